@@ -6,7 +6,7 @@ use understudy_ladder::{Parsed, Program, parse};
 use understudy_text::{Diagnostic, has_errors};
 
 use crate::plcopen::Fidelity;
-use crate::{digraph, ldmicro, plcopen, structured_text};
+use crate::{digraph, ldmicro, plcopen, text as written};
 
 /// A form of programs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -122,10 +122,7 @@ impl Format {
 pub fn read_all(format: Format, name: &str, text: &str) -> Vec<Reading> {
     let units = match format {
         Format::PlcOpen => plcopen::programs(text),
-        Format::StructuredText => {
-            let programs = structured_text::read(text).programs;
-            programs.iter().map(|unit| unit.name.to_string()).collect()
-        }
+        Format::StructuredText => written::programs(text),
         Format::Ladder | Format::Digraph | Format::LdMicro => Vec::new(),
     };
     if units.len() < 2 {
@@ -196,16 +193,7 @@ fn read_form(format: Format, name: &str, text: &str, unit: Option<&str>) -> Read
                 ..Reading::default()
             }
         }
-        Format::StructuredText => {
-            let read = structured_text::read(text);
-            let mut reading = Reading {
-                period: read.period,
-                diagnostics: read.diagnostics,
-                ..Reading::default()
-            };
-            reading.program = one(read.programs, unit, &mut reading.diagnostics);
-            reading
-        }
+        Format::StructuredText => written::read(text, unit),
     }
 }
 
@@ -213,34 +201,6 @@ fn read_form(format: Format, name: &str, text: &str, unit: Option<&str>) -> Read
 fn stem(name: &str) -> &str {
     let file = name.rsplit(['/', '\\']).next().unwrap_or(name);
     file.split('.').next().unwrap_or(file)
-}
-
-/// The only program, or the one that is asked for.
-fn one(
-    mut programs: Vec<Program>,
-    unit: Option<&str>,
-    diagnostics: &mut Vec<Diagnostic>,
-) -> Option<Program> {
-    if has_errors(diagnostics) {
-        return None;
-    }
-    let names: Vec<String> = programs
-        .iter()
-        .map(|program| format!("`{}`", program.name))
-        .collect();
-    if let Some(unit) = unit {
-        programs.retain(|program| program.name.eq_ignore_ascii_case(unit));
-    }
-    if programs.len() == 1 {
-        return programs.pop();
-    }
-    let message = match unit {
-        Some(unit) => format!("the file has no program `{unit}`"),
-        None => format!("the file has {} programs, and one is read", names.len()),
-    };
-    let error = Diagnostic::error("U1013", message, 0..0);
-    diagnostics.push(error.with_help(format!("choose one of {}", names.join(", "))));
-    None
 }
 
 /// Reads a program wherever a ladder is asked for, whatever its form.

@@ -28,8 +28,6 @@ use std::time::Duration;
 use understudy_ladder::{Name, Program};
 use understudy_text::{Diagnostic, has_errors};
 
-use crate::structured_text;
-
 /// What was read.
 #[derive(Debug, Clone, Default)]
 pub struct Reading {
@@ -49,12 +47,12 @@ pub fn read(name: &str, text: &str) -> Reading {
         let (written, found) = statements::statements(&file);
         diagnostics.extend(found);
         if !has_errors(&diagnostics) {
-            let reading = structured_text::read(&written.text);
+            let reading = crate::text::read(&written.text, None);
             diagnostics.extend(reading.diagnostics.into_iter().map(|found| Diagnostic {
                 span: written.place_of(found.span.start),
                 ..found
             }));
-            program = reading.programs.into_iter().next();
+            program = reading.program;
         }
     }
     diagnostics.sort_by_key(|found| found.span.start);

@@ -2,10 +2,11 @@
 
 pub mod digraph;
 mod format;
+mod ladders;
 pub mod ldmicro;
 pub mod plcopen;
 mod source;
-pub mod structured_text;
+mod text;
 mod twincat;
 mod written;
 

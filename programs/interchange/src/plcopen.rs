@@ -6,14 +6,12 @@
 
 mod document;
 mod fidelity;
-mod instructions;
 mod ladder;
 pub(crate) mod literal;
 mod plan;
 mod power;
-mod sequence;
 mod standard;
-mod statements;
+mod structure;
 mod typed;
 mod units;
 mod write;
@@ -24,6 +22,7 @@ use std::ops::Range;
 use std::time::Duration;
 
 use understudy_ladder::{Program, check};
+use understudy_structured_text::syntax::UnitKind;
 use understudy_text::{Diagnostic, has_errors};
 
 pub use fidelity::{Count, Fidelity, Note};
@@ -31,6 +30,7 @@ pub use typed::read_typed;
 pub use write::write;
 pub use xml::{MAXIMUM_BYTES, MAXIMUM_DEPTH, MAXIMUM_NODES};
 
+use crate::text::whole;
 use crate::written::USUAL_PERIOD;
 use document::{ActionContent, Body, Condition, Instance, Kind, Language, Pou, PouKind, Project};
 
@@ -81,7 +81,7 @@ pub fn read(text: &str, unit: Option<&str>) -> Reading {
     let (project, found) = document::read(root);
     reading.diagnostics = found;
     if let Some(pou) = chosen(&project, unit, &mut reading.diagnostics) {
-        translate(&project, pou, &mut reading);
+        translate(text, &project, pou, &mut reading);
     }
     for found in &mut reading.diagnostics {
         within(text, &mut found.span);
@@ -235,7 +235,7 @@ fn unnamed_parts(pou: &Pou, diagnostics: &mut Vec<Diagnostic>) {
 }
 
 /// A ladder of bits and standard blocks stays the ladder that it is; all else goes by way of Structured Text.
-fn translate(project: &Project, pou: &Pou, reading: &mut Reading) {
+fn translate(text: &str, project: &Project, pou: &Pou, reading: &mut Reading) {
     let runs = project
         .instances
         .iter()
@@ -270,11 +270,25 @@ fn translate(project: &Project, pou: &Pou, reading: &mut Reading) {
             return;
         }
     }
-    let lowered = units::lower(project, pou);
-    reading.diagnostics.extend(lowered.diagnostics);
-    reading.fidelity.plan(lowered.notes);
-    reading.fidelity.ignored(lowered.ignored);
-    if let Some(program) = lowered.program {
+    let (mut file, found) = read_typed(text);
+    for unit in &mut file.units {
+        // A block that is asked for is read as if it were a program.
+        if unit.name.is(&pou.name) && unit.kind == UnitKind::FunctionBlock {
+            unit.kind = UnitKind::Program;
+        }
+    }
+    let found = whole(text, (file, found), Some(&pou.name), reading.period).reading();
+    reading.diagnostics.extend(found.diagnostics);
+    let mut seen = Vec::new();
+    reading.diagnostics.retain(|found| {
+        let is_new = !seen.contains(found);
+        seen.push(found.clone());
+        is_new
+    });
+    reading.fidelity.ignored(units::lost(project, pou));
+    if let Some(mut program) = found.program {
+        program.description.clone_from(&pou.documentation);
+        reading.diagnostics.extend(check(&program));
         reading.fidelity.count(project, pou, &program);
         reading.program = Some(program);
     }

@@ -4,14 +4,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_ladder::Program as Ladder;
-use understudy_structured_text::{Lowered, Options, lower, parse};
-use understudy_text::{Diagnostic, Severity, has_errors};
+use understudy_structured_text::parse;
+use understudy_text::{Diagnostic, Severity};
 use understudy_typed::Program as Typed;
 
 use crate::format::{Format, Reading, read, unknown_form};
 use crate::plcopen;
+use crate::text::{Whole, whole};
 use crate::twincat;
-use understudy_structured_text::syntax::File;
 
 /// What a file holds.
 #[derive(Debug, Clone)]
@@ -47,7 +47,7 @@ pub struct SourceFile {
 /// Reads the program of the file `name`, and everything that is wrong with it.
 pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
     if let Some(parsed) = twincat::read(text) {
-        return typed(text, parsed, wanted, None);
+        return source(whole(text, parsed, wanted.program, wanted.period));
     }
     let Some(format) = Format::of(name, text) else {
         return SourceFile {
@@ -55,14 +55,16 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
             ..SourceFile::default()
         };
     };
+    if format == Format::StructuredText {
+        return source(whole(text, parse(text), wanted.program, wanted.period));
+    }
     let Reading {
         program,
         period,
         diagnostics,
         ..
     } = read(format, name, text, wanted.program);
-    let has_numbers = matches!(format, Format::StructuredText | Format::PlcOpen);
-    if program.is_some() || !has_numbers {
+    if program.is_some() || format != Format::PlcOpen {
         return SourceFile {
             source: program.map(Source::Ladder),
             period,
@@ -70,20 +72,15 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
         };
     }
     // What no ladder can hold may be a program with numbers, or a library.
-    let parsed = match format {
-        Format::PlcOpen => plcopen::read_typed(text),
-        _ => parse(text),
-    };
-    let found = typed(text, parsed, wanted, period);
+    let parsed = plcopen::read_typed(text);
+    let mut found = source(whole(text, parsed, wanted.program, wanted.period));
+    found.period = period.or(found.period);
     // Of two readings of a document that both have errors, the one with fewer is nearer to what was meant.
     let errors = |found: &[Diagnostic]| {
         let errors = found.iter();
         errors.filter(|it| it.severity == Severity::Error).count()
     };
-    if format == Format::PlcOpen
-        && found.source.is_none()
-        && errors(&diagnostics) <= errors(&found.diagnostics)
-    {
+    if found.source.is_none() && errors(&diagnostics) <= errors(&found.diagnostics) {
         return SourceFile {
             diagnostics,
             ..found
@@ -92,33 +89,21 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
     found
 }
 
-fn typed(
-    text: &str,
-    (file, mut diagnostics): (File, Vec<Diagnostic>),
-    wanted: Wanted<'_>,
-    in_file: Option<Duration>,
-) -> SourceFile {
-    let nanoseconds = |period: Duration| i64::try_from(period.as_nanos()).unwrap_or(i64::MAX);
-    let options = Options {
-        text,
-        program: wanted.program,
-        period: wanted.period.map(nanoseconds),
+fn source(whole: Whole) -> SourceFile {
+    let mut diagnostics = whole.diagnostics;
+    let library = (!whole.checked.is_empty()).then_some(Source::Library(whole.checked));
+    let source = match (whole.ladder, whole.typed) {
+        (Some(ladder), _) => {
+            diagnostics.extend(whole.reasons);
+            diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
+            Some(Source::Ladder(ladder))
+        }
+        (None, Some(typed)) => Some(Source::Typed(Arc::new(typed))),
+        (None, None) => library,
     };
-    let Lowered {
-        program,
-        checked,
-        diagnostics: found,
-    } = lower(&file, &options);
-    diagnostics.extend(found);
-    diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
-    let is_right = !has_errors(&diagnostics);
-    let library = (!checked.is_empty()).then_some(Source::Library(checked));
-    let source = program
-        .map(|program| Source::Typed(Arc::new(program)))
-        .or(library);
     SourceFile {
-        source: source.filter(|_| is_right),
-        period: in_file,
+        source,
+        period: whole.period,
         diagnostics,
     }
 }

@@ -33,7 +33,7 @@ use std::ops::Range;
 use std::rc::Rc;
 
 use understudy_text::{Diagnostic, Lines, MAXIMUM_FINDINGS};
-use understudy_typed::{Elementary, EnumerationId, Program, Type};
+use understudy_typed::{Elementary, EnumerationId, Program, Type, Variable};
 
 use crate::library;
 use crate::syntax::{File, Unit};
@@ -79,8 +79,21 @@ pub struct Lowered {
     pub program: Option<Program>,
     /// The units of a library, a file without a PROGRAM, which were checked one by one.
     pub checked: Vec<String>,
+    /// Names of what is not among the program's variables.
+    pub names: Names,
     /// What was found, in the order of the text.
     pub diagnostics: Vec<Diagnostic>,
+}
+
+/// Memory that is none of a program's variables, and whose routines are the library's.
+#[derive(Debug, Clone, Default)]
+pub struct Names {
+    /// Memory of charts and lists; slots of the state.
+    pub hidden: Vec<Variable>,
+    /// Variables of functions, methods and VAR_TEMP; slots counted from the start of all frames.
+    pub frames: Vec<Variable>,
+    /// For each routine, whether it is of a block of the library.
+    pub library: Vec<bool>,
 }
 
 /// Lowers the programs of a file, or checks the units of a library.
@@ -114,6 +127,7 @@ struct Lowering<'a> {
     lines: Lines<'a>,
     library_lines: Lines<'static>,
     diagnostics: Vec<Diagnostic>,
+    names: Names,
     program: Program,
     units: Vec<UnitEntry<'a>>,
     unit_names: HashMap<String, usize>,
@@ -172,6 +186,7 @@ impl<'a> Lowering<'a> {
             lines: Lines::new(text),
             library_lines: Lines::new(library::TEXT),
             diagnostics: Vec::new(),
+            names: Names::default(),
             program,
             units,
             unit_names,
@@ -208,6 +223,7 @@ impl<'a> Lowering<'a> {
         Lowered {
             program: is_whole.then_some(self.program),
             checked,
+            names: self.names,
             diagnostics: self.diagnostics,
         }
     }

@@ -134,7 +134,7 @@ impl Writer {
         let name = name.trim_matches('_');
         let starts = name.starts_with(|first: char| first.is_ascii_alphabetic());
         // The words of the language, which LDmicro does not know, are no names.
-        let is_word = crate::structured_text::is_keyword(name);
+        let is_word = understudy_structured_text::parser::is_keyword(name);
         let base = if starts && !is_word {
             name.to_owned()
         } else {

@@ -15,7 +15,6 @@ use std::ops::Range;
 use understudy_ladder::Name;
 use understudy_text::Diagnostic;
 
-pub(crate) use self::jumps::MAXIMUM_JUMPS;
 use self::links::{Links, Source};
 use self::walk::{Trace, Walk};
 use super::document::{Graph, Kind, Language, Modifier};

@@ -1,13 +1,13 @@
 //! What is said of a bad text.
 
-use understudy_interchange::structured_text::read;
+use crate::support::read;
 
 use crate::support::findings;
 
 fn check(text: &str) -> String {
     let reading = read(text);
     if understudy_text::has_errors(&reading.diagnostics) {
-        assert!(reading.programs.is_empty());
+        assert!(reading.program.is_none());
     }
     findings(text, reading.diagnostics)
 }

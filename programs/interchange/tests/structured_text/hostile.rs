@@ -1,6 +1,6 @@
 //! Texts that want to be too much: all of them end, with something said or a program.
 
-use understudy_interchange::structured_text::read;
+use crate::support::read;
 
 /// The codes that are found; nothing may panic.
 fn codes(text: &str) -> Vec<&'static str> {
@@ -8,7 +8,7 @@ fn codes(text: &str) -> Vec<&'static str> {
     let mut codes: Vec<_> = reading.diagnostics.iter().map(|found| found.code).collect();
     assert_eq!(
         understudy_text::has_errors(&reading.diagnostics),
-        reading.programs.is_empty()
+        reading.program.is_none()
     );
     codes.dedup();
     codes

@@ -17,7 +17,7 @@ fn two_names_of_one_address_are_one_bit() {
     let text =
         "PROGRAM p VAR a AT %IX0.0 : BOOL; again AT %IX0.0 : BOOL; y AT %QX0.0 : BOOL; END_VAR
 y := a AND NOT again; END_PROGRAM";
-    let reading = understudy_interchange::structured_text::read(text);
+    let reading = crate::support::read(text);
     let found = findings(text, reading.diagnostics);
     assert_eq!(
         found,

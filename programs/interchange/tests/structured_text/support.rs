@@ -2,27 +2,30 @@
 
 use std::time::Duration;
 
-use understudy_interchange::structured_text::read;
+use understudy_interchange::{Format, Reading};
 use understudy_ladder::{Program, check};
 use understudy_text::Diagnostic;
 
 pub(crate) const PERIOD: Duration = Duration::from_millis(100);
+
+/// Reads a text as a ladder.
+pub(crate) fn read(text: &str) -> Reading {
+    understudy_interchange::read(Format::StructuredText, "text.st", text, None)
+}
 
 /// The one program of a text without errors.
 pub(crate) fn program(text: &str) -> Program {
     let reading = read(text);
     let errors = understudy_text::has_errors(&reading.diagnostics);
     assert!(!errors, "{:#?}\n{text}", reading.diagnostics);
-    let [program] = reading.programs.as_slice() else {
-        panic!("one program is expected:\n{text}");
-    };
-    let found = check(program);
+    let program = reading.program.expect("one program");
+    let found = check(&program);
     assert!(
         !understudy_text::has_errors(&found),
         "{found:#?}\n{}\n{text}",
-        understudy_ladder::print(program)
+        understudy_ladder::print(&program)
     );
-    program.clone()
+    program
 }
 
 /// What is found in a text, each with its line and column.

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use understudy_interchange::structured_text::read;
+use crate::support::read;
 use understudy_ladder::Interpreter;
 
 use crate::support::program;

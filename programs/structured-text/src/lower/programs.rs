@@ -339,6 +339,7 @@ impl<'a> Lowering<'a> {
         }
         self.scope = super::names::Scope::default();
         self.calls.push(vec![(routine.id.0, instance.name.span())]);
+        self.names.library.push(false);
         self.program.routines.push(Lowered {
             name: name.to_owned(),
             kind: RoutineKind::Block,
@@ -365,6 +366,9 @@ impl<'a> Lowering<'a> {
             };
             // Memories that no person declared, as of charts.
             if variable.name.contains('.') {
+                if let Root::Own(slot) = variable.root {
+                    self.names.hidden.push(hidden(variable, own + slot));
+                }
                 continue;
             }
             let parameter = block
@@ -466,6 +470,18 @@ impl<'a> Lowering<'a> {
         self.scope = outside;
         let key = Key { owner, class, open };
         self.routine(key, &unit.name.span());
+    }
+}
+
+/// A variable that people do not see.
+pub(super) fn hidden(variable: &Variable, slot: u32) -> Shown {
+    Shown {
+        name: variable.name.clone(),
+        of: variable.of.clone(),
+        slot,
+        address: None,
+        description: None,
+        is_retained: false,
     }
 }
 

@@ -9,7 +9,7 @@ use crate::plcopen::document::Graph;
 use crate::plcopen::power::Power;
 
 /// Jumps of a body, each of which what it may skip asks.
-pub(crate) const MAXIMUM_JUMPS: usize = 64;
+const MAXIMUM_JUMPS: usize = 64;
 
 /// Says what is wrong with the jumps and labels of a plan.
 pub(super) fn check(graph: &Graph, plan: &Plan, diagnostics: &mut Vec<Diagnostic>) {

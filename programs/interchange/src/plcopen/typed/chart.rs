@@ -20,8 +20,8 @@ use crate::plcopen::document::{
 };
 use crate::plcopen::plan::{self, Plan, plan_numbers};
 use crate::plcopen::power::Power;
-use crate::plcopen::sequence::structure::{Structure, structure};
-use crate::plcopen::sequence::wired;
+use crate::plcopen::structure::wired;
+use crate::plcopen::structure::{Structure, structure};
 use crate::plcopen::xml::Passage;
 
 /// A chart with the methods that it calls.

@@ -8,7 +8,7 @@ use crate::plcopen::document::{CONDITION, Kind, Modifier, Object, Pin};
 use crate::plcopen::plan::links::Source;
 use crate::plcopen::plan::{Action, Call, Input, Step};
 use crate::plcopen::power::{Power, Read};
-use crate::plcopen::sequence::wired;
+use crate::plcopen::structure::wired;
 
 /// Power that is used more than once and has more readings is kept.
 const MAXIMUM_SHARED: usize = 40;

@@ -423,6 +423,13 @@ impl Lowering<'_> {
             }
             Number::Quotient(inner, by) => self.number(inner)?.divided(&mut self.graph, *by).0,
             Number::Remainder(inner, by) => self.number(inner)?.divided(&mut self.graph, *by).1,
+            Number::Wrapped(inner, range) => {
+                let (inner, range) = (self.number(inner)?, Interval::of(*range));
+                match inner.interval.within(range) {
+                    true => inner,
+                    false => inner.stored(&mut self.graph, range),
+                }
+            }
             Number::Choice(condition, then, otherwise) => {
                 let condition = self.truth(condition);
                 let then = self.number(then)?;

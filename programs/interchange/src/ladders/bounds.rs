@@ -37,7 +37,7 @@ impl Interval {
         Self::new(value.into(), value.into())
     }
 
-    fn of(range: (i64, i64)) -> Self {
+    pub(super) fn of(range: (i64, i64)) -> Self {
         Self::new(range.0.into(), range.1.into())
     }
 
@@ -45,7 +45,7 @@ impl Interval {
         Self::new(self.low.min(other.low), self.high.max(other.high))
     }
 
-    fn within(self, other: Self) -> bool {
+    pub(super) fn within(self, other: Self) -> bool {
         other.low <= self.low && self.high <= other.high
     }
 
@@ -300,7 +300,10 @@ impl<'a> Analysis<'a> {
     }
 
     fn set(&mut self, cell: usize, number: &Number, step: &Step, present: &mut Present) {
-        let found = evaluate(number, present);
+        let found = match number {
+            Number::Wrapped(number, _) => evaluate(number, present),
+            number => evaluate(number, present),
+        };
         let Kind::Number { declared, wide } = self.program.cells[cell].kind else {
             return;
         };
@@ -349,6 +352,10 @@ fn evaluate(number: &Number, present: &Present) -> Interval {
         }),
         Number::Quotient(number, by) => evaluate(number, present).quotient(*by),
         Number::Remainder(number, by) => evaluate(number, present).remainder(*by),
+        Number::Wrapped(number, range) => {
+            let (found, range) = (evaluate(number, present), Interval::of(*range));
+            if found.within(range) { found } else { range }
+        }
         Number::Choice(condition, then, otherwise) => {
             let side = |number, holds| {
                 let mut inner = present.clone();
@@ -438,7 +445,9 @@ fn constants(number: &Number, named: &mut BTreeSet<i128>) {
         Number::Cell(_) => {}
         Number::Sum(parts) => parts.iter().for_each(|(_, part)| constants(part, named)),
         Number::Product(parts) => parts.iter().for_each(|part| constants(part, named)),
-        Number::Quotient(inner, _) | Number::Remainder(inner, _) => constants(inner, named),
+        Number::Quotient(inner, _) | Number::Remainder(inner, _) | Number::Wrapped(inner, _) => {
+            constants(inner, named);
+        }
         Number::Choice(condition, then, otherwise) => {
             constants_of_truth(condition, named);
             constants(then, named);

@@ -78,6 +78,8 @@ pub(super) enum Number {
     /// With the sign of what is divided.
     Remainder(Box<Number>, i64),
     Choice(Box<Truth>, Box<Number>, Box<Number>),
+    /// As a type of that range holds it: past it the number wraps around.
+    Wrapped(Box<Number>, (i64, i64)),
 }
 
 impl Number {
@@ -98,7 +100,7 @@ impl Number {
             }),
             Self::Quotient(number, by) => number.constant()?.checked_div(*by),
             Self::Remainder(number, by) => number.constant()?.checked_rem(*by),
-            Self::Cell(_) | Self::Choice(..) => None,
+            Self::Cell(_) | Self::Choice(..) | Self::Wrapped(..) => None,
         }
     }
 }

@@ -1,0 +1,150 @@
+//! Typed programs as ladders: the programs of BOOLs, timers, counters and bounded integers, whatever they were written in.
+//!
+//! ```text
+//! typed program ── unroll ──► cells and steps ── bounds ──► intervals ── timers ──► clocks ── lower ──► rungs
+//! ```
+//!
+//! A scan of the ladder does what a scan of the program does. Standard blocks become blocks of the ladder where they can stand in a rung;
+//! other blocks and functions are put in place of their calls; numbers become as many bits as their values need. What a ladder
+//! cannot do is refused with its place, and the program runs as it is.
+
+mod bounds;
+mod facts;
+mod lower;
+mod number;
+mod program;
+mod timers;
+mod unroll;
+
+use std::collections::{BTreeMap, HashMap};
+
+use understudy_ladder::{Name, Program as Ladder};
+use understudy_structured_text::lower::Names;
+use understudy_structured_text::syntax::{
+    Body, Expression, ExpressionKind, File, Literal, Statement, StatementKind, TypeKind, Unit,
+    UnitKind,
+};
+use understudy_text::{Diagnostic, Lines, has_errors};
+use understudy_typed::Program;
+
+use self::unroll::Surroundings;
+
+/// A program as a ladder, with what is odd about it; nothing where it is none, with the reason.
+pub(crate) fn ladder(
+    text: &str,
+    file: &File,
+    program: &Program,
+    names: &Names,
+) -> (Option<Ladder>, Vec<Diagnostic>) {
+    let lines = Lines::new(text);
+    let mut units = file.units.iter();
+    let unit = units.find(|unit| unit.kind == UnitKind::Program && unit.name.is(&program.name));
+    let ranges = unit.map(ranges).unwrap_or_default();
+    let comments = comments(file, &lines);
+    let around = Surroundings {
+        names,
+        ranges: &ranges,
+        comments: &comments,
+    };
+    let place = |line: usize| match line.checked_sub(1) {
+        Some(index) => {
+            let range = lines.range(index);
+            let content = &text[range.clone()];
+            let start = range.start + content.len() - content.trim_start().len();
+            start..start.max(range.start + content.trim_end().len())
+        }
+        None => unit.map_or(0..0, |unit| unit.name.span()),
+    };
+    let mut resolved = match unroll::unroll(program, &around) {
+        Ok(resolved) => resolved,
+        Err(refusal) => {
+            let message = format!("`{}` is no ladder: {}", program.name, refusal.what);
+            let code = if refusal.is_size { "U1048" } else { "U1056" };
+            let error = Diagnostic::error(code, message, place(refusal.line as usize));
+            let help = "a ladder has BOOLs, timers, counters and integers within bounds; `check`, `verify`, `scan` and stations take the program as it is";
+            return (None, vec![error.with_help(help)]);
+        }
+    };
+    let (mut intervals, mut diagnostics) = bounds::bounds(&resolved);
+    diagnostics.extend(timers::place(&mut resolved, &mut intervals));
+    let mut made = None;
+    if !has_errors(&diagnostics) {
+        let name = unit.map_or_else(
+            || Name::from(program.name.as_str()),
+            |unit| Name::at(unit.name.as_str(), unit.name.span()),
+        );
+        let (mut ladder, found) = lower::lower(&name, &resolved, &intervals);
+        diagnostics.extend(found);
+        ladder.comments = unit.map(|unit| unit.comments.clone()).unwrap_or_default();
+        made = Some(ladder);
+    }
+    for found in &mut diagnostics {
+        found.span = place(found.span.start);
+    }
+    (made.filter(|_| !has_errors(&diagnostics)), diagnostics)
+}
+
+/// The ranges that variables of a unit are declared with, by their names in capitals.
+fn ranges(unit: &Unit) -> HashMap<String, (i64, i64)> {
+    let mut ranges = HashMap::new();
+    for declaration in &unit.declarations {
+        if let TypeKind::Subrange(_, low, high) = &declaration.of.kind
+            && let (Some(low), Some(high)) = (literal(low), literal(high))
+        {
+            ranges.insert(declaration.name.key(), (low, high));
+        }
+    }
+    ranges
+}
+
+fn literal(expression: &Expression) -> Option<i64> {
+    match &expression.kind {
+        ExpressionKind::Literal(Literal::Integer { value, .. }) => i64::try_from(*value).ok(),
+        ExpressionKind::Minus(inner) => literal(inner)?.checked_neg(),
+        _ => None,
+    }
+}
+
+/// The comments above statements, by their lines.
+fn comments(file: &File, lines: &Lines<'_>) -> BTreeMap<u32, Vec<String>> {
+    let mut found = BTreeMap::new();
+    for unit in &file.units {
+        if let Body::Statements(statements) = &unit.body {
+            of_statements(statements, lines, &mut found);
+        }
+    }
+    found
+}
+
+fn of_statements(
+    statements: &[Statement],
+    lines: &Lines<'_>,
+    found: &mut BTreeMap<u32, Vec<String>>,
+) {
+    for statement in statements {
+        if !statement.comments.is_empty() {
+            let line = u32::try_from(lines.index(statement.span.start) + 1).unwrap_or(u32::MAX);
+            let known = found.entry(line).or_default();
+            known.extend(statement.comments.iter().cloned());
+        }
+        match &statement.kind {
+            StatementKind::If(branches, otherwise) => {
+                for (_, body) in branches {
+                    of_statements(body, lines, found);
+                }
+                of_statements(otherwise, lines, found);
+            }
+            StatementKind::Case(_, cases, otherwise) => {
+                for (_, body) in cases {
+                    of_statements(body, lines, found);
+                }
+                of_statements(otherwise, lines, found);
+            }
+            StatementKind::For(each) => of_statements(&each.body, lines, found),
+            StatementKind::While(_, body) | StatementKind::Repeat(body, _) => {
+                of_statements(body, lines, found);
+            }
+            _ => {}
+        }
+    }
+}

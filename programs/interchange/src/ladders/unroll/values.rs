@@ -1,0 +1,547 @@
+//! Expressions: what is known of them, or what they become.
+
+use std::collections::HashSet;
+
+use understudy_ladder::Relation;
+use understudy_typed::{Comparison, Elementary, Expression, ExpressionKind, Operation};
+
+use super::super::program::{Action, Number, Role, Step, Truth, walk};
+use super::{Context, Found, Kind, Unrolling, kind_of, range_of};
+
+/// What an expression is.
+#[derive(Debug, Clone)]
+pub(super) enum Value {
+    /// This value, as it is stored.
+    Known(Elementary, u64),
+    Truth(Truth),
+    Number(Number),
+    /// The count of a counter that is a block of the ladder.
+    Count(u64),
+    /// What a ladder cannot say, and why; it is refused where it is used.
+    Unknown(String),
+}
+
+impl Value {
+    pub(super) fn known(&self) -> Option<u64> {
+        match self {
+            Self::Known(_, value) => Some(*value),
+            _ => None,
+        }
+    }
+
+    /// Its number, where it is known.
+    pub(super) fn constant(&self) -> Option<i64> {
+        match self {
+            Self::Known(of, value) => i64::try_from(of.signed(*value)).ok(),
+            _ => None,
+        }
+    }
+
+    /// Whether what it means changes where one of the cells is written.
+    fn mentions(&self, cells: &HashSet<usize>) -> bool {
+        match self {
+            Self::Truth(truth) => truth_mentions(truth, cells),
+            Self::Number(number) => number_mentions(number, cells),
+            Self::Known(..) | Self::Count(_) | Self::Unknown(_) => false,
+        }
+    }
+}
+
+fn truth_mentions(truth: &Truth, cells: &HashSet<usize>) -> bool {
+    match truth {
+        Truth::Constant(_) | Truth::Counter(..) => false,
+        Truth::Cell(cell) => cells.contains(cell),
+        Truth::Not(inner) => truth_mentions(inner, cells),
+        Truth::All(parts) | Truth::Any(parts) | Truth::Odd(parts) => {
+            parts.iter().any(|part| truth_mentions(part, cells))
+        }
+        Truth::Compare(_, left, right) => {
+            number_mentions(left, cells) || number_mentions(right, cells)
+        }
+    }
+}
+
+fn number_mentions(number: &Number, cells: &HashSet<usize>) -> bool {
+    match number {
+        Number::Constant(_) => false,
+        Number::Cell(cell) => cells.contains(cell),
+        Number::Sum(parts) => parts.iter().any(|(_, part)| number_mentions(part, cells)),
+        Number::Product(parts) => parts.iter().any(|part| number_mentions(part, cells)),
+        Number::Quotient(inner, _) | Number::Remainder(inner, _) | Number::Wrapped(inner, _) => {
+            number_mentions(inner, cells)
+        }
+        Number::Choice(condition, then, otherwise) => {
+            truth_mentions(condition, cells)
+                || number_mentions(then, cells)
+                || number_mentions(otherwise, cells)
+        }
+    }
+}
+
+/// The cells that steps write.
+pub(super) fn written(steps: &[Step]) -> HashSet<usize> {
+    let mut cells = HashSet::new();
+    walk(steps, &mut |step| {
+        if let Action::SetTruth(cell, _) | Action::SetNumber(cell, _) = step.action {
+            cells.insert(cell);
+        }
+    });
+    cells
+}
+
+impl Unrolling<'_> {
+    /// The value of an expression; calls in it become steps.
+    pub(super) fn value(&mut self, context: Context, expression: &Expression) -> Found<Value> {
+        let of = expression.of.elementary();
+        match &expression.kind {
+            ExpressionKind::Constant(value) => match of {
+                Some(of) => Ok(Value::Known(of, *value)),
+                None => Err(self.refuse("it uses a value with parts")),
+            },
+            ExpressionKind::Text(_) => Err(self.refuse("it uses a STRING")),
+            ExpressionKind::Load(place) => {
+                let address = self.address(context, place)?;
+                match of {
+                    Some(of) => self.load(address, of),
+                    None => Err(self.refuse("it uses a value with parts")),
+                }
+            }
+            ExpressionKind::Apply(Operation::Text(_), _) => Err(self.refuse("it uses a STRING")),
+            ExpressionKind::Apply(operation, operands) => {
+                let values = self.operands(context, operands.iter())?;
+                let known: Option<Vec<u64>> = values.iter().map(Value::known).collect();
+                match (known, of) {
+                    (Some(known), Some(of)) if *operation != Operation::Elapsed => {
+                        match operation.apply(&known) {
+                            Ok(value) => Ok(Value::Known(of, value)),
+                            Err(_) => Err(self.refuse("it divides by 0 or has a wrong index")),
+                        }
+                    }
+                    _ => self.operate(*operation, values),
+                }
+            }
+            ExpressionKind::Choose(parts) => self.choose(context, parts),
+            ExpressionKind::Call(call) => {
+                let found = self.call(context, call)?;
+                found.ok_or_else(|| self.refuse("it uses a call without a result"))
+            }
+        }
+    }
+
+    /// Values from left to right; what a later one changes is held before.
+    pub(super) fn operands<'e>(
+        &mut self,
+        context: Context,
+        operands: impl Iterator<Item = &'e Expression>,
+    ) -> Found<Vec<Value>> {
+        let mut values: Vec<Value> = Vec::new();
+        for operand in operands {
+            let before = self.steps.len();
+            let value = self.value(context, operand)?;
+            if self.steps.len() > before {
+                let changed = written(&self.steps[before..]);
+                for earlier in &mut values {
+                    if earlier.mentions(&changed) {
+                        *earlier = self.held_at(before, earlier.clone())?;
+                    }
+                }
+            }
+            values.push(value);
+        }
+        Ok(values)
+    }
+
+    /// The value in a cell of its own, written before the step of that number.
+    fn held_at(&mut self, before: usize, value: Value) -> Found<Value> {
+        let later = self.steps.split_off(before);
+        let held = match value {
+            Value::Truth(truth) => Value::Truth(self.hold_truth_always(truth)?),
+            Value::Number(number) => Value::Number(self.hold_number_always(number)?),
+            other => other,
+        };
+        self.steps.extend(later);
+        Ok(held)
+    }
+
+    /// Arguments of a call of a routine whose frame holds these cells: none of them changes when the frame is begun.
+    pub(super) fn held_off(&mut self, values: &mut [Value], cells: &HashSet<usize>) -> Found<()> {
+        for value in values {
+            if value.mentions(cells) {
+                *value = self.held_at(self.steps.len(), value.clone())?;
+            }
+        }
+        Ok(())
+    }
+
+    fn choose(&mut self, context: Context, parts: &[Expression; 3]) -> Found<Value> {
+        let [condition, then, otherwise] = parts;
+        let condition = self.value(context, condition)?;
+        if let Some(known) = condition.known() {
+            let taken = if known == 1 { then } else { otherwise };
+            return self.value(context, taken);
+        }
+        let condition = self.truth_of(condition)?;
+        let mut sides = Vec::new();
+        for side in [then, otherwise] {
+            sides.push(self.arm(|own| own.value(context, side))?);
+        }
+        let [then, otherwise]: [_; 2] = sides.try_into().map_err(|_| self.refuse("it chooses"))?;
+        let of = parts[1].of.elementary();
+        if then.steps.is_empty() && otherwise.steps.is_empty() {
+            self.merge(&[then.known, otherwise.known]);
+            return self.chosen(condition, then.result, otherwise.result, of);
+        }
+        // What is not evaluated has no effect.
+        let kind = of.and_then(kind_of);
+        let Some(kind) = kind else {
+            return Err(self.refuse("it chooses between values that a ladder does not have"));
+        };
+        let cell = self.fresh("chosen", kind, Role::Memory)?;
+        let mut bodies = Vec::new();
+        let mut known = Vec::new();
+        for arm in [then, otherwise] {
+            let around = std::mem::replace(&mut self.steps, arm.steps);
+            match kind {
+                Kind::Truth => {
+                    let truth = self.truth_of(arm.result)?;
+                    self.push(Action::SetTruth(cell, truth))?;
+                }
+                Kind::Number { .. } => {
+                    let number = self.number_of(arm.result)?;
+                    self.push(Action::SetNumber(cell, number))?;
+                }
+            }
+            bodies.push(std::mem::replace(&mut self.steps, around));
+            known.push(arm.known);
+        }
+        self.merge(&known);
+        let otherwise = bodies.pop().unwrap_or_default();
+        let then = bodies.pop().unwrap_or_default();
+        self.push(Action::If(vec![(condition, then)], otherwise))?;
+        Ok(match kind {
+            Kind::Truth => Value::Truth(Truth::Cell(cell)),
+            Kind::Number { .. } => Value::Number(Number::Cell(cell)),
+        })
+    }
+
+    fn chosen(
+        &mut self,
+        condition: Truth,
+        then: Value,
+        otherwise: Value,
+        of: Option<Elementary>,
+    ) -> Found<Value> {
+        if let (Value::Unknown(what), _) | (_, Value::Unknown(what)) = (&then, &otherwise) {
+            return Ok(Value::Unknown(what.clone()));
+        }
+        match of.and_then(kind_of) {
+            Some(Kind::Truth) => {
+                let (then, otherwise) = (self.truth_of(then)?, self.truth_of(otherwise)?);
+                Ok(Value::Truth(match (then, otherwise) {
+                    (then, Truth::Constant(false)) => Truth::All(vec![condition, then]),
+                    (Truth::Constant(true), otherwise) => Truth::Any(vec![condition, otherwise]),
+                    (then, otherwise) => {
+                        let condition = self.hold_truth(condition)?;
+                        let not = Truth::Not(Box::new(condition.clone()));
+                        let then = Truth::All(vec![condition, then]);
+                        Truth::Any(vec![then, Truth::All(vec![not, otherwise])])
+                    }
+                }))
+            }
+            Some(Kind::Number { .. }) => {
+                let (then, otherwise) = (self.number_of(then)?, self.number_of(otherwise)?);
+                let (then, otherwise) = (Box::new(then), Box::new(otherwise));
+                Ok(Value::Number(Number::Choice(
+                    Box::new(condition),
+                    then,
+                    otherwise,
+                )))
+            }
+            None => Ok(Value::Unknown("it chooses between times".into())),
+        }
+    }
+
+    pub(super) fn truth_of(&mut self, value: Value) -> Found<Truth> {
+        match value {
+            Value::Known(_, value) => Ok(Truth::Constant(value & 1 == 1)),
+            Value::Truth(truth) => Ok(truth),
+            Value::Unknown(what) => Err(self.refuse(what)),
+            Value::Number(_) | Value::Count(_) => Err(self.refuse("it uses a number as a BOOL")),
+        }
+    }
+
+    pub(super) fn number_of(&mut self, value: Value) -> Found<Number> {
+        match value {
+            Value::Known(of, value) => match i64::try_from(of.signed(value)) {
+                Ok(value) => Ok(Number::Constant(value)),
+                Err(_) => Err(self.refuse("it uses a number of more than 63 bits")),
+            },
+            Value::Number(number) => Ok(number),
+            Value::Count(block) => {
+                // Next time the counter's statements are executed, and its count is a number like others.
+                self.expand(block);
+                Ok(Number::Constant(0))
+            }
+            Value::Unknown(what) => Err(self.refuse(what)),
+            Value::Truth(_) => Err(self.refuse("it uses a BOOL as a number")),
+        }
+    }
+
+    fn hold_truth(&mut self, truth: Truth) -> Found<Truth> {
+        match truth {
+            Truth::Cell(_) | Truth::Constant(_) => Ok(truth),
+            _ => self.hold_truth_always(truth),
+        }
+    }
+
+    fn hold_truth_always(&mut self, truth: Truth) -> Found<Truth> {
+        let cell = self.fresh("chosen", Kind::Truth, Role::Memory)?;
+        self.push(Action::SetTruth(cell, truth))?;
+        Ok(Truth::Cell(cell))
+    }
+
+    pub(super) fn hold_number(&mut self, number: Number) -> Found<Number> {
+        match number {
+            Number::Cell(_) | Number::Constant(_) => Ok(number),
+            _ => self.hold_number_always(number),
+        }
+    }
+
+    fn hold_number_always(&mut self, number: Number) -> Found<Number> {
+        let wide = (i64::MIN >> 1, i64::MAX >> 1);
+        let kind = Kind::Number {
+            declared: wide,
+            wide,
+        };
+        let cell = self.fresh("value", kind, Role::Memory)?;
+        self.push(Action::SetNumber(cell, number))?;
+        Ok(Number::Cell(cell))
+    }
+
+    fn operate(&mut self, operation: Operation, values: Vec<Value>) -> Found<Value> {
+        use Operation as O;
+        if let O::Divide(_) | O::Modulo(_) = operation
+            && values[1].constant().is_none_or(|by| by == 0)
+        {
+            return Err(self.refuse("it divides by a number that varies"));
+        }
+        let unknown = values.iter().find_map(|value| match value {
+            Value::Unknown(what) => Some(what.clone()),
+            _ => None,
+        });
+        if let Some(what) = unknown {
+            return match operation {
+                O::Multiplex(_) => Err(self.refuse(what)),
+                _ => Ok(Value::Unknown(what)),
+            };
+        }
+        match operation {
+            O::Elapsed => Ok(Value::Unknown("it uses TIME()".into())),
+            O::Not(Elementary::Bool) => {
+                let truth = self.truths(values)?.remove(0);
+                Ok(Value::Truth(Truth::Not(Box::new(truth))))
+            }
+            O::And(Elementary::Bool) | O::Minimum(Elementary::Bool) => {
+                Ok(Value::Truth(Truth::All(self.truths(values)?)))
+            }
+            O::Or(Elementary::Bool) | O::Maximum(Elementary::Bool) => {
+                Ok(Value::Truth(Truth::Any(self.truths(values)?)))
+            }
+            O::Xor(Elementary::Bool) => Ok(Value::Truth(Truth::Odd(self.truths(values)?))),
+            O::Compare(comparison, of) => self.compare(comparison, of, values),
+            O::Select(of) => {
+                let mut values = values.into_iter();
+                let (Some(which), Some(first), Some(second)) =
+                    (values.next(), values.next(), values.next())
+                else {
+                    return Err(self.refuse("it uses SEL with too few values"));
+                };
+                let which = self.truth_of(which)?;
+                self.chosen(which, second, first, Some(of))
+            }
+            O::Multiplex(_) => {
+                let which = values[0]
+                    .constant()
+                    .and_then(|which| usize::try_from(which).ok());
+                let found = which.and_then(|which| values.get(which.saturating_add(1)).cloned());
+                found.ok_or_else(|| self.refuse("it uses MUX with a number that varies"))
+            }
+            O::Convert(from, to) => self.convert(from, to, values),
+            O::Add(of)
+            | O::Subtract(of)
+            | O::Multiply(of)
+            | O::Divide(of)
+            | O::Modulo(of)
+            | O::Negate(of)
+            | O::Absolute(of)
+            | O::Minimum(of)
+            | O::Maximum(of)
+                if range_of(of).is_some() =>
+            {
+                self.arithmetic(operation, of, values)
+            }
+            O::Reinterpret(from, to) if range_of(from).is_some() && range_of(to).is_some() => {
+                self.convert(from, to, values)
+            }
+            _ => Err(self.refuse(format!(
+                "it uses an operation that a ladder does not have: {operation:?}"
+            ))),
+        }
+    }
+
+    fn truths(&mut self, values: Vec<Value>) -> Found<Vec<Truth>> {
+        values
+            .into_iter()
+            .map(|value| self.truth_of(value))
+            .collect()
+    }
+
+    fn arithmetic(
+        &mut self,
+        operation: Operation,
+        of: Elementary,
+        values: Vec<Value>,
+    ) -> Found<Value> {
+        use Operation as O;
+        let by = values.get(1).and_then(Value::constant).unwrap_or(1);
+        let mut numbers = Vec::new();
+        for value in values {
+            numbers.push(self.number_of(value)?);
+        }
+        let number = match operation {
+            O::Add(_) => Number::Sum(numbers.into_iter().map(|number| (false, number)).collect()),
+            O::Subtract(_) | O::Negate(_) => {
+                let is_one = numbers.len() == 1;
+                let parts = numbers.into_iter().enumerate();
+                Number::Sum(parts.map(|(at, part)| (is_one || at > 0, part)).collect())
+            }
+            O::Multiply(_) => Number::Product(numbers),
+            O::Divide(_) => Number::Quotient(Box::new(numbers.remove(0)), by),
+            O::Modulo(_) => Number::Remainder(Box::new(numbers.remove(0)), by),
+            O::Absolute(_) => {
+                let number = self.hold_number(numbers.remove(0))?;
+                let zero = Box::new(Number::Constant(0));
+                let is_negative = Truth::Compare(Relation::Less, Box::new(number.clone()), zero);
+                let negated = Number::Sum(vec![(true, number.clone())]);
+                Number::Choice(Box::new(is_negative), Box::new(negated), Box::new(number))
+            }
+            _ => {
+                let is_least = matches!(operation, O::Minimum(_));
+                let relation = if is_least {
+                    Relation::Less
+                } else {
+                    Relation::Greater
+                };
+                let mut numbers = numbers.into_iter();
+                let mut best = numbers.next().unwrap_or(Number::Constant(0));
+                for other in numbers {
+                    let (left, right) = (self.hold_number(best)?, self.hold_number(other)?);
+                    let (one, two) = (Box::new(right.clone()), Box::new(left.clone()));
+                    let is_better = Truth::Compare(relation, one, two);
+                    best = Number::Choice(Box::new(is_better), Box::new(right), Box::new(left));
+                }
+                best
+            }
+        };
+        Ok(Value::Number(wrapped(number, of)))
+    }
+
+    fn compare(
+        &mut self,
+        comparison: Comparison,
+        of: Elementary,
+        values: Vec<Value>,
+    ) -> Found<Value> {
+        let relation = relation(comparison);
+        if of == Elementary::Bool {
+            let mut truths = self.truths(values)?;
+            let (Some(right), Some(left)) = (truths.pop(), truths.pop()) else {
+                return Err(self.refuse("it compares one value"));
+            };
+            let not = |truth| Truth::Not(Box::new(truth));
+            return Ok(Value::Truth(match relation {
+                Relation::Equal => not(Truth::Odd(vec![left, right])),
+                Relation::NotEqual => Truth::Odd(vec![left, right]),
+                Relation::Less => Truth::All(vec![not(left), right]),
+                Relation::LessOrEqual => Truth::Any(vec![not(left), right]),
+                Relation::Greater => Truth::All(vec![left, not(right)]),
+                Relation::GreaterOrEqual => Truth::Any(vec![left, not(right)]),
+            }));
+        }
+        let bound = |value: &Value| value.constant().and_then(|value| u16::try_from(value).ok());
+        let (count, relation_of, with) = match values.as_slice() {
+            [Value::Count(block), other] => (Some(*block), relation, bound(other)),
+            [other, Value::Count(block)] => (Some(*block), relation.mirrored(), bound(other)),
+            _ => (None, relation, None),
+        };
+        if let (Some(block), Some(with)) = (count, with) {
+            let name = self.block_name(block);
+            return Ok(Value::Truth(Truth::Counter(name, relation_of, with)));
+        }
+        let mut numbers = Vec::new();
+        for value in values {
+            numbers.push(Box::new(self.number_of(value)?));
+        }
+        match (numbers.pop(), numbers.pop()) {
+            (Some(right), Some(left)) => Ok(Value::Truth(Truth::Compare(relation, left, right))),
+            _ => Err(self.refuse("it compares one value")),
+        }
+    }
+
+    fn convert(&mut self, from: Elementary, to: Elementary, values: Vec<Value>) -> Found<Value> {
+        let Some(value) = values.into_iter().next() else {
+            return Err(self.refuse("it converts nothing"));
+        };
+        match (kind_of(from), kind_of(to)) {
+            (Some(Kind::Truth), Some(Kind::Truth)) => Ok(value),
+            (Some(Kind::Truth), Some(Kind::Number { .. })) => {
+                let truth = Box::new(self.truth_of(value)?);
+                let (one, zero) = (Number::Constant(1), Number::Constant(0));
+                Ok(Value::Number(Number::Choice(
+                    truth,
+                    Box::new(one),
+                    Box::new(zero),
+                )))
+            }
+            (Some(Kind::Number { .. }), Some(Kind::Truth)) => {
+                let number = Box::new(self.number_of(value)?);
+                let zero = Box::new(Number::Constant(0));
+                Ok(Value::Truth(Truth::Compare(
+                    Relation::NotEqual,
+                    number,
+                    zero,
+                )))
+            }
+            (Some(Kind::Number { wide: from, .. }), Some(Kind::Number { wide, .. })) => {
+                let fits = wide.0 <= from.0 && from.1 <= wide.1;
+                match value {
+                    // A count is from 0 to its preset, which INT holds.
+                    Value::Count(_) if wide.1 >= 0x7fff => Ok(value),
+                    _ if fits => Ok(value),
+                    _ => Ok(Value::Number(wrapped(self.number_of(value)?, to))),
+                }
+            }
+            (_, None) if to == Elementary::Time => Ok(Value::Unknown("it computes a time".into())),
+            _ => Err(self.refuse(format!("it converts {from} to {to}"))),
+        }
+    }
+}
+
+/// A number as its type holds it.
+fn wrapped(number: Number, of: Elementary) -> Number {
+    match range_of(of) {
+        Some(range) => Number::Wrapped(Box::new(number), range),
+        None => number,
+    }
+}
+
+fn relation(comparison: Comparison) -> Relation {
+    match comparison {
+        Comparison::Equal => Relation::Equal,
+        Comparison::NotEqual => Relation::NotEqual,
+        Comparison::Less => Relation::Less,
+        Comparison::LessOrEqual => Relation::LessOrEqual,
+        Comparison::Greater => Relation::Greater,
+        Comparison::GreaterOrEqual => Relation::GreaterOrEqual,
+    }
+}

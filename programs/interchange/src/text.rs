@@ -1,0 +1,114 @@
+//! From syntax to a program: a ladder where it is one, and the typed program that it comes from.
+
+use std::time::Duration;
+
+use understudy_ladder::Program as Ladder;
+use understudy_structured_text::syntax::{File, UnitKind};
+use understudy_structured_text::{Lowered, Options, lower, parse};
+use understudy_text::{Diagnostic, has_errors};
+use understudy_typed::Program as Typed;
+
+use crate::format::Reading;
+use crate::ladders;
+use crate::source::no_program;
+
+/// A program in both forms.
+#[derive(Default)]
+pub(crate) struct Whole {
+    /// The program with numbers; nothing where there are errors.
+    pub(crate) typed: Option<Typed>,
+    /// The same program as a ladder, where it is one.
+    pub(crate) ladder: Option<Ladder>,
+    /// The units of a library.
+    pub(crate) checked: Vec<String>,
+    /// The interval of the first task.
+    pub(crate) period: Option<Duration>,
+    /// What was found of the program.
+    pub(crate) diagnostics: Vec<Diagnostic>,
+    /// What was found of it as a ladder; an error where it is none.
+    pub(crate) reasons: Vec<Diagnostic>,
+}
+
+/// Lowers the program of a file.
+pub(crate) fn whole(
+    text: &str,
+    (file, mut diagnostics): (File, Vec<Diagnostic>),
+    program: Option<&str>,
+    period: Option<Duration>,
+) -> Whole {
+    let nanoseconds = |period: Duration| i64::try_from(period.as_nanos()).unwrap_or(i64::MAX);
+    let options = Options {
+        text,
+        program,
+        period: period.map(nanoseconds),
+    };
+    let Lowered {
+        program: typed,
+        checked,
+        names,
+        diagnostics: found,
+    } = lower(&file, &options);
+    diagnostics.extend(found);
+    diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
+    let is_right = !has_errors(&diagnostics);
+    let typed = typed.filter(|_| is_right);
+    let (ladder, reasons) = match &typed {
+        Some(typed) if typed.tasks.len() == 1 => ladders::ladder(text, &file, typed, &names),
+        Some(typed) => (None, vec![several(&file, typed)]),
+        None => (None, Vec::new()),
+    };
+    let intervals = file.tasks.iter().filter_map(|task| task.interval);
+    let first = intervals.filter(|interval| *interval > 0).next();
+    Whole {
+        typed,
+        ladder,
+        checked: if is_right { checked } else { Vec::new() },
+        period: first.map(|interval| Duration::from_nanos(interval.unsigned_abs())),
+        diagnostics,
+        reasons,
+    }
+}
+
+fn several(file: &File, typed: &Typed) -> Diagnostic {
+    let programs = file.units.iter();
+    let programs = programs.filter(|unit| unit.kind == UnitKind::Program);
+    let names: Vec<String> = programs.map(|unit| format!("`{}`", unit.name)).collect();
+    let count = typed.tasks.len();
+    let message = format!("the file runs {count} programs, and a ladder is one");
+    let error = Diagnostic::error("U1013", message, 0..0);
+    error.with_help(format!("choose one of {}", names.join(", ")))
+}
+
+impl Whole {
+    /// The ladder, or why it is none.
+    pub(crate) fn reading(self) -> Reading {
+        let mut diagnostics = self.diagnostics;
+        if self.typed.is_none() && !has_errors(&diagnostics) {
+            diagnostics.push(no_program());
+        }
+        diagnostics.extend(self.reasons);
+        diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
+        Reading {
+            program: self.ladder,
+            period: self.period,
+            diagnostics,
+            ..Reading::default()
+        }
+    }
+}
+
+/// Reads the program of a Structured Text as a ladder; `program` chooses one where there are several.
+pub(crate) fn read(text: &str, program: Option<&str>) -> Reading {
+    whole(text, parse(text), program, None).reading()
+}
+
+/// Names of the programs of a text, in its order.
+pub(crate) fn programs(text: &str) -> Vec<String> {
+    let (file, _) = parse(text);
+    let units = file.units.iter();
+    let programs = units.filter(|unit| unit.kind == UnitKind::Program);
+    programs.map(|unit| unit.name.as_str().to_owned()).collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,117 @@
+//! A ladder does what its typed program does, scan by scan.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use understudy_logic::Running;
+use understudy_structured_text::parse;
+use understudy_testing::random::Dice;
+use understudy_typed::{Interpreter, Program};
+
+use super::{Whole, whole};
+use crate::plcopen;
+
+const PERIOD: Duration = Duration::from_millis(100);
+
+/// Bits of the points of a ladder: its names, and where each stands in the image of the typed program.
+fn places(names: &[&str], points: &understudy_typed::Points) -> Vec<usize> {
+    let known = points.bit_names();
+    let place = |name: &&str| {
+        let found = known.iter().position(|known| known == name);
+        found.unwrap_or_else(|| panic!("no bit `{name}` in {known:?}"))
+    };
+    names.iter().map(place).collect()
+}
+
+/// Numbers take fewer bits in a ladder: the last bit that it has is extended.
+fn check(what: &str, whole: Whole) -> bool {
+    let (Some(ladder), Some(typed)) = (whole.ladder, whole.typed) else {
+        return false;
+    };
+    let inputs: Vec<&str> = ladder.inputs.iter().map(|it| it.name.as_str()).collect();
+    let outputs: Vec<&str> = ladder.outputs.iter().map(|it| it.name.as_str()).collect();
+    let circuit = match ladder.lower(PERIOD) {
+        Ok(circuit) => circuit,
+        Err(error) => panic!("{what}: {error:?}\n{}", understudy_ladder::print(&ladder)),
+    };
+    let mut running = Running::new(&circuit);
+    let (into, from) = (
+        places(&inputs, &typed.inputs),
+        places(&outputs, &typed.outputs),
+    );
+    let interpreter = Interpreter::new(&Program {
+        period: PERIOD.as_nanos() as i64,
+        ..typed.clone()
+    });
+    let mut state = interpreter.initial().to_vec();
+    let mut dice = Dice::new(7);
+    let mut bits = dice.bits(inputs.len());
+    for scan in 0..400 {
+        // Inputs stay for a while, so that timers run out.
+        if scan % 7 == 0 || scan > 250 {
+            bits = dice.bits(inputs.len());
+        }
+        let found = running.step(&bits);
+        let mut image = vec![0; typed.inputs.width().div_ceil(64)];
+        for (place, bit) in into.iter().zip(&bits) {
+            image[place / 64] |= u64::from(*bit) << (place % 64);
+        }
+        let mut image_out = vec![0; typed.outputs.width().div_ceil(64)];
+        interpreter.step(&mut state, &image, &mut image_out);
+        for ((name, place), found) in outputs.iter().zip(&from).zip(found) {
+            let expected = image_out[place / 64] >> (place % 64) & 1 == 1;
+            assert_eq!(
+                found,
+                expected,
+                "{what}: `{name}` in scan {scan}\n{}",
+                understudy_ladder::print(&ladder)
+            );
+        }
+    }
+    true
+}
+
+fn files(folder: &Path, found: &mut Vec<PathBuf>) {
+    let Ok(entries) = std::fs::read_dir(folder) else {
+        return;
+    };
+    for entry in entries.flatten() {
+        let path = entry.path();
+        if path.is_dir() {
+            files(&path, found);
+        } else {
+            found.push(path);
+        }
+    }
+}
+
+#[test]
+fn ladders_of_public_texts_do_what_their_typed_programs_do() {
+    let mut found = Vec::new();
+    let own = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples");
+    files(Path::new(own), &mut found);
+    files(
+        Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests")),
+        &mut found,
+    );
+    if let Some(folder) = std::env::var_os("UNDERSTUDY_DATA") {
+        files(Path::new(&folder), &mut found);
+    }
+    found.sort();
+    let mut compared = 0;
+    for path in found {
+        let ending = path.extension().and_then(|ending| ending.to_str());
+        let Ok(text) = std::fs::read_to_string(&path) else {
+            continue;
+        };
+        let parsed = match ending {
+            Some("st" | "ST") => parse(&text),
+            Some("xml") => plcopen::read_typed(&text),
+            _ => continue,
+        };
+        let name = path.display().to_string();
+        compared += usize::from(check(&name, whole(&text, parsed, None, Some(PERIOD))));
+    }
+    assert!(compared >= 10, "{compared} programs");
+    eprintln!("{compared} programs compared");
+}
