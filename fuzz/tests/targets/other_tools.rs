@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use understudy_interchange::{digraph, ldmicro, structured_text};
+use understudy_interchange::{Format, digraph, ldmicro, read};
 use understudy_ladder::{Program, check};
 
 use crate::attack::attack;
@@ -25,8 +25,8 @@ fn structured_text() {
         "programs/interchange/tests/structured_text/texts/full-of-errors.st",
     ];
     attack("structured_text", &seeds, |bytes| {
-        let reading = structured_text::read(&text(bytes));
-        reading.programs.iter().for_each(is_sound);
+        let reading = read(Format::StructuredText, "text.st", &text(bytes), None);
+        reading.program.iter().for_each(is_sound);
     });
 }
 

@@ -10,6 +10,7 @@
 
 mod bounds;
 mod facts;
+mod lost;
 mod lower;
 mod number;
 mod program;
@@ -41,9 +42,17 @@ pub(crate) fn ladder(
     let unit = units.find(|unit| unit.kind == UnitKind::Program && unit.name.is(&program.name));
     let ranges = unit.map(ranges).unwrap_or_default();
     let comments = comments(file, &lines);
+    let declarations = unit.iter().flat_map(|unit| &unit.declarations);
+    let places = declarations
+        .map(|found| {
+            let line = lines.index(found.name.span().start) + 1;
+            (found.name.key(), u32::try_from(line).unwrap_or(u32::MAX))
+        })
+        .collect();
     let around = Surroundings {
         names,
         ranges: &ranges,
+        places: &places,
         comments: &comments,
     };
     let place = |line: usize| match line.checked_sub(1) {
@@ -81,7 +90,28 @@ pub(crate) fn ladder(
     for found in &mut diagnostics {
         found.span = place(found.span.start);
     }
-    (made.filter(|_| !has_errors(&diagnostics)), diagnostics)
+    let footer = unit.map(footer).unwrap_or_default();
+    let made = made
+        .filter(|_| !has_errors(&diagnostics))
+        .map(|mut ladder| {
+            ladder.footer.extend(footer);
+            ladder
+        });
+    if made.is_some() {
+        diagnostics.extend(lost::lost(text, file, program));
+    }
+    (made, diagnostics)
+}
+
+/// The comments below the last statement.
+fn footer(unit: &Unit) -> Vec<String> {
+    match &unit.body {
+        Body::Statements(statements) => match statements.last() {
+            Some(last) if matches!(last.kind, StatementKind::Nothing) => last.comments.clone(),
+            _ => Vec::new(),
+        },
+        Body::Chart(_) | Body::Instructions(_) => Vec::new(),
+    }
 }
 
 /// The ranges that variables of a unit are declared with, by their names in capitals.

@@ -23,7 +23,7 @@ use std::time::Duration;
 
 use understudy_ladder::{Program, check};
 use understudy_structured_text::syntax::UnitKind;
-use understudy_text::{Diagnostic, has_errors};
+use understudy_text::{Diagnostic, Severity, has_errors};
 
 pub use fidelity::{Count, Fidelity, Note};
 pub use typed::read_typed;
@@ -270,7 +270,10 @@ fn translate(text: &str, project: &Project, pou: &Pou, reading: &mut Reading) {
             return;
         }
     }
-    let (mut file, found) = read_typed(text);
+    let used = units::used(project, pou);
+    let used = used.iter().map(|unit| unit.name.to_uppercase()).collect();
+    let (mut file, found) = typed::read_typed_of(text, Some(&used));
+    file.instances.retain(|instance| instance.of.is(&pou.name));
     for unit in &mut file.units {
         // A block that is asked for is read as if it were a program.
         if unit.name.is(&pou.name) && unit.kind == UnitKind::FunctionBlock {
@@ -288,7 +291,9 @@ fn translate(text: &str, project: &Project, pou: &Pou, reading: &mut Reading) {
     reading.fidelity.ignored(units::lost(project, pou));
     if let Some(mut program) = found.program {
         program.description.clone_from(&pou.documentation);
-        reading.diagnostics.extend(check(&program));
+        let found = check(&program).into_iter();
+        let errors = found.filter(|found| found.severity == Severity::Error);
+        reading.diagnostics.extend(errors);
         reading.fidelity.count(project, pou, &program);
         reading.program = Some(program);
     }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use understudy_ladder::Program as Ladder;
+use understudy_ladder::{PERIODS, Program as Ladder};
 use understudy_structured_text::syntax::{File, UnitKind};
 use understudy_structured_text::{Lowered, Options, lower, parse};
 use understudy_text::{Diagnostic, has_errors};
@@ -49,6 +49,7 @@ pub(crate) fn whole(
         diagnostics: found,
     } = lower(&file, &options);
     diagnostics.extend(found);
+    diagnostics.extend(periods(&file));
     diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
     let is_right = !has_errors(&diagnostics);
     let typed = typed.filter(|_| is_right);
@@ -57,8 +58,7 @@ pub(crate) fn whole(
         Some(typed) => (None, vec![several(&file, typed)]),
         None => (None, Vec::new()),
     };
-    let intervals = file.tasks.iter().filter_map(|task| task.interval);
-    let first = intervals.filter(|interval| *interval > 0).next();
+    let first = file.tasks.iter().find_map(|task| task.interval);
     Whole {
         typed,
         ladder,
@@ -67,6 +67,24 @@ pub(crate) fn whole(
         diagnostics,
         reasons,
     }
+}
+
+/// The findings on intervals of tasks that no station has.
+fn periods(file: &File) -> Vec<Diagnostic> {
+    let wrong = file.tasks.iter().filter(|task| {
+        let interval = task
+            .interval
+            .and_then(|interval| u64::try_from(interval).ok());
+        task.interval.is_some()
+            && interval.is_none_or(|interval| !PERIODS.contains(&Duration::from_nanos(interval)))
+    });
+    let found = wrong.map(|task| {
+        let (least, most) = (PERIODS.start(), PERIODS.end());
+        let message = format!("the interval of a task is a time from {least:?} to {most:?}");
+        let error = Diagnostic::error("U1084", message, task.name.span());
+        error.with_help("write it as a literal such as T#20ms")
+    });
+    found.collect()
 }
 
 fn several(file: &File, typed: &Typed) -> Diagnostic {
@@ -109,6 +127,3 @@ pub(crate) fn programs(text: &str) -> Vec<String> {
     let programs = units.filter(|unit| unit.kind == UnitKind::Program);
     programs.map(|unit| unit.name.as_str().to_owned()).collect()
 }
-
-#[cfg(test)]
-mod tests;

@@ -1,6 +1,7 @@
 //! Structured Text of IEC 61131-3, with numbers: text to syntax ([`parser`]), syntax to text ([`print`](mod@print)), syntax to the
 //! program form of `understudy-typed` (`lower`).
 
+mod jumps;
 mod lexer;
 mod library;
 pub mod lower;
@@ -8,6 +9,7 @@ pub mod parser;
 pub mod print;
 pub mod syntax;
 
+pub use jumps::in_parts;
 pub use library::file as library;
 pub use lower::{Lowered, Options, lower};
 pub use parser::parse;

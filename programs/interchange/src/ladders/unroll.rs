@@ -9,7 +9,7 @@ mod places;
 mod statements;
 mod values;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use understudy_ladder::{KEYWORDS, MAXIMUM_NAME_LENGTH, parse_address};
 use understudy_structured_text::lower::Names;
@@ -43,6 +43,8 @@ pub(super) struct Surroundings<'a> {
     pub(super) names: &'a Names,
     /// Declared ranges of the program's variables, by their names in capitals.
     pub(super) ranges: &'a HashMap<String, (i64, i64)>,
+    /// The lines of their declarations, by their names in capitals.
+    pub(super) places: &'a HashMap<String, u32>,
     /// Comments above statements, by line.
     pub(super) comments: &'a BTreeMap<u32, Vec<String>>,
 }
@@ -66,6 +68,8 @@ struct Unrolling<'a> {
     parts: HashMap<u64, (u64, &'static str)>,
     resolved: Resolved,
     cells: HashMap<u64, usize>,
+    /// Cells of variables that people see.
+    shown: HashSet<usize>,
     inputs: HashMap<u64, Elementary>,
     blocks: HashMap<u64, String>,
     timers: HashMap<u64, usize>,
@@ -132,6 +136,7 @@ impl<'a> Unrolling<'a> {
             parts,
             resolved: Resolved::default(),
             cells: HashMap::new(),
+            shown: HashSet::new(),
             inputs: points
                 .map(|point| (64 * u64::from(point.slot), point.of))
                 .collect(),
@@ -163,7 +168,25 @@ impl<'a> Unrolling<'a> {
             self.body(context)?;
         }
         self.resolved.steps = std::mem::take(&mut self.steps);
+        self.prune();
         Ok(())
+    }
+
+    /// Leaves out what is written to memory that people do not see and nothing reads.
+    fn prune(&mut self) {
+        let read = values::read(&self.resolved.steps);
+        let mut kept: HashSet<usize> = self.shown.clone();
+        kept.extend(read);
+        for timer in &self.resolved.timers {
+            kept.extend([timer.started, timer.output]);
+        }
+        drop_unread(&mut self.resolved.steps, &kept);
+        for (at, cell) in self.resolved.cells.iter_mut().enumerate() {
+            // A pin is not declared.
+            if !kept.contains(&at) && matches!(cell.role, Role::Memory | Role::Passing) {
+                cell.role = Role::Pin;
+            }
+        }
     }
 
     fn refuse(&self, what: impl Into<String>) -> Refusal {
@@ -180,6 +203,8 @@ impl<'a> Unrolling<'a> {
         let points = program.inputs.iter().chain(program.outputs.iter());
         for point in points.filter(|point| point.slot != 0) {
             if kind_of(point.of).is_none() {
+                let line = self.around.places.get(&point.name.to_ascii_uppercase());
+                self.line = line.copied().unwrap_or(0);
                 return Err(self.refuse(format!("`{}` is a {}", point.name, point.of)));
             }
         }
@@ -267,6 +292,9 @@ impl<'a> Unrolling<'a> {
             description: whole.and_then(|variable| variable.description.clone()),
         })?;
         self.cells.insert(address, cell);
+        if self.program.part_at(address).is_some() {
+            self.shown.insert(cell);
+        }
         Ok(cell)
     }
 
@@ -373,6 +401,28 @@ impl<'a> Unrolling<'a> {
             }
         }
     }
+}
+
+fn drop_unread(steps: &mut Vec<Step>, kept: &HashSet<usize>) {
+    let mut comments = Vec::new();
+    steps.retain_mut(|step| {
+        comments.append(&mut step.comments);
+        let stays = match &mut step.action {
+            Action::SetTruth(cell, _) | Action::SetNumber(cell, _) => kept.contains(cell),
+            Action::If(branches, otherwise) => {
+                for (_, body) in branches.iter_mut() {
+                    drop_unread(body, kept);
+                }
+                drop_unread(otherwise, kept);
+                !otherwise.is_empty() || branches.iter().any(|(_, body)| !body.is_empty())
+            }
+            Action::Block { .. } | Action::Timer { .. } => true,
+        };
+        if stays {
+            step.comments = std::mem::take(&mut comments);
+        }
+        stays
+    });
 }
 
 /// What a cell of a type holds, where a ladder can.

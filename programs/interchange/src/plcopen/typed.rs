@@ -10,7 +10,7 @@ mod network;
 mod surroundings;
 mod values;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
 use roxmltree::Node;
@@ -35,6 +35,14 @@ struct Typed {
 
 /// Reads a document, with everything that is wrong with it. Places are those of the document.
 pub fn read_typed(text: &str) -> (File, Vec<Diagnostic>) {
+    read_typed_of(text, None)
+}
+
+/// Reads of a document the units of these names, in capitals; all of them where none are given.
+pub(super) fn read_typed_of(
+    text: &str,
+    units: Option<&HashSet<String>>,
+) -> (File, Vec<Diagnostic>) {
     let document = match xml::parse(text) {
         Ok(document) => document,
         Err(error) => return (File::default(), vec![error]),
@@ -59,7 +67,7 @@ pub fn read_typed(text: &str) -> (File, Vec<Diagnostic>) {
         diagnostics: Vec::new(),
     };
     account::check(root, &mut typed.diagnostics);
-    typed.project(root);
+    typed.project(root, units);
     let mut diagnostics = typed.diagnostics;
     for found in &mut diagnostics {
         within(text, &mut found.span);
@@ -99,8 +107,12 @@ impl Typed {
         found.is_some_and(|unit| unit.kind != UnitKind::Program)
     }
 
-    fn project(&mut self, root: Node<'_, '_>) {
-        let (project, found) = document::read_bodies(root);
+    fn project(&mut self, root: Node<'_, '_>, units: Option<&HashSet<String>>) {
+        let (mut project, found) = document::read_bodies(root);
+        project.pous.retain(|pou| {
+            let name = pou.name.to_uppercase();
+            units.is_none_or(|units| units.contains(&name))
+        });
         self.diagnostics.extend(found);
         for types in elements(root).filter(|part| part.tag_name().name() == "types") {
             for list in elements(types).filter(|list| list.tag_name().name() == "dataTypes") {
@@ -211,5 +223,6 @@ fn foreign(part: &Part, pou: &Pou) -> Diagnostic {
         "`{}` is an action or transition of `{}`, which is not a chart",
         part.name, pou.name
     );
-    Diagnostic::error("U1010", message, part.name.span())
+    let found = Diagnostic::warning("U1023", message, part.name.span());
+    found.with_help("nothing does it: move its statements into the body")
 }

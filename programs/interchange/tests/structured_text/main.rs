@@ -1,6 +1,7 @@
 //! Structured Text, from outside.
 
 mod errors;
+mod execution;
 mod hostile;
 mod lowering;
 mod random;

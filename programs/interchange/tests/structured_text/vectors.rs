@@ -108,7 +108,7 @@ fn the_standard_blocks_do_what_the_standard_says() {
         for call in calls {
             let source = format!(
                 "PROGRAM semantics VAR_INPUT {} : BOOL; END_VAR VAR_OUTPUT {} : BOOL; END_VAR \
-                 VAR block : {kind}; always : BOOL := TRUE; END_VAR {call} {shown} END_PROGRAM",
+                 VAR block : {kind}; always : BOOL := TRUE; END_VAR always := always; {call} {shown} END_PROGRAM",
                 names(&inputs, "in_"),
                 names(&outputs, "out_")
             );

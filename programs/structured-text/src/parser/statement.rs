@@ -97,6 +97,15 @@ impl Parser<'_> {
                 }),
             }
         }
+        // What is written below the last statement stands at one that does nothing.
+        let comments = self.comments();
+        if !comments.is_empty() && self.at_word("END_PROGRAM") {
+            statements.push(Statement {
+                kind: StatementKind::Nothing,
+                span: self.span(),
+                comments,
+            });
+        }
         statements
     }
 

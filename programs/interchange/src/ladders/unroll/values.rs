@@ -39,42 +39,13 @@ impl Value {
 
     /// Whether what it means changes where one of the cells is written.
     fn mentions(&self, cells: &HashSet<usize>) -> bool {
+        let mut read = HashSet::new();
         match self {
-            Self::Truth(truth) => truth_mentions(truth, cells),
-            Self::Number(number) => number_mentions(number, cells),
-            Self::Known(..) | Self::Count(_) | Self::Unknown(_) => false,
+            Self::Truth(truth) => read_truth(truth, &mut read),
+            Self::Number(number) => read_number(number, &mut read),
+            Self::Known(..) | Self::Count(_) | Self::Unknown(_) => {}
         }
-    }
-}
-
-fn truth_mentions(truth: &Truth, cells: &HashSet<usize>) -> bool {
-    match truth {
-        Truth::Constant(_) | Truth::Counter(..) => false,
-        Truth::Cell(cell) => cells.contains(cell),
-        Truth::Not(inner) => truth_mentions(inner, cells),
-        Truth::All(parts) | Truth::Any(parts) | Truth::Odd(parts) => {
-            parts.iter().any(|part| truth_mentions(part, cells))
-        }
-        Truth::Compare(_, left, right) => {
-            number_mentions(left, cells) || number_mentions(right, cells)
-        }
-    }
-}
-
-fn number_mentions(number: &Number, cells: &HashSet<usize>) -> bool {
-    match number {
-        Number::Constant(_) => false,
-        Number::Cell(cell) => cells.contains(cell),
-        Number::Sum(parts) => parts.iter().any(|(_, part)| number_mentions(part, cells)),
-        Number::Product(parts) => parts.iter().any(|part| number_mentions(part, cells)),
-        Number::Quotient(inner, _) | Number::Remainder(inner, _) | Number::Wrapped(inner, _) => {
-            number_mentions(inner, cells)
-        }
-        Number::Choice(condition, then, otherwise) => {
-            truth_mentions(condition, cells)
-                || number_mentions(then, cells)
-                || number_mentions(otherwise, cells)
-        }
+        !read.is_disjoint(cells)
     }
 }
 
@@ -87,6 +58,67 @@ pub(super) fn written(steps: &[Step]) -> HashSet<usize> {
         }
     });
     cells
+}
+
+/// The cells that steps read.
+pub(super) fn read(steps: &[Step]) -> HashSet<usize> {
+    let mut cells = HashSet::new();
+    walk(steps, &mut |step| match &step.action {
+        Action::SetTruth(_, truth) | Action::Timer { wire: truth, .. } => {
+            read_truth(truth, &mut cells);
+        }
+        Action::SetNumber(_, number) => read_number(number, &mut cells),
+        Action::If(branches, _) => {
+            for (condition, _) in branches {
+                read_truth(condition, &mut cells);
+            }
+        }
+        Action::Block { wire, feeds, .. } => {
+            read_truth(wire, &mut cells);
+            for (_, feed) in feeds {
+                read_truth(feed, &mut cells);
+            }
+        }
+    });
+    cells
+}
+
+fn read_truth(truth: &Truth, cells: &mut HashSet<usize>) {
+    match truth {
+        Truth::Constant(_) | Truth::Counter(..) => {}
+        Truth::Cell(cell) => {
+            cells.insert(*cell);
+        }
+        Truth::Not(inner) => read_truth(inner, cells),
+        Truth::All(parts) | Truth::Any(parts) | Truth::Odd(parts) => {
+            for part in parts {
+                read_truth(part, cells);
+            }
+        }
+        Truth::Compare(_, left, right) => {
+            read_number(left, cells);
+            read_number(right, cells);
+        }
+    }
+}
+
+fn read_number(number: &Number, cells: &mut HashSet<usize>) {
+    match number {
+        Number::Constant(_) => {}
+        Number::Cell(cell) => {
+            cells.insert(*cell);
+        }
+        Number::Sum(parts) => parts.iter().for_each(|(_, part)| read_number(part, cells)),
+        Number::Product(parts) => parts.iter().for_each(|part| read_number(part, cells)),
+        Number::Quotient(inner, _) | Number::Remainder(inner, _) | Number::Wrapped(inner, _) => {
+            read_number(inner, cells);
+        }
+        Number::Choice(condition, then, otherwise) => {
+            read_truth(condition, cells);
+            read_number(then, cells);
+            read_number(otherwise, cells);
+        }
+    }
 }
 
 impl Unrolling<'_> {

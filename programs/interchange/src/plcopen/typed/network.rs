@@ -6,9 +6,10 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use understudy_ladder::Name as Written;
+use understudy_structured_text::in_parts;
 use understudy_structured_text::parser::parse_expression_at;
 use understudy_structured_text::syntax::{
-    Argument, Class, Declaration, Expression, ExpressionKind, File, Label, Name, Operator, Path,
+    Argument, Class, Declaration, Expression, ExpressionKind, File, Name, Operator, Path,
     Statement, StatementKind, UnitKind,
 };
 use understudy_text::Diagnostic;
@@ -134,30 +135,9 @@ impl<'a> Network<'a> {
         }
         let first = parts.iter().flatten().next();
         let span = first.map_or(0..0, |first| first.span.clone());
-        let count = parts.len() as i128;
         let next = self.next();
-        let cases = parts.into_iter().enumerate().map(|(at, mut body)| {
-            let at = at as i128;
-            let behind = make::integer(at + 1, &span);
-            body.insert(
-                0,
-                make::assign(make::path(&next, None, &span), behind, &span),
-            );
-            let first = make::integer(at, &span);
-            (vec![Label { first, last: None }], body)
-        });
-        let body = StatementKind::Case(make::variable(&next, &span), cases.collect(), Vec::new());
-        let begin = make::path(&next, None, &span);
-        let is_inside = make::chain(
-            vec![make::variable(&next, &span), make::integer(count, &span)],
-            Operator::Compare(Comparison::Less),
-            &span,
-        );
-        let body = vec![make::statement(body, &span)];
-        vec![
-            make::assign(begin, make::integer(0, &span), &span),
-            make::statement(StatementKind::While(is_inside, body), &span),
-        ]
+        let turn = self.declare("network.turn", make::named("DINT", &span));
+        in_parts(parts, &next, &turn, &span)
     }
 
     fn next(&self) -> String {

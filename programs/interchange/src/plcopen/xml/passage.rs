@@ -83,11 +83,6 @@ impl Passage {
         }
     }
 
-    /// The place of all of it.
-    pub(crate) fn span(&self) -> Range<usize> {
-        self.place(0..self.text.len())
-    }
-
     /// A part of the text, with its places.
     pub(crate) fn slice(&self, part: Range<usize>) -> Self {
         let first = self.place(part.start..part.start).start;
@@ -100,16 +95,6 @@ impl Passage {
             text: self.text[part.clone()].to_owned(),
             places: std::iter::once((0, first)).chain(inner).collect(),
         }
-    }
-
-    /// The parts of the text that stand in the file letter for letter, with the place of each.
-    pub(crate) fn pieces(&self) -> impl Iterator<Item = (&str, Range<usize>)> {
-        let ends = self.places.iter().skip(1).map(|(start, _)| *start);
-        let ends = ends.chain([self.text.len()]);
-        self.places
-            .iter()
-            .zip(ends)
-            .map(|((start, place), end)| (&self.text[*start..end], *place..place + (end - start)))
     }
 }
 
@@ -130,8 +115,6 @@ mod tests {
             let slice = passage.slice(start..passage.as_str().len());
             assert_eq!(&file[slice.place(0..word.len())], *raw, "{word}");
         }
-        let joined: String = passage.pieces().map(|(text, _)| text).collect();
-        assert_eq!(joined, passage.as_str());
     }
 
     #[test]

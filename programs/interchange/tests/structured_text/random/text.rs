@@ -341,17 +341,17 @@ impl fmt::Display for Text {
             out,
             "FUNCTION twice : INT\n  VAR_INPUT x : INT; END_VAR\n  twice := 2 * x;\nEND_FUNCTION\n
 FUNCTION_BLOCK Total
-  VAR_INPUT enable : BOOL; value : SINT; END_VAR
-  VAR_OUTPUT sum : SINT; big : BOOL; END_VAR
+  VAR_INPUT enable : BOOL; value : INT; END_VAR
+  VAR_OUTPUT sum : INT; big : BOOL; END_VAR
   IF enable THEN sum := sum + value; END_IF;
   big := twice(sum) > 20;
 END_FUNCTION_BLOCK
 
 PROGRAM random
-  VAR_INPUT a0, a1, a2 : BOOL; u : USINT (0..7); END_VAR
-  VAR_OUTPUT y0 : BOOL; y1 : BOOL := TRUE; v : SINT := 3; END_VAR
+  VAR_INPUT a0, a1, a2 : BOOL; u : INT (0..7); END_VAR
+  VAR_OUTPUT y0 : BOOL; y1 : BOOL := TRUE; v : INT := 3; END_VAR
   VAR
-    b0, b1 : BOOL; n0 : USINT; n1 : INT (0..9); n2 : SINT := -7; k : INT;
+    b0, b1 : BOOL; n0 : INT; n1 : INT (0..9); n2 : INT := -7; k : INT;
     rise : R_TRIG; fall : F_TRIG; set_first : SR; reset_first : RS; up, many : CTU;
     on, late : TON; off, linger : TOF; pulse, flash : TP; total : Total;
   END_VAR"

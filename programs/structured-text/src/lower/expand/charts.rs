@@ -16,11 +16,11 @@ use understudy_typed::Elementary;
 
 use crate::syntax::{
     Association, Chart, Class, Declaration, Expression, Initializer, Name, Operator, Path, Span,
-    Statement, TypeKind, TypeName, Unit, UnitKind,
+    Statement, Transition, TypeKind, TypeName, Unit, UnitKind,
 };
 
 use super::written::{
-    all, assign, at_least, boolean, call, declare, elementary, join, not, part, path, since,
+    all, assign, boolean, call, declare, elementary, invoke, join, not, part, path, since,
     variable, when,
 };
 
@@ -36,12 +36,16 @@ struct Deed {
     memories: Vec<String>,
     /// Statements before it.
     before: Vec<Statement>,
+    /// Timers of SD and SL, which run on what is stored when all is set and reset.
+    timers: Vec<Statement>,
 }
 
 struct Writer<'a> {
     chart: &'a Chart,
     declarations: Vec<Declaration>,
     statements: Vec<Statement>,
+    /// The variables that say that a step is entered, by its name in capitals.
+    entered: HashMap<String, Vec<String>>,
     diagnostics: &'a mut Vec<Diagnostic>,
 }
 
@@ -55,6 +59,7 @@ pub(super) fn statements(
         chart,
         declarations: Vec::new(),
         statements: Vec::new(),
+        entered: HashMap::new(),
         diagnostics,
     };
     if !matches!(unit.kind, UnitKind::Program | UnitKind::FunctionBlock) {
@@ -94,6 +99,43 @@ impl Writer<'_> {
         let declaration = declare(&name, Class::Local, elementary(of, span), None, span);
         self.declarations.push(declaration);
         name
+    }
+
+    /// A hidden TON.
+    fn timer(&mut self, span: &Span) -> String {
+        let name = format!("timer.{}", self.declarations.len());
+        let of = TypeName {
+            kind: TypeKind::Named(Name::new("TON", span.clone())),
+            span: span.clone(),
+        };
+        self.declarations
+            .push(declare(&name, Class::Local, of, None, span));
+        name
+    }
+
+    /// A TON that is TRUE when a step has been active for that time. Where a transition enters the step that it leaves, the time begins again.
+    fn step_timer(&mut self, step: &str, duration: &Expression, span: &Span) -> String {
+        let timer = self.timer(span);
+        let again = |transition: &&Transition| {
+            let has = |names: &[Name]| names.iter().any(|name| name.is(step));
+            has(&transition.from) && has(&transition.to)
+        };
+        if self
+            .chart
+            .transitions
+            .iter()
+            .any(|transition| again(&transition))
+        {
+            let begins = self.entered.get(&step.to_ascii_uppercase()).cloned();
+            let begins =
+                begins.map(|fires| fires.iter().map(|name| variable(name, span)).collect());
+            let begins = all(begins.unwrap_or_default(), Operator::Or, span);
+            let stop = invoke(&timer, [("IN", boolean(false, span))], span);
+            self.statements.push(when(begins, vec![stop], span));
+        }
+        let given = [("IN", part(step, "X", span)), ("PT", duration.clone())];
+        self.statements.push(invoke(&timer, given, span));
+        timer
     }
 
     fn steps(&mut self, span: &Span) {
@@ -186,6 +228,12 @@ impl Writer<'_> {
             let fires = self.hidden("fires", Elementary::Bool, span);
             self.statements
                 .push(assign(path(&fires, None, span), condition, span));
+            for name in transition.to.iter().filter(|name| known(name)) {
+                self.entered
+                    .entry(name.key())
+                    .or_default()
+                    .push(fires.clone());
+            }
             fired.push((at, fires));
         }
         for is_end in [true, false] {
@@ -259,11 +307,13 @@ impl Writer<'_> {
             }
             _ => boolean(false, &span),
         };
-        // The time is over in a scan behind the one in which it began, as with a TON.
-        let is_over = || {
-            let passed = at_least(part(step, "T", &span), duration.clone());
-            join(was_active(), Operator::And, passed)
+        let is_timed = matches!(qualifier.as_str(), "L" | "D" | "DS");
+        let timer = if is_timed {
+            self.step_timer(step, &duration, &span)
+        } else {
+            String::new()
         };
+        let is_over = || part(&timer, "Q", &span);
         match qualifier.as_str() {
             "" | "N" => deed.drives.push(is_active()),
             "S" => deed.sets.push(is_active()),
@@ -282,15 +332,13 @@ impl Writer<'_> {
             "DS" => deed.sets.push(join(is_active(), Operator::And, is_over())),
             "SD" | "SL" => {
                 let stored = self.hidden("stored", Elementary::Bool, &span);
-                let start = self.hidden("start", Elementary::Time, &span);
-                let now = call("TIME", Vec::new(), &span);
-                let body = vec![
-                    assign(path(&stored, None, &span), boolean(true, &span), &span),
-                    assign(path(&start, None, &span), now, &span),
-                ];
+                let timer = self.timer(&span);
+                let set = assign(path(&stored, None, &span), boolean(true, &span), &span);
                 let is_new = join(begins(), Operator::And, not(variable(&stored, &span)));
-                deed.before.push(when(is_new, body, &span));
-                let passed = at_least(since(variable(&start, &span), &span), duration);
+                deed.before.push(when(is_new, vec![set], &span));
+                let given = [("IN", variable(&stored, &span)), ("PT", duration)];
+                deed.timers.push(invoke(&timer, given, &span));
+                let passed = part(&timer, "Q", &span);
                 let passed = if qualifier == "SD" {
                     passed
                 } else {
@@ -344,6 +392,7 @@ impl Writer<'_> {
             let reset = reset.collect();
             self.statements.push(when(resets, reset, &span));
         }
+        self.statements.append(&mut deed.timers);
         if deed.drives.is_empty() {
             return;
         }

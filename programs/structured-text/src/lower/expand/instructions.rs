@@ -16,9 +16,11 @@ use understudy_text::Diagnostic;
 use understudy_typed::{Comparison, Elementary};
 
 use crate::syntax::{
-    Argument, Class, Declaration, Expression, ExpressionKind, Instruction, Label, Name, Operator,
-    Path, Span, Statement, StatementKind, Step, Unit,
+    Argument, Class, Declaration, Expression, ExpressionKind, Instruction, Name, Operator, Path,
+    Span, Statement, StatementKind, Step, Unit,
 };
+
+use crate::jumps::in_parts;
 
 use super::written::{
     assign, boolean, declare, elementary, integer, join, not, path, statement, variable, when,
@@ -29,6 +31,9 @@ const MAXIMUM_OPEN: usize = 32;
 
 /// The variable that says which part of the list is next.
 const NEXT: &str = "list.next";
+
+/// The counter of loops of one turn.
+const TURN: &str = "list.turn";
 
 /// What waits for its bracket.
 struct Open {
@@ -135,23 +140,9 @@ impl Writer<'_> {
         let span = self.unit.name.span();
         let of = elementary(Elementary::Dint, &span);
         declarations.push(declare(NEXT, Class::Temporary, of, None, &span));
-        let count = parts.len() as i128;
-        let cases = parts.into_iter().enumerate().map(|(at, mut body)| {
-            let next = integer(at as i128 + 1, &span);
-            body.insert(0, assign(path(NEXT, None, &span), next, &span));
-            let first = integer(at as i128, &span);
-            (vec![Label { first, last: None }], body)
-        });
-        let case = StatementKind::Case(variable(NEXT, &span), cases.collect(), Vec::new());
-        let more = join(
-            variable(NEXT, &span),
-            Operator::Compare(Comparison::Less),
-            integer(count, &span),
-        );
-        let body = vec![statement(case, &span)];
-        let start = assign(path(NEXT, None, &span), integer(0, &span), &span);
-        let whole = statement(StatementKind::While(more, body), &span);
-        (declarations, vec![start, whole])
+        let of = elementary(Elementary::Dint, &span);
+        declarations.push(declare(TURN, Class::Temporary, of, None, &span));
+        (declarations, in_parts(parts, NEXT, TURN, &span))
     }
 
     fn push(&mut self, statement: Statement) {

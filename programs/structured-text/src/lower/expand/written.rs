@@ -1,6 +1,6 @@
 //! Syntax that is made here in the place of what a person wrote.
 
-use understudy_typed::{Comparison, Elementary};
+use understudy_typed::Elementary;
 
 use crate::syntax::{
     Argument, Class, Declaration, Expression, ExpressionKind, Initializer, Literal, Name, Operator,
@@ -93,8 +93,17 @@ pub(super) fn all(values: Vec<Expression>, operator: Operator, span: &Span) -> E
     joined.unwrap_or_else(|| boolean(operator == Operator::And, span))
 }
 
-pub(super) fn at_least(left: Expression, right: Expression) -> Expression {
-    join(left, Operator::Compare(Comparison::GreaterOrEqual), right)
+/// A call of a block with values by name.
+pub(super) fn invoke<const N: usize>(
+    name: &str,
+    given: [(&str, Expression); N],
+    span: &Span,
+) -> Statement {
+    let given = given
+        .into_iter()
+        .map(|(input, value)| Argument::Given(Name::new(input, span.clone()), value));
+    let kind = StatementKind::Call(path(name, None, span), given.collect());
+    statement(kind, span)
 }
 
 pub(super) fn call(name: &str, arguments: Vec<Expression>, span: &Span) -> Expression {

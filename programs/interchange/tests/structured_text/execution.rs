@@ -1,17 +1,16 @@
 //! A ladder does what its typed program does, scan by scan.
 
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
+use understudy_interchange::{Format, plcopen, read};
+use understudy_ladder::Program as Ladder;
 use understudy_logic::Running;
-use understudy_structured_text::parse;
+use understudy_structured_text::syntax::File;
+use understudy_structured_text::{Options, lower, parse};
 use understudy_testing::random::Dice;
 use understudy_typed::{Interpreter, Program};
 
-use super::{Whole, whole};
-use crate::plcopen;
-
-const PERIOD: Duration = Duration::from_millis(100);
+use crate::support::PERIOD;
 
 /// Bits of the points of a ladder: its names, and where each stands in the image of the typed program.
 fn places(names: &[&str], points: &understudy_typed::Points) -> Vec<usize> {
@@ -23,28 +22,32 @@ fn places(names: &[&str], points: &understudy_typed::Points) -> Vec<usize> {
     names.iter().map(place).collect()
 }
 
-/// Numbers take fewer bits in a ladder: the last bit that it has is extended.
-fn check(what: &str, whole: Whole) -> bool {
-    let (Some(ladder), Some(typed)) = (whole.ladder, whole.typed) else {
-        return false;
+/// The typed program of a file.
+pub(crate) fn typed(text: &str, file: &File) -> Option<Program> {
+    let options = Options {
+        text,
+        program: None,
+        period: i64::try_from(PERIOD.as_nanos()).ok(),
     };
+    lower(file, &options).program
+}
+
+/// Compares the scans of both.
+pub(crate) fn check(what: &str, ladder: &Ladder, typed: &Program, seed: u64) {
     let inputs: Vec<&str> = ladder.inputs.iter().map(|it| it.name.as_str()).collect();
     let outputs: Vec<&str> = ladder.outputs.iter().map(|it| it.name.as_str()).collect();
     let circuit = match ladder.lower(PERIOD) {
         Ok(circuit) => circuit,
-        Err(error) => panic!("{what}: {error:?}\n{}", understudy_ladder::print(&ladder)),
+        Err(error) => panic!("{what}: {error:?}\n{}", understudy_ladder::print(ladder)),
     };
     let mut running = Running::new(&circuit);
     let (into, from) = (
         places(&inputs, &typed.inputs),
         places(&outputs, &typed.outputs),
     );
-    let interpreter = Interpreter::new(&Program {
-        period: PERIOD.as_nanos() as i64,
-        ..typed.clone()
-    });
+    let interpreter = Interpreter::new(typed);
     let mut state = interpreter.initial().to_vec();
-    let mut dice = Dice::new(7);
+    let mut dice = Dice::new(seed);
     let mut bits = dice.bits(inputs.len());
     for scan in 0..400 {
         // Inputs stay for a while, so that timers run out.
@@ -64,11 +67,10 @@ fn check(what: &str, whole: Whole) -> bool {
                 found,
                 expected,
                 "{what}: `{name}` in scan {scan}\n{}",
-                understudy_ladder::print(&ladder)
+                understudy_ladder::print(ladder)
             );
         }
     }
-    true
 }
 
 fn files(folder: &Path, found: &mut Vec<PathBuf>) {
@@ -104,13 +106,19 @@ fn ladders_of_public_texts_do_what_their_typed_programs_do() {
         let Ok(text) = std::fs::read_to_string(&path) else {
             continue;
         };
-        let parsed = match ending {
-            Some("st" | "ST") => parse(&text),
-            Some("xml") => plcopen::read_typed(&text),
+        let (format, (file, _)) = match ending {
+            Some("st" | "ST") => (Format::StructuredText, parse(&text)),
+            Some("xml") => (Format::PlcOpen, plcopen::read_typed(&text)),
             _ => continue,
         };
         let name = path.display().to_string();
-        compared += usize::from(check(&name, whole(&text, parsed, None, Some(PERIOD))));
+        let found = read(format, &name, &text, None);
+        if let (Some(ladder), Some(typed)) = (found.program, typed(&text, &file))
+            && typed.tasks.len() == 1
+        {
+            check(&name, &ladder, &typed, 7);
+            compared += 1;
+        }
     }
     assert!(compared >= 10, "{compared} programs");
     eprintln!("{compared} programs compared");

@@ -1,0 +1,107 @@
+//! What of a text a ladder does not keep, although it is one.
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::ops::Range;
+
+use understudy_structured_text::syntax::{File, Name, TypeKind, UnitKind};
+use understudy_text::Diagnostic;
+use understudy_typed::{Program, Type};
+
+/// Names that one finding lists.
+const MAXIMUM_LISTED: usize = 20;
+
+/// Retention, second names of one address, and what nothing uses.
+pub(super) fn lost(text: &str, file: &File, program: &Program) -> Vec<Diagnostic> {
+    let declared = |name: &str| {
+        let units = file.units.iter().flat_map(|unit| &unit.declarations);
+        let mut all = units.chain(&file.globals);
+        all.find(|found| found.name.is(name))
+            .map_or(0..0, |found| found.name.span())
+    };
+    let warning = |message: String, span| Diagnostic::warning("U1055", message, span);
+    let mut found = Vec::new();
+    let mut first: BTreeMap<u32, &str> = BTreeMap::new();
+    for variable in &program.variables {
+        let span = declared(&variable.name);
+        if variable.is_retained {
+            let message = format!(
+                "that `{}` is retained over a loss of power is not kept: the state of a circuit is kept by its copies",
+                variable.name
+            );
+            found.push(warning(message, span.clone()));
+        }
+        match first.get(&variable.slot) {
+            Some(first) if !matches!(variable.of, Type::Structure(..)) => {
+                let message = format!(
+                    "`{}` as a second name of `{first}`, whose address it has, is not kept",
+                    variable.name
+                );
+                found.push(warning(message, span));
+            }
+            _ => {
+                first.insert(variable.slot, &variable.name);
+            }
+        }
+    }
+    // The parts of a document are reported by their counts.
+    if !text
+        .trim_start_matches('\u{feff}')
+        .trim_start()
+        .starts_with('<')
+    {
+        found.extend(unused(text, file));
+    }
+    found
+}
+
+/// What is declared outside of the programs and not used elsewhere in the text.
+fn unused(text: &str, file: &File) -> Option<Diagnostic> {
+    let belongs = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
+    let mut places: HashMap<String, Vec<usize>> = HashMap::new();
+    for word in text
+        .split(|letter| !belongs(letter))
+        .filter(|word| !word.is_empty())
+    {
+        let place = word.as_ptr() as usize - text.as_ptr() as usize;
+        places
+            .entry(word.to_ascii_uppercase())
+            .or_default()
+            .push(place);
+    }
+    let is_named = |name: &Name, own: &Range<usize>| {
+        let found = places.get(&name.key());
+        found.is_some_and(|found| found.iter().any(|place| !own.contains(place)))
+    };
+    let mut unused: Vec<&Name> = Vec::new();
+    for unit in &file.units {
+        if unit.kind != UnitKind::Program && !is_named(&unit.name, &unit.span) {
+            unused.push(&unit.name);
+        }
+    }
+    for definition in &file.types {
+        let values = match &definition.of.kind {
+            TypeKind::Enumeration(values, _) => values.as_slice(),
+            _ => &[],
+        };
+        let mut names = values
+            .iter()
+            .map(|(name, _)| name)
+            .chain([&definition.name]);
+        if !names.any(|name| is_named(name, &name.span())) {
+            unused.push(&definition.name);
+        }
+    }
+    let globals = file.globals.iter().map(|global| &global.name);
+    unused.extend(globals.filter(|name| !is_named(name, &name.span())));
+    let mut seen = HashSet::new();
+    unused.retain(|name| seen.insert(name.key()));
+    let first = unused.first()?;
+    let listed = unused.iter().take(MAXIMUM_LISTED);
+    let listed: Vec<String> = listed.map(|name| format!("`{name}`")).collect();
+    let more = match unused.len() - listed.len() {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    let message = format!("nothing uses {}{more}: not kept", listed.join(", "));
+    Some(Diagnostic::warning("U1055", message, first.span()))
+}
