@@ -68,8 +68,7 @@ pub(crate) fn ladder(
         Ok(resolved) => resolved,
         Err(refusal) => {
             let message = format!("`{}` is no ladder: {}", program.name, refusal.what);
-            let code = if refusal.is_size { "U1048" } else { "U1056" };
-            let error = Diagnostic::error(code, message, place(refusal.line as usize));
+            let error = Diagnostic::error(refusal.code, message, place(refusal.line as usize));
             let help = "a ladder has BOOLs, timers, counters and integers within bounds; `check`, `verify`, `scan` and stations take the program as it is";
             return (None, vec![error.with_help(help)]);
         }

@@ -273,7 +273,9 @@ fn translate(text: &str, project: &Project, pou: &Pou, reading: &mut Reading) {
     let used = units::used(project, pou);
     let used = used.iter().map(|unit| unit.name.to_uppercase()).collect();
     let (mut file, found) = typed::read_typed_of(text, Some(&used));
-    file.instances.retain(|instance| instance.of.is(&pou.name));
+    // The period is that of the task that was found.
+    file.instances.clear();
+    file.tasks.clear();
     for unit in &mut file.units {
         // A block that is asked for is read as if it were a program.
         if unit.name.is(&pou.name) && unit.kind == UnitKind::FunctionBlock {

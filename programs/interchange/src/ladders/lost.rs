@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use understudy_structured_text::syntax::{File, Name, TypeKind, UnitKind};
 use understudy_text::Diagnostic;
-use understudy_typed::{Program, Type};
+use understudy_typed::{Elementary, Program, Type};
 
 /// Names that one finding lists.
 const MAXIMUM_LISTED: usize = 20;
@@ -20,7 +20,6 @@ pub(super) fn lost(text: &str, file: &File, program: &Program) -> Vec<Diagnostic
     };
     let warning = |message: String, span| Diagnostic::warning("U1055", message, span);
     let mut found = Vec::new();
-    let mut first: BTreeMap<u32, &str> = BTreeMap::new();
     for variable in &program.variables {
         let span = declared(&variable.name);
         if variable.is_retained {
@@ -30,16 +29,32 @@ pub(super) fn lost(text: &str, file: &File, program: &Program) -> Vec<Diagnostic
             );
             found.push(warning(message, span.clone()));
         }
-        match first.get(&variable.slot) {
-            Some(first) if !matches!(variable.of, Type::Structure(..)) => {
+        if has_others(program, &variable.of) {
+            let message = format!(
+                "`{}` has what a ladder does not hold and nothing here uses: not kept",
+                variable.name
+            );
+            found.push(warning(message, span));
+        }
+    }
+    let mut first: BTreeMap<String, &Name> = BTreeMap::new();
+    let units = file.units.iter();
+    let programs =
+        units.filter(|unit| unit.kind == UnitKind::Program && unit.name.is(&program.name));
+    for declaration in programs.flat_map(|unit| &unit.declarations) {
+        let Some(address) = &declaration.address else {
+            continue;
+        };
+        let name = &declaration.name;
+        match first.get(&address.key()) {
+            Some(first) => {
                 let message = format!(
-                    "`{}` as a second name of `{first}`, whose address it has, is not kept",
-                    variable.name
+                    "`{name}` as a second name of `{first}`, whose address it has, is not kept"
                 );
-                found.push(warning(message, span));
+                found.push(warning(message, name.span()));
             }
-            _ => {
-                first.insert(variable.slot, &variable.name);
+            None => {
+                first.insert(address.key(), name);
             }
         }
     }
@@ -52,6 +67,21 @@ pub(super) fn lost(text: &str, file: &File, program: &Program) -> Vec<Diagnostic
         found.extend(unused(text, file));
     }
     found
+}
+
+/// Whether a type has parts that no ladder holds; times are the presets of timers.
+fn has_others(program: &Program, of: &Type) -> bool {
+    match of {
+        Type::Elementary(of) | Type::Enumeration(_, of) => {
+            !of.is_integer() && !matches!(of, Elementary::Bool | Elementary::Time)
+        }
+        Type::Text(_) => true,
+        Type::Array(array) => has_others(program, &array.element),
+        Type::Structure(id, _) => {
+            let fields = &program.structures[id.0 as usize].fields;
+            fields.iter().any(|field| has_others(program, &field.of))
+        }
+    }
 }
 
 /// What is declared outside of the programs and not used elsewhere in the text.

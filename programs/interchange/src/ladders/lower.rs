@@ -16,7 +16,7 @@ use understudy_text::Diagnostic;
 use self::rungs::Rungs;
 use super::bounds::Interval;
 use super::number::{Bits, choose};
-use super::program::{Action, Cell, Kind, Number, Resolved, Role, Step, Truth};
+use super::program::{Action, Cell, Kind, Number, Resolved, Role, Step, Truth, walk};
 
 /// The widest number that is calculated with, in bits.
 const MAXIMUM_WIDTH: usize = 63;
@@ -149,7 +149,9 @@ impl Lowering<'_> {
                 .block(&self.graph, &self.leaves, name, *kind, wire, &fed);
         } else {
             self.step(step);
-            self.rungs.comment(&step.comments);
+            walk(std::slice::from_ref(step), &mut |step| {
+                self.rungs.comment(&step.comments);
+            });
             self.flush();
         }
         self.operations += self.graph.operations().len();

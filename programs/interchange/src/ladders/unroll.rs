@@ -32,8 +32,8 @@ pub(super) struct Refusal {
     pub(super) what: String,
     /// In this line, from 1; 0 where it has none.
     pub(super) line: u32,
-    /// It is too large, not of the wrong kind.
-    pub(super) is_size: bool,
+    /// Of the finding.
+    pub(super) code: &'static str,
 }
 
 type Found<T> = Result<T, Refusal>;
@@ -80,8 +80,9 @@ struct Unrolling<'a> {
     comments: BTreeMap<u32, Vec<String>>,
     /// Choices around.
     depth: usize,
-    /// Choices around the innermost loop or routine.
+    /// Choices around the innermost loop, and around the innermost routine.
     floor: usize,
+    entry: usize,
     line: u32,
     namesakes: HashMap<String, usize>,
 }
@@ -109,7 +110,7 @@ pub(super) fn unroll(program: &Program, around: &Surroundings<'_>) -> Found<Reso
     Err(Refusal {
         what: "its calls and conditions depend on each other in too many ways".into(),
         line: 0,
-        is_size: true,
+        code: "U1048",
     })
 }
 
@@ -148,6 +149,7 @@ impl<'a> Unrolling<'a> {
             comments: around.comments.clone(),
             depth: 0,
             floor: 0,
+            entry: 0,
             line: 0,
             namesakes: HashMap::new(),
         }
@@ -193,7 +195,7 @@ impl<'a> Unrolling<'a> {
         Refusal {
             what: what.into(),
             line: self.line,
-            is_size: false,
+            code: "U1056",
         }
     }
 
@@ -242,7 +244,7 @@ impl<'a> Unrolling<'a> {
             return Ok(());
         }
         Err(Refusal {
-            is_size: true,
+            code: "U1048",
             ..self.refuse(format!(
                 "has more than {MAXIMUM_STEPS} steps with its loops written out and its blocks in place"
             ))
@@ -353,7 +355,7 @@ impl<'a> Unrolling<'a> {
     fn add(&mut self, cell: Cell) -> Found<usize> {
         if self.resolved.cells.len() >= MAXIMUM_CELLS {
             return Err(Refusal {
-                is_size: true,
+                code: "U1048",
                 ..self.refuse(format!("has more than {MAXIMUM_CELLS} variables"))
             });
         }

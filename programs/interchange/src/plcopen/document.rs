@@ -88,7 +88,6 @@ pub(crate) enum Section {
 pub(crate) struct Variable {
     pub(crate) name: Name,
     pub(crate) section: Section,
-    pub(crate) constant: bool,
     pub(crate) retain: bool,
     pub(crate) kind: VariableType,
     /// As written, with its `%`.

@@ -287,5 +287,5 @@ fn comments_stay_above_what_they_stand_above() {
         .iter()
         .filter(|rung| !rung.comments.is_empty());
     let comments: Vec<_> = commented.flat_map(|rung| &rung.comments).collect();
-    assert_eq!(comments, ["What ( *is* ) skipped"]);
+    assert_eq!(comments, ["What (*is*) skipped"]);
 }

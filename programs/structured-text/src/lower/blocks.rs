@@ -210,7 +210,18 @@ impl<'a> Lowering<'a> {
     fn member(&mut self, unit: usize, declaration: &'a Declaration, layout: &mut Layout) {
         let key = declaration.name.key();
         if layout.block.members.contains_key(&key) {
-            let message = format!("`{}` is declared twice", declaration.name);
+            let name = &declaration.name;
+            let mut others = self.units[unit].unit.declarations.iter();
+            let other = others.find(|other| other.name == *name);
+            let message = match other.filter(|other| other.name.as_str() != name.as_str()) {
+                Some(other) => {
+                    format!(
+                        "`{}` and `{name}` are one name, and both are declared",
+                        other.name
+                    )
+                }
+                None => format!("`{name}` is declared twice"),
+            };
             let help = "remove or rename one of them; a block has the variables of its base";
             self.error_with("U1042", message, declaration.name.span(), help);
             return;

@@ -9,7 +9,7 @@ use understudy_typed::{Argument, Call, Elementary, Place, RoutineId, Type};
 use super::super::facts::{BlockFacts, STANDARD, inputs, outputs, preset};
 use super::super::program::{Action, Truth};
 use super::values::Value;
-use super::{Context, Found, Unrolling};
+use super::{Context, Found, Refusal, Unrolling};
 
 /// What a call gives to the inputs of a block.
 pub(super) type GivenParts = Vec<(&'static str, Value)>;
@@ -249,7 +249,10 @@ impl Unrolling<'_> {
             if setting.is_none() && (is_given || !facts.is_timer()) {
                 if facts.is_timer() {
                     let name = self.block_name(block);
-                    return Err(self.refuse(format!("the time PT of `{name}` varies")));
+                    return Err(Refusal {
+                        code: "U1045",
+                        ..self.refuse(format!("the time PT of `{name}` varies"))
+                    });
                 }
                 self.expand(block);
                 return Ok(());
@@ -268,7 +271,10 @@ impl Unrolling<'_> {
         let name = self.block_name(block);
         let Some(kind) = self.block_kind(&facts, &wire, setting) else {
             if facts.is_timer() {
-                return Err(self.refuse(format!("the time PT of `{name}` varies")));
+                return Err(Refusal {
+                    code: "U1045",
+                    ..self.refuse(format!("the time PT of `{name}` varies"))
+                });
             }
             self.expand(block);
             return Ok(());

@@ -82,12 +82,12 @@ impl Unrolling<'_> {
     pub(super) fn body(&mut self, context: Context) -> Found<()> {
         let is_library = self.around.names.library.get(context.routine.0 as usize);
         let is_library = is_library == Some(&true);
-        let (line, floor) = (self.line, self.floor);
-        self.floor = self.depth;
+        let (line, floor, entry) = (self.line, self.floor, self.entry);
+        (self.floor, self.entry) = (self.depth, self.depth);
         let program = self.program;
         let body = &program.routine(context.routine).body;
         self.list(context, body, is_library)?;
-        (self.line, self.floor) = (line, floor);
+        (self.line, self.floor, self.entry) = (line, floor, entry);
         Ok(())
     }
 
@@ -270,7 +270,11 @@ impl Unrolling<'_> {
     }
 
     fn leave(&mut self, what: Leave) -> Found<Left> {
-        if self.depth == self.floor {
+        let floor = match what {
+            Leave::Routine => self.entry,
+            Leave::Loop | Leave::Turn => self.floor,
+        };
+        if self.depth == floor {
             return Ok(Left {
                 is_always: true,
                 sure: Some(what),

@@ -276,7 +276,6 @@ impl Reader {
             into.push(Variable {
                 name,
                 section,
-                constant: flag("constant"),
                 retain: flag("retain") || flag("persistent"),
                 kind,
                 address: attribute(node, "address").filter(|address| !address.is_empty()),

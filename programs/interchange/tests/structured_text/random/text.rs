@@ -45,7 +45,7 @@ pub(crate) enum Statement {
     /// CTU with its preset.
     Count(&'static str, Truth, Truth, Number),
     /// Its preset in scans of 100 ms.
-    Timer(&'static str, &'static str, Truth, u32),
+    Timer(&'static str, Truth, u32),
     /// `late` is stopped; this may happen anywhere.
     Stop,
     /// A block of the text: two inputs, and what it has added up.
@@ -224,7 +224,7 @@ fn timed(dice: &mut Dice, depth: usize, timers: &[(&'static str, &'static str)])
                     "TP" => 3,
                     _ => pick(dice, &[0, 1, 3, 5]),
                 };
-                list.push(Statement::Timer(word, name, truth(dice, 2), scans));
+                list.push(Statement::Timer(name, truth(dice, 2), scans));
             }
             _ => {
                 let branches = (0..1 + dice.below(2))
@@ -242,11 +242,11 @@ impl Text {
     pub(crate) fn random(dice: &mut Dice) -> Self {
         let mut body = Vec::new();
         // A timer stands where every execution passes, and once.
-        for (word, name) in [("TON", "on"), ("TOF", "off"), ("TP", "pulse")] {
+        for name in ["on", "off", "pulse"] {
             let count = dice.below(4);
             body.extend(statements(dice, count, 2));
             let scans = u32::try_from(dice.below(5)).expect("small");
-            body.push(Statement::Timer(word, name, truth(dice, 2), scans));
+            body.push(Statement::Timer(name, truth(dice, 2), scans));
         }
         let timers = [("TON", "late"), ("TOF", "linger"), ("TP", "flash")];
         body.extend(timed(dice, 3, &timers));
@@ -324,7 +324,7 @@ impl fmt::Display for Statement {
             Self::Count(name, clock, reset, preset) => {
                 writeln!(out, "{name}(CU := {clock}, R := {reset}, PV := {preset});")
             }
-            Self::Timer(_, name, wire, scans) => {
+            Self::Timer(name, wire, scans) => {
                 writeln!(out, "{name}(IN := {wire}, PT := T#{}ms);", scans * 100)
             }
             Self::Stop => writeln!(out, "late(IN := FALSE);"),

@@ -49,6 +49,8 @@ struct Writer<'a> {
     /// The statements of each part.
     parts: Vec<Vec<Statement>>,
     result: Option<Expression>,
+    /// Where the result was made that nothing has taken yet.
+    idle: Option<Span>,
     open: Vec<Open>,
     diagnostics: &'a mut Vec<Diagnostic>,
 }
@@ -65,6 +67,7 @@ pub(super) fn statements(
         declarations: Vec::new(),
         parts: vec![Vec::new()],
         result: None,
+        idle: None,
         open: Vec::new(),
         diagnostics,
     };
@@ -80,11 +83,13 @@ pub(super) fn statements(
     }
     for instruction in list {
         if instruction.label.is_some() {
+            writer.lost();
             writer.result = None;
             writer.parts.push(Vec::new());
         }
         writer.instruction(instruction);
     }
+    writer.lost();
     if !writer.open.is_empty() {
         let message = "a bracket of the instruction list is not closed";
         writer.error("U1017", message.to_owned(), unit.name.span());
@@ -130,6 +135,16 @@ impl Writer<'_> {
             .push(Diagnostic::error(code, message, span));
     }
 
+    /// Reports a result that nothing has taken.
+    fn lost(&mut self) {
+        if let Some(span) = self.idle.take() {
+            let message = "this result has no effect: nothing stores it".to_owned();
+            let found = Diagnostic::warning("U1023", message, span);
+            let help = "store it with ST, or remove the instruction";
+            self.diagnostics.push(found.with_help(help));
+        }
+    }
+
     /// The parts as one row, or as a loop over a CASE.
     fn finish(self) -> (Vec<Declaration>, Vec<Statement>) {
         let mut declarations = self.declarations;
@@ -153,6 +168,7 @@ impl Writer<'_> {
 
     /// The result, which must be known.
     fn taken(&mut self, span: &Span) -> Option<Expression> {
+        self.idle = None;
         if self.result.is_none() {
             let message = "no result yet: an LD is missing before this instruction";
             self.error("U1017", message.to_owned(), span.clone());
@@ -214,8 +230,11 @@ impl Writer<'_> {
     fn with_operand(&mut self, word: &str, first: Expression, instruction: &Instruction) {
         let span = &instruction.span;
         match word {
-            "LD" => self.result = Some(first),
-            "LDN" => self.result = Some(not(first)),
+            "LD" | "LDN" => {
+                self.lost();
+                self.idle = Some(span.clone());
+                self.result = Some(if word == "LDN" { not(first) } else { first });
+            }
             "ST" | "STN" => {
                 let Some(to) = self.stored(&first) else {
                     return;
@@ -292,6 +311,7 @@ impl Writer<'_> {
         if let Some(first) = first {
             let right = if negated { not(first) } else { first };
             self.result = Some(join(before, operator, right));
+            self.idle = Some(span.clone());
         }
     }
 
@@ -380,5 +400,6 @@ impl Writer<'_> {
             span: span.clone(),
         };
         self.result = Some(value);
+        self.idle = Some(span.clone());
     }
 }
