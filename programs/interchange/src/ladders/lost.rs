@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::Range;
 
-use understudy_structured_text::syntax::{File, Name, TypeKind, UnitKind};
+use understudy_structured_text::syntax::{Class, File, Name, TypeKind, UnitKind};
 use understudy_text::Diagnostic;
 use understudy_typed::{Elementary, Program, Type};
 
@@ -42,10 +42,14 @@ pub(super) fn lost(text: &str, file: &File, program: &Program) -> Vec<Diagnostic
     let programs =
         units.filter(|unit| unit.kind == UnitKind::Program && unit.name.is(&program.name));
     for declaration in programs.flat_map(|unit| &unit.declarations) {
+        let name = &declaration.name;
+        if declaration.class == Class::Input && declaration.initial.is_some() {
+            let message = format!("the initial value of the input `{name}` is not kept");
+            found.push(warning(message, name.span()));
+        }
         let Some(address) = &declaration.address else {
             continue;
         };
-        let name = &declaration.name;
         match first.get(&address.key()) {
             Some(first) => {
                 let message = format!(

@@ -160,7 +160,7 @@ impl<'a> Unrolling<'a> {
         let program = self.program;
         for task in &program.tasks {
             if task.every != 1 {
-                return Err(self.refuse("runs in some scans only"));
+                return Err(self.refuse("it runs in some scans only"));
             }
             self.begin(task.routine, &[])?;
             let context = Context {
@@ -246,7 +246,7 @@ impl<'a> Unrolling<'a> {
         Err(Refusal {
             code: "U1048",
             ..self.refuse(format!(
-                "has more than {MAXIMUM_STEPS} steps with its loops written out and its blocks in place"
+                "it has more than {MAXIMUM_STEPS} steps with its loops written out and its blocks in place"
             ))
         })
     }
@@ -356,7 +356,7 @@ impl<'a> Unrolling<'a> {
         if self.resolved.cells.len() >= MAXIMUM_CELLS {
             return Err(Refusal {
                 code: "U1048",
-                ..self.refuse(format!("has more than {MAXIMUM_CELLS} variables"))
+                ..self.refuse(format!("it has more than {MAXIMUM_CELLS} variables"))
             });
         }
         self.resolved.cells.push(cell);

@@ -5,10 +5,11 @@ mod text;
 use proptest::prelude::*;
 use understudy_structured_text::parse;
 use understudy_testing::random::Dice;
+use understudy_text::Diagnostic;
 
 use self::text::Text;
 use crate::execution::{check, typed};
-use crate::support::program;
+use crate::support::{program, read};
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
@@ -17,6 +18,9 @@ proptest! {
     fn a_ladder_scans_as_its_text_executes(seed: u64) {
         let mut dice = Dice::new(seed);
         let source = Text::random(&mut dice).to_string();
+        // A counter that an inner loop assigns under a condition is refused, and so is a loop that does not end.
+        let is_refused = |found: &Diagnostic| matches!(found.code, "U1048" | "U1056") && found.message.contains("no ladder");
+        prop_assume!(!read(&source).diagnostics.iter().any(is_refused));
         let ladder = program(&source);
         let typed = typed(&source, &parse(&source).0).expect("a sound program");
         check(&source, &ladder, &typed, seed);

@@ -5,7 +5,7 @@ use understudy_typed::{Elementary, Place, Root, Type};
 use super::super::facts::{inputs, outputs};
 use super::super::program::{Action, Number, Role, Timer, Truth};
 use super::values::Value;
-use super::{Context, Found, Kind, Unrolling, kind_of};
+use super::{Context, Found, Kind, Refusal, Unrolling, kind_of};
 
 impl Unrolling<'_> {
     /// The address of a place: 64 · slot + bit, the slots of the frames behind those of the state.
@@ -200,7 +200,10 @@ impl Unrolling<'_> {
     pub(super) fn store(&mut self, address: u64, of: Elementary, value: Value) -> Found<()> {
         if self.inputs.contains_key(&address) {
             let (name, _) = self.name(address, of);
-            return Err(self.refuse(format!("it assigns the input `{name}`")));
+            return Err(Refusal {
+                code: "U1044",
+                ..self.refuse(format!("it assigns the input `{name}`"))
+            });
         }
         self.next.written.insert(address);
         if address >= 64 * u64::from(self.program.state) {

@@ -431,7 +431,8 @@ impl Unrolling<'_> {
         let mut is_first = true;
         loop {
             let is_over = if by > 0 { value > to } else { value < to };
-            let turn = |own: &mut Self| {
+            let mut reached = i128::from(value);
+            let mut turn = |own: &mut Self| {
                 let stored = value as u64 & of.mask();
                 if !is_first {
                     own.store(counter, of, Value::Known(of, stored))?;
@@ -441,8 +442,13 @@ impl Unrolling<'_> {
                 }
                 own.counted()?;
                 let found = own.list(context, &each.body, is_library)?;
-                if own.known(counter, of) != Some(stored) && !found.is_always {
-                    return Err(own.refuse("it has a FOR whose counter is assigned in the loop"));
+                match own.known(counter, of) {
+                    Some(left_at) => reached = of.signed(left_at),
+                    None if found.is_always => {}
+                    None => {
+                        let what = "it has a FOR whose counter is assigned in the loop";
+                        return Err(own.refuse(what));
+                    }
                 }
                 Ok(found)
             };
@@ -471,7 +477,7 @@ impl Unrolling<'_> {
             if is_over || ends || all_leave {
                 break;
             }
-            let next = i128::from(value) + i128::from(by);
+            let next = reached + i128::from(by);
             let stored = next as u64 & of.mask();
             if of.signed(stored) != next {
                 break;
