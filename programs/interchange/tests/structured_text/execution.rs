@@ -121,5 +121,4 @@ fn ladders_of_public_texts_do_what_their_typed_programs_do() {
         }
     }
     assert!(compared >= 10, "{compared} programs");
-    eprintln!("{compared} programs compared");
 }
