@@ -41,7 +41,8 @@ pub struct Remarks {
 }
 
 impl Subject {
-    /// What is suspicious about the order and the effect of the rungs.
+    /// What is suspicious about the order and the effect of the rungs that somebody wrote: those with a place in a text. Rungs that
+    /// were made from statements have none.
     ///
     /// # Errors
     /// As [`Subject::new`].
@@ -51,6 +52,10 @@ impl Subject {
         period: Duration,
         bounds: Bounds<'_>,
     ) -> Result<Remarks, LowerError> {
+        let coils = program.rungs.iter().flat_map(|rung| &rung.coils);
+        if coils.map(|coil| coil.target.span()).all(|span| span.is_empty()) {
+            return Ok(Remarks::default());
+        }
         let (circuit, writes) = program.lower_writes(period)?;
         let questions = Questions::of(program, &circuit, &writes);
         let mut remarking = Remarking {

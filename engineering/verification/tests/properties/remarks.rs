@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 use proptest::prelude::*;
-use understudy_ladder::{CoilKind, Element, Program, Write, parse, visit};
+use understudy_ladder::{CoilKind, Element, Name, Program, Write, parse, visit};
 use understudy_logic::{Circuit, Scan, Scratch, bit};
 use understudy_verification::program::{Bounds, Remarks, Subject};
 
@@ -54,6 +54,18 @@ fn a_rung_without_effect() {
         "rung\n    a b ( y )\nrung\n    y /a ( z )\n",
         &[("U0443", 0)],
     );
+}
+
+/// Rungs made from the statements of a text: their order is the order of the statements.
+#[test]
+fn nothing_is_said_of_rungs_that_nobody_wrote() {
+    let text = "program p\ninput a\ninput b\noutput y\nrung\n    a ( y )\nrung\n    b ( y )\n";
+    let (mut program, _) = parse(text).into_result().expect("a right program");
+    assert_eq!(remarks(&program).1.found.len(), 2);
+    for rung in &mut program.rungs {
+        rung.coils[0].target = Name::from("y");
+    }
+    assert_eq!(remarks(&program).1, Remarks::default());
 }
 
 /// The vendor's light of a staircase: the button that sets the light is the one that resets it.
