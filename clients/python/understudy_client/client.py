@@ -107,6 +107,7 @@ class Client:
         self._session = zenoh.open(config)
         self._root = f"understudy/mirror/{cluster}"
         self._timeout = timeout
+        self._cluster = ""
         self._sessions: dict[str, _Session] = {}
         self._writing = threading.Lock()
 
@@ -133,7 +134,7 @@ class Client:
     def _one(self, key: str) -> Any:
         found = self._get(key)
         if key not in found:
-            raise LookupError(f"the gateway has not published `{key}` yet")
+            raise LookupError(f"the gateway has not published `{key}` yet, or did not answer within {self._timeout:g} s")
         return found[key]
 
     def run(self) -> dict[str, Any]:
@@ -173,7 +174,8 @@ class Client:
 
         Raise WriteRefused if the write has no effect, and WriteUndecided if that is not known.
         """
-        key = f"understudy/mirror/{self.run()['cluster']}/write"
+        self._cluster = self._cluster or self.run()["cluster"]
+        key = f"understudy/mirror/{self._cluster}/write"
         question = {"name": name, "input": input, "value": value, "owner": owner or getpass.getuser(), "reason": reason}
         with self._writing:
             session = self._sessions.setdefault(name, _Session())
