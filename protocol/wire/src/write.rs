@@ -146,8 +146,8 @@ pub enum WriteRefusal {
         /// The next number of the session; 1 for a session that is not known.
         expected: u32,
     },
-    /// More sessions than [`MAXIMUM_SESSIONS`] write at the same time.
-    #[error("too many sessions write at the same time (at most {MAXIMUM_SESSIONS})")]
+    /// The input has a write that is not sampled or a pulse that is not over, or more sessions than [`MAXIMUM_SESSIONS`] write.
+    #[error("another write of this input is not over, or more than {MAXIMUM_SESSIONS} sessions write: repeat the write")]
     Busy,
     /// The program does not run: its state is not known yet, is lost, or its sensors are unknown.
     #[error("the program does not run")]
