@@ -12,7 +12,7 @@ use tokio_modbus::server::Service;
 use tokio_modbus::server::tcp::Server;
 use tokio_modbus::{ExceptionCode, Request, Response};
 use understudy_bus::{Connections, Listener, RelayedCallers, relay_known};
-use understudy_journal::{Refusal, RequestedValue, WriteRequest};
+use understudy_journal::{DECIDED_WITHIN, Refusal, RequestedValue, WriteRequest};
 use understudy_wire::{MAXIMUM_OWNER_LENGTH, Role};
 
 use crate::error::GatewayError;
@@ -32,6 +32,8 @@ const MOST_CLIENTS: usize = 64;
 
 /// Time limit for the next request and for taking an answer.
 const PATIENCE: Duration = Duration::from_secs(60);
+
+const _: () = assert!(PATIENCE.as_secs() > DECIDED_WITHIN.as_secs());
 
 /// By the standard, in one answer.
 const MOST_BITS: u16 = 2000;

@@ -28,7 +28,7 @@ pub use members::{Members, NamedSignal};
 pub use named_files::{ALLOWED_FOLDERS, named_file};
 pub use numbering::Numbering;
 pub use operator::{
-    Acknowledgement, AlarmRefusal, Command, Commanded, Commander, Commands, Done,
+    Acknowledgement, AlarmRefusal, Command, Commanded, Commander, Commands, DECIDED_WITHIN, Done,
     MAXIMUM_SHELVING_SECONDS, OperatorAction, PendingWrites, Refusal, RequestedValue, RunSocket,
     Shelving, Unshelving, WriteProblem, WriteRequest, WriteSessions, commands, find_alarm,
     force_value, new_write, write_answer,

@@ -31,7 +31,7 @@ use crate::record::{Happening, Record, RunEvent};
 
 pub use acknowledgement::Acknowledgement;
 pub use new_write::{RequestedValue, WriteProblem, WriteRequest, force_value, new_write};
-pub use sessions::WriteSessions;
+pub use sessions::{DECIDED_WITHIN, WriteSessions};
 pub use shelving::{AlarmRefusal, MAXIMUM_SHELVING_SECONDS, Shelving, Unshelving, find_alarm};
 pub use socket::RunSocket;
 pub(crate) use socket::SOCKET;

@@ -13,6 +13,7 @@ use tokio::sync::mpsc;
 use tokio_rustls::TlsAcceptor;
 use tokio_rustls::server::TlsStream;
 use understudy_bus::{Connection as Limited, Connections, Listener as Limiting};
+use understudy_journal::DECIDED_WITHIN;
 
 /// Connections at once.
 const MAXIMUM_CONNECTIONS: usize = 512;
@@ -20,8 +21,10 @@ const MAXIMUM_CONNECTIONS: usize = 512;
 /// Who does not finish the handshake by then is gone.
 const HANDSHAKE_PATIENCE: Duration = Duration::from_secs(3);
 
-/// Time limit for a whole request and for its answer. A viewer gets a message more often.
-const PATIENCE: Duration = Duration::from_secs(20);
+/// Time limit for a whole request and for its answer. A viewer gets a message more often; the answer to a write takes the longest.
+const PATIENCE: Duration = Duration::from_secs(40);
+
+const _: () = assert!(PATIENCE.as_secs() > DECIDED_WITHIN.as_secs());
 
 /// A connection that counts among the bounded.
 pub(crate) enum Connection {

@@ -147,7 +147,9 @@ pub enum WriteRefusal {
         expected: u32,
     },
     /// The input has a write that is not sampled or a pulse that is not over, or more sessions than [`MAXIMUM_SESSIONS`] write.
-    #[error("another write of this input is not over, or more than {MAXIMUM_SESSIONS} sessions write: repeat the write")]
+    #[error(
+        "another write of this input is not over, or more than {MAXIMUM_SESSIONS} sessions write: repeat the write"
+    )]
     Busy,
     /// The program does not run: its state is not known yet, is lost, or its sensors are unknown.
     #[error("the program does not run")]

@@ -53,7 +53,10 @@ impl Subject {
         bounds: Bounds<'_>,
     ) -> Result<Remarks, LowerError> {
         let coils = program.rungs.iter().flat_map(|rung| &rung.coils);
-        if coils.map(|coil| coil.target.span()).all(|span| span.is_empty()) {
+        if coils
+            .map(|coil| coil.target.span())
+            .all(|span| span.is_empty())
+        {
             return Ok(Remarks::default());
         }
         let (circuit, writes) = program.lower_writes(period)?;

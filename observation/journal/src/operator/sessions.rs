@@ -12,7 +12,7 @@ use super::new_write::new_id;
 use super::{Command, Commander, Done, Refusal};
 
 /// Time within which a write is repeated under its identifier until its outcome is known. A remote I/O remembers a session for longer.
-const DECIDED_WITHIN: Duration = Duration::from_secs(30);
+pub const DECIDED_WITHIN: Duration = Duration::from_secs(30);
 
 /// Time limit of one attempt.
 const ATTEMPT: Duration = Duration::from_secs(10);
