@@ -334,12 +334,17 @@ fn clients_of_four_kinds_write_while_members_are_killed_and_frames_are_lost() {
                 Writer::start("opcua", "asyncua", address, first, &[certificates])
             }),
         ];
-        let written = clients.into_iter().flatten().map(|client| {
-            let outcomes = client.outcomes();
+        // Each is read as it writes: one whose output nobody reads waits for its reader.
+        let written = clients.into_iter().flatten();
+        let written: Vec<_> = written
+            .map(|client| scope.spawn(|| client.outcomes()))
+            .collect();
+        let mut all = Vec::new();
+        for outcomes in written {
+            let outcomes = outcomes.join().expect("no panic");
             assert_eq!(outcomes.len(), writes() as usize);
-            outcomes
-        });
-        let mut all: Vec<_> = written.flatten().collect();
+            all.extend(outcomes);
+        }
         all.extend(by_page.join().expect("no panic"));
         drop(killed);
         killing.join().expect("no panic");
