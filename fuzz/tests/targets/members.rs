@@ -8,7 +8,7 @@ use understudy_remote_io::RemoteIo;
 use understudy_seal::{ClusterSecret, Opener, Revocations, Seal, Title};
 use understudy_testing::press_cell;
 use understudy_wire::{
-    ClusterHash, Force, MAXIMUM_FRAME_BYTES, Member, ProgramId, SignalPlace, StationId, Time,
+    ClusterHash, Force, MAXIMUM_FRAME_BYTES, Member, ProgramId, Roster, SignalPlace, StationId, Time,
     decode, encode,
 };
 
@@ -89,7 +89,7 @@ fn endpoints() {
             return;
         };
         if let Some(own) = peers.first().map(|peer| peer.member) {
-            let _ = Endpoints::new(ClusterHash(1), own, peers, Vec::new());
+            let _ = Endpoints::new(ClusterHash(1), own, peers, Roster::new(2, 3, Vec::new()));
         }
     });
 }

@@ -128,15 +128,7 @@ impl Site {
             }
             None if impairment.is_none() => {}
             _ => {
-                let neighbours = cluster.neighbours();
-                site.route(
-                    cluster,
-                    &neighbours,
-                    link,
-                    &peers,
-                    hosts.as_ref(),
-                    settings.seed,
-                )?;
+                site.route(cluster, link, &peers, hosts.as_ref(), settings.seed)?;
                 site.write_views(&peers, directory)
                     .map_err(system("to write the endpoints of each member"))?;
             }
@@ -201,7 +193,6 @@ impl Site {
     fn route(
         &mut self,
         cluster: &Cluster,
-        neighbours: &[(Member, Member)],
         link: LinkKind,
         peers: &[Peer],
         hosts: Option<&Hosts>,
@@ -214,7 +205,7 @@ impl Site {
                 cluster.agreement().cluster,
                 first.member,
                 peers.to_vec(),
-                neighbours.to_vec(),
+                cluster.roster(),
             );
             let own = own.map_err(LaboratoryError::Endpoints)?;
             for second in peers {

@@ -11,7 +11,7 @@ use std::time::Duration;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use understudy_wire::{
-    Body, Frame, Image, Member, ProgramSet, StationId, StationSet, Time, decode, encode,
+    Body, Frame, Image, Member, ProgramSet, Roster, StationId, StationSet, Time, decode, encode,
 };
 
 use crate::fault::Action;
@@ -33,8 +33,7 @@ pub(crate) struct Links {
     queue: Queue,
     stations: StationSet,
     remote_ios: ProgramSet,
-    /// By program: those that read its signals.
-    readers: Vec<ProgramSet>,
+    roster: Roster,
     /// By place of the sender.
     senders: Vec<Sender>,
     /// By rank: what flips in the next samples that a station takes in.
@@ -90,16 +89,15 @@ impl Flips {
 }
 
 impl Links {
-    /// Links of so many stations, and of one remote I/O for each program with the programs that read its signals.
+    /// Links of so many stations and remote I/Os.
     pub(crate) fn new(
-        stations: usize,
-        readers: Vec<ProgramSet>,
+        (stations, remote_ios): (usize, usize),
+        roster: Roster,
         network: Network,
         seed: u64,
     ) -> Self {
-        let remote_ios = readers.len();
         Self {
-            readers,
+            roster,
             usual: network,
             disturbance: None,
             network,
@@ -312,23 +310,13 @@ impl Links {
         let sender = &self.senders[place];
         let mut stations = self.stations.without(sender.deaf_stations);
         let mut remote_ios = self.remote_ios.without(sender.deaf_remote_ios);
-        match frame.header.sender {
-            Member::Station(sender) => stations.remove(sender),
-            Member::RemoteIo(program) => remote_ios.remove(program),
-            Member::Plant(_) => {}
-        }
-        match &frame.body {
-            Body::Sample(_) => {
-                remote_ios = match frame.header.sender {
-                    Member::RemoteIo(program) => remote_ios.and(self.readers[program.index()]),
-                    _ => ProgramSet::EMPTY,
-                };
-            }
-            Body::Transfer(transfer) => {
-                stations = stations.and(StationSet::only(transfer.to));
-                remote_ios = ProgramSet::EMPTY;
-            }
-            _ => {}
+        let topic = self.roster.topic(&frame);
+        let audience = self.roster.audience(topic, frame.header.sender);
+        stations = stations.and(audience.stations);
+        remote_ios = remote_ios.and(audience.remote_ios);
+        if let Body::Transfer(transfer) = &frame.body {
+            stations = stations.and(StationSet::only(transfer.to));
+            remote_ios = ProgramSet::EMPTY;
         }
         if let Some(metered) = &mut self.metered {
             let mut bytes = Vec::new();
@@ -391,7 +379,7 @@ impl Hash for Links {
             queue,
             stations: _,
             remote_ios: _,
-            readers: _,
+            roster: _,
             senders,
             intakes,
             late,

@@ -2,7 +2,7 @@
 
 use understudy_cluster::Cluster;
 use understudy_plant::{Followed, Plant};
-use understudy_wire::{Epoch, ProgramId, ProgramSet, StationId};
+use understudy_wire::{Epoch, Member, ProgramId, Roster, StationId};
 
 /// The settings of every member. Remote I/Os and plants are indexed by program.
 #[derive(Debug, Clone)]
@@ -20,16 +20,13 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// For each program, the programs that read its signals.
-    pub(crate) fn readers(&self) -> Vec<ProgramSet> {
-        let programs = (0..self.remote_ios.len()).map(|index| ProgramId(index as u8));
-        let readers_of = |source: ProgramId| {
-            let readers = self.remote_ios.iter();
-            let readers =
-                readers.filter(|it| it.signals.iter().any(|signal| signal.from == source));
-            readers.map(|reader| reader.program).collect()
-        };
-        programs.map(readers_of).collect()
+    /// Who receives what; plants are not on the network.
+    pub(crate) fn roster(&self) -> Roster {
+        let pairs = self.remote_ios.iter().flat_map(|reader| {
+            let sources = reader.signals.iter().map(|signal| signal.from);
+            sources.map(|source| (Member::RemoteIo(source), Member::RemoteIo(reader.program)))
+        });
+        Roster::new(self.remote_ios.len(), self.stations.len(), pairs.collect())
     }
 }
 

@@ -113,7 +113,12 @@ impl Simulation {
         });
         let remote_ios = parts.remote_ios.iter();
         let mut simulation = Self {
-            links: Links::new(parts.stations.len(), parts.readers(), network, seed),
+            links: Links::new(
+                (parts.stations.len(), parts.remote_ios.len()),
+                parts.roster(),
+                network,
+                seed,
+            ),
             now,
             stations: stations.collect(),
             remote_ios: remote_ios

@@ -21,6 +21,10 @@ impl Station {
         if !self.member.attendance.receive_turn(station) {
             return;
         }
+        // Turns of most controllers do not come here: the others say who published.
+        if !self.is_understudy() {
+            self.member.attendance.attest(turn.heard);
+        }
         let own_program = ProgramId(station.0);
         let understudy = self.settings.agreement.schedule.is_understudy(station);
         for word in &turn.words {

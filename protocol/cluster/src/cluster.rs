@@ -18,7 +18,7 @@ use understudy_parity::ParityController;
 use understudy_plant::{Followed, Plant};
 use understudy_remote_io::{Diagnosis, Release, SignalSource, StaleState, StopPoints, ValueFault};
 use understudy_typed::Program as TypedProgram;
-use understudy_wire::{Epoch, Image, Member, ProgramHash, ProgramId, StationId};
+use understudy_wire::{Epoch, Image, Member, ProgramHash, ProgramId, Roster, StationId};
 
 /// What carries the frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
@@ -234,9 +234,9 @@ impl Cluster {
         &self.plants
     }
 
-    /// Pairs (i, j) of members where plant j takes the parts of plant i or follows its sensors, or remote I/O j reads a
-    /// signal of program i: j receives from i.
-    pub fn neighbours(&self) -> Vec<(Member, Member)> {
+    /// Who receives what. Plant j receives from plant i where it takes its parts or follows its sensors, and remote I/O j from remote I/O i
+    /// where it reads a signal of program i.
+    pub fn roster(&self) -> Roster {
         let plants = self.plants.iter().enumerate();
         let pairs = plants.flat_map(|(listener, place)| {
             let place = place.iter();
@@ -258,7 +258,9 @@ impl Cluster {
             })
         });
         let pairs: BTreeSet<_> = pairs.chain(signals).collect();
-        pairs.into_iter().collect()
+        let schedule = &self.agreement.schedule;
+        let pairs = pairs.into_iter().collect();
+        Roster::new(schedule.controllers(), schedule.stations(), pairs)
     }
 
     /// Alarms on signals of the programs, in the order of the file.

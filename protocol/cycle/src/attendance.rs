@@ -13,6 +13,8 @@ pub struct Attendance {
     silent: Vec<u32>,
     flagged: StationSet,
     published: StationSet,
+    /// Published as other stations say, in this cycle.
+    attested: StationSet,
 }
 
 /// A flag that changed.
@@ -32,7 +34,14 @@ impl Attendance {
             silent: vec![flag_after; stations],
             flagged: StationSet::first(stations),
             published: StationSet::EMPTY,
+            attested: StationSet::EMPTY,
         }
+    }
+
+    /// Notes that these stations published in this cycle, as the turn of another one says.
+    pub fn attest(&mut self, stations: StationSet) {
+        let known = StationSet::first(self.silent.len());
+        self.attested = self.attested.or(stations.and(known));
     }
 
     /// Notes that a turn of this cycle was received; true for the first one of a station in a cycle.
@@ -46,19 +55,20 @@ impl Attendance {
 
     /// Stations that published in this cycle.
     pub fn published(&self) -> StationSet {
-        self.published
+        self.published.or(self.attested)
     }
 
     /// Flagged stations: not received for too long up to the last cycle, and not in this one.
     pub fn flagged(&self) -> StationSet {
-        self.flagged.without(self.published)
+        self.flagged.without(self.published())
     }
 
     /// Ends a cycle that this member took part in; calls `change` with every flag that changes.
     pub fn close_cycle(&mut self, mut change: impl FnMut(Change)) {
+        let published = self.published();
         for (rank, silent) in self.silent.iter_mut().enumerate() {
             let station = StationId(rank as u8);
-            if self.published.contains(station) {
+            if published.contains(station) {
                 *silent = 0;
                 if self.flagged.contains(station) {
                     self.flagged.remove(station);
@@ -73,6 +83,7 @@ impl Attendance {
             }
         }
         self.published = StationSet::EMPTY;
+        self.attested = StationSet::EMPTY;
     }
 }
 

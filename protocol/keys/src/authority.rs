@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use rcgen::{Issuer, KeyPair};
 use understudy_cluster::Cluster;
 use understudy_seal::{ClusterSecret, Title};
-use understudy_wire::{Member, Topic};
+use understudy_wire::Member;
 
 use crate::certificate::{self, Subject};
 use crate::date::Date;
@@ -359,7 +359,7 @@ impl Authority {
     }
 
     fn keys_of(&self, holder: &Holder, cluster: &Cluster) -> KeysFile {
-        let neighbours = cluster.neighbours();
+        let roster = cluster.roster();
         let own = cluster.member(&holder.name);
         let mut file = KeysFile {
             cluster: self.register.cluster.clone(),
@@ -392,7 +392,7 @@ impl Authority {
             let Some(member) = cluster.member(&other.name) else {
                 continue;
             };
-            if Topic::between(member, own, &neighbours).is_some() {
+            if roster.is_received(member, own) {
                 let key = self.secret.frame_key(self.title(other));
                 file.heard.push(Heard {
                     name: other.name.clone(),

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use understudy_cluster::Cluster;
 use understudy_seal::{FrameKey, KEY_BYTES, Opener, Revocations, Seal, TransferKey};
-use understudy_wire::{ClusterHash, ConfigurationHash, Member, StationId, Topic};
+use understudy_wire::{ClusterHash, ConfigurationHash, Member, StationId};
 
 use crate::certificate;
 use crate::date::Date;
@@ -125,7 +125,7 @@ impl MemberKeys {
         let name = cluster.member_name(own).unwrap_or_default();
         let (file, revoked) = read(folder, cluster, Some(name), now)?;
         let mut errors = Vec::new();
-        let neighbours = cluster.neighbours();
+        let roster = cluster.roster();
         let damaged = |whose: &str| KeysError::Damaged {
             path: folder.join("keys.toml"),
             reason: format!(
@@ -144,7 +144,7 @@ impl MemberKeys {
         let (mut to, mut from) = (Vec::new(), Vec::new());
         for member in cluster.members() {
             let other = cluster.member_name(member).unwrap_or_default();
-            if Topic::between(member, own, &neighbours).is_none() {
+            if !roster.is_received(member, own) {
                 continue;
             }
             let no_key = || KeysError::NoKey {

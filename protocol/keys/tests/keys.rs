@@ -15,7 +15,7 @@ use understudy_keys::{
     Authority, DEFAULT_PERSON, Date, KeysError, MemberKeys, OperatorKeys, People, Role,
 };
 use understudy_seal::{Opener, Refusal};
-use understudy_wire::{Body, Frame, Header, Member, Moment, Topic, encode};
+use understudy_wire::{Body, Frame, Header, Member, Moment, encode};
 
 const DAYS: u32 = 365;
 
@@ -113,7 +113,7 @@ fn datagram(cluster: &Cluster, keys: &MemberKeys, sender: Member) -> Vec<u8> {
 #[test]
 fn each_member_hears_whom_it_has_to_hear_and_has_no_other_key() {
     let (cluster, authority) = issued("each_member");
-    let neighbours = cluster.neighbours();
+    let roster = cluster.roster();
     for speaker in cluster.members() {
         let keys = loaded(&authority, &cluster, speaker);
         for listener in cluster.members() {
@@ -121,7 +121,7 @@ fn each_member_hears_whom_it_has_to_hear_and_has_no_other_key() {
             let found = loaded(&authority, &cluster, listener)
                 .opener()
                 .open(&mut said);
-            if Topic::between(speaker, listener, &neighbours).is_some() {
+            if roster.is_received(speaker, listener) {
                 assert!(
                     matches!(found, Ok(Some(_))),
                     "{listener:?} of {speaker:?}: {found:?}"

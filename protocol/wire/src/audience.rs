@@ -1,24 +1,36 @@
-//! Receivers of each kind of frame.
+//! Receivers of each kind of frame: whoever needs it, and no other member.
 //!
-//! Invariant: a member receives from another one on one topic at most, so that one subscription and one key for each
-//! are enough.
-//!
-//! | topic | sent by | received by |
+//! | topic | frames | received by |
 //! |---|---|---|
-//! | cycle | stations | all other stations and all remote I/Os; a Transfer only by the station that asked, where the
-//! link can choose |
-//! | cycle | remote I/Os | all stations, and the remote I/Os of programs that read a signal of theirs |
-//! | field | plant i | remote I/O i, and the plants that it feeds or that follow it |
-//! | actuation | remote I/O i | plant i |
+//! | cycle | Sync, Join, turns of understudies, turns that relay samples | all stations and remote I/Os |
+//! | cycle | Transfer | the station that asked, where the link can choose |
+//! | turn | other turns of controller i | all remote I/Os (equation (12) needs every other output), the understudies, the next two controllers |
+//! | sample | samples of remote I/O i | controller i, the understudies, the next controller, the remote I/Os of programs that read a signal of i |
+//! | field | sensors of plant i | remote I/O i, and the plants that it feeds or that follow it |
+//! | actuation | outputs of remote I/O i | plant i |
+//!
+//! So what a controller receives does not grow with the number of controllers. "Next" goes around: the first controller follows the last.
+//!
+//! * A controller waits for its predecessor's turn, and for the one before where the predecessor is flagged; where both are flagged it publishes
+//!   in its own slot. Which other stations published it learns from the understudies' turns, and from those of its predecessors.
+//! * The next controller has a sample that the understudy and controller i both lack, and relays it to all.
 
-use crate::frame::Body;
-use crate::identifier::Member;
+use crate::frame::{Body, Frame};
+use crate::identifier::{Member, StationId};
+use crate::set::{ProgramSet, StationSet};
 
-/// Topic of a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+/// Controllers after a controller that receive its turns.
+const FOLLOWERS: usize = 2;
+
+/// Topic of a frame: members that receive frames of one sender on one topic receive all of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Topic {
-    /// The cycle of the cluster.
+    /// What all members of the cycle need.
     Cycle,
+    /// Turns of controllers.
+    Turn,
+    /// Samples of remote I/Os.
+    Sample,
     /// Sensors of a plant.
     Field,
     /// Outputs that a remote I/O drives.
@@ -27,45 +39,226 @@ pub enum Topic {
 
 impl Topic {
     /// All topics; the place of each is `topic as usize`.
-    pub const ALL: [Self; 3] = [Self::Cycle, Self::Field, Self::Actuation];
+    pub const ALL: [Self; 5] = [
+        Self::Cycle,
+        Self::Turn,
+        Self::Sample,
+        Self::Field,
+        Self::Actuation,
+    ];
+}
 
-    /// Topic of a kind of frame.
-    pub fn of(body: &Body) -> Self {
-        match body {
-            Body::Sync | Body::Sample(_) | Body::Turn(_) | Body::Join(_) | Body::Transfer(_) => {
-                Self::Cycle
-            }
-            Body::Field(_) => Self::Field,
-            Body::Actuation(_) => Self::Actuation,
+/// The receivers of a frame.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Audience {
+    /// Stations.
+    pub stations: StationSet,
+    /// Remote I/Os, by their programs.
+    pub remote_ios: ProgramSet,
+    /// Plants, by their programs.
+    pub plants: ProgramSet,
+}
+
+impl Audience {
+    /// Whether `member` is one of them.
+    pub fn contains(&self, member: Member) -> bool {
+        match member {
+            Member::Station(station) => self.stations.contains(station),
+            Member::RemoteIo(program) => self.remote_ios.contains(program),
+            Member::Plant(program) => self.plants.contains(program),
         }
     }
 
-    /// Topic on which `receiver` receives from `sender`, if any; a pair (i, j) in `neighbours` means that plant or
+    /// Whether nobody receives it.
+    pub fn is_empty(&self) -> bool {
+        self.stations.is_empty() && self.remote_ios.is_empty() && self.plants.is_empty()
+    }
+}
+
+/// The members of a cluster, as far as they decide who receives what.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Roster {
+    controllers: usize,
+    stations: usize,
+    neighbours: Vec<(Member, Member)>,
+}
+
+impl Roster {
+    /// A cluster of `controllers`, each with a remote I/O and a plant, among `stations`. A pair (i, j) in `neighbours` means that plant or
     /// remote I/O j also receives from plant or remote I/O i.
-    pub fn between(
-        sender: Member,
-        receiver: Member,
-        neighbours: &[(Member, Member)],
-    ) -> Option<Self> {
-        if sender == receiver {
-            return None;
+    pub fn new(controllers: usize, stations: usize, neighbours: Vec<(Member, Member)>) -> Self {
+        Self {
+            controllers,
+            stations,
+            neighbours,
         }
-        let is_neighbour = || neighbours.contains(&(sender, receiver));
-        match (sender, receiver) {
-            // Its sample names the lineage that proves the signals of its program.
-            (Member::RemoteIo(_), Member::RemoteIo(_)) => is_neighbour().then_some(Self::Cycle),
-            (
-                Member::Station(_) | Member::RemoteIo(_),
-                Member::Station(_) | Member::RemoteIo(_),
-            ) => Some(Self::Cycle),
-            (Member::RemoteIo(program), Member::Plant(plant)) => {
-                (program == plant).then_some(Self::Actuation)
+    }
+
+    /// Whether a member is an understudy.
+    pub fn is_understudy(&self, member: Member) -> bool {
+        matches!(member, Member::Station(station) if (self.controllers..self.stations).contains(&station.index()))
+    }
+
+    /// Topic of a frame.
+    pub fn topic(&self, frame: &Frame) -> Topic {
+        match (&frame.body, frame.header.sender) {
+            (Body::Turn(turn), Member::Station(station)) => {
+                let is_understudy = self.is_understudy(Member::Station(station));
+                if !is_understudy && turn.relayed.is_empty() {
+                    Topic::Turn
+                } else {
+                    Topic::Cycle
+                }
             }
-            (Member::Plant(plant), Member::RemoteIo(program)) => {
-                (program == plant).then_some(Self::Field)
-            }
-            (Member::Plant(_), Member::Plant(_)) => is_neighbour().then_some(Self::Field),
-            (Member::Station(_), Member::Plant(_)) | (Member::Plant(_), Member::Station(_)) => None,
+            (Body::Sync | Body::Turn(_) | Body::Join(_) | Body::Transfer(_), _) => Topic::Cycle,
+            (Body::Sample(_), _) => Topic::Sample,
+            (Body::Field(_), _) => Topic::Field,
+            (Body::Actuation(_), _) => Topic::Actuation,
         }
+    }
+
+    /// Members that receive what `sender` sends on `topic`.
+    pub fn audience(&self, topic: Topic, sender: Member) -> Audience {
+        let programs = ProgramSet::first(self.controllers);
+        let stations = StationSet::first(self.stations);
+        let understudies = stations.without(StationSet::first(self.controllers));
+        let mut audience = match (topic, sender) {
+            (Topic::Cycle, Member::Station(_)) => Audience {
+                stations,
+                remote_ios: programs,
+                ..Audience::default()
+            },
+            (Topic::Turn, Member::Station(station)) if station.index() < self.controllers => {
+                Audience {
+                    stations: understudies.or(self.following(station.index(), FOLLOWERS)),
+                    remote_ios: programs,
+                    ..Audience::default()
+                }
+            }
+            (Topic::Sample, Member::RemoteIo(program)) => Audience {
+                stations: understudies
+                    .or(StationSet::only(StationId(program.0)))
+                    .or(self.following(program.index(), 1)),
+                remote_ios: self.neighbours_of(sender),
+                ..Audience::default()
+            },
+            (Topic::Field, Member::Plant(program)) => Audience {
+                remote_ios: ProgramSet::only(program),
+                plants: self.neighbours_of(sender),
+                ..Audience::default()
+            },
+            (Topic::Actuation, Member::RemoteIo(program)) => Audience {
+                plants: ProgramSet::only(program),
+                ..Audience::default()
+            },
+            _ => Audience::default(),
+        };
+        match sender {
+            Member::Station(station) => audience.stations.remove(station),
+            Member::RemoteIo(program) => audience.remote_ios.remove(program),
+            Member::Plant(program) => audience.plants.remove(program),
+        }
+        audience
+    }
+
+    /// Whether `receiver` receives anything from `sender`.
+    pub fn is_received(&self, sender: Member, receiver: Member) -> bool {
+        let mut topics = Topic::ALL.into_iter();
+        topics.any(|topic| self.audience(topic, sender).contains(receiver))
+    }
+
+    fn following(&self, controller: usize, count: usize) -> StationSet {
+        let next = (1..=count).map(|by| (controller + by) % self.controllers.max(1));
+        next.map(|place| StationId(place as u8)).collect()
+    }
+
+    /// Remote I/Os for a remote I/O, plants for a plant.
+    fn neighbours_of(&self, sender: Member) -> ProgramSet {
+        let pairs = self.neighbours.iter();
+        let receivers = pairs.filter(|(from, _)| *from == sender);
+        receivers
+            .filter_map(|(_, to)| match (sender, *to) {
+                (Member::RemoteIo(_), Member::RemoteIo(program))
+                | (Member::Plant(_), Member::Plant(program)) => Some(program),
+                _ => None,
+            })
+            .collect::<ProgramSet>()
+            .and(ProgramSet::first(self.controllers))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identifier::ProgramId;
+
+    fn received(roster: &Roster, receiver: Member) -> usize {
+        let stations = (0..roster.stations).map(|rank| Member::Station(StationId(rank as u8)));
+        let programs = (0..roster.controllers).map(|place| ProgramId(place as u8));
+        let senders = stations.chain(programs.map(Member::RemoteIo));
+        let topics = [Topic::Turn, Topic::Sample];
+        let heard = |sender| {
+            let audience = |topic| roster.audience(topic, sender).contains(receiver);
+            topics.into_iter().filter(|topic| audience(*topic)).count()
+        };
+        senders.map(heard).sum()
+    }
+
+    /// Turns and samples that a controller receives do not grow with N; a remote I/O receives N turns, an understudy N of each.
+    #[test]
+    fn what_a_controller_receives_does_not_grow() {
+        for controllers in 3..=63 {
+            let roster = Roster::new(controllers, controllers + 1, Vec::new());
+            for place in 0..controllers as u8 {
+                assert_eq!(received(&roster, Member::Station(StationId(place))), 4);
+                let remote_io = Member::RemoteIo(ProgramId(place));
+                assert_eq!(received(&roster, remote_io), controllers);
+            }
+            let understudy = Member::Station(StationId(controllers as u8));
+            assert_eq!(received(&roster, understudy), 2 * controllers);
+        }
+    }
+
+    /// No member receives its own frames; each controller and each understudy receives the samples that it steps with.
+    #[test]
+    fn those_who_step_a_program_receive_its_samples() {
+        for controllers in 1..=8_u8 {
+            for understudies in 0..=2 {
+                let stations = controllers + understudies;
+                let roster = Roster::new(controllers.into(), stations.into(), Vec::new());
+                for program in 0..controllers {
+                    let sender = Member::RemoteIo(ProgramId(program));
+                    let audience = roster.audience(Topic::Sample, sender);
+                    let understudies = controllers..stations;
+                    let mut stepping = understudies.chain([program]);
+                    assert!(stepping.all(|rank| audience.stations.contains(StationId(rank))));
+                    assert!(audience.remote_ios.is_empty());
+                    let witness = StationId((program + 1) % controllers);
+                    assert!(audience.stations.contains(witness));
+                }
+                for rank in 0..stations {
+                    let own = Member::Station(StationId(rank));
+                    assert!(!roster.is_received(own, own));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn neighbours_receive_what_they_read() {
+        let [first, second] = [ProgramId(0), ProgramId(1)];
+        let pairs = vec![
+            (Member::Plant(first), Member::Plant(second)),
+            (Member::RemoteIo(second), Member::RemoteIo(first)),
+        ];
+        let roster = Roster::new(2, 3, pairs);
+        let field = roster.audience(Topic::Field, Member::Plant(first));
+        assert_eq!(field.remote_ios, ProgramSet::only(first));
+        assert_eq!(field.plants, ProgramSet::only(second));
+        let sample = roster.audience(Topic::Sample, Member::RemoteIo(second));
+        assert_eq!(sample.remote_ios, ProgramSet::only(first));
+        let drives = roster.audience(Topic::Actuation, Member::RemoteIo(first));
+        assert_eq!(drives.plants, ProgramSet::only(first));
+        assert!(drives.stations.is_empty() && drives.remote_ios.is_empty());
     }
 }

@@ -112,7 +112,7 @@ pub enum Source {
 /// Frame of the station that holds the token.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Turn {
-    /// Stations that it received in this cycle before it published.
+    /// Stations that published in this cycle before it did, as far as it knows.
     pub heard: StationSet,
     /// The states that it holds, one for each program at most, in the order of programs.
     pub holdings: SmallVec<[Holding; 2]>,

@@ -156,7 +156,7 @@ pub fn examine_peers(
     let end = clock.now() + patience;
     let mut heard: BTreeMap<Member, ConfigurationHash> = BTreeMap::new();
     let mut refused: BTreeMap<Option<Member>, String> = BTreeMap::new();
-    let expected = endpoints.heard().count();
+    let expected = endpoints.senders().count();
     let mut bytes = Vec::new();
     while clock.now() < end && heard.len() < expected {
         while opened.receive(&mut bytes) {
@@ -180,8 +180,8 @@ pub fn examine_peers(
             })?;
     }
     Ok(endpoints
-        .heard()
-        .map(|(peer, _)| {
+        .senders()
+        .map(|peer| {
             let name = format!("{} ({})", peer.name, peer.address);
             match (heard.get(&peer.member), refused.get(&Some(peer.member))) {
                 (Some(theirs), _) if *theirs == configuration => {

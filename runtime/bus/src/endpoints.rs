@@ -1,9 +1,9 @@
-//! Who is where; who is to hear whom is said by [`Topic::between`].
+//! Who is where; [`Roster`] says who receives what.
 
 use std::net::SocketAddr;
 
 use serde::{Deserialize, Serialize};
-use understudy_wire::{ClusterHash, Member, Topic};
+use understudy_wire::{ClusterHash, Member, Roster, Topic};
 
 use crate::error::BusError;
 
@@ -24,12 +24,11 @@ pub struct Endpoints {
     cluster: ClusterHash,
     own: Peer,
     others: Vec<Peer>,
-    neighbours: Vec<(Member, Member)>,
+    roster: Roster,
 }
 
 impl Endpoints {
-    /// `members` are all of the cluster, `own` among them; a pair (i, j) in `neighbours` is as for
-    /// [`Topic::between`].
+    /// `members` are all of the cluster, `own` among them.
     ///
     /// # Errors
     /// [`BusError::NoAddress`] where `own` is not among the members; [`BusError::SharedAddress`] where two have one address.
@@ -37,7 +36,7 @@ impl Endpoints {
         cluster: ClusterHash,
         own: Member,
         members: Vec<Peer>,
-        neighbours: Vec<(Member, Member)>,
+        roster: Roster,
     ) -> Result<Self, BusError> {
         for (place, first) in members.iter().enumerate() {
             let same = |second: &&Peer| second.address == first.address;
@@ -56,7 +55,7 @@ impl Endpoints {
             cluster,
             own,
             others,
-            neighbours,
+            roster,
         })
     }
 
@@ -75,30 +74,39 @@ impl Endpoints {
         &self.others
     }
 
-    /// On which topic `listener` hears `speaker`, if at all.
-    pub(crate) fn topic(&self, speaker: Member, listener: Member) -> Option<Topic> {
-        Topic::between(speaker, listener, &self.neighbours)
+    /// Who receives what.
+    pub fn roster(&self) -> &Roster {
+        &self.roster
     }
 
     /// Whether this member and `other` have something to say to each other, in either direction.
     pub fn talks_with(&self, other: Member) -> bool {
         let own = self.own.member;
-        self.topic(own, other).or(self.topic(other, own)).is_some()
+        self.roster.is_received(own, other) || self.roster.is_received(other, own)
     }
 
     /// Those who hear this member on `topic`.
     pub(crate) fn audience(&self, topic: Topic) -> impl Iterator<Item = &Peer> {
-        self.others
-            .iter()
-            .filter(move |peer| self.topic(self.own.member, peer.member) == Some(topic))
+        let audience = self.roster.audience(topic, self.own.member);
+        let others = self.others.iter();
+        others.filter(move |peer| audience.contains(peer.member))
     }
 
-    /// Those whom this member hears, each with its topic.
-    pub(crate) fn heard(&self) -> impl Iterator<Item = (&Peer, Topic)> {
-        self.others.iter().filter_map(|peer| {
-            let topic = self.topic(peer.member, self.own.member)?;
-            Some((peer, topic))
+    /// Those whom this member hears on `topic`.
+    pub(crate) fn heard(&self, topic: Topic) -> impl Iterator<Item = &Peer> {
+        let own = self.own.member;
+        let others = self.others.iter();
+        others.filter(move |peer| {
+            let audience = self.roster.audience(topic, peer.member);
+            audience.contains(own)
         })
+    }
+
+    /// Those whom this member hears on any topic.
+    pub(crate) fn senders(&self) -> impl Iterator<Item = &Peer> {
+        let own = self.own.member;
+        let others = self.others.iter();
+        others.filter(move |peer| self.roster.is_received(peer.member, own))
     }
 
     /// Those whom this member calls: of two who have something to say to each other, the later in the order of members
@@ -136,7 +144,8 @@ mod tests {
 
     fn endpoints(own: Member) -> Endpoints {
         let feeds = vec![(Member::Plant(ProgramId(0)), Member::Plant(ProgramId(1)))];
-        Endpoints::new(ClusterHash(1), own, cell(), feeds).expect("own is among the members")
+        let roster = Roster::new(2, 3, feeds);
+        Endpoints::new(ClusterHash(1), own, cell(), roster).expect("own is among the members")
     }
 
     fn check(own: Member, topic: Topic, expected: &[&str]) {
@@ -157,8 +166,13 @@ mod tests {
         );
         check(Member::Station(StationId(1)), Topic::Field, &[]);
         check(
+            Member::Station(StationId(1)),
+            Topic::Turn,
+            &["0", "2", "3", "4"],
+        );
+        check(
             Member::RemoteIo(ProgramId(0)),
-            Topic::Cycle,
+            Topic::Sample,
             &["0", "1", "2"],
         );
         check(Member::RemoteIo(ProgramId(0)), Topic::Actuation, &["5"]);
@@ -171,13 +185,13 @@ mod tests {
         for first in cell() {
             for second in cell() {
                 let (mine, theirs) = (endpoints(first.member), endpoints(second.member));
-                let said = mine.topic(first.member, second.member);
-                let heard = theirs
-                    .heard()
-                    .find(|(peer, _)| **peer == first)
-                    .map(|(_, topic)| topic);
-                assert_eq!(said, heard);
-                let talks = said.or(mine.topic(second.member, first.member)).is_some();
+                let said = |topic| mine.audience(topic).any(|peer| *peer == second);
+                let heard = |topic| theirs.heard(topic).any(|peer| *peer == first);
+                for topic in Topic::ALL {
+                    assert_eq!(said(topic), heard(topic));
+                }
+                let talks = mine.talks_with(second.member);
+                assert_eq!(talks, theirs.talks_with(first.member));
                 let calls = mine.called().filter(|peer| **peer == second).count()
                     + theirs.called().filter(|peer| **peer == first).count();
                 assert_eq!(calls, usize::from(talks));
@@ -188,11 +202,16 @@ mod tests {
     #[test]
     fn a_stranger_and_a_shared_address_are_refused() {
         let stranger = Member::Station(StationId(9));
-        let refused = Endpoints::new(ClusterHash(1), stranger, cell(), Vec::new());
+        let refused = Endpoints::new(ClusterHash(1), stranger, cell(), Roster::new(2, 3, Vec::new()));
         assert!(matches!(refused, Err(BusError::NoAddress { .. })));
         let mut members = cell();
         members[1].address = members[4].address;
-        let refused = Endpoints::new(ClusterHash(1), members[0].member, members, Vec::new());
+        let refused = Endpoints::new(
+            ClusterHash(1),
+            members[0].member,
+            members,
+            Roster::new(2, 3, Vec::new()),
+        );
         assert!(
             matches!(refused, Err(BusError::SharedAddress { first, second, .. }) if first == "1" && second == "4")
         );

@@ -8,7 +8,7 @@ use std::os::fd::{AsFd, BorrowedFd};
 
 use nix::sys::socket::{setsockopt, sockopt};
 use understudy_seal::OVERHEAD_BYTES;
-use understudy_wire::{Body, Frame, MAXIMUM_FRAME_BYTES, Member, Topic};
+use understudy_wire::{Body, Frame, MAXIMUM_FRAME_BYTES, Member, Roster, Topic};
 
 use crate::endpoints::Endpoints;
 use crate::error::BusError;
@@ -20,6 +20,7 @@ pub(crate) const RECEIVE_BUFFER_BYTES: usize = 1024 * 1024;
 pub(crate) struct UdpLink {
     socket: UdpSocket,
     address: SocketAddr,
+    roster: Roster,
     audiences: [Vec<(Member, SocketAddr)>; Topic::ALL.len()],
     datagram: Box<[u8]>,
     unsent: u64,
@@ -40,6 +41,7 @@ impl UdpLink {
         Ok(Self {
             address: socket.local_addr().map_err(failed)?,
             socket,
+            roster: endpoints.roster().clone(),
             audiences: Topic::ALL.map(audience),
             // One byte more than a sealed frame may have, so that what is too long is seen to be.
             datagram: vec![0; MAXIMUM_FRAME_BYTES + OVERHEAD_BYTES + 1].into(),
@@ -58,7 +60,7 @@ impl Link for UdpLink {
             Body::Transfer(transfer) => Some(Member::Station(transfer.to)),
             _ => None,
         };
-        for (member, address) in &self.audiences[Topic::of(&frame.body) as usize] {
+        for (member, address) in &self.audiences[self.roster.topic(frame) as usize] {
             if only.is_none_or(|only| only == *member)
                 && self.socket.send_to(bytes, address).is_err()
             {

@@ -21,7 +21,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use understudy_wire::{ClusterHash, Frame, Member, Time, Topic};
+use understudy_wire::{ClusterHash, Frame, Member, Roster, Time, Topic};
 use zenoh::Wait;
 use zenoh::key_expr::KeyExpr;
 use zenoh::pubsub::{Publisher, Subscriber};
@@ -30,7 +30,7 @@ use zenoh::sample::Locality;
 
 use crate::clock::Clock;
 use crate::doorbell::{Inbox, Outbox, doorbell};
-use crate::endpoints::Endpoints;
+use crate::endpoints::{Endpoints, Peer};
 use crate::error::{BusError, reason};
 use crate::link::{Link, LinkCounters, LinkKind, Reopening};
 use crate::rights::raise_link_thread;
@@ -74,6 +74,7 @@ type Published = [AtomicBool; Topic::ALL.len()];
 
 pub(crate) struct ZenohLink {
     address: SocketAddr,
+    roster: Roster,
     inbox: Inbox<Vec<u8>>,
     /// Replaced by the keeper with those of a new session.
     publishers: Arc<Mutex<Arc<Publishers>>>,
@@ -137,6 +138,7 @@ impl ZenohLink {
             })?;
         Ok(Self {
             address,
+            roster: endpoints.roster().clone(),
             inbox,
             publishers,
             published,
@@ -162,7 +164,7 @@ impl Link for ZenohLink {
                 .lock()
                 .unwrap_or_else(PoisonError::into_inner),
         );
-        let topic = Topic::of(&frame.body) as usize;
+        let topic = self.roster.topic(frame) as usize;
         if let Some(publisher) = &publishers[topic] {
             match publisher.put(bytes).wait() {
                 Ok(()) => self.published[topic].store(true, Ordering::Relaxed),
@@ -238,9 +240,11 @@ impl Session {
             }
         }
         let mut exact = Vec::new();
-        for (peer, topic) in endpoints.heard() {
-            let key = key(cluster, topic, peer.member);
-            exact.push(session.declare_keyexpr(key).wait()?);
+        for topic in Topic::ALL {
+            for peer in endpoints.heard(topic) {
+                let key = key(cluster, topic, peer.member);
+                exact.push(session.declare_keyexpr(key).wait()?);
+            }
         }
         let subscribers = subscriptions(endpoints).into_iter().map(|key| {
             let ears = ears.clone();
@@ -313,7 +317,7 @@ impl Keeper {
         let heard = self.ears.heard.swap(false, Ordering::Relaxed);
         let due = self.silence.look(now, heard);
         // Of one that nobody sends to nothing can be told.
-        let listens = self.endpoints.heard().next().is_some();
+        let listens = self.endpoints.senders().next().is_some();
         if listens && (due || self.session.is_none()) {
             self.reopen(self.silence.lasts(now));
         }
@@ -356,26 +360,35 @@ fn key(cluster: ClusterHash, topic: Topic, speaker: Member) -> String {
 fn prefix(cluster: ClusterHash, topic: Topic) -> String {
     let topic = match topic {
         Topic::Cycle => "cycle",
+        Topic::Turn => "turn",
+        Topic::Sample => "sample",
         Topic::Field => "field",
         Topic::Actuation => "actuation",
     };
     format!("understudy/{cluster}/{topic}")
 }
 
-/// What a member subscribes to. Of the cycle it hears all stations, or all remote I/Os, or both; one expression for each costs every
-/// peer one declaration, where one for each peer would cost a cluster of n members n³.
+/// What a member subscribes to. Of the cycle it hears all stations; a remote I/O also hears all turns of controllers, and an understudy these
+/// and all samples. One expression for each costs every peer one declaration, where one for each peer would cost a cluster of n members n³.
 fn subscriptions(endpoints: &Endpoints) -> BTreeSet<String> {
     let cluster = endpoints.cluster();
-    let heard = endpoints.heard();
-    heard
-        .map(|(peer, topic)| match (topic, peer.member) {
-            (Topic::Cycle, Member::Station(_)) => format!("{}/station-$*", prefix(cluster, topic)),
-            (Topic::Cycle, Member::RemoteIo(_)) => {
-                format!("{}/remote-io-$*", prefix(cluster, topic))
+    let mut all = BTreeSet::new();
+    for topic in Topic::ALL {
+        let hears_all = match (topic, endpoints.own().member) {
+            (Topic::Cycle, _) | (Topic::Turn, Member::RemoteIo(_)) => true,
+            (Topic::Turn | Topic::Sample, own) => endpoints.roster().is_understudy(own),
+            _ => false,
+        };
+        let of = |peer: &Peer| {
+            if hears_all {
+                format!("{}/$*", prefix(cluster, topic))
+            } else {
+                key(cluster, topic, peer.member)
             }
-            (_, member) => key(cluster, topic, member),
-        })
-        .collect()
+        };
+        all.extend(endpoints.heard(topic).map(of));
+    }
+    all
 }
 
 fn settings(endpoints: &Endpoints) -> zenoh::Result<zenoh::Config> {

@@ -125,9 +125,8 @@ where
     M: Machine + Send,
     M::Event: Serialize + Send + 'static,
 {
-    let neighbours = cluster.neighbours();
     let peers = options.peers.clone();
-    let endpoints = Endpoints::new(cluster.agreement().cluster, member, peers, neighbours);
+    let endpoints = Endpoints::new(cluster.agreement().cluster, member, peers, cluster.roster());
     let endpoints = endpoints.map_err(MemberError::Endpoints)?;
     let keys = read_keys(options, cluster, member)?;
     let settings = MemberSettings {

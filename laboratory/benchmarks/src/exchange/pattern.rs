@@ -83,13 +83,13 @@ impl Pattern {
         }
     }
 
-    /// Takes the turn of this station where it has the token: station 0 after all samples, the others after their predecessor.
+    /// Takes the turn of this station where it has the token: station 0 after its sample, the others after their predecessor.
     fn take_turn(&mut self, now: Time) {
         let Member::Station(own) = self.own else {
             return;
         };
         let has_token = match own.0.checked_sub(1) {
-            None => self.sampled.len() == usize::from(PROGRAMS),
+            None => self.sampled.contains(ProgramId(0)),
             Some(before) => self.published.contains(StationId(before)),
         };
         if has_token && own.0 < STATIONS && !self.published.contains(own) {

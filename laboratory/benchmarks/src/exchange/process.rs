@@ -18,7 +18,7 @@ use understudy_bus::{
     NoField, Noted, Peer, Record, ZENOH_RUNTIME, free_addresses, keep_times,
 };
 use understudy_seal::{ClusterSecret, KEY_BYTES, Opener, Seal, Title};
-use understudy_wire::{ClusterHash, Member, ProgramId, StationId};
+use understudy_wire::{ClusterHash, Member, ProgramId, Roster, StationId};
 
 use super::meter::{Exchange, Meter};
 use super::pattern::{PROGRAMS, Pattern, STATIONS};
@@ -149,7 +149,8 @@ fn play_part(part: Part) -> Result<(), BusError> {
         carrier,
         settings,
     } = part;
-    let endpoints = Endpoints::new(ClusterHash(u64::MAX), own, members, Vec::new())?;
+    let roster = Roster::new(PROGRAMS.into(), STATIONS.into(), Vec::new());
+    let endpoints = Endpoints::new(ClusterHash(u64::MAX), own, members, roster)?;
     let wanted = settings.cycles as usize;
     let meter = Meter::new(usize::from(STATIONS), u64::from(SKIPPED_CYCLES), wanted);
     match carrier {
@@ -202,11 +203,7 @@ fn run_raw(endpoints: &Endpoints, settings: Settings, meter: Meter) -> Result<()
     let (mut sink, journal) =
         Journal::start::<Exchange>(1, clock, own.member, own.name, io::stdout())?;
     keep_times(settings.real_time);
-    // The same datagrams as those of the links: one for each member that receives the frame.
-    let receivers = endpoints.others().iter();
-    let receivers = receivers.filter(|peer| endpoints.talks_with(peer.member));
-    let others: Vec<SocketAddr> = receivers.map(|peer| peer.address).collect();
-    let exchange = play(own.member, &socket, &others, settings.period, meter)
+    let exchange = play(own.member, &socket, endpoints, settings.period, meter)
         .map_err(refused("to carry a datagram"))?;
     sink.record(clock.now(), Noted::Member(exchange));
     drop(sink);

@@ -4,8 +4,8 @@ use std::io;
 use std::net::{SocketAddr, UdpSocket};
 use std::time::Duration;
 
-use understudy_bus::Clock;
-use understudy_wire::{Member, StationId, Time, encode};
+use understudy_bus::{Clock, Endpoints};
+use understudy_wire::{Frame, Member, StationId, Time, encode};
 
 use super::meter::{Exchange, Meter};
 use super::pattern::{CYCLE_MASTER, PROGRAMS, STATIONS, frames_of_a_cycle, turn_of};
@@ -19,11 +19,20 @@ struct Script {
     datagrams: Vec<Vec<u8>>,
     /// Sender of each, and the station whose turn it is.
     senders: Vec<(Member, Option<StationId>)>,
+    /// Those who receive each, as the links send it.
+    receivers: Vec<Vec<SocketAddr>>,
 }
 
 impl Script {
-    fn new() -> Self {
+    fn new(endpoints: &Endpoints) -> Self {
         let frames = frames_of_a_cycle();
+        let receivers = |frame: &Frame| {
+            let roster = endpoints.roster();
+            let audience = roster.audience(roster.topic(frame), frame.header.sender);
+            let others = endpoints.others().iter();
+            let others = others.filter(|peer| audience.contains(peer.member));
+            others.map(|peer| peer.address).collect()
+        };
         let datagrams = frames.iter().enumerate().map(|(place, frame)| {
             let mut bytes = Vec::new();
             encode(frame, &mut bytes).expect("the pattern keeps the bounds of the wire");
@@ -36,7 +45,17 @@ impl Script {
                 .iter()
                 .map(|frame| (frame.header.sender, turn_of(frame)))
                 .collect(),
+            receivers: frames.iter().map(receivers).collect(),
         }
+    }
+
+    fn send(&mut self, socket: &UdpSocket, place: usize, cycle: u64) -> io::Result<()> {
+        let datagram = &mut self.datagrams[place];
+        datagram[1..9].copy_from_slice(&cycle.to_le_bytes());
+        for receiver in &self.receivers[place] {
+            socket.send_to(datagram, receiver)?;
+        }
+        Ok(())
     }
 
     fn place_of(&self, member: Member, which: usize) -> Option<usize> {
@@ -49,11 +68,11 @@ impl Script {
 pub(super) fn play(
     own: Member,
     socket: &UdpSocket,
-    others: &[SocketAddr],
+    endpoints: &Endpoints,
     period: Duration,
     mut meter: Meter,
 ) -> io::Result<Exchange> {
-    let mut script = Script::new();
+    let mut script = Script::new(endpoints);
     let is_cycle_master = own == CYCLE_MASTER;
     // The cycle master's first datagram is the Sync, and its second the turn.
     let mine = script
@@ -73,7 +92,7 @@ pub(super) fn play(
             cycle += 1;
             heard[0] = true;
             note(&mut meter, &script, 0, cycle, clock.now());
-            broadcast(socket, others, &mut script.datagrams[0], cycle)?;
+            script.send(socket, 0, cycle)?;
         }
         while !heard[heard.len() - 1] {
             let Ok(length) = socket.recv(&mut received) else {
@@ -92,7 +111,7 @@ pub(super) fn play(
                 note(&mut meter, &script, place, cycle, clock.now());
             }
             let token = match own {
-                CYCLE_MASTER => heard[1..=usize::from(PROGRAMS)].iter().all(|&one| one),
+                CYCLE_MASTER => heard[1],
                 Member::Station(_) => heard[mine - 1],
                 _ => heard[0],
             };
@@ -100,7 +119,7 @@ pub(super) fn play(
                 published = true;
                 heard[mine] = true;
                 note(&mut meter, &script, mine, cycle, clock.now());
-                broadcast(socket, others, &mut script.datagrams[mine], cycle)?;
+                script.send(socket, mine, cycle)?;
             }
         }
         if is_cycle_master {
@@ -121,19 +140,6 @@ fn place_and_cycle(datagram: &[u8], places: usize) -> Option<(usize, u64)> {
     let (&place, rest) = datagram.split_first()?;
     let cycle = rest.first_chunk().map(|bytes| u64::from_le_bytes(*bytes))?;
     (usize::from(place) < places).then_some((usize::from(place), cycle))
-}
-
-fn broadcast(
-    socket: &UdpSocket,
-    others: &[SocketAddr],
-    datagram: &mut [u8],
-    cycle: u64,
-) -> io::Result<()> {
-    datagram[1..9].copy_from_slice(&cycle.to_le_bytes());
-    for other in others {
-        socket.send_to(datagram, other)?;
-    }
-    Ok(())
 }
 
 fn note(meter: &mut Meter, script: &Script, place: usize, cycle: u64, now: Time) {

@@ -10,7 +10,7 @@ use understudy_cycle::{Agreement, Input, Machine, Mode, Output, RemoteIoInput, S
 use understudy_seal::{ClusterSecret, FrameKey, Opener, Seal, Title};
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Field, Frame, Header, Image, Lineage,
-    Member, Moment, ProgramId, Sample, StationId, StationSet, Time, Topic,
+    Member, Moment, ProgramId, Roster, Sample, StationId, StationSet, Time,
 };
 
 /// How often each member says something.
@@ -190,12 +190,18 @@ pub(crate) fn key(member: Member) -> FrameKey {
     })
 }
 
+/// Two controllers and an understudy; plant 1 feeds plant 2.
+fn roster() -> Roster {
+    let feeds = vec![(Member::Plant(ProgramId(0)), Member::Plant(ProgramId(1)))];
+    Roster::new(2, 3, feeds)
+}
+
 /// The keys of one member in one of its lives.
 #[allow(dead_code, reason = "some tests have no keys")]
 pub(crate) fn guard(own: Member, life: u64, peers: &[Peer]) -> Guard {
-    let feeds = [(Member::Plant(ProgramId(0)), Member::Plant(ProgramId(1)))];
+    let roster = roster();
     let heard = peers.iter().map(|peer| peer.member);
-    let heard = heard.filter(|&member| Topic::between(member, own, &feeds).is_some());
+    let heard = heard.filter(|&member| roster.is_received(member, own));
     Guard::with_keys(
         Seal::new(own, key(own), life as u32, []),
         Opener::new(
@@ -208,6 +214,5 @@ pub(crate) fn guard(own: Member, life: u64, peers: &[Peer]) -> Guard {
 }
 
 pub(crate) fn endpoints(own: Member, peers: &[Peer]) -> Endpoints {
-    let feeds = vec![(Member::Plant(ProgramId(0)), Member::Plant(ProgramId(1)))];
-    Endpoints::new(agreement().cluster, own, peers.to_vec(), feeds).expect("own is among them")
+    Endpoints::new(agreement().cluster, own, peers.to_vec(), roster()).expect("own is among them")
 }
