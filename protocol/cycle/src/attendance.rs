@@ -117,6 +117,21 @@ mod tests {
         }
     }
 
+    /// What others say counts for the flags, and a turn that comes after it is still the first one.
+    #[test]
+    fn stations_are_attested() {
+        let mut attendance = Attendance::new(3, 2);
+        for _ in 0..3 {
+            attendance.attest(StationSet::from_bits(0b1010));
+            assert_eq!(attendance.published(), StationSet::only(StationId(1)));
+            assert!(attendance.receive_turn(StationId(1)));
+            attendance.close_cycle(|_| ());
+        }
+        let flagged = StationSet::from_bits(0b101);
+        assert_eq!(attendance.flagged(), flagged);
+        assert_eq!(attendance.published(), StationSet::EMPTY);
+    }
+
     #[test]
     fn a_station_that_is_not_in_the_cluster_is_not_counted() {
         assert!(!Attendance::new(2, 3).receive_turn(StationId(2)));

@@ -1,7 +1,7 @@
 //! Seven processes that exchange one pattern: each is this program again, with its part as JSON.
 
 use std::io::{self, BufRead, BufReader};
-use std::net::{SocketAddr, UdpSocket};
+use std::net::UdpSocket;
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, channel};
