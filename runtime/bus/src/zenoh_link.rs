@@ -381,7 +381,7 @@ fn subscriptions(endpoints: &Endpoints) -> BTreeSet<String> {
         };
         let of = |peer: &Peer| {
             if hears_all {
-                format!("{}/$*", prefix(cluster, topic))
+                format!("{}/*", prefix(cluster, topic))
             } else {
                 key(cluster, topic, peer.member)
             }
