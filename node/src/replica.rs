@@ -5,14 +5,21 @@
 //! to a state that it had a few steps ago, or starts from the initial state where the history does; otherwise it is
 //! [`Standing::Lost`] until another station transfers a state. It never steps on a guess.
 
+mod log;
+mod transfer;
+
 use std::collections::VecDeque;
 use std::sync::Arc;
 
 use understudy_executable::Scratch;
 use understudy_wire::{
-    Body, Digest, Frame, Holding, Image, Lineage, Moment, ProgramId, Recalled, Sample, StationId,
-    Transfer,
+    Body, Digest, Frame, Holding, Image, Lineage, Moment, ProgramId, Recalled, Sample, Segment,
+    StationId,
 };
+
+use self::log::Log;
+pub(crate) use self::transfer::SEGMENTS_A_CYCLE;
+use self::transfer::{Joining, Snapshot};
 
 use crate::settings::Program;
 
@@ -40,8 +47,10 @@ pub(crate) struct Replica {
     past: VecDeque<State>,
     /// The last step: a state that was transferred has no outputs until it is stepped.
     step: Step,
-    /// The last sample that could not be followed, to be replayed onto a state that is transferred later.
-    unfollowed: Option<Arc<Frame>>,
+    /// While it is lost.
+    joining: Joining,
+    /// For other stations, of a state of several segments.
+    snapshots: Vec<Snapshot>,
     remembered: Remembered,
     history: usize,
 }
@@ -92,6 +101,8 @@ pub(crate) enum Followed {
     Synchronised,
     /// It is current, because the history starts from the initial state.
     FromGenesis(Lineage),
+    /// It is current, with the state of that station.
+    CaughtUp(StationId),
     /// Its state is not in the history.
     Lost,
     /// The history does not lead to the lineage in the sample: the sample was changed on its way, and counts as lost.
@@ -111,7 +122,8 @@ impl Replica {
                 outputs: Image::zero(program.executable.output_count()),
                 after: None,
             },
-            unfollowed: None,
+            joining: Joining::default(),
+            snapshots: Vec::new(),
             remembered: Remembered::Nothing,
             history,
         }
@@ -196,7 +208,7 @@ impl Replica {
 
     /// A station reports at `now` to hold the state of the cycle `stepped`. If that is no newer than the newest sample
     /// received here, `silent_after` cycles after it, the remote I/O is not received there either; if that station
-    /// received samples itself, as it recalls, no newer output was computed from its state.
+    /// received samples itself, as it recalls, no newer output was computed from its state, unless it is taking over another one.
     pub(crate) fn receive_holding(
         &mut self,
         station: StationId,
@@ -204,6 +216,7 @@ impl Replica {
         theirs: Option<&Recalled>,
         (now, silent_after): (Moment, u32),
     ) {
+        let gives_to = self.gives_to(station);
         let Remembered::Received(received, recalled) = &mut self.remembered else {
             return;
         };
@@ -212,6 +225,7 @@ impl Replica {
             recalled.accounted_for.remove(station);
         } else if let Some(theirs) = theirs
             && now >= received.plus(u64::from(silent_after))
+            && !gives_to
         {
             recalled.accounted_for.insert(station);
             recalled.applied = recalled.applied.max(theirs.applied);
@@ -301,92 +315,18 @@ impl Replica {
             });
             self.replay(program, scratch, sample, place, moment);
             self.standing = Standing::Proven;
-            self.unfollowed = None;
+            self.joining = Joining::default();
             return Followed::FromGenesis(self.lineage().unwrap_or(genesis));
         }
         self.standing = Standing::Lost;
-        self.unfollowed = Some(Arc::clone(frame));
-        Followed::Lost
-    }
-
-    /// Adopts a state from another station if it leads to the last sample received. True if it was adopted.
-    pub(crate) fn adopt(
-        &mut self,
-        program: &Program,
-        scratch: &mut Scratch,
-        transfer: &Transfer,
-        shadow_cycles: u32,
-    ) -> bool {
-        if self.standing != Standing::Lost
-            || transfer.hash != program.hash
-            || transfer.state.width() != program.executable.state_count()
-        {
-            return false;
-        }
-        let unfollowed = self.unfollowed.take();
-        let place = match unfollowed.as_deref() {
-            Some(Frame {
-                body: Body::Sample(sample),
-                ..
-            }) => {
-                let place = lineages_of(sample)
-                    .iter()
-                    .position(|&lineage| lineage == transfer.lineage);
-                if place.is_none() {
-                    self.unfollowed = unfollowed;
-                    return false;
-                }
-                place
-            }
-            // No sample was received: the remote I/O is down, and the state is kept until it comes back.
-            _ if self.held.is_none() => None,
-            _ => return false,
-        };
-        self.past.clear();
-        self.held = Some(Held {
-            born: transfer.born,
-            state: State {
-                bits: transfer.state.clone(),
-                lineage: transfer.lineage,
-                stepped: transfer.stepped,
-                digest: transfer.digest,
-            },
-        });
-        self.standing = Standing::Shadow(shadow_cycles);
-        if let (Some(place), Some(frame)) = (place, unfollowed)
-            && let Body::Sample(sample) = &frame.body
-        {
-            self.replay(program, scratch, sample, place, frame.header.moment);
-        }
-        true
-    }
-
-    /// The state, for a station that lacks it and can prove outputs with it from then on; `None` unless it is
-    /// synchronised.
-    pub(crate) fn transfer(&mut self, program: &Program, to: StationId) -> Option<Transfer> {
-        let held = self
-            .held
-            .as_ref()
-            .filter(|_| self.standing == Standing::Proven)?;
-        if let Remembered::Relayed(recalled) | Remembered::Received(_, recalled) =
-            &mut self.remembered
-        {
-            recalled.accounted_for.remove(to);
-        }
-        Some(Transfer {
-            to,
-            program: self.id,
-            hash: program.hash,
-            born: held.born,
-            lineage: held.state.lineage,
-            stepped: held.state.stepped,
-            digest: held.state.digest,
-            state: held.state.bits.clone(),
-        })
+        self.keep(program, sample, moment);
+        let caught_up = self.catch_up(program, scratch, shadow_cycles);
+        caught_up.map_or(Followed::Lost, Followed::CaughtUp)
     }
 
     /// Ends the cycle `moment`. True where the shadow mode has just ended.
     pub(crate) fn close_cycle(&mut self, moment: Moment) -> bool {
+        self.close_transfers();
         match self.standing {
             Standing::Shadow(left) if self.is_current(moment) => {
                 self.standing = match left {
@@ -414,7 +354,8 @@ impl Replica {
         self.held = None;
         self.past.clear();
         self.standing = Standing::Lost;
-        self.unfollowed = None;
+        self.joining = Joining::default();
+        self.snapshots.clear();
     }
 
     /// Applies the remote I/O's exclusion of this station, or its end: it then starts again without a state. True where
@@ -430,11 +371,20 @@ impl Replica {
         changed
     }
 
+    /// Keeps a sample that cannot be followed: for a state of one segment, which comes at once, the newest is enough.
+    fn keep(&mut self, program: &Program, sample: &Sample, moment: Moment) {
+        let is_whole = Segment::count(program.executable.state_count()) == 1;
+        match &mut self.joining.log {
+            Some(log) if !is_whole => log.extend(sample, moment),
+            log => *log = Some(Log::of(sample, moment)),
+        }
+    }
+
     fn synchronised(&mut self, shadow_cycles: u32) -> Followed {
         if self.standing == Standing::Lost {
             self.standing = Standing::Shadow(shadow_cycles);
         }
-        self.unfollowed = None;
+        self.joining = Joining::default();
         Followed::Synchronised
     }
 

@@ -88,6 +88,8 @@ enum Rest {
 /// What a station remembers of the current cycle only.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 struct CycleNotes {
+    /// Segments of wide states that it has sent.
+    segments: usize,
     token: Token,
     rest: Rest,
     /// Outputs that controllers published of their own programs.
@@ -237,12 +239,17 @@ impl Station {
             frame,
             self.settings.agreement.shadow_cycles,
         );
-        if let Followed::FromGenesis(lineage) = followed {
+        let adopted = match followed {
+            Followed::FromGenesis(lineage) => Some((lineage, None)),
+            Followed::CaughtUp(from) => Some((sample.after, Some(from))),
+            Followed::Synchronised | Followed::Lost | Followed::Changed => None,
+        };
+        if let Some((lineage, from)) = adopted {
             self.report(Event::Adopted {
                 moment,
                 program,
                 lineage,
-                from: None,
+                from,
             });
         }
     }

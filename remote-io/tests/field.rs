@@ -75,6 +75,7 @@ impl Bench {
             holdings: Default::default(),
             recalled: Vec::new(),
             lacks: ProgramSet::EMPTY,
+            partial: Vec::new(),
         };
         for body in [Body::Sync, Body::Join(join)] {
             let frame = Arc::new(Frame { header, body });

@@ -89,6 +89,7 @@ fn run(held: [Held; 3], release: Release, released_at: u64, cycles: u64) -> Vec<
                         inputs: Image::zero(1),
                     }],
                     lacks: ProgramSet::EMPTY,
+                    partial: Vec::new(),
                 }),
             });
             remote_io.handle_input(start, Input::Frame(&frame));

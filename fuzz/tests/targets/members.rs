@@ -8,8 +8,8 @@ use understudy_remote_io::RemoteIo;
 use understudy_seal::{ClusterSecret, Opener, Revocations, Seal, Title};
 use understudy_testing::press_cell;
 use understudy_wire::{
-    ClusterHash, Force, MAXIMUM_FRAME_BYTES, Member, ProgramId, Roster, SignalPlace, StationId, Time,
-    decode, encode,
+    ClusterHash, Force, MAXIMUM_FRAME_BYTES, Member, ProgramId, Roster, SignalPlace, StationId,
+    Time, decode, encode,
 };
 
 use crate::attack::attack;

@@ -16,7 +16,7 @@ use understudy_cycle::{Agreement, Copies, Input, Machine, Output};
 use understudy_executable::{Executable, Scratch};
 use understudy_wire::{
     Body, Cycle, Digest, Epoch, Frame, Header, Holding, Image, Lineage, Member, Moment,
-    ProgramHash, ProgramId, ProgramSet, StationId, StationSet, Time, Transfer, Turn, Word,
+    ProgramHash, ProgramId, ProgramSet, Segment, StationId, StationSet, Time, Transfer, Turn, Word,
 };
 
 /// How two boxes share one program.
@@ -210,7 +210,7 @@ impl Partner {
             lineage: Lineage::genesis(ProgramHash::default(), self.moment(0)),
             stepped: self.moment(self.stepped),
             digest: Digest::of(&self.state),
-            state: self.state.clone(),
+            state: Segment::single(&self.state),
         };
         self.send(now, Body::Transfer(transfer));
     }
@@ -263,7 +263,7 @@ impl Partner {
                 outranked
             }
             (Standing::Active, Redundancy::ActiveActive) => {
-                let differs = transfer.state != self.state;
+                let differs = transfer.state.part != self.state;
                 stepped > self.stepped || (stepped == self.stepped && differs && other_is_first)
             }
             (_, redundancy) => {
@@ -276,7 +276,7 @@ impl Partner {
         };
         if takes {
             self.term = self.term.max(term);
-            self.state.clone_from(&transfer.state);
+            self.state.clone_from(&transfer.state.part);
             self.stepped = stepped;
             self.done = stepped == self.cycle;
         }

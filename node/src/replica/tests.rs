@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use understudy_logic::{Circuit, CircuitBuilder};
 use understudy_wire::{
     ClusterHash, ConfigurationHash, Cycle, Epoch, Header, Member, ProgramHash, StationId,
-    StationSet,
+    StationSet, Transfer,
 };
 
 use super::*;
@@ -126,7 +126,7 @@ impl Truth {
             lineage: self.lineages[place],
             stepped: moment(place as u64),
             digest: Digest(0),
-            state: Image::from_bits(self.states[place]),
+            state: Segment::single(&Image::from_bits(self.states[place])),
         }
     }
 
@@ -197,7 +197,7 @@ proptest! {
                 }
                 Step::Transfer { age } => {
                     let lost = replica.standing() == Standing::Lost;
-                    let adopted = replica.adopt(&program, &mut scratch, &truth.transfer(age), SHADOW_CYCLES);
+                    let adopted = replica.adopt(&program, &mut scratch, (StationId(1), &truth.transfer(age)), SHADOW_CYCLES);
                     prop_assert!(lost || !adopted);
                     if adopted {
                         prop_assert_eq!(replica.standing(), Standing::Shadow(SHADOW_CYCLES));
@@ -236,9 +236,24 @@ fn a_transferred_state_is_published_only_after_its_shadow_mode() {
         hash: ProgramHash(12),
         ..truth.transfer(0)
     };
-    assert!(!replica.adopt(&program, &mut scratch, &wrong, SHADOW_CYCLES));
-    assert!(!replica.adopt(&program, &mut scratch, &truth.transfer(7), SHADOW_CYCLES));
-    assert!(replica.adopt(&program, &mut scratch, &truth.transfer(2), SHADOW_CYCLES));
+    assert!(!replica.adopt(
+        &program,
+        &mut scratch,
+        (StationId(1), &wrong),
+        SHADOW_CYCLES
+    ));
+    assert!(!replica.adopt(
+        &program,
+        &mut scratch,
+        (StationId(1), &truth.transfer(7)),
+        SHADOW_CYCLES
+    ));
+    assert!(replica.adopt(
+        &program,
+        &mut scratch,
+        (StationId(1), &truth.transfer(2)),
+        SHADOW_CYCLES
+    ));
     let mut proved = Vec::new();
     for _ in 0..3 {
         let frame = truth.sample(true);

@@ -1,13 +1,13 @@
 //! Repair: a station asks for the states that it lacks, and transfers those that others lack.
 //!
 //! The first station that holds a state answers: its controller, then the understudies by rank. A transferred state is
-//! checked by [`crate::replica::Replica::adopt`]: it must lead to the last sample that was received.
+//! checked by [`crate::replica::Replica::adopt`]: it must lead to the last sample that was received. A wide state comes in segments.
 
 use understudy_wire::{Body, Join, ProgramSet, StationId, Time, Transfer};
 
 use super::{Rest, Role, Station};
 use crate::event::Event;
-use crate::replica::{Replica, Standing};
+use crate::replica::{Replica, SEGMENTS_A_CYCLE};
 
 impl Station {
     pub(super) fn receive_join(&mut self, station: StationId, join: &Join) {
@@ -18,21 +18,25 @@ impl Station {
         self.take_recalled(&join.recalled);
         self.receive_holdings(station, &join.holdings, &join.recalled);
         self.cycle.lacked = self.cycle.lacked.or(join.lacks);
+        let mut budget = SEGMENTS_A_CYCLE.saturating_sub(self.cycle.segments);
         for program in join.wants.iter() {
             if self.cycle.others_have.contains(program) && self.own().0 != program.0 {
                 continue;
             }
-            let transfer = self
-                .replicas
-                .iter_mut()
-                .find(|replica| replica.id() == program)
-                .and_then(|replica| {
-                    replica.transfer(&self.settings.programs[program.index()], station)
-                });
-            if let Some(transfer) = transfer {
+            let mut replicas = self.replicas.iter_mut();
+            let Some(replica) = replicas.find(|replica| replica.id() == program) else {
+                continue;
+            };
+            let partial = join
+                .partial
+                .iter()
+                .find(|partial| partial.program == program);
+            let program = &self.settings.programs[program.index()];
+            for transfer in replica.transfer(program, station, partial, &mut budget) {
                 self.member.send(Body::Transfer(transfer));
             }
         }
+        self.cycle.segments = SEGMENTS_A_CYCLE - budget;
     }
 
     pub(super) fn adopt(&mut self, from: StationId, transfer: &Transfer) {
@@ -48,7 +52,7 @@ impl Station {
         };
         let program = &self.settings.programs[transfer.program.index()];
         let shadow_cycles = self.settings.agreement.shadow_cycles;
-        if replica.adopt(program, &mut self.scratch, transfer, shadow_cycles) {
+        if replica.adopt(program, &mut self.scratch, (from, transfer), shadow_cycles) {
             let event = Event::Adopted {
                 moment: self.member.moment(),
                 program: transfer.program,
@@ -64,8 +68,9 @@ impl Station {
         let Some(moment) = self.member.clock.moment() else {
             return;
         };
-        let lost = |replica: &&Replica| replica.standing() == Standing::Lost;
-        let wants: ProgramSet = self.replicas.iter().filter(lost).map(Replica::id).collect();
+        let wanting = || self.replicas.iter().filter(|replica| replica.wants_state());
+        let wants: ProgramSet = wanting().map(Replica::id).collect();
+        let partial = wanting().filter_map(Replica::partial).collect();
         if wants != self.wanted {
             self.wanted = wants;
             if !wants.is_empty() {
@@ -80,6 +85,7 @@ impl Station {
                 holdings,
                 recalled,
                 lacks: self.lacks(),
+                partial,
             }));
         }
     }

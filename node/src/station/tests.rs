@@ -10,7 +10,8 @@ use understudy_cycle::{Agreement, Input, Machine, Mode, Output, Schedule};
 use understudy_logic::{Circuit, CircuitBuilder};
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
-    Lineage, Member, Moment, ProgramHash, ProgramId, ProgramSet, StationId, StationSet, Time, Word,
+    Lineage, Member, Moment, ProgramHash, ProgramId, ProgramSet, Segment, StationId, StationSet,
+    Time, Word,
 };
 
 use super::Station;
@@ -155,6 +156,7 @@ fn sent(what: Sent, cycle: u64, to: u8) -> Option<(Member, Body)> {
                 holdings: Default::default(),
                 recalled: Vec::new(),
                 lacks: ProgramSet::EMPTY,
+                partial: Vec::new(),
             };
             (station(rank), Body::Join(join))
         }
@@ -167,7 +169,7 @@ fn sent(what: Sent, cycle: u64, to: u8) -> Option<(Member, Body)> {
                 lineage: lineage(program, born, cycle),
                 stepped: moment(cycle - 1),
                 digest: Digest::of(&state_before(born, cycle - 1)),
-                state: state_before(born, cycle),
+                state: Segment::single(&state_before(born, cycle)),
             };
             (station(rank), Body::Transfer(transfer))
         }
@@ -196,7 +198,7 @@ fn describe(output: Output<Event>) -> Option<String> {
             }
             Body::Join(join) => format!("joins, wants {:?}", join.wants),
             Body::Transfer(transfer) => {
-                let (program, state) = (transfer.program.0, &transfer.state);
+                let (program, state) = (transfer.program.0, &transfer.state.part);
                 format!("gives {state} of program {program} to {}", transfer.to.0)
             }
             _ => return None,

@@ -5,7 +5,7 @@ use std::time::Duration;
 use smallvec::SmallVec;
 use understudy_cycle::Mode;
 use understudy_wire::{
-    Holding, Moment, ProgramId, ProgramSet, StationId, StationSet, Time, Turn, Word,
+    Holding, Moment, ProgramId, ProgramSet, Segment, StationId, StationSet, Time, Turn, Word,
 };
 
 use super::{ControllerTurn, Station, Token};
@@ -131,17 +131,23 @@ impl Station {
             .all(|replica| replica.is_current(moment))
     }
 
-    /// Reports the states that it holds, every [`STATES_EVERY`].
+    /// Reports the states that it holds, every [`STATES_EVERY`]; a state of n segments n times less often.
     fn report_states(&mut self, moment: Moment) {
         let period = self.settings.agreement.schedule.period();
         let cycles = STATES_EVERY.as_nanos() / period.as_nanos().max(1);
-        if u128::from(moment.cycle.0) % cycles.max(1) + 1 < cycles {
+        let is_due = |segments: usize| {
+            let cycles = (cycles * segments as u128).max(1);
+            u128::from(moment.cycle.0) % cycles + 1 >= cycles
+        };
+        if !is_due(1) {
             return;
         }
         for place in 0..self.replicas.len() {
             let replica = &self.replicas[place];
-            if let Some((lineage, state)) = replica.state().filter(|_| replica.may_publish(moment))
-            {
+            let state = replica.state().filter(|(_, state)| {
+                replica.may_publish(moment) && is_due(Segment::count(state.width()))
+            });
+            if let Some((lineage, state)) = state {
                 let event = Event::Holds {
                     moment,
                     program: replica.id(),

@@ -11,7 +11,7 @@ use understudy_seal::{
 use understudy_wire::{
     Actuation, Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Field, Frame,
     FrameError, Header, Image, Lineage, MAXIMUM_IMAGE_BITS, Member, Moment, ProgramHash, ProgramId,
-    StationId, Transfer, encode,
+    Segment, StationId, Transfer, encode,
 };
 
 const ROBOT: Member = Member::Station(StationId(0));
@@ -105,7 +105,7 @@ fn transfer(from: Member, to: StationId, state: Image) -> Frame {
         lineage: Lineage(8),
         stepped: Moment::default(),
         digest: Digest(9),
-        state,
+        state: Segment::single(&state),
     });
     framed(from, 4, body)
 }

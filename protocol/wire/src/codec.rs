@@ -3,7 +3,7 @@
 //! ```text
 //! offset  size  what
 //!      0     4  magic "UNDR"
-//!      4     1  version of this layout, 5
+//!      4     1  version of this layout, 6
 //!      5     n  header and body, bincode 2 "standard": little-endian, integers as varints, enums by their index
 //!    5+n     4  CRC-32 (IEEE) of everything before it, little-endian
 //! ```
@@ -22,7 +22,7 @@ use crate::write::{MAXIMUM_SESSIONS, WriteId};
 pub const MAXIMUM_FRAME_BYTES: usize = 32 * 1024;
 
 const MAGIC: [u8; 4] = *b"UNDR";
-const VERSION: u8 = 5;
+const VERSION: u8 = 6;
 const PREFIX_BYTES: usize = 5;
 const CHECKSUM_BYTES: usize = 4;
 /// Maximum number of positions that a plant shows.
@@ -176,6 +176,12 @@ fn keeps_promises(frame: &Frame) -> Result<(), FrameError> {
         Body::Join(join) => {
             kept(station, "only a station joins")?;
             kept_recalled(&join.recalled)?;
+            let partial = join.partial.iter().map(|partial| partial.program);
+            let programs: ProgramSet = partial.collect();
+            kept(
+                programs.len() == join.partial.len() && programs.without(join.wants).is_empty(),
+                "a station has segments of a state that it wants, once for each program",
+            )?;
             kept_holdings(&join.holdings).map(|_| ())
         }
         Body::Transfer(transfer) => {
@@ -184,6 +190,10 @@ fn keeps_promises(frame: &Frame) -> Result<(), FrameError> {
                 transfer.to.index() < MAXIMUM_STATIONS
                     && transfer.program.index() < MAXIMUM_PROGRAMS,
                 "the indices of a transfer are below 64",
+            )?;
+            kept(
+                transfer.state.fits(),
+                "a segment is a part of its state, which has at most 256 KiB",
             )
         }
         Body::Field(field) => {

@@ -17,6 +17,7 @@ use crate::identifier::{
 };
 use crate::image::Image;
 use crate::lineage::{Digest, Lineage};
+use crate::segment::{Segment, SegmentMask};
 use crate::set::{ProgramSet, StationSet};
 use crate::write::WriteId;
 
@@ -170,6 +171,21 @@ pub struct Join {
     pub recalled: Vec<Recalled>,
     /// As in a [`Turn`].
     pub lacks: ProgramSet,
+    /// States of several segments of which it has some; one for each program of `wants` at most.
+    pub partial: Vec<Partial>,
+}
+
+/// A state of which a station has received some segments.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Partial {
+    /// Program of the state.
+    pub program: ProgramId,
+    /// Lineage of the state.
+    pub lineage: Lineage,
+    /// Segments that are missing.
+    pub missing: SegmentMask,
+    /// Whether no segment came for so long that a station with another state may send that.
+    pub waits: bool,
 }
 
 /// The newest sample of a program as recalled by a station that has received none in this cycle: the program's remote
@@ -194,7 +210,7 @@ pub struct Recalled {
     pub inputs: Image,
 }
 
-/// x(i), for the station that asked.
+/// x(i), or a segment of it, for the station that asked.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Transfer {
     /// Station that asked.
@@ -212,7 +228,7 @@ pub struct Transfer {
     /// Digest of the state before that sample, as in [`Holding`].
     pub digest: Digest,
     /// x(i) after that sample.
-    pub state: Image,
+    pub state: Segment,
 }
 
 /// Sensors and counts of a simulated plant.

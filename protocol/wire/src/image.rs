@@ -8,8 +8,11 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 
-/// Maximum number of bits of one image: a state of this size still fits into one frame.
+/// Maximum number of bits of an image that is sent as it is: it fits into one frame.
 pub const MAXIMUM_IMAGE_BITS: usize = 64 * 1024;
+
+/// Maximum number of bits of a state, 256 KiB; a wide one is sent in segments.
+pub const MAXIMUM_STATE_BITS: usize = 32 * MAXIMUM_IMAGE_BITS;
 
 /// Bit k of word k / 64 is element k + 1 of the vector.
 #[derive(PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
@@ -29,8 +32,8 @@ struct RawImage {
 /// Reason why bits are not an image.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ImageError {
-    /// Wider than [`MAXIMUM_IMAGE_BITS`].
-    #[error("an image of {width} bits is wider than {MAXIMUM_IMAGE_BITS}")]
+    /// Wider than [`MAXIMUM_STATE_BITS`].
+    #[error("an image of {width} bits is wider than {MAXIMUM_STATE_BITS}")]
     TooWide {
         /// Requested width.
         width: usize,
@@ -49,9 +52,9 @@ impl Image {
     /// An image whose bits are all 0.
     ///
     /// # Panics
-    /// If wider than [`MAXIMUM_IMAGE_BITS`]; widths are checked where a cluster is configured.
+    /// If wider than [`MAXIMUM_STATE_BITS`]; widths are checked where a cluster is configured.
     pub fn zero(width: usize) -> Self {
-        assert!(width <= MAXIMUM_IMAGE_BITS, "an image of {width} bits");
+        assert!(width <= MAXIMUM_STATE_BITS, "an image of {width} bits");
         Self {
             width: width as u32,
             words: SmallVec::from_elem(0, width.div_ceil(64)),
@@ -60,7 +63,7 @@ impl Image {
 
     /// An image from packed words, bit k of word k / 64 being element k + 1.
     pub fn from_words(width: usize, words: &[u64]) -> Result<Self, ImageError> {
-        if width > MAXIMUM_IMAGE_BITS {
+        if width > MAXIMUM_STATE_BITS {
             return Err(ImageError::TooWide { width });
         }
         let unused = if width.is_multiple_of(64) {
@@ -84,7 +87,7 @@ impl Image {
     /// An image from its bits in order.
     ///
     /// # Panics
-    /// If there are more than [`MAXIMUM_IMAGE_BITS`].
+    /// If there are more than [`MAXIMUM_STATE_BITS`].
     pub fn from_bits(bits: impl IntoIterator<Item = bool>) -> Self {
         let bits: SmallVec<[bool; 64]> = bits.into_iter().collect();
         let mut image = Self::zero(bits.len());
@@ -220,7 +223,7 @@ mod tests {
         assert!(Image::from_words(64, &[u64::MAX]).is_ok());
         assert!(Image::from_words(65, &[u64::MAX]).is_err());
         assert!(Image::from_words(0, &[]).is_ok());
-        assert!(Image::from_words(MAXIMUM_IMAGE_BITS + 1, &[]).is_err());
+        assert!(Image::from_words(MAXIMUM_STATE_BITS + 1, &[]).is_err());
     }
 
     /// Every pair of images of up to four bits against addition bit by bit.

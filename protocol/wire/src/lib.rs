@@ -10,6 +10,7 @@ mod frame;
 mod identifier;
 mod image;
 mod lineage;
+mod segment;
 mod set;
 mod state_choice;
 mod time;
@@ -22,15 +23,16 @@ pub use force::{
     PointValue, SignalPlace, check_owner_and_reason,
 };
 pub use frame::{
-    Actuation, Body, Field, Frame, Header, Holding, Join, MAXIMUM_HISTORY, Recalled, Relayed,
-    Sample, Source, Transfer, Turn, Word,
+    Actuation, Body, Field, Frame, Header, Holding, Join, MAXIMUM_HISTORY, Partial, Recalled,
+    Relayed, Sample, Source, Transfer, Turn, Word,
 };
 pub use identifier::{
     ClusterHash, ConfigurationHash, Cycle, Epoch, MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, Member,
     Moment, ProgramHash, ProgramId, StationId,
 };
-pub use image::{Image, ImageError, MAXIMUM_IMAGE_BITS};
+pub use image::{Image, ImageError, MAXIMUM_IMAGE_BITS, MAXIMUM_STATE_BITS};
 pub use lineage::{Digest, Lineage};
+pub use segment::{MAXIMUM_SEGMENTS, Segment, SegmentMask};
 pub use set::{Element, ProgramSet, Set, StationSet};
 pub use state_choice::StateChoice;
 pub use time::Time;

@@ -5,8 +5,8 @@ use smallvec::smallvec;
 use understudy_wire::{
     Actuation, Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Field, Frame,
     FrameError, Header, Holding, Image, Join, Lineage, MAXIMUM_FRAME_BYTES, Member, Moment,
-    ProgramHash, ProgramId, ProgramSet, Recalled, Relayed, Sample, StationId, StationSet, Transfer,
-    Turn, Word, WriteId, decode, encode,
+    Partial, ProgramHash, ProgramId, ProgramSet, Recalled, Relayed, Sample, Segment, StationId,
+    StationSet, Transfer, Turn, Word, WriteId, decode, encode,
 };
 
 fn moment(epoch: u64, cycle: u64) -> Moment {
@@ -96,6 +96,12 @@ fn every_kind() -> Vec<(&'static str, Frame)> {
         holdings: smallvec![holding(1)],
         recalled: vec![recalled(0), recalled(1)],
         lacks: ProgramSet::from_bits(0b10),
+        partial: vec![Partial {
+            program: ProgramId(0),
+            lineage: Lineage(6),
+            missing: 0b101,
+            waits: true,
+        }],
     };
     let transfer = Transfer {
         to: StationId(0),
@@ -105,7 +111,7 @@ fn every_kind() -> Vec<(&'static str, Frame)> {
         lineage: Lineage(8),
         stepped: moment(3, 4),
         digest: Digest(9),
-        state: image(7, 0b1001001),
+        state: Segment::single(&image(7, 0b1001001)),
     };
     let field = Field {
         sensors: image(6, 0b1010),
@@ -256,6 +262,7 @@ fn a_frame_that_breaks_a_promise_never_leaves() {
         holdings: smallvec![],
         recalled: vec![recalled(1), recalled(1)],
         lacks: ProgramSet::EMPTY,
+        partial: Vec::new(),
     };
     check_refused(station, Body::Join(twice));
 }
@@ -270,7 +277,9 @@ fn a_frame_past_the_bound_never_leaves() {
         lineage: Lineage(0),
         stepped: Moment::default(),
         digest: Digest(0),
-        state: Image::from_bits((0..understudy_wire::MAXIMUM_IMAGE_BITS).map(|_| true)),
+        state: Segment::single(&Image::from_bits(
+            (0..understudy_wire::MAXIMUM_IMAGE_BITS).map(|_| true),
+        )),
     };
     let widest = frame(Member::Station(StationId(0)), Body::Transfer(transfer));
     let bytes = bytes_of(&widest);

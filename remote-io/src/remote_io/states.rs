@@ -206,6 +206,7 @@ impl Bench {
             holdings: held.into_iter().collect(),
             recalled: vec![recalled],
             lacks: ProgramSet::EMPTY,
+            partial: Vec::new(),
         })
     }
 

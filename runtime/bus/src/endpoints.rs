@@ -202,7 +202,12 @@ mod tests {
     #[test]
     fn a_stranger_and_a_shared_address_are_refused() {
         let stranger = Member::Station(StationId(9));
-        let refused = Endpoints::new(ClusterHash(1), stranger, cell(), Roster::new(2, 3, Vec::new()));
+        let refused = Endpoints::new(
+            ClusterHash(1),
+            stranger,
+            cell(),
+            Roster::new(2, 3, Vec::new()),
+        );
         assert!(matches!(refused, Err(BusError::NoAddress { .. })));
         let mut members = cell();
         members[1].address = members[4].address;

@@ -3,7 +3,9 @@
 //! The bounds are those of the layout at its longest: an integer takes at most 9 bytes, and a frame has a header besides.
 
 use understudy_text::Diagnostic;
-use understudy_wire::{MAXIMUM_FRAME_BYTES, MAXIMUM_IMAGE_BITS, MAXIMUM_SESSIONS};
+use understudy_wire::{
+    MAXIMUM_FRAME_BYTES, MAXIMUM_IMAGE_BITS, MAXIMUM_SESSIONS, MAXIMUM_STATE_BITS,
+};
 
 use super::Member;
 use crate::cluster::RemoteIo;
@@ -27,11 +29,6 @@ fn image_bytes(bits: usize) -> usize {
 /// A sample: the inputs of each cycle of its history.
 fn sample_bytes(inputs: usize, history: usize, has_operator_inputs: bool) -> usize {
     FRAME_BYTES + history * image_bytes(inputs) + usize::from(has_operator_inputs) * WRITES_BYTES
-}
-
-/// A transfer: one state.
-fn transfer_bytes(registers: usize) -> usize {
-    FRAME_BYTES + image_bytes(registers)
 }
 
 /// The turn of an understudy: a word for each program that is silent, one for the rest, all that it holds, and the last inputs of
@@ -70,7 +67,6 @@ pub(crate) fn check(
             continue;
         };
         let inputs = interface.inputs.width();
-        let registers = code.state_bits();
         let outputs = interface.outputs.width();
         widest = widest.max(outputs);
         widest_inputs = widest_inputs.max(inputs);
@@ -94,11 +90,6 @@ pub(crate) fn check(
             sample_bytes(inputs, history as usize, has_operator_inputs(index)),
             "a smaller `history` makes samples shorter",
         );
-        report(
-            format!("{registers} state bits"),
-            transfer_bytes(registers),
-            "divide the program: memory, timers and counters are state bits",
-        );
     }
     let bytes = turn_bytes(members.len(), written, widest_inputs, widest);
     if bytes > MAXIMUM_FRAME_BYTES {
@@ -114,15 +105,13 @@ pub(crate) fn check(
 pub(crate) fn too_wide(name: &str, code: &Code) -> Option<String> {
     let interface = code.interface();
     let widths = [
-        ("inputs", interface.inputs.width()),
-        ("state bits", code.state_bits()),
-        ("outputs", interface.outputs.width()),
+        ("inputs", interface.inputs.width(), MAXIMUM_IMAGE_BITS),
+        ("state bits", code.state_bits(), MAXIMUM_STATE_BITS),
+        ("outputs", interface.outputs.width(), MAXIMUM_IMAGE_BITS),
     ];
     let mut widths = widths.into_iter();
-    let (what, bits) = widths.find(|(_, bits)| *bits > MAXIMUM_IMAGE_BITS)?;
-    Some(format!(
-        "`{name}` has {bits} {what}; there may be {MAXIMUM_IMAGE_BITS}"
-    ))
+    let (what, bits, most) = widths.find(|(_, bits, most)| bits > most)?;
+    Some(format!("`{name}` has {bits} {what}; there may be {most}"))
 }
 
 #[cfg(test)]
@@ -130,8 +119,8 @@ mod tests {
     use smallvec::SmallVec;
     use understudy_wire::{
         Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
-        Lineage, MAXIMUM_HISTORY, Member, Moment, ProgramHash, ProgramId, ProgramSet, Recalled,
-        Sample, StationId, StationSet, Transfer, Turn, Word, WriteId, encode,
+        Lineage, MAXIMUM_HISTORY, Member, Moment, ProgramId, ProgramSet, Recalled, Sample,
+        StationId, StationSet, Turn, Word, WriteId, encode,
     };
 
     use super::*;
@@ -187,18 +176,7 @@ mod tests {
                 let bound = sample_bytes(bits, history, true);
                 check_body(Member::RemoteIo(ProgramId(63)), Body::Sample(sample), bound);
             }
-            let transfer = Transfer {
-                to: StationId(63),
-                program: ProgramId(63),
-                hash: ProgramHash(u64::MAX),
-                born: LATE,
-                lineage: Lineage(u64::MAX),
-                stepped: LATE,
-                digest: Digest(u64::MAX),
-                state: ones(bits),
-            };
             let station = Member::Station(StationId(63));
-            check_body(station, Body::Transfer(transfer), transfer_bytes(bits));
             for programs in [1, 2, 63] {
                 let holding = |program| Holding {
                     program: ProgramId(program),
@@ -241,8 +219,5 @@ mod tests {
                 );
             }
         }
-        let widest = MAXIMUM_IMAGE_BITS;
-        assert!(transfer_bytes(widest) <= MAXIMUM_FRAME_BYTES);
-        assert!(transfer_bytes(4 * widest) > MAXIMUM_FRAME_BYTES);
     }
 }

@@ -256,10 +256,10 @@ fn more_than_there_may_be() {
     let loaded = load(&cluster, &[("press.ladder", PRESS), ("wide.ladder", &wide)]);
     assert!(loaded.cluster.is_none());
     insta::assert_snapshot!(findings(&loaded.reports));
-    // A counter or a memory bit is a state bit; so is each of these latches, in a controller and in a plant.
+    // In a controller and in a plant.
     let mut states = "program states\ninput there\noutput go\n".to_owned();
     for index in 0..=65_536 {
-        states += &format!("memory m{index}\n");
+        states += &format!("output m{index}\n");
     }
     states += "rung there";
     for index in 0..=65_536 {
