@@ -83,7 +83,6 @@ export async function until(what, expression) {
 }
 
 export async function picture(name) {
-  await evaluate("(() => { document.getElementById('toast')?.hidePopover?.(); })()");
   const { data } = await call("Page.captureScreenshot", { format: "png" });
   writeFileSync(join(pictures, `${name}.png`), Buffer.from(data, "base64"));
 }

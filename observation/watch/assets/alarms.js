@@ -1,14 +1,15 @@
 // Alarms: what each says, and what an operator does with it.
 
-import { act, tell } from "/ask.js";
+import { act, tell, toast } from "/ask.js";
 import { el, keyed, setText } from "/element.js";
-import { owner } from "/commands.js";
+import { complete, nameField, owner, reasonField } from "/who.js";
 
 const SHELVE_MINUTES = 60;
 
 export function card() {
   return el("section", { class: "card", "aria-labelledby": "alarms-title" },
     el("h2", { id: "alarms-title" }, "Alarms"),
+    el("p", { id: "alarm-who", class: "who" }, el("label", {}, "Your name ", nameField("alarm-owner"))),
     el("ul", { id: "alarm-list", class: "plain" }), el("p", { id: "no-alarm" }, "none"),
     el("div", { id: "signal-alarms", hidden: "" },
       el("h3", {}, "Alarms on signals"),
@@ -30,6 +31,7 @@ export function show(state) {
     line.querySelector("button").hidden = Boolean(by);
   });
   const alarms = state.process_alarms;
+  document.getElementById("alarm-who").hidden = alarms.length === 0 && state.alarms.every((alarm) => alarm.acknowledged);
   document.getElementById("signal-alarms").hidden = alarms.length === 0;
   keyed(document.querySelector("#signal-alarm-table tbody"), alarms, (alarm) => alarm.name, makeSignalAlarm, (row, alarm) => {
     const { shelved } = alarm;
@@ -40,8 +42,15 @@ export function show(state) {
   });
 }
 
+const hasName = () => complete(document.getElementById("alarm-owner"));
+
 function makeAlarm(alarm) {
-  const acknowledge = () => act(() => tell(`/api/alarms/${alarm.id}/acknowledge`, { owner: owner() }));
+  const acknowledge = () => act(async () => {
+    if (hasName()) {
+      await tell(`/api/alarms/${alarm.id}/acknowledge`, { owner: owner() });
+      toast(`✓ ${alarm.who}: alarm of cycle ${alarm.cycle} acknowledged, by ${owner()}`);
+    }
+  });
   return el("li", {}, el("span", { "aria-hidden": "true" }, "⚠ "), el("span", { class: "alarm-words" }), " ", el("span", { class: "alarm-by" }), " ",
     el("button", { type: "button", click: acknowledge }, "Acknowledge"));
 }
@@ -51,30 +60,33 @@ function makeSignalAlarm(alarm) {
   const row = el("tr", { "data-alarm": alarm.name },
     el("td", {}, alarm.name, ": ", alarm.text), el("td", {}, alarm.priority), el("td", { class: "alarm-state" }),
     el("td", {}, `${alarm.program}.${alarm.signal}`), el("td", {}, alarm.action ?? ""), el("td", {}, button));
-  button.addEventListener("click", () => (row.dataset.state === "shelved" ? unshelve(alarm.name) : ask(alarm.name, row)));
+  button.addEventListener("click", () => ask(alarm.name, row, row.dataset.state === "shelved"));
   return row;
 }
 
-const unshelve = (name) => act(() => tell("/api/alarms/unshelve", { name, owner: owner(), reason: "on the page" }));
-
-// Time and reason, in a row of the table.
-function ask(name, row) {
+// The reason, and for shelving the time, in a row of the table.
+function ask(name, row, ends) {
   if (row.querySelector("form")) {
     return;
   }
   const minutes = el("input", { type: "number", min: "1", max: "1440", value: String(SHELVE_MINUTES), required: "" });
-  const reason = el("input", { type: "text", maxlength: "120", required: "" });
+  const reason = reasonField();
   const close = () => form.remove();
-  const send = async (event) => {
+  const send = (event) => {
     event.preventDefault();
-    const body = { name, seconds: Math.round(Number(minutes.value) * 60), owner: owner(), reason: reason.value };
-    if (await act(() => tell("/api/alarms/shelve", body))) {
-      close();
+    if (hasName()) {
+      const body = { name, owner: owner(), reason: reason.value };
+      const done = ends ? tell("/api/alarms/unshelve", body) : tell("/api/alarms/shelve", { ...body, seconds: Math.round(Number(minutes.value) * 60) });
+      act(async () => {
+        await done;
+        close();
+        toast(`✓ ${name}: ${ends ? "shelving ended" : `shelved for ${minutes.value} min`}, by ${body.owner}`);
+      });
     }
   };
   const form = el("form", { class: "shelve", submit: send },
-    el("label", {}, "Minutes ", minutes), " ", el("label", {}, "Reason ", reason), " ",
-    el("button", { type: "submit" }, "Shelve"), " ", el("button", { type: "button", click: close }, "Cancel"));
+    ends ? null : [el("label", {}, "Minutes ", minutes), " "], el("label", {}, "Reason ", reason), " ",
+    el("button", { type: "submit" }, ends ? "End shelving" : "Shelve"), " ", el("button", { type: "button", click: close }, "Cancel"));
   row.lastElementChild.append(form);
   reason.focus();
 }

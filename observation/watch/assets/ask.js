@@ -25,21 +25,15 @@ async function answered(answer) {
   throw new Error(error ? `${error.message} (${error.code})` : `the page answered ${answer.status}`);
 }
 
-let hiding = 0;
+let fading = 0;
 
-// A sentence that goes away by itself.
+// Says what was done, or why not, in the line at the foot of the page. It stays there until the next one.
 export function toast(text) {
   const place = document.getElementById("toast");
-  place.textContent = text;
-  place.hidden = false;
-  // Above a dialog that is open.
-  place.hidePopover?.();
-  place.showPopover?.();
-  clearTimeout(hiding);
-  hiding = setTimeout(() => {
-    place.hidePopover?.();
-    place.hidden = true;
-  }, 8000);
+  place.textContent = `${new Date().toLocaleTimeString()} ${text}`;
+  place.dataset.fresh = "true";
+  clearTimeout(fading);
+  fading = setTimeout(() => { place.dataset.fresh = "false"; }, 8000);
 }
 
 // Runs an action and shows its error.
@@ -47,7 +41,7 @@ export async function act(work) {
   try {
     return await work();
   } catch (error) {
-    toast(error.message);
+    toast(`✗ ${error.message}`);
     return undefined;
   }
 }

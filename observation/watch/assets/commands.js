@@ -1,14 +1,11 @@
 // Commands to members. The reason is shown next to a button that is disabled.
 
-import { act, tell, toast } from "/ask.js";
+import { tell, toast } from "/ask.js";
 import { el, setText, valueText } from "/element.js";
 import { isLive, stale, state } from "/time.js";
+import { complete, nameField, owner, reasonField } from "/who.js";
 
 let run = null;
-
-export const owner = () => run?.person || localStorage.getItem("owner") || "operator";
-
-export const setOwner = (name) => localStorage.setItem("owner", name);
 
 export function prepare(facts) {
   run = facts;
@@ -33,23 +30,23 @@ export function obstacle(forbidden = run.commands.why) {
 const DOWN = "it is down";
 const UP = "it is running";
 
-// The actions, each with the reason why it is impossible now, if there is one.
+// The actions, each with the reason why it is impossible now, if there is one, and what is done by it.
 function actions(member) {
   const { down } = member;
   const still = member.state === "suspended";
   const all = [
-    ["kill", "Kill", "as kill -9", down ? DOWN : null],
-    ["restart", "Start again", "", down ? null : UP],
-    ["stop", "Suspend", "as SIGSTOP", down ? DOWN : still ? "it is suspended already" : null],
-    ["continue", "Resume", "as SIGCONT", down ? DOWN : still ? null : "it is not suspended"],
+    ["kill", "Kill", "as kill -9", down ? DOWN : null, "killed"],
+    ["restart", "Start again", "", down ? null : UP, "started again"],
+    ["stop", "Suspend", "as SIGSTOP", down ? DOWN : still ? "it is suspended already" : null, "suspended"],
+    ["continue", "Resume", "as SIGCONT", down ? DOWN : still ? null : "it is not suspended", "resumed"],
   ];
   if (member.kind !== "plant") {
     const cut = member.cut;
-    all.push(["isolate", "Cut off", "from all other members", cut ? "it is cut off already" : null]);
-    all.push(["rejoin", "Connect again", "", cut ? null : "it is not cut off"]);
+    all.push(["isolate", "Cut off", "from all other members", cut ? "it is cut off already" : null, "cut off from all other members"]);
+    all.push(["rejoin", "Connect again", "", cut ? null : "it is not cut off", "connected again"]);
   }
   if (member.kind === "remote-io") {
-    all.push(["release", "Release", "its outputs, and the stations that it excluded", down ? DOWN : null]);
+    all.push(["release", "Release", "its outputs, and the stations that it excluded", down ? DOWN : null, "released"]);
   }
   return all;
 }
@@ -62,27 +59,35 @@ function find(wanted) {
   return members.find((member) => member.kind === wanted.kind && member.program === wanted.program);
 }
 
-// Fields for owner and reason of a command to a member, and a function that gives it.
+// Fields for owner and reason of a command to a member, and a function that gives it and says what was done.
 function giver(member) {
   const dialog = document.getElementById("command");
-  const reason = el("input", { id: "command-reason", type: "text", maxlength: "120", value: "test", required: true });
-  const who = el("input", { id: "command-owner", type: "text", maxlength: "40", value: owner(), required: true, disabled: Boolean(run.person) });
-  const give = async (command) => {
-    setOwner(who.value);
-    const body = { member: member.name, command, owner: who.value, reason: reason.value };
-    const done = await act(() => tell("/api/command", body));
-    if (done) {
-      toast(`${member.name}: command done`);
-      dialog.close();
+  const who = nameField("command-owner");
+  const reason = reasonField("command-reason");
+  const answer = el("p", { id: "command-answer", class: "bad", role: "alert" });
+  let busy = false;
+  const give = async (command, done) => {
+    if (busy || !complete(who, reason)) {
+      return;
     }
+    busy = true;
+    setText(answer, "");
+    try {
+      await tell("/api/command", { member: member.name, command, owner: owner(), reason: reason.value });
+      dialog.close();
+      toast(`✓ ${member.name}: ${done}, by ${owner()} at cycle ${state().newest}`);
+    } catch (error) {
+      setText(answer, `✗ ${error.message}`);
+    }
+    busy = false;
   };
-  const asked = el("p", { class: "who" }, el("label", {}, "Name ", who), " ", el("label", {}, "Reason ", reason));
+  const asked = [el("p", { class: "who" }, el("label", {}, "Your name ", who), " ", el("label", {}, "Reason ", reason)), answer];
   return { asked, give };
 }
 
 function open(content) {
   const dialog = document.getElementById("command");
-  dialog.replaceChildren(...content.filter(Boolean));
+  dialog.replaceChildren(...content.flat().filter(Boolean));
   dialog.showModal();
 }
 
@@ -93,10 +98,10 @@ export function openMember(wanted, signal) {
   }
   const because = obstacle();
   const { asked, give } = giver(member);
-  const button = ([name, words, meaning, why]) => {
+  const button = ([name, words, meaning, why, done]) => {
     const reasonWhy = because ?? run.commands.impossible[name] ?? why;
     return el("li", {},
-      el("button", { type: "button", disabled: Boolean(reasonWhy), "data-command": name, click: () => give({ command: name }) }, words),
+      el("button", { type: "button", disabled: Boolean(reasonWhy), "data-command": name, click: () => give({ command: name }, done) }, words),
       " ", el("span", { class: "soft" }, reasonWhy ? `cannot: ${reasonWhy}` : meaning));
   };
   open([
@@ -106,7 +111,7 @@ export function openMember(wanted, signal) {
     asked,
     el("ul", { class: "plain actions" }, actions(member).map(button)),
     member.kind === "remote-io" ? forcing(member, signal, because, give) : null,
-    el("form", { method: "dialog" }, el("button", { type: "submit", autofocus: true }, "Close")),
+    el("form", { method: "dialog" }, el("button", { type: "submit" }, "Close")),
   ]);
 }
 
@@ -133,8 +138,8 @@ export function openChoice(name, which) {
     el("p", {}, `${warning} Compare the state of the plant with the program first.`),
     because ? el("p", { class: "obstacle" }, `cannot: ${because}`) : null,
     asked,
-    el("p", {}, el("button", { type: "button", id: "confirm-choice", disabled: Boolean(because), click: () => give(command) }, cold ? "Start cold" : "Continue")),
-    el("form", { method: "dialog" }, el("button", { type: "submit", autofocus: true }, "Cancel")),
+    el("p", {}, el("button", { type: "button", id: "confirm-choice", disabled: Boolean(because), click: () => give(command, cold ? "cold start" : `continues from cycle ${lost.newest}`) }, cold ? "Start cold" : "Continue")),
+    el("form", { method: "dialog" }, el("button", { type: "submit" }, "Cancel")),
   ]);
 }
 
@@ -157,7 +162,11 @@ function forcing(member, signal, because, give) {
     return { [kind]: point.bit };
   };
   const down = because ?? (member.down ? DOWN : null);
-  const force = el("button", { type: "button", "data-command": "force", click: () => give({ command: "force", signal: place(), value: number.hidden ? bit.value : number.value, seconds: Number(seconds.value) }) }, "Force");
+  const force = el("button", { type: "button", "data-command": "force", click: () => {
+    const { kind, point } = chosen();
+    const value = number.hidden ? bit.value : number.value;
+    give({ command: "force", signal: place(), value, seconds: Number(seconds.value) }, `${kind} ${point.name} forced to ${value} for ${seconds.value} s`);
+  } }, "Force");
   const fit = () => {
     const { point } = chosen();
     number.hidden = point.type === "BOOL";
@@ -170,7 +179,7 @@ function forcing(member, signal, because, give) {
   const nameOf = (held) => facts[`${held.kind}s`][held.index]?.name ?? `at bit ${held.bit}`;
   const held = forces.map((force) =>
     el("li", {}, `${force.kind} ${nameOf(force)} = ${valueText(force.value)}, by ${force.owner}: ${force.reason} `,
-      el("button", { type: "button", disabled: Boolean(down), "data-command": "unforce", click: () => give({ command: "unforce", signal: { [force.kind]: force.bit } }) }, "Take back")));
+      el("button", { type: "button", disabled: Boolean(down), "data-command": "unforce", click: () => give({ command: "unforce", signal: { [force.kind]: force.bit } }, `force of ${force.kind} ${nameOf(force)} taken back`) }, "Take back")));
   return el("fieldset", {},
     el("legend", {}, "Force a signal"),
     el("label", {}, "Signal ", which), " ", el("span", { class: "force-value" }, "Value ", bit, number, " ", type), " ", el("label", {}, "for seconds ", seconds), " ",

@@ -1,7 +1,8 @@
 // A program as a ladder with the power flow of the shown cycle, or as text with the values after its scan; for an understudy its parity words, with the outputs of their masks.
 
+import { changed } from "/address.js";
 import { act, ask } from "/ask.js";
-import { el, keyed, setAttribute, setText, valueText } from "/element.js";
+import { el, keyed, setAttribute, setText, svg, valueText } from "/element.js";
 import { cycleParameter, isLive, state } from "/time.js";
 import { ladderLegend } from "/legend.js";
 import { openWhy } from "/why.js";
@@ -10,6 +11,11 @@ let run = null;
 let program = 0;
 let find = "";
 let names = "symbols";
+// Pages of rungs; a rung that was asked for is shown once.
+let page = 0;
+let pages = 1;
+let rung = null;
+let later = 0;
 let asking = false;
 let wanted = false;
 let shown = "";
@@ -28,14 +34,20 @@ export function prepare(facts) {
   id("view-ladder").append(
     el("div", { class: "tools" },
       el("label", {}, "Program ", el("select", { id: "ladder-program", change: choose }, programs, sums)),
-      el("label", {}, "Find ", el("input", { id: "ladder-find", type: "search", input: (event) => { find = event.target.value.trim(); refresh(true); } })),
-      el("label", {}, "Names ", el("select", { id: "ladder-names", change: (event) => { names = event.target.value; refresh(true); } },
+      el("label", {}, "Find ", el("input", { id: "ladder-find", type: "search", input: (event) => look(event.target.value.trim()) })),
+      el("label", {}, "Names ", el("select", { id: "ladder-names", change: (event) => { names = event.target.value; chosen(); } },
         el("option", { value: "symbols" }, "symbols"), el("option", { value: "addresses" }, "addresses"))),
       el("label", {}, "Palette ", el("select", { id: "ladder-palette", change: (event) => palette(event.target.value) },
         el("option", { value: "understudy" }, "Understudy"), el("option", { value: "codesys" }, "CODESYS"), el("option", { value: "tia" }, "TIA"))),
     ),
     el("p", { id: "ladder-stamp", class: "stamp", role: "status" }),
+    el("p", { id: "ladder-forced", class: "bad", role: "status", hidden: true }),
     el("div", { id: "ladder-legend" }, ladderLegend()),
+    el("nav", { id: "ladder-pages", class: "tools", "aria-label": "Pages of rungs", hidden: true },
+      el("button", { id: "page-back", type: "button", click: () => turn(-1) }, "◀ Page"),
+      el("span", { id: "page-words", role: "status" }),
+      el("button", { id: "page-on", type: "button", click: () => turn(1) }, "Page ▶"),
+      el("label", {}, "Go to rung ", el("input", { id: "ladder-rung", type: "number", min: "1", step: "1", change: (event) => goToRung(Number(event.target.value)) }))),
     el("div", { class: "ladder-columns" },
       el("div", { id: "ladder-picture", class: "wide", tabindex: "0", role: "region", "aria-label": "Ladder" }),
       el("section", { id: "ladder-cross", class: "card", "aria-label": "Cross-reference" })),
@@ -50,22 +62,68 @@ function palette(name) {
   document.documentElement.dataset.palette = name;
 }
 
-// `#ladder/PROGRAM/SIGNAL` opens a program, and finds a signal in it.
-export function enter([number, signal]) {
-  if (number !== undefined) {
-    program = Math.min(Number(number) || 0, run.programs.length - 1);
-    find = signal ?? "";
-    id("ladder-program").value = String(program);
-    id("ladder-find").value = find;
-  }
+// What is chosen, as an address has it.
+export function selection() {
+  return { program, find, names: names === "symbols" ? "" : names, page: page > 0 ? page + 1 : "" };
+}
+
+// Takes a choice from an address: `program` is the number of a program, or the name of an understudy.
+export function select(wanted) {
+  const options = [...id("ladder-program").options].map((option) => option.value);
+  const name = wanted.program ?? "0";
+  const value = [name, `sum ${name}`].find((known) => options.includes(known)) ?? options[0];
+  id("ladder-program").value = value;
+  program = programOf(value);
+  find = wanted.find ?? "";
+  id("ladder-find").value = find;
+  names = wanted.names === "addresses" ? "addresses" : "symbols";
+  id("ladder-names").value = names;
+  page = Math.max(0, (Number(wanted.page) || 1) - 1);
+  rung = null;
+}
+
+export function enter() {
   cross();
   refresh(true);
 }
 
+const programOf = (value) => (value.startsWith("sum ") ? value.slice(4) : Number(value));
+
 function choose(event) {
-  const { value } = event.target;
-  program = value.startsWith("sum ") ? value.slice(4) : Number(value);
+  program = programOf(event.target.value);
+  page = 0;
+  rung = null;
   cross();
+  chosen();
+}
+
+function look(words) {
+  find = words;
+  id("ladder-find").value = words;
+  page = 0;
+  rung = null;
+  chosen();
+}
+
+function turn(by) {
+  page = Math.min(Math.max(page + by, 0), pages - 1);
+  rung = null;
+  id("ladder-picture").scrollTop = 0;
+  chosen();
+}
+
+// A rung that the search has not found is shown without the search.
+function goToRung(number) {
+  if (Number.isInteger(number) && number > 0) {
+    find = "";
+    id("ladder-find").value = "";
+    rung = number;
+    chosen();
+  }
+}
+
+function chosen() {
+  changed();
   refresh(true);
 }
 
@@ -75,7 +133,17 @@ export function show() {
 
 async function refresh(now) {
   wanted = true;
-  if (asking || (!now && isLive() && performance.now() - last < PAUSE)) {
+  if (asking || !state()) {
+    return;
+  }
+  const pause = !now && isLive() ? PAUSE - (performance.now() - last) : 0;
+  if (pause > 0) {
+    later ||= setTimeout(() => {
+      later = 0;
+      if (!id("view-ladder").hidden) {
+        refresh(true);
+      }
+    }, pause);
     return;
   }
   asking = true;
@@ -92,24 +160,91 @@ async function refresh(now) {
 }
 
 async function picture() {
-  const question = `/api/ladder/${program}?names=${names}&find=${encodeURIComponent(find)}&${cycleParameter()}`;
+  const place = rung === null ? `page=${page}` : `rung=${rung}`;
+  const question = `/api/ladder/${program}?names=${names}&find=${encodeURIComponent(find)}&${place}&${cycleParameter()}`;
   const answer = await act(() => ask(question));
   if (!answer || typeof program !== "number") {
     return;
   }
   setText(id("ladder-stamp"), answer.words);
   id("ladder-legend").hidden = Boolean(answer.lines);
+  const forced = forcesOf();
+  showForced(forced);
+  showPages(answer.rungs);
   if (answer.lines) {
-    showText(answer.lines);
-  } else if (answer.svg !== shown) {
-    shown = answer.svg;
+    showText(answer.lines, forced);
+    return;
+  }
+  const key = `${JSON.stringify(forced)}${answer.svg}`;
+  if (key !== shown) {
+    shown = key;
     // The server draws it from the program, and escapes every name.
     id("ladder-picture").innerHTML = answer.svg;
+    mark(forced);
+  }
+  if (rung !== null) {
+    const number = [...id("ladder-picture").querySelectorAll("text.soft")].find((label) => label.textContent === String(rung));
+    number?.scrollIntoView({ block: "start" });
+    rung = null;
+  }
+}
+
+function showPages(rungs) {
+  id("ladder-pages").hidden = !rungs || rungs.pages < 2;
+  if (!rungs) {
+    return;
+  }
+  if (page !== rungs.page) {
+    page = rungs.page;
+    changed();
+  }
+  pages = rungs.pages;
+  const [first, last] = rungs.shown ?? [0, 0];
+  setText(id("page-words"), `rungs ${first} to ${last} of ${rungs.count}, page ${page + 1} of ${pages}`);
+  id("page-back").disabled = page === 0;
+  id("page-on").disabled = page === pages - 1;
+  id("ladder-rung").max = rungs.count;
+}
+
+// The forced signals of the program in the shown cycle.
+function forcesOf() {
+  const facts = run.programs[program];
+  const forces = state().programs[program]?.forced ?? [];
+  return forces.flatMap(({ kind, index, value, owner, reason }) => {
+    const signal = facts[`${kind}s`][index];
+    return signal ? [{ name: signal.name, address: signal.address, words: `${kind} ${signal.name} = ${valueText(value)}, forced by ${owner}: ${reason}` }] : [];
+  });
+}
+
+function showForced(forced) {
+  const place = id("ladder-forced");
+  place.hidden = forced.length === 0;
+  setText(place, forced.length === 0 ? "" : `F: ${forced.map(({ words }) => words).join("; ")}`);
+}
+
+// The name on a label, without its meaning and its value.
+const nameOn = (label) => (label.firstChild?.nodeName === "title" ? label.childNodes[1] : label.firstChild)?.textContent;
+
+// A boxed F at each place of a forced signal.
+function mark(forced) {
+  for (const label of id("ladder-picture").querySelectorAll("text.name")) {
+    const name = nameOn(label);
+    const force = forced.find((force) => force.name === name || force.address === name);
+    if (!force) {
+      continue;
+    }
+    const left = Number(label.getAttribute("x")) + Number(label.getAttribute("textLength")) + 1;
+    const top = Number(label.getAttribute("y")) - 13;
+    label.classList.add("forced");
+    label.after(svg("g", { class: "forced-mark" },
+      svg("title", {}, force.words),
+      svg("rect", { x: left, y: top, width: 10, height: 12, rx: 2 }),
+      svg("text", { x: left + 5, y: top + 9.5, "text-anchor": "middle" }, "F")));
   }
 }
 
 // A line for each line of the text; what was not executed is pale, and values are to the right of the text.
-function showText(lines) {
+function showText(lines, forced) {
   if (shown !== "text" || !id("ladder-picture").querySelector("table.program-text")) {
     shown = "text";
     const head = el("tr", {}, ["line", "statement", "values after the scan"].map((text) => el("th", { scope: "col" }, text)));
@@ -128,7 +263,12 @@ function showText(lines) {
         line.values,
         ([name]) => name,
         ([name]) => el("button", { type: "button", class: "link", click: () => askWhy(name) }),
-        (button, [name, value]) => setText(button, `${name} = ${typeof value === "boolean" ? String(value).toUpperCase() : valueText(value)}`),
+        (button, [name, value]) => {
+          const force = forced.find((force) => force.name.toLowerCase() === name.toLowerCase());
+          setText(button, `${name} = ${typeof value === "boolean" ? String(value).toUpperCase() : valueText(value)}${force ? " F" : ""}`);
+          button.classList.toggle("forced", Boolean(force));
+          setAttribute(button, "title", force?.words ?? "");
+        },
       );
     },
   );
@@ -145,7 +285,7 @@ function pick(event) {
   if (!label || typeof program !== "number") {
     return;
   }
-  const name = label.firstChild?.nodeName === "title" ? label.childNodes[1]?.textContent : label.firstChild?.textContent;
+  const name = nameOn(label);
   const { outputs } = run.programs[program];
   const index = outputs.findIndex((output) => output.name === name || output.address === name);
   if (index >= 0) {
@@ -165,10 +305,11 @@ async function cross() {
   if (!answer) {
     return;
   }
-  const rungs = (list) => list.map((rung) => rung + 1).join(", ");
+  const numbers = (list) => list.map((place) => String(place + 1));
+  const rungs = (list) => (answer.place === "rung" ? numbers(list).flatMap((number) => [el("button", { class: "link", type: "button", "aria-label": `Rung ${number}`, click: () => goToRung(Number(number)) }, number), " "]) : numbers(list).join(", "));
   const row = (signal) =>
     el("tr", {},
-      el("th", { scope: "row" }, el("button", { class: "link", type: "button", click: () => { find = signal.name; id("ladder-find").value = find; refresh(true); } }, signal.name)),
+      el("th", { scope: "row" }, el("button", { class: "link", type: "button", click: () => look(signal.name) }, signal.name)),
       el("td", {}, signal.address ?? ""), el("td", {}, rungs(signal.written)), el("td", {}, rungs(signal.read)), el("td", { class: "soft" }, signal.comment ?? ""));
   const head = ["signal", "address", `written in ${answer.place}`, `read in ${answer.place}`, "meaning"];
   place.replaceChildren(el("h2", {}, "Cross-reference"),
@@ -181,6 +322,8 @@ const sumOf = (word) => word.mask.join(" ⊕ ");
 // y(N+1), element by element, with the outputs that it is the sum of.
 function sum() {
   const now = state();
+  showForced([]);
+  showPages(null);
   const members = run.programs;
   const station = now.members.find((member) => member.name === program);
   const width = Math.max(...members.map((item) => item.outputs.length));

@@ -3,8 +3,9 @@
 
 import { tell } from "/ask.js";
 import { el, setAttribute, setText, valueText } from "/element.js";
-import { obstacle, owner, setOwner } from "/commands.js";
+import { obstacle } from "/commands.js";
 import { makeReads } from "/reads.js";
+import { complete, nameField, owner, reasonField } from "/who.js";
 
 let run = null;
 let reads = null;
@@ -18,12 +19,12 @@ export function prepare(facts) {
   run = facts;
   const place = id("view-operate");
   panels = run.programs.filter((program) => program.inputs.some((input) => input.operator)).map(makePanel);
-  const name = el("input", { id: "operate-owner", type: "text", maxlength: "40", value: owner(), disabled: Boolean(run.person), change: (event) => setOwner(event.target.value) });
-  const reason = el("input", { id: "operate-reason", type: "text", maxlength: "120", value: "from the page" });
+  const name = nameField("operate-owner");
+  const reason = reasonField("operate-reason");
   place.append(el("p", { id: "operate-obstacle", class: "obstacle", role: "status", hidden: true }));
   if (panels.length > 0) {
     place.append(
-      el("p", { class: "who" }, el("label", {}, "Name ", name), " ", el("label", {}, "Reason ", reason)),
+      el("p", { class: "who" }, el("label", {}, "Your name ", name), " ", el("label", {}, "Reason ", reason)),
       el("div", { class: "cards" }, panels.map((panel) => panel.element)));
   }
   reads = makeReads(run);
@@ -100,7 +101,7 @@ function makeControl(program, input, index) {
     say("busy", "… write under way");
     refresh();
     try {
-      const body = { member: program.remote_io, command: { command: "write", input: input.name, value: text }, owner: id("operate-owner").value, reason: id("operate-reason").value };
+      const body = { member: program.remote_io, command: { command: "write", input: input.name, value: text }, owner: owner(), reason: id("operate-reason").value };
       const done = await tell("/api/command", body);
       const cycle = done.run_cycle ?? done.cycle;
       say("done", `✓ ${kind === "pulse" ? "" : `${wordsOf(input, text)} `}in effect since cycle ${cycle}`);
@@ -113,6 +114,10 @@ function makeControl(program, input, index) {
   };
   const write = (text) => {
     if (parts.busy) {
+      return;
+    }
+    if (!complete(id("operate-owner"), id("operate-reason"))) {
+      say("refused", "✗ not written: enter your name and the reason above");
       return;
     }
     if (!confirm) {

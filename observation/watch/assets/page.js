@@ -1,27 +1,31 @@
-// The page: its views and its head.
+// The page: its views, its head and its address.
 
+import * as address from "/address.js";
 import { act, ask, tell, toast } from "/ask.js";
 import { setText } from "/element.js";
+import * as kept from "/kept.js";
+import * as signals from "/signals.js";
 import * as time from "/time.js";
 import * as cluster from "/cluster.js";
 import * as operate from "/operate.js";
 import * as ladder from "/ladder.js";
+import * as watch from "/values.js";
 import * as trends from "/trends.js";
 import * as events from "/events.js";
 import * as compare from "/compare.js";
 import * as commands from "/commands.js";
 import * as tour from "/tour.js";
+import * as who from "/who.js";
 import * as why from "/why.js";
 
-const VIEWS = { cluster, operate, ladder, trends, events, compare };
+const VIEWS = { cluster, operate, ladder, watch, trends, events, compare };
 
-function currentView() {
-  const name = location.hash.slice(1).split("/")[0];
-  return name in VIEWS ? name : "cluster";
-}
+let current = "cluster";
 
-function showView() {
-  const current = currentView();
+// Shows what the address asks for. A view is given a selection only where the address has one.
+function showWanted() {
+  const { view, cycle, reason, selection } = address.wanted();
+  current = view in VIEWS ? view : "cluster";
   for (const name of Object.keys(VIEWS)) {
     document.getElementById(`view-${name}`).hidden = name !== current;
     const tab = document.getElementById(`tab-${name}`);
@@ -31,10 +35,32 @@ function showView() {
       tab.removeAttribute("aria-current");
     }
   }
-  VIEWS[current].enter?.(location.hash.split("/").slice(1).map(decodeURIComponent));
+  if (cycle === "live") {
+    time.goLive();
+  } else if (cycle !== null) {
+    time.openAt(cycle);
+  }
+  if (Object.keys(selection).length > 0) {
+    VIEWS[current].select?.(selection);
+  }
+  VIEWS[current].enter?.();
+  if (reason) {
+    why.select(reason);
+  }
   if (time.state()) {
     VIEWS[current].show(time.state(), time.isLive());
   }
+  address.forget();
+}
+
+// The address of what is shown; nothing before there is anything.
+function shownAddress() {
+  const state = time.state();
+  if (!state) {
+    return "";
+  }
+  const cycle = time.isLive() ? "live" : state.cycle;
+  return address.addressOf(current, { cycle, ...VIEWS[current].selection?.(), why: why.shown() });
 }
 
 let period = 0;
@@ -94,6 +120,10 @@ async function begin() {
       location.assign("/login.html");
     }),
   );
+  kept.prepare(run);
+  signals.prepare(run);
+  who.prepare(run);
+  address.prepare(shownAddress);
   for (const part of [commands, why, ...Object.values(VIEWS)]) {
     part.prepare(run);
   }
@@ -102,13 +132,15 @@ async function begin() {
   time.onState((state, live) => {
     head(state, live);
     scenarioOver(state, run);
-    VIEWS[currentView()].show(state, live);
+    VIEWS[current].show(state, live);
+    why.show();
     showStale();
+    address.changed();
   });
   setInterval(showStale, 250);
   addEventListener("visibilitychange", showStale);
-  addEventListener("hashchange", showView);
-  showView();
+  addEventListener("hashchange", showWanted);
+  showWanted();
   tour.prepare(run);
   time.start(run);
 }

@@ -4,6 +4,8 @@
 // requested once, and late answers are dropped.
 
 import { act, ask } from "/ask.js";
+import { el, setText } from "/element.js";
+import { keep, kept } from "/kept.js";
 
 // Older values are stale: the server sends an event at least twice a second.
 const STALE_MS = 2000;
@@ -15,8 +17,19 @@ let newest = null;
 let shown = null;
 let wanted = null;
 let asking = false;
-let playing = 0;
 let range = null;
+
+// The cycle that an address asks for, before the first state has come.
+let opening = null;
+
+// A replay: where it began, when, and how fast.
+let playing = null;
+let period = 1;
+let speed = 1;
+const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 50];
+const TICK_MS = 40;
+// A replay of a live run that is started at its newest cycle begins so long before it.
+const BACK_MS = 10_000;
 
 // Of the last event from the server: when it came by two clocks, of which one may stand still and the other be set; what was read of the
 // journal, where it is being read; and how old the newest record was.
@@ -71,7 +84,7 @@ function show(next) {
   scrub.setAttribute("aria-valuetext", `cycle ${shown.cycle}`);
   const button = document.getElementById("live");
   button.setAttribute("aria-pressed", String(live));
-  button.textContent = shown.finished ? "End" : "Live";
+  setText(button, shown.finished ? "End" : "Live");
 }
 
 function take(next) {
@@ -83,10 +96,24 @@ function take(next) {
   range = [Math.min(0, next.oldest), next.newest];
   const status = document.getElementById("status");
   status.classList.remove("lost");
-  if (live) {
+  if (opening !== null) {
+    const cycle = opening;
+    opening = null;
+    goTo(cycle);
+  } else if (live) {
     show(next);
   } else {
     document.getElementById("scrub").max = next.newest;
+  }
+}
+
+// Shows a cycle as soon as it is known which there are.
+export function openAt(cycle) {
+  if (newest) {
+    goTo(cycle);
+  } else {
+    live = false;
+    opening = cycle;
   }
 }
 
@@ -94,17 +121,27 @@ export function goLive() {
   stop();
   live = true;
   wanted = null;
+  opening = null;
   if (newest) {
     show(newest);
   }
 }
 
+// Shows a cycle; a replay continues from there.
 export function goTo(cycle) {
+  const number = seek(cycle);
+  if (playing) {
+    playing = { ...playing, from: number, at: performance.now() };
+  }
+}
+
+function seek(cycle) {
   const [first, last] = range ?? [0, 0];
   const number = Math.min(Math.max(Math.round(Number(cycle)) || 0, first), last);
   live = false;
   wanted = number;
-  return fetchWanted();
+  fetchWanted();
+  return number;
 }
 
 async function fetchWanted() {
@@ -126,29 +163,51 @@ async function fetchWanted() {
 }
 
 function stop() {
-  clearInterval(playing);
-  playing = 0;
+  clearInterval(playing?.timer);
+  playing = null;
   document.getElementById("play").textContent = "Play";
 }
 
+// From the cycle that is shown. At its end a finished run begins again, and a live one is replayed from some seconds ago.
 function play() {
   if (playing) {
     stop();
     return;
   }
-  document.getElementById("play").textContent = "Pause";
-  if (live || shown?.cycle >= range?.[1]) {
-    goTo(range?.[0] ?? 0);
+  if (!range || !shown) {
+    return;
   }
-  playing = setInterval(() => {
-    if (shown && !asking) {
-      if (shown.cycle >= range[1]) {
-        stop();
-      } else {
-        goTo(shown.cycle + 1);
-      }
+  document.getElementById("play").textContent = "Pause";
+  const [first, last] = range;
+  const atEnd = live || shown.cycle >= last;
+  const back = shown.finished ? first : last - Math.round(BACK_MS / period);
+  const from = seek(atEnd ? back : (wanted ?? shown.cycle));
+  playing = { from, at: performance.now(), timer: setInterval(tick, TICK_MS) };
+}
+
+// By the clock: where the server is slower than the replay, cycles are left out.
+function tick() {
+  const cycle = playing.from + Math.floor(((performance.now() - playing.at) * speed) / period);
+  if (cycle < range[1]) {
+    if (cycle > (wanted ?? shown.cycle)) {
+      seek(cycle);
     }
-  }, 120);
+  } else if (shown.cycle < range[1]) {
+    seek(range[1]);
+  } else {
+    stop();
+    if (!newest.finished) {
+      goLive();
+    }
+  }
+}
+
+function choose(next) {
+  speed = next;
+  keep("speed", speed);
+  if (playing) {
+    playing = { ...playing, from: wanted ?? shown.cycle, at: performance.now() };
+  }
 }
 
 function step(by) {
@@ -157,12 +216,17 @@ function step(by) {
 }
 
 export function start(run) {
+  period = run.period_us / 1000;
+  const speeds = document.getElementById("speed");
+  speed = SPEEDS.find((known) => known === kept("speed")) ?? 1;
+  speeds.append(...SPEEDS.map((known) => el("option", { value: known, selected: known === speed }, `× ${known}`)));
   patience = Math.max(STALE_MS, (STALE_CYCLES * run.period_us) / 1000);
   const on = (id, event, work) => document.getElementById(id).addEventListener(event, work);
   on("live", "click", goLive);
   on("back", "click", () => step(-1));
   on("forth", "click", () => step(1));
   on("play", "click", play);
+  on("speed", "change", (event) => choose(Number(event.target.value)));
   on("scrub", "input", (event) => goTo(event.target.value));
   on("cycle", "change", (event) => goTo(event.target.value));
   addEventListener("keydown", (event) => {

@@ -1,39 +1,74 @@
 // Why an output has its value: the chain of contacts or statements that caused it; for a reconstructed output also its proof.
 
+import { addressOf, changed } from "/address.js";
 import { act, ask } from "/ask.js";
 import { el, valueText } from "/element.js";
 import { SOURCES } from "/sources.js";
 import { cycleParameter, goTo } from "/time.js";
 
+// What is shown, as an address has it: `PROGRAM/OUTPUT@CYCLE`.
+let open = null;
+let before = null;
+// What an address asks for, before the run is known.
+let wanted = null;
+
 export function prepare() {
   addEventListener("keydown", (event) => {
-    if (event.key === "Escape") {
-      document.getElementById("why").hidden = true;
+    if (event.key === "Escape" && open) {
+      hide();
     }
   });
 }
 
-export async function openWhy(program, output) {
-  const answer = await act(() => ask(`/api/why/${program}/${encodeURIComponent(output)}?${cycleParameter()}`));
+export const shown = () => open;
+
+export function select(text) {
+  wanted = text;
+}
+
+// Opens what an address asks for.
+export function show() {
+  const found = /^(\d+)\/(.+)@(-?\d+)$/.exec(wanted ?? "");
+  const isOpen = wanted === open;
+  wanted = null;
+  if (found && !isOpen) {
+    const [, program, output, cycle] = found;
+    explain(program, output, `cycle=${cycle}`, false);
+  }
+}
+
+function hide() {
+  document.getElementById("why").hidden = true;
+  open = null;
+  changed();
+  before?.focus?.();
+}
+
+export const openWhy = (program, output) => explain(program, output, cycleParameter(), true);
+
+async function explain(program, output, cycle, takesFocus) {
+  const answer = await act(() => ask(`/api/why/${program}/${encodeURIComponent(output)}?${cycle}`));
   if (!answer) {
     return;
   }
   const drawer = document.getElementById("why");
-  const before = document.activeElement;
-  const hide = () => {
-    drawer.hidden = true;
-    before?.focus?.();
-  };
+  open = `${program}/${output}@${answer.cycle}`;
+  changed();
+  if (takesFocus && !drawer.contains(document.activeElement)) {
+    before = document.activeElement;
+  }
   const close = el("button", { type: "button", click: hide }, "Close");
   drawer.replaceChildren(
     el("div", { class: "drawer-head" }, el("h2", {}, `Why is ${answer.signal} ${valueText(answer.value)}?`), close),
     el("p", { class: "soft" }, `${answer.program}, cycle ${answer.cycle}; remote I/O ${answer.remote_io}`),
     ...source(answer).map((line) => el("p", {}, line)),
     answer.because ? el("ul", { class: "cause" }, tree(answer.because)) : el("p", {}, "It is the configured fail-safe value: the program did not cause it."),
-    el("p", {}, el("a", { href: `#ladder/${program}/${encodeURIComponent(answer.signal)}`, click: () => (drawer.hidden = true) }, "Show it in the program")),
+    el("p", {}, el("a", { href: addressOf("ladder", { program, find: answer.signal }), click: hide }, "Show it in the program")),
   );
   drawer.hidden = false;
-  close.focus();
+  if (takesFocus) {
+    close.focus();
+  }
 }
 
 // Source of the value and its proof: equation (12) with its numbers.

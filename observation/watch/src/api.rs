@@ -3,10 +3,12 @@
 mod alarms;
 mod command;
 mod compare;
+mod events;
 mod facts;
 mod ladder;
 mod live;
 mod session;
+mod signals;
 mod trends;
 mod why;
 
@@ -35,13 +37,15 @@ pub(crate) fn router(app: Arc<App>) -> Router {
         .route("/api/run", get(facts::run))
         .route("/api/live", get(live::live))
         .route("/api/state", get(facts::state))
-        .route("/api/events", get(facts::events))
+        .route("/api/events", get(events::events))
         .route("/api/ladder/{program}", get(ladder::picture))
         .route(
             "/api/cross-reference/{program}",
             get(ladder::cross_reference),
         )
         .route("/api/why/{program}/{output}", get(why::why))
+        .route("/api/signals", get(signals::signals))
+        .route("/api/values", get(signals::values))
         .route("/api/trends", get(trends::trends))
         .route("/api/compare", get(compare::compare))
         .route(

@@ -174,21 +174,30 @@ impl Model {
 
     pub(crate) fn trace_at(&self, history: &History, place: usize) -> Result<Trace, ViewError> {
         let sampled = self.sampled_at(history, place)?;
+        let interpreter = self.interpreter_of(history, place)?;
+        Ok(interpreter.trace(sampled.state.words(), sampled.inputs.words()))
+    }
+
+    /// The interpreter of a program with numbers.
+    pub(crate) fn interpreter_of(
+        &self,
+        history: &History,
+        place: usize,
+    ) -> Result<&Interpreter, ViewError> {
         let program = history.program();
         let interpreter = self.interpreters[program.index()].get_or_init(|| {
             let typed = self.cluster.controllers()[program.index()].code.typed()?;
             Some(Interpreter::new(typed))
         });
-        let interpreter = interpreter.as_ref().ok_or_else(|| ViewError::NoState {
+        interpreter.as_ref().ok_or_else(|| ViewError::NoState {
             cycle: history.steps()[place].cycle,
             program: self.program_name(program).to_owned(),
             reason: "only a program with numbers has statements".to_owned(),
-        })?;
-        Ok(interpreter.trace(sampled.state.words(), sampled.inputs.words()))
+        })
     }
 
     /// The sample of a step, where the state before it is known.
-    fn sampled_at<'h>(&self, history: &'h History, place: usize) -> Result<&'h Sampled, ViewError> {
+    pub(crate) fn sampled_at<'h>(&self, history: &'h History, place: usize) -> Result<&'h Sampled, ViewError> {
         let step = &history.steps()[place];
         step.sampled.as_ref().ok_or_else(|| {
             let missing = step.driven.as_ref().and_then(|driven| driven.missing);

@@ -1,4 +1,4 @@
-//! Facts of the run, its state in a cycle, and its events.
+//! Facts of the run, and its state in a cycle.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use serde_json::Value;
 use understudy_cluster::{Controller, OperatorDeclaration};
 use understudy_remote_io::{OperatorInput, OperatorInputKind};
 use understudy_typed::Points;
-use understudy_view::{Event, elementary};
+use understudy_view::elementary;
 use understudy_wire::{Member, ProgramId, Role};
 
 use super::Answered;
@@ -24,9 +24,6 @@ use crate::error::Problem;
 use crate::login::Person;
 use crate::model::{Known, Model};
 use crate::shown::{self, NOTHING};
-
-/// Events in one answer, at most.
-const MAXIMUM_EVENTS: usize = 1000;
 
 #[derive(Debug, Serialize)]
 pub(super) struct RunFacts {
@@ -300,64 +297,6 @@ pub(super) fn known(model: &Model) -> Answered<&Known> {
 
 fn not_begun(model: &Model) -> Problem {
     Problem::unrecorded(model.waits_for.clone())
-}
-
-#[derive(Debug, Deserialize)]
-pub(super) struct Wanted {
-    limit: Option<usize>,
-    #[serde(default)]
-    find: String,
-    until: Option<i64>,
-}
-
-#[derive(Debug, Serialize)]
-pub(super) struct Events {
-    /// The newest first.
-    events: Vec<ShownEvent>,
-}
-
-#[derive(Debug, Serialize)]
-struct ShownEvent {
-    id: u64,
-    cycle: i64,
-    who: String,
-    kind: &'static str,
-    level: &'static str,
-    what: String,
-    cause: Option<String>,
-}
-
-pub(super) async fn events(
-    State(app): State<Arc<App>>,
-    wanted: Result<Query<Wanted>, QueryRejection>,
-) -> Answered<Json<Events>> {
-    let Query(wanted) = wanted?;
-    let find = wanted.find.to_lowercase();
-    let model = app.model();
-    let known = known(&model)?;
-    let mentions = |event: &Event| {
-        let texts = [&event.name, &event.text];
-        let texts = texts.into_iter().chain(&event.cause);
-        let mut texts = texts.map(|text| text.to_lowercase());
-        texts.any(|text| text.contains(&find)) || event.event.contains(&find)
-    };
-    let events = known.run.events().rev();
-    let events = events
-        .filter(|event| wanted.until.is_none_or(|until| event.cycle <= until + 1))
-        .filter(|event| find.is_empty() || mentions(event))
-        .take(wanted.limit.unwrap_or(200).min(MAXIMUM_EVENTS))
-        .map(|event| ShownEvent {
-            id: event.number,
-            cycle: event.cycle,
-            who: event.name.clone(),
-            kind: event.event,
-            level: event.level.word(),
-            what: event.text.clone(),
-            cause: event.cause.clone(),
-        });
-    Ok(Json(Events {
-        events: events.collect(),
-    }))
 }
 
 #[cfg(test)]

@@ -20,8 +20,8 @@ use crate::model::Known;
 use crate::renamed::by_address;
 use crate::shown;
 
-/// Rungs in one picture, at most.
-const MAXIMUM_RUNGS: usize = 60;
+/// Rungs on one page, at most.
+const RUNGS_ON_A_PAGE: usize = 40;
 
 #[derive(Debug, Deserialize)]
 pub(super) struct Wanted {
@@ -30,6 +30,11 @@ pub(super) struct Wanted {
     names: Names,
     #[serde(default)]
     find: String,
+    /// Of the rungs that were found, from 0; the last one where there are fewer.
+    #[serde(default)]
+    page: usize,
+    /// The page with this rung, from 1, in place of `page`.
+    rung: Option<usize>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
@@ -47,8 +52,41 @@ pub(super) struct Picture {
     words: String,
     /// Empty for a program with numbers.
     svg: String,
+    /// Nothing for a program with numbers.
+    rungs: Option<Rungs>,
     /// The text of a program with numbers, in place of a drawing.
     lines: Option<Vec<ShownLine>>,
+}
+
+/// Which rungs a picture shows.
+#[derive(Debug, Serialize)]
+struct Rungs {
+    page: usize,
+    pages: usize,
+    /// Rungs of the program.
+    count: usize,
+    found: usize,
+    /// Numbers of the first and the last rung on the page.
+    shown: Option<(usize, usize)>,
+}
+
+/// The page of the found rungs that is wanted.
+fn page<'r>(found: &'r [usize], count: usize, wanted: &Wanted) -> (Rungs, &'r [usize]) {
+    let pages = found.len().div_ceil(RUNGS_ON_A_PAGE).max(1);
+    let of_rung = wanted.rung.map(|rung| {
+        let before = found.partition_point(|&place| place + 1 < rung);
+        before / RUNGS_ON_A_PAGE
+    });
+    let page = of_rung.unwrap_or(wanted.page).min(pages - 1);
+    let own = found.chunks(RUNGS_ON_A_PAGE).nth(page).unwrap_or_default();
+    let rungs = Rungs {
+        page,
+        pages,
+        count,
+        found: found.len(),
+        shown: own.first().zip(own.last()).map(|(first, last)| (first + 1, last + 1)),
+    };
+    (rungs, own)
 }
 
 pub(super) async fn picture(
@@ -82,8 +120,8 @@ fn draw(known: &Known, program: ProgramId, cycle: i64, wanted: &Wanted) -> Answe
         return Ok(text(known, program, cycle, wanted.find.trim()));
     };
     let evaluation = known.run.evaluation(program, cycle);
-    let rungs: Vec<usize> = found(ladder, wanted.find.trim()).collect();
-    let shown = &rungs[..rungs.len().min(MAXIMUM_RUNGS)];
+    let found: Vec<usize> = found(ladder, wanted.find.trim()).collect();
+    let (rungs, shown) = page(&found, ladder.rungs.len(), wanted);
     let flow = evaluation.as_ref().ok();
     let svg = match wanted.names {
         Names::Symbols => draw_svg_rungs(ladder, shown, flow),
@@ -101,13 +139,14 @@ fn draw(known: &Known, program: ProgramId, cycle: i64, wanted: &Wanted) -> Answe
         (Err(error), _) => words += &format!(": without power flow: {}", error.words()),
         (Ok(_), None) => {}
     }
-    if shown.len() < ladder.rungs.len() {
-        words += &format!("; {} of {} rungs", shown.len(), ladder.rungs.len());
+    if rungs.found < rungs.count {
+        words += &format!("; {} of {} rungs", rungs.found, rungs.count);
     }
     Ok(Picture {
         cycle,
         words,
         svg: without_style(&svg),
+        rungs: Some(rungs),
         lines: None,
     })
 }
@@ -133,6 +172,7 @@ fn text(known: &Known, program: ProgramId, cycle: i64, find: &str) -> Picture {
         cycle,
         words,
         svg: String::new(),
+        rungs: None,
         lines: Some(lines),
     }
 }
@@ -262,6 +302,41 @@ fn note(rungs: &mut BTreeMap<String, Vec<usize>>, names: Vec<String>, place: usi
         let of_name = rungs.entry(name).or_default();
         if of_name.last() != Some(&place) {
             of_name.push(place);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_found_rung_is_on_one_page() {
+        for length in [0, 1, 39, 40, 41, 80, 200] {
+            // Every third rung was found.
+            let found: Vec<usize> = (0..length).map(|place| place * 3).collect();
+            let of = |page, rung| Wanted {
+                cycle: None,
+                names: Names::Symbols,
+                find: String::new(),
+                page,
+                rung,
+            };
+            let (first, _) = page(&found, length * 3, &of(0, None));
+            let all = (0..first.pages).flat_map(|number| {
+                let (rungs, own) = page(&found, length * 3, &of(number, None));
+                assert_eq!(rungs.page, number);
+                assert!(own.len() <= RUNGS_ON_A_PAGE);
+                own.to_vec()
+            });
+            assert_eq!(all.collect::<Vec<_>>(), found);
+            for &place in &found {
+                let (_, own) = page(&found, length * 3, &of(0, Some(place + 1)));
+                assert!(own.contains(&place), "rung {}", place + 1);
+            }
+            // One behind the last is the last page.
+            let (last, _) = page(&found, length * 3, &of(99, Some(usize::MAX)));
+            assert_eq!(last.page, last.pages - 1);
         }
     }
 }

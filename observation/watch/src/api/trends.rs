@@ -1,5 +1,6 @@
 //! Chosen signals over the cycles, with the source of each program's outputs and what was done to the cluster.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use axum::Json;
@@ -9,11 +10,12 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use understudy_journal::source_word;
 use understudy_typed::Point;
-use understudy_view::{Timeline, number_of};
+use understudy_view::{StateSignal, Timeline, number_of};
 use understudy_wire::{Image, ProgramId};
 
 use super::Answered;
 use super::facts::known;
+use super::signals::{Signal, Signals, identifiers};
 use crate::app::App;
 use crate::error::Problem;
 use crate::model::Known;
@@ -28,12 +30,15 @@ const MAXIMUM_CYCLES: i64 = 100_000;
 /// Changes of one signal, at most; what is older is left out.
 const MAXIMUM_CHANGES: usize = 20_000;
 
+/// Cycles of which the states of the programs are recomputed for one answer, at most: the newest.
+const MAXIMUM_SCANS: usize = 2000;
+
 /// Faults in one answer, at most.
 const MAXIMUM_FAULTS: usize = 200;
 
 #[derive(Debug, Deserialize)]
 pub(super) struct Wanted {
-    /// `PROGRAM.input.NUMBER` or `PROGRAM.output.NUMBER`, with commas between.
+    /// Identifiers with commas between.
     #[serde(default)]
     signals: String,
     from: i64,
@@ -81,19 +86,9 @@ pub(super) async fn trends(
             "from {from} to {to}: a trend has 1 to {MAXIMUM_CYCLES} cycles"
         )));
     }
-    let names: Vec<&str> = signals.split(',').filter(|name| !name.is_empty()).collect();
-    if names.len() > MAXIMUM_SIGNALS {
-        return Err(Problem::bad(format!(
-            "{} signals: at most {MAXIMUM_SIGNALS}",
-            names.len()
-        )));
-    }
+    let names = identifiers(&signals, MAXIMUM_SIGNALS)?;
     let model = app.model();
     let known = known(&model)?;
-    let signals = names.iter().map(|name| {
-        trend(known, name, from, to)
-            .ok_or_else(|| Problem::unknown(format!("the run has no signal {name:.60}")))
-    });
     let sources = known
         .run
         .program_ids()
@@ -105,7 +100,7 @@ pub(super) async fn trends(
     Ok(Json(Trends {
         from,
         to,
-        signals: signals.collect::<Answered<_>>()?,
+        signals: trends_of(known, &names, from, to)?,
         sources: sources.collect(),
         faults: faults
             .take(MAXIMUM_FAULTS)
@@ -117,23 +112,78 @@ pub(super) async fn trends(
     }))
 }
 
-fn trend(known: &Known, name: &str, from: i64, to: i64) -> Option<Trend> {
-    let mut parts = name.split('.');
-    let program = ProgramId(parts.next()?.parse().ok()?);
-    let kind = parts.next()?;
-    let index: usize = parts.next()?.parse().ok()?;
-    let controller = known.run.cluster().controllers().get(program.index())?;
-    let series = known.run.series();
-    let (points, timeline) = match kind {
-        "input" => (&controller.interface.inputs, series.inputs(program)?),
-        "output" => (&controller.interface.outputs, series.outputs(program)?),
-        _ => return None,
+fn trends_of(known: &Known, names: &[&str], from: i64, to: i64) -> Answered<Vec<Trend>> {
+    let mut signals = Signals::default();
+    let mut trends = Vec::new();
+    let mut of_states: BTreeMap<u8, (Vec<usize>, Vec<StateSignal>)> = BTreeMap::new();
+    for name in names {
+        let (program, signal) = signals.find(known, name)?;
+        let series = known.run.series();
+        let (label, runs) = match signal {
+            Signal::Input(point) => {
+                let timeline = series.inputs(program);
+                let runs = timeline.map(|timeline| runs(timeline, &point, from, to));
+                (point.name, runs.unwrap_or_default())
+            }
+            Signal::Output(point) => {
+                let timeline = series.outputs(program);
+                let runs = timeline.map(|timeline| runs(timeline, &point, from, to));
+                (point.name, runs.unwrap_or_default())
+            }
+            Signal::State(signal) => {
+                let own = of_states.entry(program.0).or_default();
+                let name = signal.name.clone();
+                own.0.push(trends.len());
+                own.1.push(signal);
+                (name, Vec::new())
+            }
+        };
+        let name = format!("{}.{label}", shown::program_name(&known.run, program));
+        trends.push(Trend { name, runs });
+    }
+    for (program, (places, own)) in of_states {
+        let program = ProgramId(program);
+        let scans = known
+            .run
+            .state_trend(program, (from, to), &own, MAXIMUM_SCANS);
+        for (number, place) in places.into_iter().enumerate() {
+            let values = scans.iter().map(|(cycle, values)| {
+                let drawn = match &values[number] {
+                    Value::Bool(on) => u8::from(*on).into(),
+                    other => other.clone(),
+                };
+                (*cycle, drawn)
+            });
+            trends[place].runs = state_runs(values, from, to);
+        }
+    }
+    Ok(trends)
+}
+
+/// Values of single cycles as runs; what lies between them is not known.
+fn state_runs(
+    values: impl Iterator<Item = (i64, Value)>,
+    from: i64,
+    to: i64,
+) -> Vec<(i64, Option<Value>)> {
+    let mut runs: Vec<(i64, Option<Value>)> = Vec::new();
+    let mut known_up_to = from;
+    let mut push = |cycle, value| {
+        if runs.last().is_none_or(|(_, last)| *last != value) {
+            runs.push((cycle, value));
+        }
     };
-    let point = points.iter().nth(index)?;
-    Some(Trend {
-        name: format!("{}.{}", controller.name, point.name),
-        runs: runs(timeline, point, from, to),
-    })
+    for (cycle, value) in values {
+        if cycle > known_up_to {
+            push(known_up_to, None);
+        }
+        push(cycle, Some(value));
+        known_up_to = cycle + 1;
+    }
+    if known_up_to <= to {
+        push(known_up_to, None);
+    }
+    runs
 }
 
 fn runs(

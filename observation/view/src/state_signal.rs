@@ -1,0 +1,269 @@
+//! The state of a program by name: memory bits, timers and counters of a ladder, variables of a program with numbers.
+//!
+//! Their values in a cycle are those after its scan, recomputed from the samples in the journal.
+
+use std::collections::BTreeSet;
+
+use serde_json::Value;
+use understudy_cluster::Controller;
+use understudy_ladder::{BlockKind, Element, Evaluation, Program as Ladder, Reading, visit};
+use understudy_typed::{Part, Program as TypedProgram};
+use understudy_wire::ProgramId;
+
+use crate::error::ViewError;
+use crate::history::History;
+use crate::model::Model;
+use crate::value::elementary;
+
+/// Signals of one program that are listed, at most; the first ones.
+const MAXIMUM_SIGNALS: usize = 2000;
+
+/// Kind of a signal in the state of a program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StateKind {
+    /// A memory bit of a ladder.
+    Memory,
+    /// Elapsed time of a timer, as a number of nanoseconds.
+    Timer,
+    /// Value of a counter.
+    Counter,
+    /// A variable of a program with numbers, or a part of one.
+    Variable,
+}
+
+/// A signal in the state of a program.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StateSignal {
+    /// Its name, such as `pressing` or `pid.integral`.
+    pub name: String,
+    /// Its kind.
+    pub kind: StateKind,
+    /// Its type, such as `BOOL`.
+    pub of: &'static str,
+    /// Its address, such as `%MX0.0`.
+    pub address: Option<String>,
+    /// Its description.
+    pub description: Option<String>,
+    place: Place,
+}
+
+/// Where its value is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Place {
+    /// Number of the memory bit.
+    Memory(usize),
+    /// Rung, and the element in it in the order of [`visit`].
+    Block(usize, usize),
+    Part(Part),
+}
+
+impl StateKind {
+    /// The kind in one word.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Memory => "memory",
+            Self::Timer => "timer",
+            Self::Counter => "counter",
+            Self::Variable => "variable",
+        }
+    }
+}
+
+impl Model {
+    /// The signals in the state of a program; nothing where the cluster has no such program.
+    pub fn state_signals(&self, program: ProgramId) -> Vec<StateSignal> {
+        let controller = self.cluster.controllers().get(program.index());
+        controller.map_or_else(Vec::new, |controller| {
+            let typed = controller.code.typed();
+            match (controller.ladder(), typed) {
+                (Some(ladder), _) => of_ladder(ladder),
+                (None, Some(typed)) => of_typed(controller, typed),
+                (None, None) => Vec::new(),
+            }
+        })
+    }
+
+    /// The values of signals in the state of a program after the scan of a cycle.
+    ///
+    /// # Errors
+    /// Where the cycle or the state is not known.
+    pub fn state_values(
+        &self,
+        program: ProgramId,
+        cycle: i64,
+        signals: &[StateSignal],
+    ) -> Result<Vec<Value>, ViewError> {
+        let history = self.history_of(program)?;
+        let place = history
+            .place_of(cycle)
+            .ok_or_else(|| self.no_cycle(program, cycle))?;
+        self.state_values_at(history, place, signals)
+    }
+
+    fn state_values_at(
+        &self,
+        history: &History,
+        place: usize,
+        signals: &[StateSignal],
+    ) -> Result<Vec<Value>, ViewError> {
+        let controller = &self.cluster.controllers()[history.program().index()];
+        if controller.ladder().is_some() {
+            let evaluation = self.evaluation_at(history, place)?;
+            let values = signals.iter();
+            return Ok(values
+                .map(|signal| signal.in_scan(&evaluation))
+                .collect());
+        }
+        let state = self.state_after(history, place)?;
+        let values = signals.iter();
+        Ok(values.map(|signal| signal.in_state(&state)).collect())
+    }
+
+    /// The values of signals in the state of a program after each scan from one cycle to another, as far as they are known; the newest
+    /// `most` cycles of these. It scans the program for each of them.
+    pub fn state_trend(
+        &self,
+        program: ProgramId,
+        (from, to): (i64, i64),
+        signals: &[StateSignal],
+        most: usize,
+    ) -> Vec<(i64, Vec<Value>)> {
+        let Some(history) = self.history(program) else {
+            return Vec::new();
+        };
+        let steps = history.steps().iter().enumerate();
+        let wanted = steps.filter(|(_, step)| (from..=to).contains(&step.cycle) && !step.void);
+        let newest = wanted.rev().take(most);
+        let values = newest.filter_map(|(place, step)| {
+            let values = self.state_values_at(history, place, signals).ok()?;
+            Some((step.cycle, values))
+        });
+        let mut values: Vec<(i64, Vec<Value>)> = values.collect();
+        values.reverse();
+        // Of a cycle of which several records tell, the last counts, as in all other views.
+        values.dedup_by(|later, earlier| {
+            let same = later.0 == earlier.0;
+            if same {
+                std::mem::swap(later, earlier);
+            }
+            same
+        });
+        values
+    }
+
+    /// x(t+1) of a program with numbers.
+    fn state_after(&self, history: &History, place: usize) -> Result<Vec<u64>, ViewError> {
+        let sampled = self.sampled_at(history, place)?;
+        let interpreter = self.interpreter_of(history, place)?;
+        let controller = &self.cluster.controllers()[history.program().index()];
+        let mut outputs = vec![0; controller.interface.outputs.width().div_ceil(64)];
+        let mut state = sampled.state.words().to_vec();
+        state.resize(interpreter.state_words(), 0);
+        interpreter.step(&mut state, sampled.inputs.words(), &mut outputs);
+        Ok(state)
+    }
+}
+
+impl StateSignal {
+    fn in_scan(&self, evaluation: &Evaluation) -> Value {
+        match &self.place {
+            Place::Memory(number) => evaluation.memory.get(*number).copied().into(),
+            Place::Block(rung, element) => {
+                let rung = evaluation.rungs.get(*rung);
+                let flow = rung.and_then(|rung| rung.elements.get(*element));
+                match flow.map(|flow| flow.reading) {
+                    Some(Reading::Number(number)) => number.into(),
+                    Some(Reading::Time(elapsed)) => u64::try_from(elapsed.as_nanos()).ok().into(),
+                    _ => Value::Null,
+                }
+            }
+            Place::Part(_) => Value::Null,
+        }
+    }
+
+    fn in_state(&self, state: &[u64]) -> Value {
+        let Place::Part(part) = &self.place else {
+            return Value::Null;
+        };
+        let stored = part.stored(state);
+        stored.map_or(Value::Null, |(of, stored)| elementary(of, stored))
+    }
+}
+
+fn of_ladder(ladder: &Ladder) -> Vec<StateSignal> {
+    let memory = ladder.memory.iter().enumerate();
+    let mut signals: Vec<StateSignal> = memory
+        .map(|(number, signal)| StateSignal {
+            name: signal.name.to_string(),
+            kind: StateKind::Memory,
+            of: "BOOL",
+            address: signal.address.as_ref().map(ToString::to_string),
+            description: signal.description.clone(),
+            place: Place::Memory(number),
+        })
+        .collect();
+    for (number, rung) in ladder.rungs.iter().enumerate() {
+        let mut element = 0;
+        visit(&rung.network, &mut |seen| {
+            if let Element::Block(block) = seen
+                && let Some((kind, of)) = shown_as(block.kind)
+            {
+                signals.push(StateSignal {
+                    name: block.name.to_string(),
+                    kind,
+                    of,
+                    address: None,
+                    description: Some(format!("{} in rung {}", block.kind.word(), number + 1)),
+                    place: Place::Block(number, element),
+                });
+            }
+            element += 1;
+        });
+    }
+    signals.truncate(MAXIMUM_SIGNALS);
+    signals
+}
+
+fn shown_as(kind: BlockKind) -> Option<(StateKind, &'static str)> {
+    match kind {
+        BlockKind::Ton(_) | BlockKind::Tof(_) | BlockKind::Tp(_) => Some((StateKind::Timer, "TIME")),
+        BlockKind::Ctu(_) | BlockKind::Ctd(_) | BlockKind::Ctud(_) => {
+            Some((StateKind::Counter, "UINT"))
+        }
+        BlockKind::Sr | BlockKind::Rs | BlockKind::RTrig | BlockKind::FTrig => None,
+    }
+}
+
+/// All that has a value of its own and is no input and no output.
+fn of_typed(controller: &Controller, typed: &TypedProgram) -> Vec<StateSignal> {
+    let interface = &controller.interface;
+    let points = interface.inputs.iter().chain(interface.outputs.iter());
+    let own: BTreeSet<u64> = points.map(|point| u64::from(point.slot)).collect();
+    let mut signals = Vec::new();
+    for variable in &typed.variables {
+        let end = 64 * (u64::from(variable.slot) + variable.of.slots());
+        let mut address = 64 * u64::from(variable.slot);
+        while address < end && signals.len() < MAXIMUM_SIGNALS {
+            let part = typed.part_at(address).filter(|part| part.address == address);
+            let of = part.as_ref().and_then(|part| part.of.elementary());
+            if let Some((part, of)) = part.zip(of)
+                && !own.contains(&(address / 64))
+            {
+                let is_whole = part.name == variable.name;
+                signals.push(StateSignal {
+                    name: part.name.clone(),
+                    kind: StateKind::Variable,
+                    of: of.name(),
+                    address: variable.address.clone().filter(|_| is_whole),
+                    description: variable.description.clone().filter(|_| is_whole),
+                    place: Place::Part(part),
+                });
+            }
+            // Elements of an array may share a slot; all else begins at one.
+            let next = address + of.map_or(64, |of| u64::from(of.bits()));
+            let shares = typed.part_at(next).is_some_and(|part| part.address == next);
+            address = if shares { next } else { (address / 64 + 1) * 64 };
+        }
+    }
+    signals
+}
