@@ -4,7 +4,7 @@
 //
 // The page may command a laboratory of the press cell. With the process of its server, this is suspended for some seconds. With the file of axe-core, each view is checked for accessibility too.
 
-import { accessible, call, click, evaluate, more, open, picture, problems, run, scheme, size, text, until } from "./chromium.mjs";
+import { accessible, answer, call, change, click, evaluate, more, open, picture, problems, run, scheme, size, text, until } from "./chromium.mjs";
 
 const [server, axe] = more;
 
@@ -14,6 +14,7 @@ const lampOf = (program) => `[...document.querySelectorAll("#protection-list li"
 const command = async (name, what) => {
   await click(member(name));
   await until(what, `document.querySelector("[data-command=${what}]")?.disabled === false`);
+  await answer();
   await click(`[data-command=${what}]`);
   await until("it is done", "!document.getElementById('command').open");
 };
@@ -55,6 +56,7 @@ async function drive() {
   await until("the dialog", "document.getElementById('command').open");
   await picture("command");
   await accessible("command", axe);
+  await answer();
   await click("[data-command=kill]");
   await until("its end", `${stateOf("robot")} === "killed"`);
   await until("a smaller margin", `${text("#redundancy-words")}.includes("1 of 2 failures")`);
@@ -79,6 +81,7 @@ async function drive() {
   // A button that cannot act says why.
   await click(member("robot"));
   await until("a reason", `document.querySelector("[data-command=kill]")?.disabled && ${text("#command .actions")}.includes("cannot: it is down")`);
+  await answer();
   await click("[data-command=restart]");
   await until("its return", `${stateOf("robot")} === "publishing"`);
 
@@ -96,6 +99,7 @@ async function drive() {
   await until("what it does", `${text("#command")}.includes("The plant has moved on since")`);
   await picture("choice");
   await accessible("choice", axe);
+  await answer();
   await click("#confirm-choice");
   await until("an older state that goes on", `${lampOf("robot")} !== "lost" && document.querySelector(".picture-frame .flow[data-source=reconstructed]") !== null`);
   await command("robot", "restart");
@@ -123,11 +127,13 @@ async function drive() {
   // Force an output, and take it back.
   await click(member("robot-io"));
   await evaluate("document.getElementById('force-signal').value = 'output 0'");
+  await answer();
   await click("[data-command=force]");
   await until("a forced output", `${text(".signal-forced:not(:empty)")}.includes("forced by")`);
   await picture("forced");
   await click(member("robot-io"));
   await until("what can be taken back", `document.querySelector("[data-command=unforce]") !== null`);
+  await answer();
   await click("[data-command=unforce]");
   await until("a free output", `document.querySelector(".signal-forced:not(:empty)") === null`);
 
@@ -154,6 +160,7 @@ async function drive() {
   await open("events");
   await until("events", `${text("#event-table tbody")}.includes("killed")`);
   await until("an alarm", `document.querySelectorAll("#alarm-list li").length > 0`);
+  await change("#alarm-owner", "anna");
   await click("#alarm-list li[data-open=true] button");
   await until("its acknowledgement", `${text("#alarm-list")}.includes("acknowledged by")`);
   await picture("events");

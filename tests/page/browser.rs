@@ -1,5 +1,7 @@
 //! A real browser drives every view of a real laboratory, where `UNDERSTUDY_BROWSER` names a Chromium and Node is installed.
 
+use std::fs;
+use std::path::Path;
 use std::process::Command;
 
 use serde_json::Value;
@@ -72,4 +74,36 @@ fn a_browser_sees_a_kill_and_asks_why() {
 fn a_browser_starts_a_shuttle_and_sees_since_when() {
     let cluster = "examples/two-shuttles/cluster.toml";
     drive("operate", cluster, "operate.mjs", |_| Vec::new());
+}
+
+/// The press cell with 90 more rungs in the robot, which are a chain of memory bits, a timer of the arm's laps and a counter of them.
+fn large_cell(folder: &Path) -> String {
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/press-cell");
+    for name in ["cluster.toml", "press.ladder"] {
+        fs::copy(example.join(name), folder.join(name)).expect("an example");
+    }
+    let robot = fs::read_to_string(example.join("robot.ladder")).expect("an example");
+    let (head, rungs) = robot.split_at(robot.find("rung ").expect("rungs"));
+    let mut text = head.to_owned();
+    for number in 1..=90 {
+        text += &format!("memory extra_{number}\n");
+    }
+    text += &format!("\n{rungs}\n");
+    text += "rung \"a lap\"\n    arm_left {CTU laps 1000 R=stop}\n";
+    text += "rung \"its time\"\n    /arm_left {TON lap.time 60s}\n";
+    for number in 1..=90 {
+        let before = match number {
+            1 => "arm_left".to_owned(),
+            number => format!("extra_{}", number - 1),
+        };
+        text += &format!("rung \"extra {number}\"\n    {before} ( extra_{number} )\n");
+    }
+    fs::write(folder.join("robot.ladder"), text).expect("written");
+    folder.join("cluster.toml").display().to_string()
+}
+
+#[test]
+fn a_browser_reads_events_rungs_values_and_links() {
+    let cluster = large_cell(&empty_folder("reader-cell"));
+    drive("reader", &cluster, "reader.mjs", |_| Vec::new());
 }

@@ -99,6 +99,15 @@ export async function scheme(value) {
 export const text = (selector) => `(document.querySelector(${JSON.stringify(selector)})?.textContent ?? "")`;
 export const click = (selector) => evaluate(`(() => { const found = document.querySelector(${JSON.stringify(selector)}); if (!found) throw new Error("nothing is there"); found.dispatchEvent(new MouseEvent("click", { bubbles: true })); })()`);
 
+// Fills an entry in, as a person does.
+export const change = (selector, value) => evaluate(`(() => { const entry = document.querySelector(${JSON.stringify(selector)}); entry.value = ${JSON.stringify(value)}; for (const name of ["input", "change"]) { entry.dispatchEvent(new Event(name, { bubbles: true })); } })()`);
+
+// Answers who gives a command and why, in the dialog that is open.
+export async function answer(owner = "anna", reason = "a test") {
+  await change("#command-owner", owner);
+  await change("#command-reason", reason);
+}
+
 // Checks a view with axe-core, where its file is given.
 export async function accessible(view, axe) {
   if (!axe) {

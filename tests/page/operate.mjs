@@ -4,7 +4,7 @@
 //
 // The page may command a laboratory of two-shuttles that nobody has written to yet.
 
-import { accessible, click, evaluate, more, open, picture, problems, run, scheme, size, text, until } from "./chromium.mjs";
+import { accessible, answer as asked, change, click, evaluate, more, open, picture, problems, run, scheme, size, text, until } from "./chromium.mjs";
 
 const [axe] = more;
 
@@ -38,6 +38,10 @@ async function drive() {
     problems.push("the shuttle ran before it was started");
   }
   const before = await evaluate(`${state}.then((state) => state.cycle)`);
+  await click(`${control("left", "start")} button`);
+  await until("the question for a name", `${answer("left", "start")}.includes("enter your name and the reason") && document.activeElement.id === "operate-owner"`);
+  await change("#operate-owner", "anna");
+  await change("#operate-reason", "a test");
   await click(`${control("left", "start")} button`);
   await until("the answer", `/in effect since cycle \\d+/.test(${answer("left", "start")})`);
   const cycle = Number(await evaluate(`${answer("left", "start")}.match(/cycle (\\d+)/)[1]`));
@@ -112,10 +116,12 @@ async function drive() {
   await evaluate(`(() => { const which = document.getElementById("force-signal"); which.value = [...which.options].find((option) => option.textContent === "input speed").value; which.dispatchEvent(new Event("change")); })()`);
   await type("#force-number", "12.5");
   await picture("force");
+  await asked();
   await click("[data-command=force]");
   await until("a forced number", `${text(".signal-forced:not(:empty)")}.includes("forced by") && ${text('.signal[data-kind=input][data-value="12.5"]')}.includes("speed")`);
   await click('g.member[data-name="left-io"]');
   await until("what can be taken back", `${text("#command fieldset ul")}.includes("input speed = 12.5")`);
+  await asked();
   await click("[data-command=unforce]");
   await until("a free input", `document.querySelector(".signal-forced:not(:empty)") === null`);
 }

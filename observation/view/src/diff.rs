@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_journal::source_word;
-use understudy_typed::{Elementary, Point, Points};
+use understudy_typed::{Point, Points};
 use understudy_wire::{Image, ProgramId};
 
 use crate::model::Model;
@@ -170,13 +170,12 @@ fn image_text(image: Option<&Image>) -> String {
     image.map_or("nothing".to_owned(), Image::to_string)
 }
 
-/// Shows images with numbers by the points that differ, as values; images of bits stay as they are.
+/// Shows images by the points that differ, by name and value.
 fn differing_values(found: &mut Difference, points: &Points, images: [Option<&Image>; 2]) {
     let [Some(left), Some(right)] = images else {
         return;
     };
-    let are_bits = points.iter().all(|point| point.of == Elementary::Bool);
-    if are_bits || [left, right].iter().any(|it| it.width() != points.width()) {
+    if [left, right].iter().any(|it| it.width() != points.width()) {
         return;
     }
     let points = points.iter();

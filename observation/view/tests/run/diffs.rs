@@ -64,6 +64,18 @@ fn a_lost_program_differs_in_its_outputs() {
     let first = first.expect("its outputs fell safe");
     assert_eq!(first.name, "robot");
     assert!(first.cycle >= 30, "{first:?}");
+    // Outputs by name, only those that differ, with opposite values.
+    let robot = cell.controllers()[0].interface.outputs.iter();
+    let names: Vec<&str> = robot.map(|output| output.name.as_str()).collect();
+    let (left, right): (Vec<&str>, Vec<&str>) =
+        (first.left.split(", ").collect(), first.right.split(", ").collect());
+    assert_eq!(left.len(), right.len(), "{first:?}");
+    for (left, right) in left.into_iter().zip(right) {
+        let (name, value) = left.split_once(" = ").expect("a name and a value");
+        assert!(names.contains(&name), "{left}");
+        let opposite = if value == "0" { "1" } else { "0" };
+        assert_eq!(right, format!("{name} = {opposite}"));
+    }
     assert!(
         found
             .differences

@@ -15,6 +15,7 @@ mod process_alarms;
 mod protection;
 mod replay;
 mod screen;
+mod state_signals;
 mod support;
 mod why;
 mod writes;

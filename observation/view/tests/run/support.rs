@@ -19,7 +19,13 @@ pub(crate) fn cell() -> Cluster {
 
 /// The example with operator inputs and signals.
 pub(crate) fn shuttles() -> Cluster {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/two-shuttles");
+    example("two-shuttles")
+}
+
+/// The cluster of an example.
+pub(crate) fn example(name: &str) -> Cluster {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
+    let folder = folder.join(name);
     let text = |name: &str| fs::read_to_string(folder.join(name));
     let file = text("cluster.toml").expect("an example");
     let mut open = |name: &str| text(name).map_err(|error| error.to_string());
