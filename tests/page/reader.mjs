@@ -75,8 +75,10 @@ async function ladder() {
 
 async function watch() {
   await open("watch");
-  for (const signal of ["0.state.laps", "0.state.lap.time", "0.state.holding", "0.input.3", "1.output.0"]) {
-    await change("#watch-search", signal.split(".").at(-1) === "time" ? "lap.time" : "");
+  const signals = { "0.state.laps": "robot.laps", "0.state.lap.time": "TIME", "0.state.holding": "gripper holds", "0.input.3": "arm_up", "1.output.0": "%QX0.0" };
+  for (const [signal, words] of Object.entries(signals)) {
+    await change("#watch-search", words);
+    await until(signal, `document.querySelector('#view-watch input[value="${signal}"]') !== null`);
     await click(`#view-watch input[value="${signal}"]`);
   }
   await until("a counter that counts", `Number(document.querySelector('[data-signal="0.state.laps"]')?.dataset.value) > 1`);
@@ -86,11 +88,11 @@ async function watch() {
   await call("Page.reload");
   await until("the same table", `${rows("watch-table")}.length === 5 && document.querySelector('[data-signal="0.state.holding"]').dataset.value !== undefined`);
   await click("#back");
-  const link = "(document.body.dataset.when === 'replay' && location.hash.includes('signals=0.state.laps,0.state.lap.time,0.state.holding,0.input.3,1.output.0'))";
-  await until("its address", link);
+  const ofCycle = `${text("#watch-words")}.startsWith("cycle " + (location.hash.match(/cycle=(\\d+)/)?.[1] ?? "?") + ";")`;
+  await until("its address", `${ofCycle} && location.hash.includes("signals=0.state.laps,0.state.lap.time,0.state.holding,0.input.3,1.output.0")`);
   const [address, values] = await evaluate(`[location.hash, ${rows("watch-table")}.map((row) => row.dataset.value).join()]`);
   await elsewhere(address);
-  await until("the same values", `${rows("watch-table")}.map((row) => row.dataset.value).join() === ${JSON.stringify(values)}`);
+  await until("the same values", `${ofCycle} && ${rows("watch-table")}.map((row) => row.dataset.value).join() === ${JSON.stringify(values)}`);
   await click("#live");
 }
 

@@ -16,6 +16,8 @@ let page = 0;
 let pages = 1;
 let rung = null;
 let later = 0;
+// Counts the choices of a person: an answer to a question from before the last one is not shown.
+let choices = 0;
 let asking = false;
 let wanted = false;
 let shown = "";
@@ -80,6 +82,7 @@ export function select(wanted) {
   id("ladder-names").value = names;
   page = Math.max(0, (Number(wanted.page) || 1) - 1);
   rung = null;
+  choices += 1;
 }
 
 export function enter() {
@@ -123,6 +126,7 @@ function goToRung(number) {
 }
 
 function chosen() {
+  choices += 1;
   changed();
   refresh(true);
 }
@@ -160,10 +164,11 @@ async function refresh(now) {
 }
 
 async function picture() {
+  const before = choices;
   const place = rung === null ? `page=${page}` : `rung=${rung}`;
   const question = `/api/ladder/${program}?names=${names}&find=${encodeURIComponent(find)}&${place}&${cycleParameter()}`;
   const answer = await act(() => ask(question));
-  if (!answer || typeof program !== "number") {
+  if (!answer || choices !== before) {
     return;
   }
   setText(id("ladder-stamp"), answer.words);

@@ -26,6 +26,7 @@ export const signalLegend = () =>
   list("Signals", [
     item(el("span", { class: "lamp", "data-on": "1", "aria-hidden": "true" }), "1, on"),
     item(el("span", { class: "lamp", "aria-hidden": "true" }), "0, off"),
+    el("li", {}, "F: forced"),
     el("li", {}, "click an output to see why it has its value"),
   ]);
 
@@ -43,6 +44,7 @@ export const ladderLegend = () => {
     item(line("wire"), "no power"),
     item(el("span", { class: "closed-contact", "aria-hidden": "true" }), "closed contact"),
     el("li", {}, "1 and 0 next to a name: its value in the cycle shown above"),
+    el("li", {}, "F: forced"),
     el("li", {}, "click an output to see why it has its value"),
   ]);
 };

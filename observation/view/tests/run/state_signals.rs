@@ -81,7 +81,7 @@ fn the_state_of_a_ladder_is_that_of_the_naive_scan() {
         let newest = model.state_trend(program, (10, 200), &signals, 7);
         assert_eq!(newest, expected[expected.len() - 7..]);
     }
-    let expected = BTreeSet::from(["memory", "timer"]);
+    let expected = BTreeSet::from(["counter", "memory", "timer"]);
     assert_eq!((&kinds, &moved), (&expected, &expected), "none stays at 0");
 }
 
@@ -98,7 +98,7 @@ fn the_variables_of_a_program_with_numbers_are_those_of_its_trace() {
         "no input and no output"
     );
     let mut seen = BTreeSet::new();
-    for cycle in 10..400 {
+    for cycle in 10..680 {
         let (lines, error) = model.text_at(program, cycle).expect("a text");
         assert!(error.is_none(), "cycle {cycle}");
         let values = model.state_values(program, cycle, &signals).expect("known");
@@ -110,8 +110,8 @@ fn the_variables_of_a_program_with_numbers_are_those_of_its_trace() {
         }
     }
     assert!(
-        seen.contains(&("granted", Some(true))) || seen.contains(&("forward", Some(false))),
-        "something moved: {seen:?}"
+        seen.contains(&("forward", Some(false))),
+        "it came to the end of its track: {seen:?}"
     );
     assert!(model.state_values(program, 9999, &signals).is_err());
 }
@@ -119,7 +119,7 @@ fn the_variables_of_a_program_with_numbers_are_those_of_its_trace() {
 /// The left shuttle is started.
 const STARTED: &str = "\
 title = \"started\"
-cycles = 450
+cycles = 700
 
 [[step]]
 at = 20
