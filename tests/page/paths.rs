@@ -76,6 +76,47 @@ fn a_finished_run_answers_every_question() {
             .is_some_and(|faults| faults.len() >= 2)
     );
 
+    // Memory, as the scan of the cycle left it; in a trend the same.
+    let signals = page.get("/api/signals").json();
+    let memory = signals
+        .as_array()
+        .and_then(|signals| signals.iter().find(|signal| signal["name"] == "holding"))
+        .expect("a memory bit of the robot");
+    assert_eq!(
+        (&memory["id"], &memory["kind"], &memory["type"]),
+        (&"0.state.holding".into(), &"memory".into(), &"BOOL".into())
+    );
+    let trend = page
+        .get("/api/trends?signals=0.state.holding,0.input.0&from=40&to=290")
+        .json();
+    let runs = trend["signals"][0]["runs"].as_array().expect("runs");
+    assert!(runs.len() > 2, "it takes and leaves parts: {runs:?}");
+    for run in runs {
+        let at = |cycle: i64| {
+            let values = page.get(&format!(
+                "/api/values?signals=1.output.0,0.state.holding&cycle={cycle}"
+            ));
+            u64::from(values.json()["values"][1] == true)
+        };
+        let (cycle, value) = (run[0].as_i64().expect("a cycle"), &run[1]);
+        assert_eq!(*value, at(cycle), "cycle {cycle}");
+        assert!(cycle == 40 || *value != at(cycle - 1), "cycle {cycle}");
+    }
+
+    let alarms = page.get("/api/events?levels=alarm,warning").json();
+    let found = alarms["events"].as_array().expect("events");
+    let is_severe = |event: &serde_json::Value| {
+        ["alarm", "warning"].contains(&event["level"].as_str().unwrap_or_default())
+    };
+    assert!(!found.is_empty() && found.iter().all(is_severe));
+    let press = page.get("/api/events?members=press&fold=false").json();
+    let found = press["events"].as_array().expect("events");
+    assert!(!found.is_empty() && found.iter().all(|event| event["who"] == "press"));
+    assert_eq!(
+        (press["rows"].as_u64(), press["members"]["press"].as_u64()),
+        (Some(found.len() as u64), Some(found.len() as u64))
+    );
+
     let events = page.get("/api/events?find=killed").json();
     assert!(
         events["events"]
@@ -188,6 +229,13 @@ fn bad_questions_get_clear_answers_and_stop_nothing() {
         ("/api/trends?signals=0.nothing.0&from=0&to=9", 404, "U0681"),
         ("/api/trends?signals=0.output.99&from=0&to=9", 404, "U0681"),
         ("/api/events?limit=-1", 400, "U0682"),
+        ("/api/events?levels=terrible", 400, "U0682"),
+        ("/api/events?fold=perhaps", 400, "U0682"),
+        ("/api/ladder/0?page=-1", 400, "U0682"),
+        ("/api/values?signals=0.state.nothing", 404, "U0681"),
+        ("/api/values?signals=9.input.0", 404, "U0681"),
+        ("/api/values?signals=0.input.0&cycle=9999999", 404, "U0683"),
+        ("/api/trends?signals=0.state.&from=0&to=9", 404, "U0681"),
         ("/api/compare", 400, "U0682"),
         ("/api/compare?with=..%2F..", 404, "U0681"),
         ("/api/compare?with=latest", 404, "U0681"),
@@ -219,6 +267,13 @@ fn bad_questions_get_clear_answers_and_stop_nothing() {
         ));
         assert_eq!((answer.status, answer.code().as_str()), (403, "U0685"));
     }
+    let many = "0.input.0,".repeat(201);
+    assert_eq!(
+        page.get(&format!("/api/values?signals={many}")).code(),
+        "U0682"
+    );
+    let behind = page.get("/api/ladder/0?page=77").json();
+    assert_eq!(behind["rungs"]["page"], 0, "{behind:.300}");
     let unread = page.get(&format!("/api/events?find={long}"));
     assert_eq!(unread.status, 200);
     let kill =

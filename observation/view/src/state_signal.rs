@@ -110,9 +110,7 @@ impl Model {
         if controller.ladder().is_some() {
             let evaluation = self.evaluation_at(history, place)?;
             let values = signals.iter();
-            return Ok(values
-                .map(|signal| signal.in_scan(&evaluation))
-                .collect());
+            return Ok(values.map(|signal| signal.in_scan(&evaluation)).collect());
         }
         let state = self.state_after(history, place)?;
         let values = signals.iter();
@@ -226,7 +224,9 @@ fn of_ladder(ladder: &Ladder) -> Vec<StateSignal> {
 
 fn shown_as(kind: BlockKind) -> Option<(StateKind, &'static str)> {
     match kind {
-        BlockKind::Ton(_) | BlockKind::Tof(_) | BlockKind::Tp(_) => Some((StateKind::Timer, "TIME")),
+        BlockKind::Ton(_) | BlockKind::Tof(_) | BlockKind::Tp(_) => {
+            Some((StateKind::Timer, "TIME"))
+        }
         BlockKind::Ctu(_) | BlockKind::Ctd(_) | BlockKind::Ctud(_) => {
             Some((StateKind::Counter, "UINT"))
         }
@@ -244,7 +244,9 @@ fn of_typed(controller: &Controller, typed: &TypedProgram) -> Vec<StateSignal> {
         let end = 64 * (u64::from(variable.slot) + variable.of.slots());
         let mut address = 64 * u64::from(variable.slot);
         while address < end && signals.len() < MAXIMUM_SIGNALS {
-            let part = typed.part_at(address).filter(|part| part.address == address);
+            let part = typed
+                .part_at(address)
+                .filter(|part| part.address == address);
             let of = part.as_ref().and_then(|part| part.of.elementary());
             if let Some((part, of)) = part.zip(of)
                 && !own.contains(&(address / 64))
@@ -262,7 +264,11 @@ fn of_typed(controller: &Controller, typed: &TypedProgram) -> Vec<StateSignal> {
             // Elements of an array may share a slot; all else begins at one.
             let next = address + of.map_or(64, |of| u64::from(of.bits()));
             let shares = typed.part_at(next).is_some_and(|part| part.address == next);
-            address = if shares { next } else { (address / 64 + 1) * 64 };
+            address = if shares {
+                next
+            } else {
+                (address / 64 + 1) * 64
+            };
         }
     }
     signals

@@ -75,7 +75,7 @@ export function select(wanted) {
 function apply(wanted) {
   const list = (text) => (text ?? "").split(",").filter(Boolean);
   find = wanted.find ?? "";
-  levels.choose(list(wanted.levels));
+  levels.choose(list(wanted.levels).filter((word) => word in LEVELS));
   kinds.choose(list(wanted.kinds));
   members.choose(list(wanted.members));
   ofHost = wanted.host === "shown";

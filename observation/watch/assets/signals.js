@@ -23,14 +23,16 @@ function take(signals) {
   byId = new Map(all.map((signal) => [signal.id, signal]));
 }
 
-// The signals in the states are asked for once, when a view needs them.
+// The signals in the states are asked for once, when a view needs them; says whether they are known. After a failure, a view may ask again a
+// second later.
 export function load() {
   loading ??= act(() => ask("/api/signals")).then((signals) => {
     if (signals) {
       take(signals);
     } else {
-      loading = null;
+      setTimeout(() => { loading = null; }, 1000);
     }
+    return Boolean(signals);
   });
   return loading;
 }

@@ -56,6 +56,7 @@ export function prepare(facts) {
   addEventListener("resize", redraw);
   addEventListener("theme", redraw);
   addEventListener("pointerup", () => setTimeout(() => { dragging = false; }));
+  addEventListener("pointercancel", () => { dragging = false; });
 }
 
 // What is chosen, as an address has it.
@@ -97,9 +98,10 @@ function picked() {
 
 export async function enter() {
   drawn = "";
-  await load();
   // What this run does not have is left out.
-  chosen = chosen.filter((signal) => find(signal));
+  if (await load()) {
+    chosen = chosen.filter(find);
+  }
   id("trend-span").value = String(span);
   choice.show();
   refresh(true);
@@ -166,7 +168,13 @@ function key(event) {
 }
 
 async function refresh(now) {
-  if (!state() || dragging || id("view-trends").hidden || !chosen.every(find)) {
+  if (!state() || dragging || id("view-trends").hidden) {
+    return;
+  }
+  if (!chosen.every(find)) {
+    if (!now) {
+      enter();
+    }
     return;
   }
   const { from, to } = range();

@@ -45,9 +45,10 @@ export function select(wanted) {
 }
 
 export async function enter() {
-  await load();
   // What this run does not have is left out.
-  chosen = chosen.filter((signal) => find(signal));
+  if (await load()) {
+    chosen = chosen.filter(find);
+  }
   choice.element.open ||= chosen.length === 0;
   choice.show();
   fill();
@@ -77,7 +78,13 @@ async function refresh(now) {
     again = true;
     return;
   }
-  if (!state() || chosen.length === 0 || !chosen.every(find)) {
+  if (!state() || chosen.length === 0) {
+    return;
+  }
+  if (!chosen.every(find)) {
+    if (!now) {
+      enter();
+    }
     return;
   }
   const pause = !now && isLive() ? PAUSE - (performance.now() - last) : 0;

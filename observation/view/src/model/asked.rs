@@ -197,7 +197,11 @@ impl Model {
     }
 
     /// The sample of a step, where the state before it is known.
-    pub(crate) fn sampled_at<'h>(&self, history: &'h History, place: usize) -> Result<&'h Sampled, ViewError> {
+    pub(crate) fn sampled_at<'h>(
+        &self,
+        history: &'h History,
+        place: usize,
+    ) -> Result<&'h Sampled, ViewError> {
         let step = &history.steps()[place];
         step.sampled.as_ref().ok_or_else(|| {
             let missing = step.driven.as_ref().and_then(|driven| driven.missing);

@@ -67,8 +67,10 @@ fn a_lost_program_differs_in_its_outputs() {
     // Outputs by name, only those that differ, with opposite values.
     let robot = cell.controllers()[0].interface.outputs.iter();
     let names: Vec<&str> = robot.map(|output| output.name.as_str()).collect();
-    let (left, right): (Vec<&str>, Vec<&str>) =
-        (first.left.split(", ").collect(), first.right.split(", ").collect());
+    let (left, right): (Vec<&str>, Vec<&str>) = (
+        first.left.split(", ").collect(),
+        first.right.split(", ").collect(),
+    );
     assert_eq!(left.len(), right.len(), "{first:?}");
     for (left, right) in left.into_iter().zip(right) {
         let (name, value) = left.split_once(" = ").expect("a name and a value");

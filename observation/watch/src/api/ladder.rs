@@ -84,7 +84,10 @@ fn page<'r>(found: &'r [usize], count: usize, wanted: &Wanted) -> (Rungs, &'r [u
         pages,
         count,
         found: found.len(),
-        shown: own.first().zip(own.last()).map(|(first, last)| (first + 1, last + 1)),
+        shown: own
+            .first()
+            .zip(own.last())
+            .map(|(first, last)| (first + 1, last + 1)),
     };
     (rungs, own)
 }
