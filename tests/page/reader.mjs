@@ -154,7 +154,7 @@ async function replay() {
 async function events() {
   // A member that was suspended is woken late.
   await evaluate(command("press", "stop"));
-  await until("a suspended station", `fetch("/api/state").then((answer) => answer.json()).then(({ members }) => members.find(({ name }) => name === "press").state === "suspended")`);
+  await until("a flagged station", `fetch("/api/events?kinds=flagged").then((answer) => answer.json()).then(({ events }) => events.length > 0)`);
   await evaluate(command("press", "continue"));
   await open("events");
   await until("hidden events", `/^[1-9]\\d* of the host hidden:$/.test(${text("#event-host-words")})`);

@@ -7,12 +7,15 @@
 const EVERY_MS = 300;
 
 let written = "";
+// The address as it was read or written last. Another one is a step that the page has yet to take, and is not overwritten.
+let seen = location.hash;
 let waiting = 0;
 let current = () => "";
 
 // What the address asks for.
 export function wanted() {
-  const [view, query = ""] = location.hash.slice(1).split("?");
+  seen = location.hash;
+  const [view, query = ""] = seen.slice(1).split("?");
   const keys = Object.fromEntries(new URLSearchParams(query));
   const { cycle, why: reason, ...selection } = keys;
   const number = /^-?\d+$/.test(cycle ?? "") ? Number(cycle) : null;
@@ -42,9 +45,10 @@ export function changed() {
 
 function write() {
   const next = current();
-  if (next && next !== written) {
+  if (next && next !== written && location.hash === seen) {
     written = next;
     history.replaceState(null, "", next);
+    seen = location.hash;
   }
 }
 
