@@ -275,16 +275,8 @@ function draw() {
   const lanes = lanesOf(answer.signals);
   const height = lanes.reduce((sum, lane) => sum + lane.height, 0);
   const labels = lanes.flatMap(labelsOf).sort(([one], [other]) => one - other);
-  const marks = new Set([answer.from, answer.to]);
-  if (answer.from <= state().cycle && state().cycle <= answer.to) {
-    marks.add(state().cycle);
-  }
-  for (const signal of answer.signals) {
-    for (const [cycle] of signal.runs) {
-      marks.add(cycle);
-    }
-  }
-  const cycles = [...marks].sort((a, b) => a - b);
+  // A point for each cycle, so that the values at the cursor are those of its cycle.
+  const cycles = Array.from({ length: answer.to - answer.from + 1 }, (_, place) => answer.from + place);
   const values = answer.signals.map((signal) => cycles.map(reader(signal.runs)));
   const rows = values.map((row, index) => row.map((value) => (value === null ? null : heightOf(lanes[index], value))));
   const place = id("trend-plot");
