@@ -13,7 +13,8 @@ const stateOf = (name) => `document.querySelector('${member(name)}')?.dataset.st
 const lampOf = (program) => `[...document.querySelectorAll("#protection-list li")].find((line) => line.textContent.includes(" ${program}: "))?.dataset.protection`;
 const command = async (name, what) => {
   await click(member(name));
-  await until(what, `document.querySelector("[data-command=${what}]")?.disabled === false`);
+  // A dialog that was opened while the values were old is opened again.
+  await until(what, `document.querySelector("[data-command=${what}]")?.disabled === false || (document.getElementById("command").close(), document.querySelector('${member(name)}').dispatchEvent(new MouseEvent("click", { bubbles: true })), false)`);
   await answer();
   await click(`[data-command=${what}]`);
   await until("it is done", "!document.getElementById('command').open");
