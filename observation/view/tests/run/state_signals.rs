@@ -128,7 +128,7 @@ cycles = 700
 [[step]]
 at = 20
 action = \"write\"
-remote_io = \"left-io\"
+station = \"left-io\"
 input = \"start\"
 value = true
 ";
