@@ -270,8 +270,9 @@ fn effects(run: &Path) -> BTreeMap<u64, BTreeSet<String>> {
         let record = serde_json::to_value(record).expect("JSON");
         let event = &record["event"];
         match event["event"].as_str() {
-            Some("written") => {
-                let write = &event["write"];
+            // A remote I/O that is killed loses the records of its last moment, and not the write.
+            Some("commanded") if event["command"]["command"] == "write" => {
+                let write = &event["command"];
                 let stored = write["value"]["stored"].as_u64();
                 values.insert(write["id"].to_string(), stored);
             }
