@@ -9,6 +9,7 @@ mod event;
 mod foresight;
 mod history;
 mod holders;
+mod ramp;
 mod remote_io;
 mod selection;
 mod settings;
@@ -20,9 +21,10 @@ pub use channel::Channel;
 pub use diagnosis::Diagnosis;
 pub use event::{Event, Lacking, LackingReason, Missing};
 pub use foresight::Foreseen;
+pub use ramp::Ramp;
 pub use remote_io::RemoteIo;
 pub use settings::{Release, Settings, StaleState, StopPoints, ValueFault};
 pub use source::{
-    InputPlace, OperatorInput, OperatorInputKind, SignalInput, SignalSource, ValueMismatch,
+    OperatorInput, OperatorInputKind, PointPlace, SignalInput, SignalSource, ValueMismatch,
     in_order,
 };

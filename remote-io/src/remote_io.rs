@@ -43,6 +43,7 @@ use understudy_wire::{
 use crate::diagnosis::Diagnosing;
 use crate::event::{Event, Missing};
 use crate::holders::Holders;
+use crate::ramp::Descent;
 use crate::selection::Selection;
 use crate::settings::Settings;
 use crate::trust::Trust;
@@ -83,6 +84,8 @@ pub struct RemoteIo {
     missed: u32,
     applied: Option<Applied>,
     last_true: Option<Image>,
+    /// The way to the fail-safe values, until all ramps have ended.
+    descent: Option<Descent>,
     program: Execution,
     trust: Trust,
     /// Words and states that differed at the last deadline, with those who can be wrong.
@@ -164,6 +167,7 @@ impl RemoteIo {
             missed: 0,
             applied: None,
             last_true: None,
+            descent: None,
             program: Execution::Running,
             trust: Trust::default(),
             differed: Vec::new(),
@@ -344,6 +348,7 @@ impl Hash for RemoteIo {
             missed,
             applied,
             last_true,
+            descent,
             program,
             trust,
             differed,
@@ -352,7 +357,7 @@ impl Hash for RemoteIo {
         (sensors, field, diagnosing, diagnosed, forcing).hash(hasher);
         (writing, signals).hash(hasher);
         (looked, protection, turns, deadline, missed, applied).hash(hasher);
-        (last_true, program, trust, differed).hash(hasher);
+        (last_true, descent, program, trust, differed).hash(hasher);
     }
 }
 

@@ -8,6 +8,7 @@ use understudy_wire::{Image, ProgramHash, ProgramId};
 
 use crate::channel::Channel;
 use crate::diagnosis::Diagnosis;
+use crate::ramp::Ramp;
 use crate::source::{OperatorInput, SignalInput, SignalSource};
 
 /// Configuration of one remote I/O.
@@ -37,6 +38,8 @@ pub struct Settings {
     pub hold_cycles: u32,
     /// Fail-safe y(i), applied after that; its width is that of the outputs.
     pub fail_safe: Image,
+    /// Outputs that move to their fail-safe values by a ramp.
+    pub ramps: Vec<Ramp>,
     /// Who releases the outputs after a cold start.
     pub release: Release,
     /// Reaction to a value fault that no majority locates.

@@ -3,26 +3,26 @@
 use understudy_typed::Elementary;
 use understudy_wire::{Image, PointValue, ProgramId, Role};
 
-/// Value in the process image of inputs.
+/// Place of a value in a process image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct InputPlace {
-    /// First bit in u(i), counted from 0.
+pub struct PointPlace {
+    /// First bit in u(i) or y(i), counted from 0.
     pub bit: u16,
     /// Type.
     pub of: Elementary,
 }
 
-impl InputPlace {
+impl PointPlace {
     /// Stores a value.
-    pub(crate) fn set(self, inputs: &mut Image, stored: u64) {
+    pub(crate) fn set(self, image: &mut Image, stored: u64) {
         for bit in 0..self.of.bits() {
-            inputs.set(usize::from(self.bit) + bit as usize, stored >> bit & 1 == 1);
+            image.set(usize::from(self.bit) + bit as usize, stored >> bit & 1 == 1);
         }
     }
 
     /// The stored value.
-    pub fn get(self, inputs: &Image) -> u64 {
-        read(inputs, self.bit, self.of)
+    pub fn get(self, image: &Image) -> u64 {
+        read(image, self.bit, self.of)
     }
 }
 
@@ -36,7 +36,7 @@ fn read(image: &Image, bit: u16, of: Elementary) -> u64 {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct OperatorInput {
     /// Place in u(i).
-    pub place: InputPlace,
+    pub place: PointPlace,
     /// Behaviour of the written value.
     pub kind: OperatorInputKind,
     /// Stored value before the first write.
@@ -135,7 +135,7 @@ pub struct SignalInput {
     /// First bit of the value in the outputs of that program.
     pub output: u16,
     /// Place in u(i), of the type of the output.
-    pub place: InputPlace,
+    pub place: PointPlace,
     /// Bit of u(i) that is TRUE while the value is at most `stale_after` cycles older than usual.
     pub valid: Option<u16>,
     /// Stored value while it is not.

@@ -114,6 +114,7 @@ fn settings() -> Settings {
         diagnosis: None,
         hold_cycles: 2,
         fail_safe: Image::zero(1),
+        ramps: Vec::new(),
         release: Release::Automatic,
         value_fault: ValueFault::default(),
         stale_state: StaleState::Operator,

@@ -52,6 +52,7 @@ fn run(held: [Held; 3], release: Release, released_at: u64, cycles: u64) -> Vec<
             diagnosis: None,
             hold_cycles: 3,
             fail_safe: Image::zero(1),
+            ramps: Vec::new(),
             release,
             value_fault: ValueFault::Hold,
             stale_state: StaleState::Operator,

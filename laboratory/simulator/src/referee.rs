@@ -20,13 +20,17 @@
 //! A cold start is no violation by itself: the referee counts it, and [`crate::Simulation`], which knows the states of all
 //! stations, reports one that was not necessary.
 
+mod descent;
+
 use std::collections::VecDeque;
 use std::hash::{Hash, Hasher};
 
 use serde::{Deserialize, Serialize};
 use understudy_executable::{Executable, Scratch};
-use understudy_remote_io::{Event, Settings};
+use understudy_remote_io::{Event, Ramp, Settings};
 use understudy_wire::{Image, Lineage, Moment, ProgramHash, Source, StationId};
+
+use descent::Descent;
 
 /// States that are remembered, at most, where some of them lie before the floor; the oldest are forgotten.
 const REMEMBERED: usize = 1024;
@@ -49,6 +53,7 @@ pub struct Referee {
     executable: Executable,
     hash: ProgramHash,
     fail_safe: Image,
+    ramps: Vec<Ramp>,
     hold_cycles: u32,
     scratch: Scratch,
     /// The states that the samples led to, newest last.
@@ -60,6 +65,7 @@ pub struct Referee {
     /// h(x(t), u(t)) of the newest sample, with its cycle.
     truth: Option<(Moment, Image)>,
     last_true: Option<Image>,
+    descent: Descent,
     held: u32,
     /// Records are missing, and no state after them is known yet.
     blind: bool,
@@ -176,6 +182,10 @@ impl Hash for Referee {
             .for_each(|state| state.hash(hasher));
         let newest = self.newest.map(|place| place - self.floor.min(place));
         (newest, &self.truth, &self.last_true).hash(hasher);
+        // Without ramps there is one way to the fail-safe values.
+        if !self.ramps.is_empty() {
+            self.descent.hash(hasher);
+        }
         (self.held, self.blind, self.choice, self.applied).hash(hasher);
     }
 }
@@ -193,6 +203,7 @@ impl Referee {
             executable,
             hash: settings.hash,
             fail_safe: settings.fail_safe.clone(),
+            ramps: settings.ramps.clone(),
             hold_cycles: settings.hold_cycles,
             scratch: Scratch::default(),
             states: VecDeque::new(),
@@ -200,6 +211,7 @@ impl Referee {
             newest: None,
             truth: None,
             last_true: None,
+            descent: Descent::default(),
             held: 0,
             blind: false,
             seen: VecDeque::new(),
@@ -235,6 +247,7 @@ impl Referee {
         self.newest = None;
         self.truth = None;
         self.last_true = None;
+        self.descent.forget();
         self.held = 0;
         self.blind = true;
     }
@@ -474,6 +487,9 @@ impl Referee {
     }
 
     fn judge(&mut self, moment: Moment, driven: &Image, source: Source) -> Result<(), Violation> {
+        if source != Source::FailSafe {
+            self.descent.begins_at(driven);
+        }
         match source {
             Source::Direct | Source::Reconstructed | Source::Held if self.blind => Ok(()),
             Source::Direct | Source::Reconstructed => {
@@ -508,7 +524,8 @@ impl Referee {
             Source::FailSafe => {
                 self.held = 0;
                 self.last_true = None;
-                if *driven == self.fail_safe {
+                let descent = &mut self.descent;
+                if descent.permits(driven, &self.fail_safe, &self.ramps) {
                     return Ok(());
                 }
                 Err(Violation::NotTheFailSafe {

@@ -53,6 +53,9 @@ pub struct Why {
     pub has_numbers: bool,
     /// How it was reconstructed.
     pub reconstructed: Option<Reconstructed>,
+    /// Configured fail-safe value, where the output is on a ramp to it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ramp_to: Option<Value>,
     /// The chain of contacts or statements; nothing for a fail-safe value, unless a program fault led to it.
     pub because: Option<Reason>,
 }
@@ -178,6 +181,9 @@ impl Model {
                 }
             }
         };
+        let fail_safe = &self.cluster.remote_ios()[program.index()].fail_safe;
+        let configured = output.map(|output| value_in(output, fail_safe));
+        let on_ramp = source == Some(Source::FailSafe) && configured != driven;
         let value = driven
             .or(because.as_ref().map(|reason| reason.value.clone()))
             .unwrap_or_default();
@@ -193,6 +199,7 @@ impl Model {
             scanned: scanned.filter(|scanned| *scanned != value),
             inputs: inputs.collect(),
             has_numbers: controller.code.typed().is_some(),
+            ramp_to: configured.filter(|_| on_ramp),
             value,
             reconstructed: step
                 .driven

@@ -16,7 +16,9 @@ use understudy_logic::Circuit;
 use understudy_node::Program;
 use understudy_parity::ParityController;
 use understudy_plant::{Followed, Plant};
-use understudy_remote_io::{Diagnosis, Release, SignalSource, StaleState, StopPoints, ValueFault};
+use understudy_remote_io::{
+    Diagnosis, Ramp, Release, SignalSource, StaleState, StopPoints, ValueFault,
+};
 use understudy_typed::Program as TypedProgram;
 use understudy_wire::{Epoch, Image, Member, ProgramHash, ProgramId, Roster, StationId};
 
@@ -121,6 +123,8 @@ pub struct RemoteIo {
     pub hold_cycles: u32,
     /// y(i) after that.
     pub fail_safe: Image,
+    /// Numeric outputs that move to their fail-safe values by a ramp.
+    pub ramps: Vec<Ramp>,
     /// Who releases the outputs after a cold start.
     pub release: Release,
     /// Its inputs that do not come from the field.
@@ -375,6 +379,7 @@ impl Cluster {
                 .map(|it| Arc::clone(&it.compiled)),
             hold_cycles: remote_io.hold_cycles,
             fail_safe: remote_io.fail_safe.clone(),
+            ramps: remote_io.ramps.clone(),
             release: remote_io.release,
             value_fault: remote_io.value_fault,
             stale_state: remote_io.stale_state,

@@ -45,6 +45,10 @@ pub(crate) fn configuration_text(cluster: &Cluster, plants: &[String]) -> String
         line(format_args!("remote io {}", remote_io.name));
         line(format_args!("  hold {}", remote_io.hold_cycles));
         line(format_args!("  fail-safe {}", remote_io.fail_safe));
+        for ramp in &remote_io.ramps {
+            let bit = ramp.place.bit;
+            line(format_args!("  ramp {bit} {:016x}", ramp.step.to_bits()));
+        }
         line(format_args!("  release {:?}", remote_io.release));
         line(format_args!("  value fault {:?}", remote_io.value_fault));
         line(format_args!("  stale state {:?}", remote_io.stale_state));

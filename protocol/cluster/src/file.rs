@@ -85,6 +85,7 @@ pub(crate) struct RemoteIoSection {
     pub(crate) controller: Option<Placed<String>>,
     pub(crate) hold_cycles: u32,
     pub(crate) fail_safe: Vec<(Placed<String>, Constant)>,
+    pub(crate) ramp: Vec<(Placed<String>, Constant)>,
     /// Index into [`crate::format::RELEASES`].
     pub(crate) release: usize,
     /// Index into [`crate::format::VALUE_FAULTS`].
@@ -172,6 +173,7 @@ pub(crate) fn read(text: &str, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
             controller: fields.text("controller", diagnostics),
             hold_cycles: fields.count("hold_cycles", diagnostics),
             fail_safe: fields.values("fail_safe", diagnostics),
+            ramp: fields.values("ramp", diagnostics),
             release: fields.word("release", diagnostics),
             value_fault: fields.word("value_fault", diagnostics),
             stale_state: fields.word("stale_state", diagnostics),

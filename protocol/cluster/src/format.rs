@@ -189,6 +189,7 @@ pub(crate) static REMOTE_IO: Section = Section {
         key name: Kind::Name, "names it; `<controller>-io` where absent";
         key hold_cycles: count(0, MANY_CYCLES, 3), "cycles for which the last proven outputs are held when no output can be proved";
         key fail_safe: Kind::Values, "fail-safe values after that, by the name of the output, such as `{ grip = true, heating = 12.5 }`; `false` or 0 for all others";
+        key ramp: Kind::Values, "change per second of a numeric output on its way to its fail-safe value, such as `{ heating = 5.0 }`; an output without one changes at once";
         key release: word(&RELEASES), "how the outputs are released after a cold start of the program";
         key value_fault: word(&VALUE_FAULTS), "the applied outputs while two stations publish different outputs of one history and there is no majority: `hold`, the last proven outputs and then the fail-safe ones, until the stations agree or the operator releases them; `alarm`, the outputs of the controller itself; `fail-safe`, the fail-safe outputs at once, until the operator releases them";
         key stale_state: word(&STALE_STATES), "reaction when living stations hold only states that are older than the newest applied output: `operator`, the outputs are held, then fail-safe, until the operator chooses the older state or a cold start; `cold`, the program starts from its initial state";

@@ -34,6 +34,7 @@
 mod alarms;
 mod devices;
 mod diagnosis;
+mod fail_safe;
 mod follows;
 mod inputs;
 mod ladders;
@@ -52,7 +53,6 @@ use understudy_logic::Circuit;
 use understudy_node::Program;
 use understudy_remote_io::{Release, StaleState, ValueFault};
 use understudy_text::spelling::suggestion;
-use understudy_text::tables::Constant;
 use understudy_text::{Diagnostic, Report};
 use understudy_wire::{ClusterHash, ConfigurationHash, Image, MAXIMUM_PROGRAMS};
 
@@ -62,9 +62,7 @@ use self::names::Names;
 use crate::cluster::{Cluster, Controller, Link, RemoteIo, Security, Understudy};
 use crate::code::Code;
 use crate::configuration::configuration_text;
-use crate::fields::MAXIMUM_MISFITS;
 use crate::file::{self, ClusterFile, ControllerSection};
-use crate::value::stored_value;
 
 /// The longest cluster file in bytes.
 pub const MAXIMUM_TEXT_BYTES: usize = 1 << 20;
@@ -360,7 +358,8 @@ fn remote_ios(
             continue;
         };
         let member = &members[index];
-        let fail_safe = fail_safe(member, &section.fail_safe, diagnostics);
+        let fail_safe = fail_safe::values(member, &section.fail_safe, diagnostics);
+        let ramps = fail_safe::ramps(member, &section.ramp, period, diagnostics);
         let name = section.name.map(|name| name.value);
         let remote_io = RemoteIo {
             name: name.unwrap_or_else(|| {
@@ -370,6 +369,7 @@ fn remote_ios(
             }),
             hold_cycles: section.hold_cycles,
             fail_safe,
+            ramps,
             release: [Release::Automatic, Release::Operator][section.release],
             inputs: inputs::resolve(
                 &section.inputs,
@@ -406,7 +406,8 @@ fn remote_ios(
             RemoteIo {
                 name,
                 hold_cycles: crate::format::REMOTE_IO.default_count("hold_cycles"),
-                fail_safe: fail_safe(member, &[], diagnostics),
+                fail_safe: fail_safe::values(member, &[], diagnostics),
+                ramps: Vec::new(),
                 release: Release::default(),
                 inputs: Vec::new(),
                 field: None,
@@ -422,47 +423,6 @@ fn remote_ios(
 
 fn default_remote_io_name(member: &Member) -> String {
     format!("{}-io", member.name)
-}
-
-/// y(i) from the names that are set.
-fn fail_safe(
-    member: &Member,
-    entries: &[(crate::fields::Placed<String>, Constant)],
-    diagnostics: &mut Vec<Diagnostic>,
-) -> Image {
-    let Some((_, interface)) = &member.code else {
-        return Image::default();
-    };
-    let outputs = &interface.outputs;
-    let mut image = Image::zero(outputs.width().min(understudy_wire::MAXIMUM_IMAGE_BITS));
-    let mut misfits = 0;
-    for (name, value) in entries {
-        if let Some(output) = outputs.find(&name.value) {
-            match stored_value(value, output.of) {
-                Ok(stored) => output.set(image.words_mut(), stored),
-                Err(expected) => {
-                    let message = format!("`{}` is {}: {expected}", output.name, output.of);
-                    diagnostics.push(Diagnostic::error("U0204", message, name.span.clone()));
-                }
-            }
-            continue;
-        }
-        misfits += 1;
-        if misfits <= MAXIMUM_MISFITS {
-            let message = format!("`{}` has no output `{}`", member.name, name.value);
-            diagnostics.push(
-                Diagnostic::error("U0209", message, name.span.clone())
-                    .with_help(suggestion(&name.value, outputs.names())),
-            );
-        }
-    }
-    if misfits > MAXIMUM_MISFITS {
-        let more = misfits - MAXIMUM_MISFITS;
-        let message = format!("`{}` has none of {more} more outputs", member.name);
-        let span = member.section.span.clone();
-        diagnostics.push(Diagnostic::error("U0209", message, span));
-    }
-    image
 }
 
 fn check_understudies(

@@ -7,6 +7,7 @@ use super::knowledge::Run;
 use super::{Applied, Authority, Deadline, Execution, Question, RemoteIo};
 use crate::event::{Event, Missing};
 use crate::history::History;
+use crate::ramp::Descent;
 use crate::selection::{Received, Selection};
 use crate::settings::ValueFault;
 use crate::trust::Accusation;
@@ -151,12 +152,7 @@ impl RemoteIo {
                     Some(outputs) => (outputs, Source::Held, None, Some(missing)),
                     None => {
                         self.last_true = None;
-                        (
-                            self.settings.fail_safe.clone(),
-                            Source::FailSafe,
-                            None,
-                            Some(missing),
-                        )
+                        (self.descend(), Source::FailSafe, None, Some(missing))
                     }
                 }
             }
@@ -164,6 +160,7 @@ impl RemoteIo {
         let moment = self.moment();
         if missing.is_none() {
             self.missed = 0;
+            self.descent = None;
             self.last_true = Some(outputs.clone());
             self.knowledge.applied(moment);
             self.report_in_effect(moment);
@@ -186,6 +183,25 @@ impl RemoteIo {
             missing,
             heard: self.member.published(),
         });
+    }
+
+    /// The fail-safe values, or the next outputs on the way to them.
+    fn descend(&mut self) -> Image {
+        let (fail_safe, ramps) = (&self.settings.fail_safe, &self.settings.ramps);
+        match &self.applied {
+            Some(applied) if applied.source != Source::FailSafe && !ramps.is_empty() => {
+                self.descent = Some(Descent::new(applied.outputs.clone()));
+            }
+            _ => {}
+        }
+        let Some(descent) = &mut self.descent else {
+            return fail_safe.clone();
+        };
+        let outputs = descent.next(fail_safe, ramps);
+        if outputs == *fail_safe {
+            self.descent = None;
+        }
+        outputs
     }
 
     /// The next deadline: of this cycle, or of one that no station has started in time.

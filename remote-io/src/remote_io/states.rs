@@ -98,6 +98,7 @@ impl Bench {
             diagnosis: None,
             hold_cycles: 2,
             fail_safe: Image::zero(1),
+            ramps: Vec::new(),
             release: Release::Operator,
             value_fault: ValueFault::FailSafe,
             stale_state: StaleState::Operator,

@@ -81,6 +81,7 @@ pub(crate) fn parts(understudies: usize) -> Parts {
         diagnosis: None,
         hold_cycles: 1,
         fail_safe: Image::zero(1),
+        ramps: Vec::new(),
         release: Release::Automatic,
         value_fault: ValueFault::Hold,
         stale_state: StaleState::Operator,

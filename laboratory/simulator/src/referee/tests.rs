@@ -42,6 +42,7 @@ fn referee() -> Referee {
         diagnosis: None,
         hold_cycles: 2,
         fail_safe: Image::zero(1),
+        ramps: Vec::new(),
         release: Release::Automatic,
         value_fault: ValueFault::Hold,
         stale_state: StaleState::Operator,

@@ -64,7 +64,13 @@ impl Why {
                 let _ = writeln!(text, "    {}", list(&restored.values));
             }
         }
-        if self.because.is_none() || self.source == Some(FAIL_SAFE) {
+        if let Some(configured) = &self.ramp_to {
+            let configured = value_text(configured);
+            let _ = writeln!(
+                text,
+                "  it is on its ramp to the fail-safe value {configured}"
+            );
+        } else if self.because.is_none() || self.source == Some(FAIL_SAFE) {
             let _ = writeln!(text, "  it is the configured fail-safe value");
         }
         if let Some(reason) = &self.because {

@@ -301,7 +301,7 @@ fn not_begun(model: &Model) -> Problem {
 
 #[cfg(test)]
 mod tests {
-    use understudy_remote_io::InputPlace;
+    use understudy_remote_io::PointPlace;
     use understudy_typed::Elementary;
 
     use super::*;
@@ -310,7 +310,7 @@ mod tests {
     fn an_input_says_why_a_person_may_not_write_it() {
         let declared = OperatorDeclaration {
             input: OperatorInput {
-                place: InputPlace {
+                place: PointPlace {
                     bit: 0,
                     of: Elementary::Int,
                 },

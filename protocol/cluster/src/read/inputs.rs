@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::time::Duration;
 
 use understudy_executable::Interface;
-use understudy_remote_io::{InputPlace, OperatorInput, OperatorInputKind, SignalInput, in_order};
+use understudy_remote_io::{OperatorInput, OperatorInputKind, PointPlace, SignalInput, in_order};
 use understudy_text::Diagnostic;
 use understudy_text::spelling::suggestion;
 use understudy_text::tables::Constant;
@@ -115,8 +115,8 @@ pub(super) fn outputs_read(sections: &[RemoteIoSection]) -> BTreeSet<String> {
     from.map(|from| from.value.clone()).collect()
 }
 
-fn place(point: &Point) -> InputPlace {
-    InputPlace {
+fn place(point: &Point) -> PointPlace {
+    PointPlace {
         // Images are at most 64 Kbit wide, which is checked elsewhere.
         bit: u16::try_from(point.bit).unwrap_or(u16::MAX),
         of: point.of,

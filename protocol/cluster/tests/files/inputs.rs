@@ -5,7 +5,7 @@ use std::time::Duration;
 use crate::common::{findings, load, load_with};
 use understudy_cluster::Overrides;
 use understudy_remote_io::{
-    InputPlace, OperatorInput, OperatorInputKind, SignalInput, SignalSource,
+    OperatorInput, OperatorInputKind, PointPlace, SignalInput, SignalSource,
 };
 use understudy_typed::Elementary;
 use understudy_wire::{Member, ProgramId, Role};
@@ -57,7 +57,7 @@ ready = { from = "right.done", default = true, stale_after = 7 }
     let settings = cluster
         .remote_io_settings(ProgramId(0))
         .expect("it is there");
-    let place = |bit, of| InputPlace { bit, of };
+    let place = |bit, of| PointPlace { bit, of };
     let bits = |value: f32| u64::from(value.to_bits());
     let start = OperatorInput {
         place: place(1, Elementary::Bool),

@@ -1,0 +1,71 @@
+//! What may be driven as fail-safe: the configured values, and for outputs with a ramp the values on the way to them.
+
+use understudy_remote_io::Ramp;
+use understudy_wire::Image;
+
+/// The last outputs that were not fail-safe, and the deadlines since; nothing where they are not known.
+#[derive(Debug, Clone, Default, Hash)]
+pub(super) struct Descent {
+    begun: Option<(Image, u32)>,
+}
+
+impl Descent {
+    /// Outputs other than fail-safe ones were driven: ramps begin at them.
+    pub(super) fn begins_at(&mut self, driven: &Image) {
+        self.begun = Some((driven.clone(), 0));
+    }
+
+    /// Records are missing: what the ramps began at is not known.
+    pub(super) fn forget(&mut self) {
+        self.begun = None;
+    }
+
+    /// Takes one deadline with fail-safe outputs; whether they are permitted.
+    ///
+    /// The fail-safe values themselves always are: a remote I/O that has restarted knows no value to begin at.
+    pub(super) fn permits(&mut self, driven: &Image, fail_safe: &Image, ramps: &[Ramp]) -> bool {
+        if let Some((_, deadlines)) = &mut self.begun {
+            *deadlines = deadlines.saturating_add(1);
+        }
+        if driven == fail_safe {
+            return true;
+        }
+        let of_ramp = |bit: usize| {
+            ramps.iter().any(|ramp| {
+                let first = usize::from(ramp.place.bit);
+                (first..first + ramp.place.of.bits() as usize).contains(&bit)
+            })
+        };
+        let others_agree = driven.width() == fail_safe.width()
+            && (0..driven.width()).all(|bit| of_ramp(bit) || driven.get(bit) == fail_safe.get(bit));
+        others_agree
+            && ramps
+                .iter()
+                .all(|ramp| self.is_on(*ramp, driven, fail_safe))
+    }
+
+    /// Whether an output has gone as far as its ramp says, up to rounding.
+    fn is_on(&self, ramp: Ramp, driven: &Image, fail_safe: &Image) -> bool {
+        let Some((begun, deadlines)) = &self.begun else {
+            return true;
+        };
+        let [from, found, to] = [begun, driven, fail_safe].map(|image| number(ramp, image));
+        let way = (to - from).abs();
+        let gone = (ramp.step * f64::from(*deadlines)).min(way);
+        let rounding = match ramp.place.of.is_real() {
+            true => 1e-6 * from.abs().max(to.abs()),
+            false => 1.0,
+        };
+        let between = from.min(to) <= found && found <= from.max(to);
+        between && ((found - from).abs() - gone).abs() <= rounding
+    }
+}
+
+fn number(ramp: Ramp, image: &Image) -> f64 {
+    let (of, stored) = (ramp.place.of, ramp.place.get(image));
+    match (of.is_real(), of.bits()) {
+        (true, 32) => f64::from(f32::from_bits(stored as u32)),
+        (true, _) => f64::from_bits(stored),
+        (false, _) => of.signed(stored) as f64,
+    }
+}
