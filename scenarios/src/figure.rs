@@ -35,6 +35,8 @@ const PANEL_MARGIN: u32 = 58;
 
 /// Lanes of one panel, at most.
 const MAXIMUM_LANES: usize = 24;
+/// Heights of a number in its lane, more than a screen tells apart: a slow signal is a few steps, and not one for each cycle.
+const HEIGHTS: f64 = 32.0;
 
 const INK: RGBColor = RGBColor(0x1a, 0x20, 0x2c);
 const GRID: RGBColor = RGBColor(0xd5, 0xda, 0xe1);
@@ -314,7 +316,7 @@ fn point_lanes(trace: &Trace<Image>, points: &Points) -> Vec<Lane> {
             Elementary::Bool => (point.name.clone(), Box::new(|value| value)),
             _ if low < high => (
                 format!("{} {} … {}", point.name, short(low), short(high)),
-                Box::new(move |value| (value - low) / (high - low)),
+                Box::new(move |value| ((value - low) / (high - low) * HEIGHTS).round() / HEIGHTS),
             ),
             _ if low == high => (format!("{} {}", point.name, short(low)), Box::new(|_| 0.5)),
             _ => (point.name.clone(), Box::new(|_| 0.5)),
