@@ -7,7 +7,7 @@ use std::time::Duration;
 use clap::Args;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
-use understudy_executable::{Executable, Interface, Scratch};
+use understudy_executable::{Executable, Interface, Scratch, digest};
 use understudy_interchange::{Source, Wanted, no_program, read_source};
 use understudy_ladder::Program as Ladder;
 use understudy_text::{Diagnostic, Report, duration, has_errors};
@@ -16,23 +16,29 @@ use understudy_typed::{Elementary, Fault, Point, Points, Program};
 use crate::answer::{Answer, Status};
 use crate::files;
 
-/// Execute a program on inputs from a file, one scan for each line
+/// Execute a program on inputs from a file, one scan for each line, or on random inputs
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   understudy scan pid.st --inputs steps.txt --period 10ms
   understudy scan --json robot.ladder --inputs part-arrives.txt
+  understudy scan pid.st --digest 1000000
 
 A line of the file holds the values of all inputs in the order of their declaration, with blanks between: BOOL as 0 or 1, integers and bit
 strings in decimal, REAL and LREAL as their hexadecimal bit patterns of 8 and 16 digits or as numbers with a point, times in nanoseconds.
-Empty lines and lines that begin with # are skipped. Each scan is printed as `inputs -> outputs` in the same notation.")]
+Empty lines and lines that begin with # are skipped. Each scan is printed as `inputs -> outputs` in the same notation.
+With --digest, the inputs are pseudo-random and the same in every run. The digest of all outputs is equal on every processor and in every
+version of Understudy that executes the program alike.")]
 pub(crate) struct Arguments {
     /// Program
     #[arg(value_name = "PROGRAM")]
     program_file: PathBuf,
     /// File with the inputs, one scan a line
-    #[arg(long, value_name = "FILE")]
-    inputs: PathBuf,
+    #[arg(long, value_name = "FILE", required_unless_present = "digest")]
+    inputs: Option<PathBuf>,
+    /// Print only a digest of the outputs of this number of scans with pseudo-random inputs
+    #[arg(long, value_name = "SCANS", conflicts_with = "inputs")]
+    digest: Option<u64>,
     /// Time from one scan to the next; by default that of the file, else 10ms
     #[arg(long, value_name = "TIME", value_parser = duration::parse_positive)]
     period: Option<Duration>,
@@ -60,6 +66,15 @@ struct Result {
 }
 
 #[derive(Serialize)]
+struct Digested {
+    program: String,
+    period_ns: u64,
+    scans: u64,
+    faults: u64,
+    digest: String,
+}
+
+#[derive(Serialize)]
 struct Signal {
     name: String,
     #[serde(rename = "type")]
@@ -83,10 +98,14 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
 
 fn scan(arguments: &Arguments) -> std::result::Result<Answer, Answer> {
     let (subject, report) = subject(arguments)?;
-    let text = files::text(&arguments.inputs)?;
+    let Some(inputs) = &arguments.inputs else {
+        let answer = subject.digested(arguments.digest.unwrap_or_default());
+        return Ok(answer.with_used(vec![report]));
+    };
+    let text = files::text(inputs)?;
     let lines = lines(&text, &subject.interface.inputs).map_err(|diagnostics| {
         Answer::bad_files(vec![Report {
-            name: arguments.inputs.display().to_string(),
+            name: inputs.display().to_string(),
             text: text.clone(),
             diagnostics,
         }])
@@ -238,6 +257,25 @@ fn expected(of: Elementary) -> String {
 }
 
 impl Subject {
+    fn digested(&self, scans: u64) -> Answer {
+        let digest = digest(&self.executable, &self.interface, scans);
+        let result = Digested {
+            program: self.name.clone(),
+            period_ns: u64::try_from(self.period.as_nanos()).unwrap_or(u64::MAX),
+            scans,
+            faults: digest.faults,
+            digest: format!("{:016x}", digest.outputs),
+        };
+        let Digested {
+            program,
+            faults,
+            digest,
+            ..
+        } = &result;
+        let text = format!("{program}: digest {digest} of {scans} scans, {faults} program faults");
+        Answer::done(text, result)
+    }
+
     fn executed(&self, lines: &[Vec<u64>]) -> Answer {
         let Interface { inputs, outputs } = &self.interface;
         let mut scratch = Scratch::default();

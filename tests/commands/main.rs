@@ -21,6 +21,7 @@ mod others;
 mod petri;
 mod reconfigure;
 mod reliability;
+mod scan;
 mod verdicts;
 mod verify;
 mod view;

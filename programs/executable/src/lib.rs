@@ -1,8 +1,12 @@
 //! A program as a station executes it, whatever it was written in: a circuit of bits, or a typed program.
 
+mod digest;
+
 use understudy_logic::{Circuit, Scan};
 
 use understudy_typed::{Elementary, Machine, Points, Program};
+
+pub use self::digest::{Digest, digest};
 
 /// A compiled program; cheap to share, it holds no state.
 #[derive(Debug, Clone)]

@@ -1,0 +1,71 @@
+//! Digest of the outputs of a program over many scans with pseudo-random inputs. A program has one digest, on every processor and in
+//! every build: replicas on different machines agree bit for bit, or their digests differ.
+
+use understudy_typed::{Elementary, Point, Program};
+
+use crate::{Executable, Interface, Scratch};
+
+/// Outputs of many scans as one number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Digest {
+    /// FNV-1a over the words of all outputs, scan by scan.
+    pub outputs: u64,
+    /// Program faults, each of which was reset in the scan after it.
+    pub faults: u64,
+}
+
+/// Executes a program from its initial state. An input keeps its value in three of four scans, so that timers and integrals move.
+pub fn digest(executable: &Executable, interface: &Interface, scans: u64) -> Digest {
+    let Interface { inputs, outputs } = interface;
+    let mut scratch = Scratch::default();
+    let mut state = executable.initial().to_vec();
+    let mut read = vec![0; inputs.width().div_ceil(64)];
+    let mut driven = vec![0; outputs.width().div_ceil(64)];
+    let (reset, fault) = (inputs.find(Program::RESET), outputs.find(Program::FAULT));
+    let mut random = Random(0);
+    let mut digest = Digest {
+        outputs: 0xcbf2_9ce4_8422_2325,
+        faults: 0,
+    };
+    for _ in 0..scans {
+        let stopped = fault.is_some_and(|fault| fault.get(&driven) == 1);
+        for point in inputs.iter() {
+            if Some(point) == reset {
+                point.set(&mut read, u64::from(stopped));
+            } else if random.number() % 4 == 0 {
+                point.set(&mut read, random.value(point));
+            }
+        }
+        executable.step(&mut scratch, &mut state, &read, &mut driven);
+        digest.faults += u64::from(!stopped && fault.is_some_and(|fault| fault.get(&driven) == 1));
+        for word in &driven {
+            digest.outputs = (digest.outputs ^ word).wrapping_mul(0x0000_0100_0000_01b3);
+        }
+    }
+    digest
+}
+
+/// Random numbers: SplitMix64.
+struct Random(u64);
+
+impl Random {
+    fn number(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut mixed = self.0;
+        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        mixed ^ (mixed >> 31)
+    }
+
+    /// A value as it is stored: reals from -1000 to 1000 in thousandths, times up to 10 s, everything else in the range of its type.
+    fn value(&mut self, point: &Point) -> u64 {
+        let number = self.number();
+        let real = (number % 2_000_001) as f64 / 1000.0 - 1000.0;
+        match point.of {
+            Elementary::Real => u64::from((real as f32).to_bits()),
+            Elementary::Lreal => real.to_bits(),
+            of if of.is_time() => number % 10_000_000_000,
+            of => number & of.mask(),
+        }
+    }
+}
