@@ -52,9 +52,8 @@ use understudy_executable::Interface;
 use understudy_logic::Circuit;
 use understudy_node::Program;
 use understudy_remote_io::{Release, StaleState, ValueFault};
-use understudy_text::spelling::suggestion;
 use understudy_text::{Diagnostic, Report};
-use understudy_wire::{ClusterHash, ConfigurationHash, Image, MAXIMUM_PROGRAMS};
+use understudy_wire::{ClusterHash, ConfigurationHash, MAXIMUM_PROGRAMS};
 
 use self::ladders::Ladders;
 pub(crate) use self::marks::MARK;
