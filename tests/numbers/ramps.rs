@@ -10,7 +10,7 @@ use understudy_wire::{Member, ProgramId, Source};
 
 /// The heated tank with this line below the fail-safe values of the heater.
 fn heated_tank(ramp: &str) -> Loaded {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/heated-tank");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/heated-tank");
     let text =
         |name: &str| std::fs::read_to_string(folder.join(name)).map_err(|error| error.to_string());
     let line = "fail_safe = { heater = 0.0 }\n";

@@ -13,7 +13,7 @@ use understudy_wire::{Image, Member, Moment, ProgramId, Source, StationId};
 const CONTROLLERS: usize = 4;
 
 fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/tennessee-eastman")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/tennessee-eastman")
 }
 
 fn text(name: &str) -> Result<String, String> {

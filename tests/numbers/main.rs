@@ -1,0 +1,4 @@
+//! Programs with numbers in clusters of the simulator.
+
+mod ramps;
+mod tennessee_eastman;
