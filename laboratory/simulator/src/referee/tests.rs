@@ -2,7 +2,8 @@
 
 use understudy_cycle::{Agreement, Mode, Schedule};
 use understudy_logic::CircuitBuilder;
-use understudy_remote_io::{Release, StaleState, ValueFault};
+use understudy_remote_io::{PointPlace, Release, StaleState, ValueFault};
+use understudy_typed::Elementary;
 use understudy_wire::{
     ClusterHash, ConfigurationHash, Cycle, Epoch, ProgramId, Role, StationSet, Write, WriteId,
 };
@@ -273,4 +274,34 @@ fn a_sample_without_a_record_may_have_what_was_written() {
         }
         assert_eq!(referee.observe(&resumed).is_ok(), is_written);
     }
+}
+
+/// Outputs of a program with a ramp, driven one after the other from 10 on: whether the referee permits them all.
+#[track_caller]
+fn descends(driven: &[(bool, u16)], permitted: bool) {
+    let place = PointPlace {
+        bit: 16,
+        of: Elementary::Int,
+    };
+    let ramp = Ramp { place, step: 2.5 };
+    let image = |switch: bool, number: u16| {
+        let bits = (0..16).map(|bit| switch && bit == 0);
+        Image::from_bits(bits.chain((0..16).map(|bit| number >> bit & 1 == 1)))
+    };
+    let mut descent = Descent::default();
+    descent.begins_at(&image(true, 10));
+    let found = driven
+        .iter()
+        .all(|&(switch, number)| descent.permits(&image(switch, number), &image(false, 0), &[ramp]));
+    assert_eq!(found, permitted, "{driven:?}");
+}
+
+#[test]
+fn only_a_ramp_and_its_end_are_fail_safe() {
+    descends(&[(false, 8), (false, 5), (false, 3), (false, 0)], true);
+    descends(&[(false, 0), (false, 0)], true);
+    descends(&[(false, 10), (false, 10)], false);
+    descends(&[(false, 4)], false);
+    descends(&[(false, 12)], false);
+    descends(&[(true, 8)], false);
 }
