@@ -290,9 +290,9 @@ fn descends(driven: &[(bool, u16)], permitted: bool) {
     };
     let mut descent = Descent::default();
     descent.begins_at(&image(true, 10));
-    let found = driven
-        .iter()
-        .all(|&(switch, number)| descent.permits(&image(switch, number), &image(false, 0), &[ramp]));
+    let found = driven.iter().all(|&(switch, number)| {
+        descent.permits(&image(switch, number), &image(false, 0), &[ramp])
+    });
     assert_eq!(found, permitted, "{driven:?}");
 }
 
