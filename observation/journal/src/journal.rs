@@ -1,17 +1,17 @@
 //! `journal.jsonl`: every record of a run, one JSON object a line, in the order in which they were seen.
 //!
-//! It is kept in segments ([`Segments`]), of which the oldest go when it reaches its limit.
+//! It is kept in segments ([`Segments`]), of which those that are closed are packed, and the oldest go when it reaches its limit.
 //!
 //! Invariant: the journal never stops the run. A full disk or any other failure to write ends the journal, not the cycle; how
 //! many records it lacks and why is said in the summary.
 
-use std::fs::File;
 use std::io::{self, BufRead, BufReader, Write};
 use std::path::Path;
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::packed_file::SegmentFile;
 use crate::record::Record;
 use crate::segments::{Segments, segments_of};
 use crate::version::{WrongVersion, check_header, journal_header};
@@ -44,7 +44,7 @@ impl Journal {
 impl<W: Write> Journal<W> {
     /// A journal in any writer.
     pub fn new(mut writer: W) -> Self {
-        let headed = writer.write_all(&journal_header());
+        let headed = writer.write_all(&journal_header(1));
         let mut journal = Self::of_headed(writer);
         if let Err(error) = headed {
             journal.stop(&error);
@@ -127,9 +127,9 @@ pub const JOURNAL_LIMIT_BYTES: u64 = 1 << 30;
 pub fn records_of(
     path: &Path,
 ) -> io::Result<impl Iterator<Item = Result<Record, JournalError>> + use<>> {
-    let files: Vec<File> = segments_of(path)?
+    let files: Vec<SegmentFile> = segments_of(path)?
         .iter()
-        .map(File::open)
+        .map(|path| SegmentFile::open(path))
         .collect::<io::Result<_>>()?;
     Ok(files
         .into_iter()

@@ -12,6 +12,8 @@ mod members;
 mod named_files;
 mod numbering;
 mod operator;
+mod packed_file;
+mod packing;
 mod record;
 mod rules;
 mod run_directory;
@@ -33,6 +35,7 @@ pub use operator::{
     Shelving, Unshelving, WriteProblem, WriteRequest, WriteSessions, commands, find_alarm,
     force_value, new_write, write_answer,
 };
+pub use packed_file::SegmentFile;
 pub use record::{Happening, LABORATORY, Record, RunEvent, moment};
 pub use rules::{Process, SourceCounts, is_blocked, is_provable};
 pub use run_directory::{KEYS, RunDirectory, RunDirectoryError, time_name};

@@ -48,6 +48,9 @@ pub enum RunEvent {
     Journal {
         /// Version of the records that follow.
         version: u32,
+        /// The number that the file has when it is closed, since version 3.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        segment: Option<u64>,
     },
     /// A member was started, for the first time or again.
     Started {

@@ -21,8 +21,8 @@ use crate::host::Summary;
 use crate::link::LinkKind;
 use crate::rights::Rights;
 
-/// Version of the journal: what its records are called and hold. Journals of version 1 do not say theirs.
-pub const JOURNAL_VERSION: u32 = 2;
+/// Version of the journal: what its records are called and hold. Journals of version 1 do not say theirs; version 3 packs closed segments and records the wall clock.
+pub const JOURNAL_VERSION: u32 = 3;
 
 fn first_version() -> u32 {
     1

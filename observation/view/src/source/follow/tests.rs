@@ -105,7 +105,7 @@ fn what_is_gone_is_said() {
 fn what_is_no_record_is_left_out() {
     let folder = Folder::new("follow-bad");
     let path = folder.join("journal.jsonl");
-    let mut bytes = [journal_header(), line(0)].concat();
+    let mut bytes = [journal_header(1), line(0)].concat();
     bytes.extend(b"{\"at_ns\":1}\n\n\xff\xfe\n");
     bytes.extend(vec![b'x'; 3 * LONGEST_LINE]);
     bytes.push(b'\n');
