@@ -87,6 +87,8 @@ pub struct SegmentFile {
     inode: u64,
     /// Of a packed one.
     blocks: Option<Blocks>,
+    /// Where each piece begins, in the file and in the text; empty until it is asked.
+    pieces: Vec<[u64; 2]>,
 }
 
 #[derive(Debug)]
@@ -130,6 +132,7 @@ impl SegmentFile {
             file,
             inode,
             blocks,
+            pieces: Vec::new(),
         })
     }
 
@@ -157,35 +160,71 @@ impl SegmentFile {
         self.file.metadata()?.modified()
     }
 
-    /// Where the blocks of a packed segment begin; nothing for one that is text.
-    pub(crate) fn blocks(&mut self) -> io::Result<Vec<u64>> {
-        let mut found = Vec::new();
-        if self.blocks.is_none() {
-            return Ok(found);
+    /// Where its pieces begin, in the file and in the text: the blocks of a packed one, lines about as far apart of a text.
+    pub(crate) fn pieces(&mut self) -> io::Result<&[[u64; 2]]> {
+        if self.pieces.is_empty() {
+            self.pieces = match self.blocks {
+                Some(_) => self.found_blocks()?,
+                None => self.found_lines()?,
+            };
         }
-        let mut at = HEAD_BYTES;
-        while let Some(head) = self.block_head(at)? {
-            found.push(at);
-            at += BLOCK_HEAD_BYTES as u64 + u64::from(head[0]);
+        Ok(&self.pieces)
+    }
+
+    fn found_blocks(&mut self) -> io::Result<Vec<[u64; 2]>> {
+        let (mut found, mut at, mut text) = (Vec::new(), HEAD_BYTES, 0);
+        while let Some([packed_bytes, text_bytes, _]) = self.block_head(at)? {
+            found.push([at, text]);
+            at += BLOCK_HEAD_BYTES as u64 + u64::from(packed_bytes);
+            text += u64::from(text_bytes);
         }
         Ok(found)
     }
 
-    /// Goes on at the block that begins at a place of [`Self::blocks`].
-    pub(crate) fn go_to_block(&mut self, place: u64) {
-        if let Some(blocks) = &mut self.blocks {
-            blocks.next = place;
-            blocks.block.clear();
-            blocks.read = 0;
+    fn found_lines(&mut self) -> io::Result<Vec<[u64; 2]>> {
+        let mut found = vec![[0, 0]];
+        for at in (BLOCK as u64..self.text_bytes()?).step_by(BLOCK) {
+            self.file.seek(SeekFrom::Start(at))?;
+            let mut rest = Vec::new();
+            BufReader::new((&mut self.file).take(BLOCK as u64)).read_until(b'\n', &mut rest)?;
+            if rest.ends_with(b"\n") {
+                let line = at + rest.len() as u64;
+                found.push([line, line]);
+            }
         }
+        Ok(found)
     }
 
-    /// Goes on at a byte of a text; a packed one stays where it is.
-    pub(crate) fn go_to_byte(&mut self, place: u64) -> io::Result<()> {
-        if self.blocks.is_none() {
-            self.file.seek(SeekFrom::Start(place))?;
+    /// The text of a piece; of one that is not packed, its last line may be cut.
+    pub(crate) fn text_of(&mut self, piece: usize) -> io::Result<Vec<u8>> {
+        let Some([at, _]) = self.pieces()?.get(piece).copied() else {
+            return Ok(Vec::new());
+        };
+        if self.blocks.is_some() {
+            return Ok(self.block_at(at)?.map_or_else(Vec::new, |(text, _)| text));
         }
-        Ok(())
+        self.file.seek(SeekFrom::Start(at))?;
+        let mut text = Vec::new();
+        (&mut self.file).take(BLOCK as u64).read_to_end(&mut text)?;
+        Ok(text)
+    }
+
+    /// Reads on from the beginning of a piece; how many bytes of the text are before it.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn go_to(&mut self, piece: usize) -> io::Result<u64> {
+        let [at, text] = self.pieces()?.get(piece).copied().unwrap_or_default();
+        match &mut self.blocks {
+            Some(blocks) => {
+                (blocks.next, blocks.read) = (at.max(HEAD_BYTES), 0);
+                blocks.block.clear();
+            }
+            None => {
+                self.file.seek(SeekFrom::Start(at))?;
+            }
+        }
+        Ok(text)
     }
 
     /// Bytes packed, bytes of its text, CRC; nothing where no whole block begins there.
@@ -292,8 +331,9 @@ mod tests {
         let (from, to) = (folder.join("a.jsonl"), folder.join("a.packed"));
         fs::write(&from, text()).expect("written");
         pack_file(&from, &to).expect("packed");
-        let blocks = SegmentFile::open(&to).and_then(|mut file| file.blocks());
+        let blocks = SegmentFile::open(&to).and_then(|mut file| file.found_blocks());
         let blocks = blocks.expect("blocks");
+        let blocks: Vec<u64> = blocks.iter().map(|[at, _]| *at).collect();
         assert!(blocks.len() > 2, "{blocks:?}");
         let whole = fs::read(&to).expect("bytes");
         let mut changed = whole.clone();

@@ -80,7 +80,7 @@ impl Segments {
     }
 
     /// Whether the next line begins a new segment.
-    pub fn is_full(&self) -> bool {
+    fn is_full(&self) -> bool {
         self.at_line_start && self.written >= self.segment_bytes
     }
 
@@ -130,15 +130,7 @@ struct Packer {
 impl Packer {
     fn start() -> io::Result<Self> {
         let (closed, to_pack) = channel::<PathBuf>();
-        let pack_all = move || {
-            for text in to_pack {
-                let packed = text.with_extension(PACKED);
-                if text != packed && (packed.exists() || pack_file(&text, &packed).is_ok()) {
-                    // Where it stays, readers take the packed one.
-                    let _ = fs::remove_file(&text);
-                }
-            }
-        };
+        let pack_all = move || to_pack.iter().for_each(|text| pack(&text));
         let thread = std::thread::Builder::new()
             .name("packer".into())
             .spawn(pack_all)?;
@@ -152,6 +144,21 @@ impl Packer {
         if let Some(closed) = &self.closed {
             let _ = closed.send(text);
         }
+    }
+}
+
+/// Packs a closed segment in place of its text.
+fn pack(text: &Path) {
+    let packed = text.with_extension(PACKED);
+    if text == packed || !(packed.exists() || pack_file(text, &packed).is_ok()) {
+        return;
+    }
+    if text.exists() {
+        // Where it stays, readers take the packed one.
+        let _ = fs::remove_file(text);
+    } else {
+        // It was removed as the oldest while it was packed. Whoever removes it after this look removes both.
+        let _ = fs::remove_file(packed);
     }
 }
 
@@ -326,6 +333,24 @@ mod tests {
         segments.flush().expect("written");
         assert_eq!(lines(&path).last(), Some(&5000));
         assert!(lines(&path).len() > kept.len() / 2);
+    }
+
+    #[test]
+    fn a_segment_that_went_while_it_was_packed_does_not_come_back() {
+        let folder = Folder::new("segments-went");
+        let [text, packed] = ["a.000001.jsonl", "a.000001.packed"].map(|name| folder.join(name));
+        fs::write(&text, "1\n").expect("written");
+        pack_file(&text, &packed).expect("packed");
+        fs::remove_file(&text).expect("removed");
+        pack(&text);
+        assert!(!packed.exists());
+        // One whose writer was killed between both.
+        fs::write(&text, "1\n").expect("written");
+        pack_file(&text, &packed).expect("packed");
+        assert_eq!(lines(&folder.join("a.jsonl")), [1]);
+        pack(&text);
+        assert!(packed.exists() && !text.exists());
+        assert_eq!(lines(&folder.join("a.jsonl")), [1]);
     }
 
     #[test]

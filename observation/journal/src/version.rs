@@ -20,7 +20,7 @@ use crate::record::{Record, RunEvent};
 use crate::segments::segments_of;
 
 /// Bytes of the first line, at most.
-const LONGEST_HEADER: u64 = 4096;
+pub(crate) const LONGEST_HEADER: u64 = 4096;
 
 /// The oldest version of which files are read: its records are the same, and its closed segments were not packed.
 const OLDEST_READ: u32 = 2;

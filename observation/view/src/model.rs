@@ -177,6 +177,19 @@ impl Model {
         self.events.push(event);
     }
 
+    /// The records before are not read: `moment` is cycle `cycle` of the run, and nothing is known of what was before.
+    pub(crate) fn begins_at(&mut self, moment: Moment, cycle: i64) {
+        self.origin_is(moment, cycle);
+        self.histories.iter_mut().for_each(History::misses_records);
+    }
+
+    /// Whether an answer needed more than is known.
+    pub(crate) fn wanted_more(&self) -> bool {
+        self.histories
+            .iter()
+            .any(|history| history.end().is_reached())
+    }
+
     /// The run is over: its results are there.
     pub fn end(&mut self) {
         self.finished = true;

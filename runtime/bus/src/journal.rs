@@ -15,7 +15,8 @@ use std::thread::JoinHandle;
 use serde::{Deserialize, Serialize};
 use understudy_wire::{Member, Time};
 
-use crate::clock::Clock;
+use crate::anchor::Anchors;
+use crate::clock::{Clock, wall_clock};
 use crate::error::BusError;
 use crate::host::Summary;
 use crate::link::LinkKind;
@@ -165,6 +166,18 @@ pub enum HostEvent {
     FieldContested,
     /// The equipment holds what the remote I/O wrote.
     FieldUncontested,
+    /// The wall clock beside the monotonic time of the record, once in ten minutes.
+    WallClock {
+        /// Nanoseconds since 1970-01-01 UTC.
+        unix_ns: u64,
+    },
+    /// The wall clock was set.
+    WallClockStepped {
+        /// Nanoseconds since 1970-01-01 UTC, after it.
+        unix_ns: u64,
+        /// By how much, in nanoseconds; negative for one that was set back.
+        step_ns: i64,
+    },
     /// Records were lost because the journal was too slow, since the last such record.
     JournalLost {
         /// How many.
@@ -268,12 +281,24 @@ impl Journal {
             .name("journal".into())
             .spawn(move || {
                 let mut output = BufWriter::new(output);
-                let unwritten = write_all(&receiver, &mut output, |(now, event)| Record {
-                    at_ns: clock.host_ns(now),
+                let mut anchors = Anchors::default();
+                let record = |at_ns, event| Record {
+                    at_ns,
                     member,
-                    name: Cow::Borrowed(&name),
+                    name: Cow::Borrowed(name.as_str()),
                     event,
-                });
+                };
+                let anchor = || {
+                    let (at_ns, unix_ns) = wall_clock()?;
+                    let event = anchors.look(at_ns, unix_ns)?;
+                    Some(record(at_ns, Noted::Host(event)))
+                };
+                let unwritten = write_all(
+                    &receiver,
+                    &mut output,
+                    |(now, event)| record(clock.host_ns(now), event),
+                    anchor,
+                );
                 unwritten + left.load(Ordering::Relaxed)
             })
             .map_err(|source| BusError::System {
@@ -294,6 +319,7 @@ fn write_all<'name, E: Serialize + 'name>(
     receiver: &Receiver<(Time, Noted<E>)>,
     output: &mut impl Write,
     record: impl Fn((Time, Noted<E>)) -> Record<'name, E>,
+    mut anchor: impl FnMut() -> Option<Record<'name, E>>,
 ) -> u64 {
     let mut unwritten = 0;
     while let Ok(first) = receiver.recv() {
@@ -303,6 +329,11 @@ fn write_all<'name, E: Serialize + 'name>(
             if write_line(output, &record(noted)).is_err() {
                 unwritten += 1;
             }
+        }
+        if let Some(anchor) = anchor()
+            && write_line(output, &anchor).is_err()
+        {
+            unwritten += 1;
         }
         if output.flush().is_err() {
             unwritten += 1;
@@ -382,7 +413,7 @@ mod tests {
         let clock = Clock::start();
         while !events(&written.lock().expect("no panic"))
             .iter()
-            .any(|event| matches!(event, Noted::Host(_)))
+            .any(|event| matches!(event, Noted::Host(HostEvent::JournalLost { .. })))
         {
             assert!(
                 clock.now() < Time(0) + Duration::from_secs(20),

@@ -4,6 +4,7 @@
 //! a link to its peers ([`LinkKind`]: Zenoh or plain UDP) and a journal, and runs it ([`Host`], or [`run_member`] for a process
 //! of its own). Nothing here decides anything about the cycle.
 
+mod anchor;
 mod announcer;
 mod channel;
 mod clock;

@@ -9,12 +9,12 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::{self, Read};
+use std::io::{self, Read as _};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
-use understudy_journal::{Record, SegmentFile, check_header, closed_segments};
+use understudy_journal::{Place, Record, SegmentFile, check_header, closed_segments};
 
 use super::Trouble;
 use super::progress::Progress;
@@ -89,6 +89,25 @@ impl Follower {
             lengths: BTreeMap::new(),
             progress: Progress::default(),
         }
+    }
+
+    /// Begins at a place in the middle.
+    pub(super) fn from_place(path: &Path, place: Place) -> io::Result<Self> {
+        let mut follower = Self::new(path);
+        let mut file = place.file;
+        let read = file.go_to(place.piece)?;
+        follower.open = Some(Open {
+            file,
+            number: place.promised.filter(|_| place.is_closed),
+            promised: place.promised,
+            read,
+            header: match place.piece {
+                0 => Header::Unread,
+                _ => Header::Accepted,
+            },
+        });
+        follower.read = read;
+        Ok(follower)
     }
 
     pub(super) fn progress(&self) -> Progress {

@@ -8,7 +8,9 @@ use understudy_testing::Folder;
 use super::*;
 
 fn line(number: u64) -> Vec<u8> {
-    let record = Record::of_run(number, RunEvent::Interrupted);
+    // What cannot be packed, so that the limit is reached.
+    let verdict = format!("{:x}", number.wrapping_mul(0x9e37_79b9_7f4a_7c15)).repeat(2);
+    let record = Record::of_run(number, RunEvent::ScenarioOver { verdict });
     let mut line = serde_json::to_vec(&record).expect("JSON");
     line.push(b'\n');
     line
@@ -21,7 +23,7 @@ fn taken(follower: &mut Follower) -> Vec<Option<u64>> {
         all.push(found.ok().map(|record| {
             assert!(matches!(
                 record.event,
-                Happening::Run(RunEvent::Interrupted)
+                Happening::Run(RunEvent::ScenarioOver { .. })
             ));
             record.at_ns
         }));
