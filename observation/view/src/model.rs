@@ -16,7 +16,7 @@ mod turns;
 use std::sync::{Arc, OnceLock};
 
 use understudy_cluster::Cluster;
-use understudy_journal::{Happening, Members, Record};
+use understudy_journal::{Happening, Members, Record, RunEvent};
 use understudy_ladder::Observer;
 use understudy_typed::Interpreter;
 use understudy_wire::{Member, Moment, ProgramId};
@@ -131,6 +131,10 @@ impl Model {
 
     /// Takes the next record.
     pub fn note(&mut self, record: &Record) {
+        if matches!(record.event, Happening::Run(RunEvent::Checkpoint { .. })) {
+            // It belongs to the journal and to no moment of the run.
+            return;
+        }
         self.records += 1;
         self.writes.note(record);
         self.at_ns = record.at_ns;

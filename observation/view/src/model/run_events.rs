@@ -62,9 +62,8 @@ impl Model {
             RunEvent::Detached { member, .. } => {
                 self.changes.push(cycle, Change::Detached(*member));
             }
-            // It is none of the records of the run.
-            RunEvent::Checkpoint { .. } => return,
-            RunEvent::Journal { .. } | RunEvent::Commanded { .. } => {}
+            RunEvent::Journal { .. } | RunEvent::Checkpoint { .. } | RunEvent::Commanded { .. } => {
+            }
         }
         self.happened(record, cycle, None);
     }
