@@ -141,7 +141,11 @@ fn of_one_segment(journal: &Path) -> String {
         file.read_to_string(&mut own).expect("text");
         fs::remove_file(segment).expect("it is ours");
         // One header is enough.
-        let header = if text.is_empty() { 0 } else { own.find('\n').expect("lines") + 1 };
+        let header = if text.is_empty() {
+            0
+        } else {
+            own.find('\n').expect("lines") + 1
+        };
         text += &own[header..];
     }
     text

@@ -20,6 +20,7 @@ use crate::clock::{Clock, wall_clock};
 use crate::error::BusError;
 use crate::host::Summary;
 use crate::link::LinkKind;
+use crate::refused_as::RefusedAs;
 use crate::rights::Rights;
 
 /// Version of the journal: what its records are called and hold. Journals of version 1 do not say theirs; version 3 packs closed segments and records the wall clock.
@@ -190,26 +191,6 @@ pub enum HostEvent {
     },
     /// The member ends as it was told to.
     Stopped(Summary),
-}
-
-/// Why a datagram does not count.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum RefusedAs {
-    /// Nothing that could be a frame.
-    NoFrame,
-    /// A frame without an authenticator.
-    Unsealed,
-    /// In the name of somebody who has nothing to say here.
-    Foreign,
-    /// The authenticator is not the sender's: made by somebody else, or changed on its way.
-    Forged,
-    /// It counted before, or is too late.
-    Replayed,
-    /// New, and of a life before the newest: two processes have the sender's keys.
-    OfAnotherLife,
-    /// The sender's keys are revoked.
-    Revoked,
 }
 
 /// Takes what is reported; never blocks.

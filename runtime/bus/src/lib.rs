@@ -25,6 +25,7 @@ mod member;
 mod operator;
 mod orders;
 mod ports;
+mod refused_as;
 mod rights;
 mod trouble;
 mod udp;
@@ -51,13 +52,13 @@ pub use host::{Host, Summary};
 pub use interruption::interruption;
 pub use journal::{
     EventSink, HostEvent, JOURNAL_RECORDS, JOURNAL_VERSION, Journal, JournalSender, Noted, Record,
-    RefusedAs,
 };
 pub use link::{Link, LinkCounters, LinkKind, NoSuchLink, Reopening, ZENOH_PORT_OFFSET};
 pub use member::{MemberSettings, run_member};
 pub use operator::{Call, Request};
 pub use orders::{Control, Cuts, Order, Orders, orders};
 pub use ports::free_addresses;
+pub use refused_as::RefusedAs;
 pub use rights::{Rights, keep_times};
 pub use wakefulness::Wakefulness;
 pub use watchdog::Watchdog;
