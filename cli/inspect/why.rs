@@ -1,7 +1,6 @@
 //! `understudy why`: the contacts that determined an output.
 
 use clap::Args;
-use understudy_view::Bounds;
 
 use crate::answer::Answer;
 use crate::inspect::view::RunArgument;
@@ -29,8 +28,6 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
-    let until = arguments.at.unwrap_or(i64::MAX);
-    let model = arguments.run.open()?.read_until(Bounds::default(), until)?;
-    let why = model.why(&arguments.output, arguments.at)?;
+    let why = arguments.run.open()?.why(&arguments.output, arguments.at)?;
     Ok(Answer::done(why.to_text(), &why).and_next(&[&"watch", &arguments.run.run]))
 }

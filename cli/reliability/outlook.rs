@@ -1,14 +1,13 @@
 //! `understudy outlook`: predicted reliability of a running cluster.
 
 use std::fs::{self, File};
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::Value;
 use understudy_campaigns::{look_ahead, observe_journal};
 use understudy_cycle::Mode;
-use understudy_journal::records;
+use understudy_journal::records_of;
 
 use crate::answer::{Answer, Status};
 use crate::reliability::prediction::{Times, refused};
@@ -53,7 +52,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     } else {
         arguments.run.clone()
     };
-    let file = File::open(&journal).map_err(|error| {
+    let told = File::open(&journal).and_then(|_| records_of(&journal));
+    let told = told.map_err(|error| {
         let replica = arguments.run.join("replica-1");
         let hint = if replica.is_dir() {
             format!("; each replica has one, such as {}", replica.display())
@@ -63,7 +63,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         let message = format!("{} cannot be read: {error}{hint}", journal.display());
         bad("U0601", message)
     })?;
-    let view = observe_journal(records(BufReader::new(file))).map_err(|error| {
+    let view = observe_journal(told).map_err(|error| {
         let said = error.to_string();
         let said = said
             .trim_start_matches(error.code())

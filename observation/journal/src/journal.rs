@@ -1,17 +1,19 @@
 //! `journal.jsonl`: every record of a run, one JSON object a line, in the order in which they were seen.
 //!
-//! It is kept in segments ([`Segments`]), of which the oldest go when it reaches its limit.
+//! It is kept in segments ([`Segments`]), of which those that are closed are packed, and the oldest go when it reaches its limit.
 //!
 //! Invariant: the journal never stops the run. A full disk or any other failure to write ends the journal, not the cycle; how
 //! many records it lacks and why is said in the summary.
 
-use std::fs::File;
 use std::io::{self, BufRead, BufReader, Write};
+use std::iter;
 use std::path::Path;
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::checkpoint::Checkpoints;
+use crate::packed_file::SegmentFile;
 use crate::record::Record;
 use crate::segments::{Segments, segments_of};
 use crate::version::{WrongVersion, check_header, journal_header};
@@ -20,6 +22,7 @@ use crate::version::{WrongVersion, check_header, journal_header};
 #[derive(Debug)]
 pub struct Journal<W: Write = Segments> {
     writer: Option<W>,
+    checkpoints: Checkpoints,
     state: JournalState,
 }
 
@@ -44,7 +47,7 @@ impl Journal {
 impl<W: Write> Journal<W> {
     /// A journal in any writer.
     pub fn new(mut writer: W) -> Self {
-        let headed = writer.write_all(&journal_header());
+        let headed = writer.write_all(&journal_header(1));
         let mut journal = Self::of_headed(writer);
         if let Err(error) = headed {
             journal.stop(&error);
@@ -56,6 +59,7 @@ impl<W: Write> Journal<W> {
     fn of_headed(writer: W) -> Self {
         Self {
             writer: Some(writer),
+            checkpoints: Checkpoints::default(),
             state: JournalState::default(),
         }
     }
@@ -66,14 +70,17 @@ impl<W: Write> Journal<W> {
             self.state.lost += 1;
             return;
         };
-        let written = serde_json::to_vec(record)
-            .map_err(io::Error::from)
-            .and_then(|mut line| {
-                line.push(b'\n');
-                writer.write_all(&line)
-            });
-        match written {
-            Ok(()) => self.state.records += 1,
+        match write_line(writer, record) {
+            Ok(bytes) => {
+                self.state.records += 1;
+                // It is none of the records of the run.
+                if let Some(checkpoint) = self.checkpoints.after(record, bytes)
+                    && let Err(error) = write_line(writer, &checkpoint)
+                {
+                    self.writer = None;
+                    self.state.stopped_by = Some(error.to_string());
+                }
+            }
             Err(error) => self.stop(&error),
         }
     }
@@ -98,6 +105,14 @@ impl<W: Write> Journal<W> {
     }
 }
 
+/// The number of bytes.
+fn write_line(writer: &mut impl Write, record: &Record) -> io::Result<usize> {
+    let mut line = serde_json::to_vec(record)?;
+    line.push(b'\n');
+    writer.write_all(&line)?;
+    Ok(line.len())
+}
+
 /// A line of a journal that is no record.
 #[derive(Debug, thiserror::Error)]
 pub enum JournalError {
@@ -120,20 +135,34 @@ pub enum JournalError {
 /// Bytes of a journal, its older segments included, where nobody says otherwise.
 pub const JOURNAL_LIMIT_BYTES: u64 = 1 << 30;
 
-/// The records of a journal in a file and its older segments, in order.
+/// The records of a journal in a file and its older segments, in order. A segment that cannot be opened is an error among them. The last line of
+/// a closed segment may be cut, where its writer was killed, and is left out.
 ///
 /// # Errors
-/// Where the folder or the oldest segment cannot be read; later ones say so as records.
+/// Where the folder cannot be read.
 pub fn records_of(
     path: &Path,
 ) -> io::Result<impl Iterator<Item = Result<Record, JournalError>> + use<>> {
-    let files: Vec<File> = segments_of(path)?
-        .iter()
-        .map(File::open)
-        .collect::<io::Result<_>>()?;
-    Ok(files
-        .into_iter()
-        .flat_map(|file| records(BufReader::new(file))))
+    let newest = path.to_owned();
+    let segments = segments_of(path)?.into_iter();
+    Ok(segments.flat_map(move |segment| {
+        let (file, error) = match SegmentFile::open(&segment) {
+            Ok(file) => (Some(file), None),
+            Err(error) => (None, Some(Err(error.into()))),
+        };
+        let is_closed = segment != newest;
+        let mut found = file
+            .into_iter()
+            .map(BufReader::new)
+            .flat_map(records)
+            .peekable();
+        let whole = iter::from_fn(move || {
+            let next = found.next()?;
+            let is_cut = matches!(next, Err(JournalError::Line { line, .. }) if line > 1);
+            (!is_cut || !is_closed || found.peek().is_some()).then_some(next)
+        });
+        whole.chain(error)
+    }))
 }
 
 /// The records of one file of a journal after its header, in order. A file of another version has none: the only item is the error.
@@ -227,8 +256,10 @@ mod tests {
         let folder = Folder::new("journal");
         let path = folder.join("journal.jsonl");
         let mut journal = Journal::create(&path, 0).expect("created");
-        for at_ns in 0..5000 {
-            journal.write(&Record::of_run(at_ns, RunEvent::Interrupted));
+        for at_ns in 0..5000_u64 {
+            // What cannot be packed, so that the limit is reached.
+            let verdict = format!("{:x}", at_ns.wrapping_mul(0x9e37_79b9_7f4a_7c15)).repeat(2);
+            journal.write(&Record::of_run(at_ns, RunEvent::ScenarioOver { verdict }));
         }
         assert_eq!(journal.finish().lost, 0);
         let read: Vec<Record> = records_of(&path)

@@ -4,6 +4,7 @@
 //! viewer shows all of them.
 
 mod alarm_fold;
+mod checkpoint;
 mod clock;
 mod journal;
 mod kept;
@@ -12,6 +13,9 @@ mod members;
 mod named_files;
 mod numbering;
 mod operator;
+mod packed_file;
+mod packing;
+mod place;
 mod record;
 mod rules;
 mod run_directory;
@@ -33,9 +37,11 @@ pub use operator::{
     Shelving, Unshelving, WriteProblem, WriteRequest, WriteSessions, commands, find_alarm,
     force_value, new_write, write_answer,
 };
+pub use packed_file::SegmentFile;
+pub use place::{Place, place_before};
 pub use record::{Happening, LABORATORY, Record, RunEvent, moment};
 pub use rules::{Process, SourceCounts, is_blocked, is_provable};
-pub use run_directory::{KEYS, RunDirectory, RunDirectoryError, time_name};
+pub use run_directory::{KEYS, RunDirectory, RunDirectoryError, time_name, time_text};
 pub use segments::{Segments, closed_segments, segments_of};
 pub use source::{SOURCES, source_word};
 pub use understudy_bus::JOURNAL_VERSION;

@@ -48,6 +48,16 @@ pub enum RunEvent {
     Journal {
         /// Version of the records that follow.
         version: u32,
+        /// The number that the file has when it is closed, since version 3.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        segment: Option<u64>,
+    },
+    /// Where a reader can begin that looks for a cycle: once in so many bytes, since version 3.
+    Checkpoint {
+        /// A moment of the cluster.
+        moment: Moment,
+        /// Which cycle of the run it is.
+        cycle: i64,
     },
     /// A member was started, for the first time or again.
     Started {

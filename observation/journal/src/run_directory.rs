@@ -177,6 +177,13 @@ pub fn time_name(now: SystemTime) -> String {
     format!("{date}T{hour:02}-{minute:02}-{second:02}Z")
 }
 
+/// `2026-11-21T02:30:00.250Z`, for people.
+pub fn time_text(time: SystemTime) -> String {
+    let time = OffsetDateTime::from(time);
+    let (date, (hour, minute, second, millisecond)) = (time.date(), time.to_hms_milli());
+    format!("{date}T{hour:02}:{minute:02}:{second:02}.{millisecond:03}Z")
+}
+
 #[cfg(test)]
 mod tests {
     use std::time::Duration;

@@ -1,22 +1,30 @@
-//! A file that never grows past its limit: a ring of segments, of which the oldest go.
+//! A file that never grows past its limit: segments, of which the oldest go.
 //!
 //! ```text
-//!   journal.000007.jsonl  journal.000008.jsonl  …  journal.jsonl
-//!   └ the oldest that is left                      └ written now
+//!   journal.000007.packed  …  journal.000031.packed  journal.000032.jsonl  journal.jsonl
+//!   └ the oldest that is left                        └ to be packed        └ written now, as text
 //! ```
 //!
-//! Each segment begins with the header that says the version of the journal.
+//! Each segment begins with the header that says the version of the journal and the segment's number. A thread of its own packs those
+//! that are closed, so the writer waits for none of it.
 //!
-//! Invariant: all segments together have at most the limit, but for the line that is being written; no line is in two segments.
+//! Invariant: all segments together have at most the limit, but for the line that is being written and the segment that is being packed; no
+//! line is lost or read twice, wherever the writer is killed: a segment that is there as text and packed is the same.
 
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufRead, BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Sender, channel};
+use std::thread::JoinHandle;
 
-use crate::version::journal_header;
+use crate::packed_file::{PACKED, SegmentFile, pack_file};
+use crate::version::{check_header, journal_header};
 
-/// Segments of one file, the one that is written now included.
+/// Segments of one file at least, the one that is written now included.
 const SEGMENTS: u64 = 8;
+
+/// Text of a segment at most: what a reader reads to its end before it knows the present.
+const SEGMENT_BYTES: u64 = 8 << 20;
 
 /// The least limit that makes sense: some records in each segment.
 const LEAST_LIMIT: u64 = 64 * 1024;
@@ -25,12 +33,14 @@ const LEAST_LIMIT: u64 = 64 * 1024;
 #[derive(Debug)]
 pub struct Segments {
     path: PathBuf,
+    limit_bytes: u64,
     segment_bytes: u64,
     writer: BufWriter<File>,
     written: u64,
     at_line_start: bool,
-    /// The number of the next segment that is closed.
-    next: u64,
+    /// The number of the segment that is written now.
+    number: u64,
+    packer: Packer,
 }
 
 impl Segments {
@@ -39,47 +49,132 @@ impl Segments {
     /// # Errors
     /// What the system says.
     pub fn create(path: &Path, limit_bytes: u64) -> io::Result<Self> {
-        let newest = closed(path)?.last().map_or(0, |(number, _)| *number);
-        let mut next = newest + 1;
-        if path.exists() {
-            fs::rename(path, closed_path(path, next))?;
-            next += 1;
+        let limit_bytes = limit_bytes.max(LEAST_LIMIT);
+        let packer = Packer::start()?;
+        let closed = closed(path)?;
+        let mut number = closed.last().map_or(0, |(number, _)| *number) + 1;
+        for (_, left) in closed {
+            packer.pack(left);
         }
-        let (writer, written) = open(path)?;
+        if path.exists() {
+            // The number that it was promised: readers know it by that.
+            number = number_in(path)?.unwrap_or(0).max(number);
+            let closed = closed_path(path, number);
+            fs::rename(path, &closed)?;
+            packer.pack(closed);
+            number += 1;
+        }
+        let (writer, written) = open(path, number)?;
         let segments = Self {
             path: path.to_owned(),
-            segment_bytes: limit_bytes.max(LEAST_LIMIT) / SEGMENTS,
+            limit_bytes,
+            segment_bytes: (limit_bytes / SEGMENTS).min(SEGMENT_BYTES),
             writer,
             written,
             at_line_start: true,
-            next,
+            number,
+            packer,
         };
         segments.remove_oldest()?;
         Ok(segments)
     }
 
+    /// Whether the next line begins a new segment.
+    fn is_full(&self) -> bool {
+        self.at_line_start && self.written >= self.segment_bytes
+    }
+
     fn rotate(&mut self) -> io::Result<()> {
         self.writer.flush()?;
-        fs::rename(&self.path, closed_path(&self.path, self.next))?;
-        self.next += 1;
+        let closed = closed_path(&self.path, self.number);
+        fs::rename(&self.path, &closed)?;
+        self.number += 1;
         self.remove_oldest()?;
-        (self.writer, self.written) = open(&self.path)?;
+        (self.writer, self.written) = open(&self.path, self.number)?;
+        self.packer.pack(closed);
         Ok(())
     }
 
+    /// Removes the oldest segments until there is room for the one that begins.
     fn remove_oldest(&self) -> io::Result<()> {
-        for (number, path) in closed(&self.path)? {
-            if number + SEGMENTS <= self.next {
-                fs::remove_file(path)?;
+        let closed = closed(&self.path)?;
+        let sizes = closed
+            .iter()
+            .map(|(_, path)| fs::metadata(path).map_or(0, |found| found.len()));
+        let sizes: Vec<u64> = sizes.collect();
+        let mut all = sizes.iter().sum::<u64>() + self.segment_bytes;
+        for ((_, path), size) in closed.iter().zip(sizes) {
+            if all <= self.limit_bytes {
+                break;
+            }
+            all -= size;
+            // Its packer may have packed it since.
+            for path in [path, &path.with_extension(PACKED)] {
+                match fs::remove_file(path) {
+                    Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+                    _ => {}
+                }
             }
         }
         Ok(())
     }
 }
 
+/// Packs closed segments in a thread of its own; one that cannot be packed stays as it is.
+#[derive(Debug)]
+struct Packer {
+    closed: Option<Sender<PathBuf>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Packer {
+    fn start() -> io::Result<Self> {
+        let (closed, to_pack) = channel::<PathBuf>();
+        let pack_all = move || to_pack.iter().for_each(|text| pack(&text));
+        let thread = std::thread::Builder::new()
+            .name("packer".into())
+            .spawn(pack_all)?;
+        Ok(Self {
+            closed: Some(closed),
+            thread: Some(thread),
+        })
+    }
+
+    fn pack(&self, text: PathBuf) {
+        if let Some(closed) = &self.closed {
+            let _ = closed.send(text);
+        }
+    }
+}
+
+/// Packs a closed segment in place of its text.
+fn pack(text: &Path) {
+    let packed = text.with_extension(PACKED);
+    if text == packed || !(packed.exists() || pack_file(text, &packed).is_ok()) {
+        return;
+    }
+    if text.exists() {
+        // Where it stays, readers take the packed one.
+        let _ = fs::remove_file(text);
+    } else {
+        // It was removed as the oldest while it was packed. Whoever removes it after this look removes both.
+        let _ = fs::remove_file(packed);
+    }
+}
+
+impl Drop for Packer {
+    /// Waits for what is to be packed: a segment takes some tenths of a second.
+    fn drop(&mut self) {
+        self.closed = None;
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
 impl Write for Segments {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if self.at_line_start && self.written >= self.segment_bytes {
+        if self.is_full() {
             self.rotate()?;
         }
         // To the end of a line at most, so that the next one may go to the next segment.
@@ -109,16 +204,23 @@ pub fn segments_of(path: &Path) -> io::Result<Vec<PathBuf>> {
 }
 
 /// A new file with its header, and the bytes of it.
-fn open(path: &Path) -> io::Result<(BufWriter<File>, u64)> {
+fn open(path: &Path, number: u64) -> io::Result<(BufWriter<File>, u64)> {
     let file = OpenOptions::new()
         .create(true)
         .write(true)
         .truncate(true)
         .open(path)?;
     let mut writer = BufWriter::with_capacity(1 << 16, file);
-    let header = journal_header();
+    let header = journal_header(number);
     writer.write_all(&header)?;
     Ok((writer, header.len() as u64))
+}
+
+/// The number that the header of a segment says.
+fn number_in(path: &Path) -> io::Result<Option<u64>> {
+    let mut line = Vec::new();
+    BufReader::new(SegmentFile::open(path)?).read_until(b'\n', &mut line)?;
+    Ok(check_header(&line).ok().flatten())
 }
 
 /// `journal.jsonl` and 7 become `journal.000007.jsonl`.
@@ -152,34 +254,45 @@ fn closed(path: &Path) -> io::Result<Vec<(u64, PathBuf)>> {
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
         let name = entry.file_name().to_string_lossy().into_owned();
-        let number = name
-            .strip_prefix(&format!("{stem}."))
-            .and_then(|rest| rest.strip_suffix(&format!(".{extension}")))
+        let rest = name.strip_prefix(&format!("{stem}."));
+        let number: Option<u64> = rest
+            .and_then(|rest| {
+                rest.strip_suffix(&format!(".{extension}"))
+                    .or(rest.strip_suffix(&format!(".{PACKED}")))
+            })
             .filter(|number| number.len() >= 6)
             .and_then(|number| number.parse().ok());
         if let Some(number) = number {
             found.push((number, entry.path()));
         }
     }
-    found.sort();
+    // Where the writer was killed between both, a segment is there as text and packed.
+    let is_text = |path: &Path| path.extension().is_none_or(|extension| extension != PACKED);
+    found.sort_by(|(one, path), (other, of_other)| {
+        one.cmp(other).then(is_text(path).cmp(&is_text(of_other)))
+    });
+    found.dedup_by_key(|(number, _)| *number);
     Ok(found)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::io::Read as _;
+
     use understudy_testing::Folder;
 
     use super::*;
 
     fn lines(path: &Path) -> Vec<u64> {
         let files = segments_of(path).expect("readable");
-        let text: String = files
-            .iter()
-            .map(|file| fs::read_to_string(file).expect("text"))
-            .collect();
+        let mut text = String::new();
+        for file in files {
+            let mut file = SegmentFile::open(&file).expect("it is there");
+            file.read_to_string(&mut text).expect("text");
+        }
         assert!(text.is_empty() || text.ends_with('\n'));
         text.lines()
-            .filter(|line| line.as_bytes() != journal_header().trim_ascii_end())
+            .filter(|line| !line.starts_with('{'))
             .map(|line| line.trim_end_matches('x').parse().expect("a number"))
             .collect()
     }
@@ -220,6 +333,24 @@ mod tests {
         segments.flush().expect("written");
         assert_eq!(lines(&path).last(), Some(&5000));
         assert!(lines(&path).len() > kept.len() / 2);
+    }
+
+    #[test]
+    fn a_segment_that_went_while_it_was_packed_does_not_come_back() {
+        let folder = Folder::new("segments-went");
+        let [text, packed] = ["a.000001.jsonl", "a.000001.packed"].map(|name| folder.join(name));
+        fs::write(&text, "1\n").expect("written");
+        pack_file(&text, &packed).expect("packed");
+        fs::remove_file(&text).expect("removed");
+        pack(&text);
+        assert!(!packed.exists());
+        // One whose writer was killed between both.
+        fs::write(&text, "1\n").expect("written");
+        pack_file(&text, &packed).expect("packed");
+        assert_eq!(lines(&folder.join("a.jsonl")), [1]);
+        pack(&text);
+        assert!(packed.exists() && !text.exists());
+        assert_eq!(lines(&folder.join("a.jsonl")), [1]);
     }
 
     #[test]

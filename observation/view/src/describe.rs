@@ -86,7 +86,7 @@ pub(crate) fn describe(record: &Record, names: &Members, writes: &Writes) -> Des
         text,
         is_ordinary: matches!(
             event,
-            "published" | "holds" | "sampled" | "applied" | "stepped"
+            "published" | "holds" | "sampled" | "applied" | "stepped" | "checkpoint" | "wall-clock"
         ),
     }
 }

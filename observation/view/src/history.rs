@@ -4,6 +4,7 @@
 //! x(t), u(t) and the lineages before and after, so that a scan can be looked at as its station evaluated it.
 
 use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use understudy_cluster::Cluster;
 use understudy_remote_io::{Event, Missing};
@@ -77,6 +78,27 @@ pub struct History {
     unplaced: VecDeque<Event>,
     /// The state after a sample that is still to come.
     awaited: Option<(Moment, Lineage, Image)>,
+    end: End,
+}
+
+/// Whether the oldest state that is known was not enough for an answer.
+#[derive(Debug, Default)]
+pub(crate) struct End(AtomicBool);
+
+impl End {
+    pub(crate) fn reach(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+
+    pub(crate) fn is_reached(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+impl Clone for End {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
 }
 
 impl History {
@@ -97,6 +119,7 @@ impl History {
             cut: false,
             unplaced: VecDeque::new(),
             awaited: None,
+            end: End::default(),
         })
     }
 
@@ -127,13 +150,24 @@ impl History {
 
     /// The place of the step that led to the state in which the step at `place` began.
     pub(crate) fn before(&self, place: usize) -> Option<usize> {
-        let before = self.steps.get(place)?.sampled.as_ref()?.before;
-        (0..place).rev().find(|&earlier| {
-            self.steps[earlier]
-                .sampled
-                .as_ref()
-                .is_some_and(|sampled| sampled.after == before)
-        })
+        let own = self.steps.get(place).and_then(|step| step.sampled.as_ref());
+        let found = own.and_then(|own| {
+            (0..place).rev().find(|&earlier| {
+                self.steps[earlier]
+                    .sampled
+                    .as_ref()
+                    .is_some_and(|sampled| sampled.after == own.before)
+            })
+        });
+        if found.is_none() {
+            self.end.reach();
+        }
+        found
+    }
+
+    /// Whether somebody has looked for what is before the oldest state that is known.
+    pub(crate) fn end(&self) -> &End {
+        &self.end
     }
 
     /// h(x(t), u(t)) of a moment, where it is among the newest.

@@ -16,7 +16,7 @@ mod turns;
 use std::sync::{Arc, OnceLock};
 
 use understudy_cluster::Cluster;
-use understudy_journal::{Happening, Members, Record};
+use understudy_journal::{Happening, Members, Record, RunEvent};
 use understudy_ladder::Observer;
 use understudy_typed::Interpreter;
 use understudy_wire::{Member, Moment, ProgramId};
@@ -131,6 +131,10 @@ impl Model {
 
     /// Takes the next record.
     pub fn note(&mut self, record: &Record) {
+        if matches!(record.event, Happening::Run(RunEvent::Checkpoint { .. })) {
+            // It belongs to the journal and to no moment of the run.
+            return;
+        }
         self.records += 1;
         self.writes.note(record);
         self.at_ns = record.at_ns;
@@ -175,6 +179,19 @@ impl Model {
             cause: None,
         };
         self.events.push(event);
+    }
+
+    /// The records before are not read: `moment` is cycle `cycle` of the run, and nothing is known of what was before.
+    pub(crate) fn begins_at(&mut self, moment: Moment, cycle: i64) {
+        self.origin_is(moment, cycle);
+        self.histories.iter_mut().for_each(History::misses_records);
+    }
+
+    /// Whether an answer needed more than is known.
+    pub(crate) fn wanted_more(&self) -> bool {
+        self.histories
+            .iter()
+            .any(|history| history.end().is_reached())
     }
 
     /// The run is over: its results are there.

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use serde_json::Value;
 use understudy_cluster::Cluster;
 use understudy_journal::{
-    Commander, JournalError, Writing, check_journal, kept_cluster, segments_of, writing,
+    Commander, JournalError, Place, Writing, check_journal, kept_cluster, place_before,
+    segments_of, writing,
 };
 use understudy_wire::{Cycle, Epoch, Moment};
 
@@ -14,6 +15,7 @@ use crate::error::ViewError;
 use crate::listing::{Filter, Listing};
 use crate::model::{Bounds, Model};
 use crate::source::{Source, Trouble};
+use crate::why::Why;
 
 const JOURNAL: &str = "journal.jsonl";
 
@@ -45,7 +47,7 @@ pub fn find_run(path: &Path) -> Result<PathBuf, ViewError> {
     if path.is_file()
         && path
             .extension()
-            .is_some_and(|extension| extension == "jsonl")
+            .is_some_and(|extension| extension == "jsonl" || extension == "packed")
     {
         return Ok(folder.to_owned());
     }
@@ -200,8 +202,51 @@ impl Run {
     /// # Errors
     /// [`ViewError::Journal`].
     pub fn read_until(&self, bounds: Bounds, cycle: i64) -> Result<Model, ViewError> {
-        let mut source = self.follow();
+        self.read_from(bounds, None, cycle)
+    }
+
+    /// Why a signal had its value in a cycle, or has it in the newest one. It reads as much of the journal as the answer needs.
+    ///
+    /// # Errors
+    /// [`ViewError`].
+    pub fn why(&self, signal: &str, cycle: Option<i64>) -> Result<Why, ViewError> {
+        let journal = self.path.join(JOURNAL);
+        let place = |cycle| place_before(&journal, cycle).ok().flatten();
+        let until = cycle.unwrap_or(i64::MAX);
+        if let Some(newest) = place(until) {
+            let before = cycle.unwrap_or(newest.cycle).saturating_sub(BACK);
+            if let Some(place) = place(before) {
+                let model = self.read_from(Bounds::default(), Some(place), until)?;
+                let why = model.why(signal, cycle);
+                if why.is_ok() && !model.wanted_more() {
+                    return why;
+                }
+            }
+        }
+        let model = self.read_from(Bounds::default(), None, until)?;
+        model.why(signal, cycle)
+    }
+
+    fn read_from(
+        &self,
+        bounds: Bounds,
+        place: Option<Place>,
+        cycle: i64,
+    ) -> Result<Model, ViewError> {
+        let journal = self.path.join(JOURNAL);
         let mut model = self.model(bounds);
+        let found = place.and_then(|place| {
+            let (moment, cycle) = (place.moment, place.cycle);
+            let source = Source::following_from(&journal, place).ok()?;
+            Some((source, moment, cycle))
+        });
+        let mut source = match found {
+            Some((source, moment, cycle)) => {
+                model.begins_at(moment, cycle);
+                source
+            }
+            None => self.follow(),
+        };
         let mut any = false;
         let is_finished = self.is_finished();
         loop {
@@ -263,6 +308,9 @@ impl Run {
         })
     }
 }
+
+/// Cycles read before the one that is asked for. A state is known two seconds after the beginning at the latest, and most causes are near.
+const BACK: i64 = 1024;
 
 /// Lines of different members may be a few cycles apart.
 const BEHIND: i64 = 64;

@@ -6,9 +6,10 @@ mod channel;
 mod follow;
 mod progress;
 
+use std::io;
 use std::path::{Path, PathBuf};
 
-use understudy_journal::{JournalError, Record, WrongVersion};
+use understudy_journal::{JournalError, Place, Record, WrongVersion};
 use understudy_text::shortened;
 
 use channel::Channel;
@@ -82,6 +83,15 @@ impl Source {
     /// The journal at `path` with all its segments: what is there, and then what is written. It need not be there yet.
     pub fn following(path: &Path) -> Self {
         Self(Kind::Files(Box::new(Follower::new(path))))
+    }
+
+    /// The same from a place of it on; nothing is said of what is before.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub(crate) fn following_from(path: &Path, place: Place) -> io::Result<Self> {
+        let follower = Follower::from_place(path, place)?;
+        Ok(Self(Kind::Files(Box::new(follower))))
     }
 
     /// Records of this process, `most` of them waiting at most; what does not fit is counted and said.

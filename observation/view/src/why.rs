@@ -320,8 +320,12 @@ impl Model {
 
 /// The place of the cycle whose outputs are held at `place`.
 fn last_true(history: &History, place: usize) -> Option<usize> {
-    (0..place).rev().find(|&earlier| {
+    let found = (0..place).rev().find(|&earlier| {
         let driven = history.steps()[earlier].driven.as_ref();
         driven.is_some_and(|driven| driven.missing.is_none())
-    })
+    });
+    if found.is_none() {
+        history.end().reach();
+    }
+    found
 }

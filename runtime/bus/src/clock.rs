@@ -31,6 +31,17 @@ impl Clock {
     }
 }
 
+/// CLOCK_MONOTONIC and the wall clock in nanoseconds, read within a millisecond; nothing where the host took longer.
+pub(crate) fn wall_clock() -> Option<(u64, u64)> {
+    let before = monotonic_ns();
+    let wall = clock_gettime(ClockId::CLOCK_REALTIME).ok()?;
+    let after = monotonic_ns();
+    let seconds = u64::try_from(wall.tv_sec()).ok()?;
+    let unix_ns = seconds.checked_mul(1_000_000_000)?;
+    let unix_ns = unix_ns.checked_add(u64::try_from(wall.tv_nsec()).ok()?)?;
+    (after - before < 1_000_000).then_some((after, unix_ns))
+}
+
 /// # Panics
 /// Never on Linux: CLOCK_MONOTONIC has existed since 2.6.
 fn monotonic_ns() -> u64 {

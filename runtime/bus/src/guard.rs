@@ -6,7 +6,7 @@ use std::sync::mpsc::{Receiver, channel};
 use understudy_seal::{Opener, Refusal, Seal};
 use understudy_wire::{Frame, FrameError, Member, decode};
 
-use crate::journal::RefusedAs;
+use crate::refused_as::RefusedAs;
 use crate::rights::run_in_background;
 
 /// Closes what a member says and opens what it hears.

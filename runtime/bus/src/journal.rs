@@ -15,14 +15,16 @@ use std::thread::JoinHandle;
 use serde::{Deserialize, Serialize};
 use understudy_wire::{Member, Time};
 
-use crate::clock::Clock;
+use crate::anchor::Anchors;
+use crate::clock::{Clock, wall_clock};
 use crate::error::BusError;
 use crate::host::Summary;
 use crate::link::LinkKind;
+use crate::refused_as::RefusedAs;
 use crate::rights::Rights;
 
-/// Version of the journal: what its records are called and hold. Journals of version 1 do not say theirs.
-pub const JOURNAL_VERSION: u32 = 2;
+/// Version of the journal: what its records are called and hold. Journals of version 1 do not say theirs; version 3 packs closed segments and records the wall clock.
+pub const JOURNAL_VERSION: u32 = 3;
 
 fn first_version() -> u32 {
     1
@@ -165,6 +167,18 @@ pub enum HostEvent {
     FieldContested,
     /// The equipment holds what the remote I/O wrote.
     FieldUncontested,
+    /// The wall clock beside the monotonic time of the record, once in ten minutes.
+    WallClock {
+        /// Nanoseconds since 1970-01-01 UTC.
+        unix_ns: u64,
+    },
+    /// The wall clock was set.
+    WallClockStepped {
+        /// Nanoseconds since 1970-01-01 UTC, after it.
+        unix_ns: u64,
+        /// By how much, in nanoseconds; negative for one that was set back.
+        step_ns: i64,
+    },
     /// Records were lost because the journal was too slow, since the last such record.
     JournalLost {
         /// How many.
@@ -177,26 +191,6 @@ pub enum HostEvent {
     },
     /// The member ends as it was told to.
     Stopped(Summary),
-}
-
-/// Why a datagram does not count.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum RefusedAs {
-    /// Nothing that could be a frame.
-    NoFrame,
-    /// A frame without an authenticator.
-    Unsealed,
-    /// In the name of somebody who has nothing to say here.
-    Foreign,
-    /// The authenticator is not the sender's: made by somebody else, or changed on its way.
-    Forged,
-    /// It counted before, or is too late.
-    Replayed,
-    /// New, and of a life before the newest: two processes have the sender's keys.
-    OfAnotherLife,
-    /// The sender's keys are revoked.
-    Revoked,
 }
 
 /// Takes what is reported; never blocks.
@@ -268,12 +262,24 @@ impl Journal {
             .name("journal".into())
             .spawn(move || {
                 let mut output = BufWriter::new(output);
-                let unwritten = write_all(&receiver, &mut output, |(now, event)| Record {
-                    at_ns: clock.host_ns(now),
+                let mut anchors = Anchors::default();
+                let record = |at_ns, event| Record {
+                    at_ns,
                     member,
-                    name: Cow::Borrowed(&name),
+                    name: Cow::Borrowed(name.as_str()),
                     event,
-                });
+                };
+                let anchor = || {
+                    let (at_ns, unix_ns) = wall_clock()?;
+                    let event = anchors.look(at_ns, unix_ns)?;
+                    Some(record(at_ns, Noted::Host(event)))
+                };
+                let unwritten = write_all(
+                    &receiver,
+                    &mut output,
+                    |(now, event)| record(clock.host_ns(now), event),
+                    anchor,
+                );
                 unwritten + left.load(Ordering::Relaxed)
             })
             .map_err(|source| BusError::System {
@@ -294,6 +300,7 @@ fn write_all<'name, E: Serialize + 'name>(
     receiver: &Receiver<(Time, Noted<E>)>,
     output: &mut impl Write,
     record: impl Fn((Time, Noted<E>)) -> Record<'name, E>,
+    mut anchor: impl FnMut() -> Option<Record<'name, E>>,
 ) -> u64 {
     let mut unwritten = 0;
     while let Ok(first) = receiver.recv() {
@@ -303,6 +310,11 @@ fn write_all<'name, E: Serialize + 'name>(
             if write_line(output, &record(noted)).is_err() {
                 unwritten += 1;
             }
+        }
+        if let Some(anchor) = anchor()
+            && write_line(output, &anchor).is_err()
+        {
+            unwritten += 1;
         }
         if output.flush().is_err() {
             unwritten += 1;
@@ -382,7 +394,7 @@ mod tests {
         let clock = Clock::start();
         while !events(&written.lock().expect("no panic"))
             .iter()
-            .any(|event| matches!(event, Noted::Host(_)))
+            .any(|event| matches!(event, Noted::Host(HostEvent::JournalLost { .. })))
         {
             assert!(
                 clock.now() < Time(0) + Duration::from_secs(20),

@@ -4,6 +4,7 @@
 //! a link to its peers ([`LinkKind`]: Zenoh or plain UDP) and a journal, and runs it ([`Host`], or [`run_member`] for a process
 //! of its own). Nothing here decides anything about the cycle.
 
+mod anchor;
 mod announcer;
 mod channel;
 mod clock;
@@ -24,6 +25,7 @@ mod member;
 mod operator;
 mod orders;
 mod ports;
+mod refused_as;
 mod rights;
 mod trouble;
 mod udp;
@@ -50,13 +52,13 @@ pub use host::{Host, Summary};
 pub use interruption::interruption;
 pub use journal::{
     EventSink, HostEvent, JOURNAL_RECORDS, JOURNAL_VERSION, Journal, JournalSender, Noted, Record,
-    RefusedAs,
 };
 pub use link::{Link, LinkCounters, LinkKind, NoSuchLink, Reopening, ZENOH_PORT_OFFSET};
 pub use member::{MemberSettings, run_member};
 pub use operator::{Call, Request};
 pub use orders::{Control, Cuts, Order, Orders, orders};
 pub use ports::free_addresses;
+pub use refused_as::RefusedAs;
 pub use rights::{Rights, keep_times};
 pub use wakefulness::Wakefulness;
 pub use watchdog::Watchdog;

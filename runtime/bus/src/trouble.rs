@@ -9,7 +9,8 @@ use std::time::Duration;
 use understudy_wire::{Member, Time};
 
 use crate::guard::Refused;
-use crate::journal::{HostEvent, RefusedAs};
+use crate::journal::HostEvent;
+use crate::refused_as::RefusedAs;
 
 /// Kinds and senders told apart in one report.
 const MAXIMUM_ENTRIES: usize = 32;

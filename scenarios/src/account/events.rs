@@ -192,6 +192,7 @@ impl Account {
                 self.cycles = self.cycles.min(told.unwrap_or(0));
             }
             RunEvent::Journal { .. }
+            | RunEvent::Checkpoint { .. }
             | RunEvent::Started { .. }
             | RunEvent::Origin { .. }
             | RunEvent::Commanded { .. }

@@ -199,7 +199,7 @@ fn a_journal_without_a_whole_cluster_or_with_a_broken_line_says_so() {
         let broken = observe_journal(understudy_journal::records(bytes));
         broken.expect_err("no record").code()
     };
-    let headed = [understudy_journal::journal_header(), b"{}\n{}\n".to_vec()].concat();
+    let headed = [understudy_journal::journal_header(1), b"{}\n{}\n".to_vec()].concat();
     assert_eq!(code(&headed), "U0532");
     assert_eq!(code(b"{}\n{}\n"), "U0532");
     let first = br#"{"at_ns":1,"name":"laboratory","party":null,"event":{"event":"finished"}}"#;

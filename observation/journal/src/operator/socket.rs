@@ -253,7 +253,7 @@ mod tests {
         let run = folder("over");
         let journal = run.join("journal.jsonl");
         // Its writer was killed in the middle of a line.
-        let begun = [journal_header().as_slice(), b"{\"at_ns\":1,\"na"].concat();
+        let begun = [journal_header(1).as_slice(), b"{\"at_ns\":1,\"na"].concat();
         std::fs::write(&journal, begun).expect("written");
         let there = Commander::of_run(run.to_path_buf());
         let writer = WriterLock::take(&run).expect("a file");

@@ -1,9 +1,9 @@
 //! Events of the processes of members, and of the laboratory that runs them.
 
-use std::time::Duration;
+use std::time::{Duration, UNIX_EPOCH};
 
 use understudy_bus::HostEvent;
-use understudy_journal::{Action, Command, Members, RunEvent};
+use understudy_journal::{Action, Command, Members, RunEvent, time_text};
 use understudy_wire::{Member, SignalPlace, StateChoice};
 
 use super::Words;
@@ -40,13 +40,26 @@ descriptions! { host: HostEvent, members: Members;
     FieldRegained => "field-regained" Notice "its equipment is read and written again";
     FieldContested => "field-contested" Alarm "another master writes the outputs of its equipment";
     FieldUncontested => "field-uncontested" Notice "its equipment holds the outputs that it wrote";
+    WallClock { unix_ns } => "wall-clock" Info format!("its wall clock shows {}", date_of(*unix_ns));
+    WallClockStepped { unix_ns, step_ns } => "wall-clock-stepped" Warning
+        format!("its wall clock was set by {} s to {}", seconds_of(*step_ns), date_of(*unix_ns));
     JournalLost { records } => "journal-lost" Warning format!("{records} records are lost");
     UnknownCommand { line } => "unknown-command" Warning format!("received an unknown command: {line}");
     Stopped(_) => "stopped" Info "ended as requested";
 }
 
+fn date_of(unix_ns: u64) -> String {
+    time_text(UNIX_EPOCH + Duration::from_nanos(unix_ns))
+}
+
+fn seconds_of(step_ns: i64) -> String {
+    let magnitude = Duration::from_nanos(step_ns.unsigned_abs()).as_secs_f64();
+    format!("{}{magnitude:.3}", if step_ns < 0 { '-' } else { '+' })
+}
+
 descriptions! { run: RunEvent, members: Members;
-    Journal { version } => "journal" Info format!("the journal has version {version}");
+    Journal { version, .. } => "journal" Info format!("the journal has version {version}");
+    Checkpoint { cycle, .. } => "checkpoint" Info format!("cycle {cycle} of the run");
     Started { member } => "started" Notice format!("{} is started", members.name(*member));
     Fault { action, member, .. } => "fault" Notice fault_text(*action, *member, members);
     Commanded { member, command, owner, reason, refused } => "commanded" Notice {

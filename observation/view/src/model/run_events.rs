@@ -62,7 +62,8 @@ impl Model {
             RunEvent::Detached { member, .. } => {
                 self.changes.push(cycle, Change::Detached(*member));
             }
-            RunEvent::Journal { .. } | RunEvent::Commanded { .. } => {}
+            RunEvent::Journal { .. } | RunEvent::Checkpoint { .. } | RunEvent::Commanded { .. } => {
+            }
         }
         self.happened(record, cycle, None);
     }

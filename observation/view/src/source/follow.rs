@@ -1,19 +1,20 @@
 //! Follows a journal through its segments.
 //!
 //! ```text
-//!   journal.000007.jsonl ─► journal.000008.jsonl ─► … ─► journal.jsonl ─(closed as the next number)─► journal.jsonl
+//!   journal.000007.packed ─► journal.000008.jsonl ─► … ─► journal.jsonl ─(closed as the next number)─► journal.jsonl
 //! ```
 //!
-//! A file that is open stays readable when it is renamed or removed, so nothing of it is lost once it has been opened. Which file
-//! follows is told by the number that ours got when it was closed.
+//! A file that is open stays readable when it is renamed, packed or removed, so nothing of it is lost once it has been opened. Which file
+//! follows is told by the number that ours gets when it is closed; its header says it.
 
-use std::fs::{self, File};
-use std::io::{self, Read};
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::{self, Read as _};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
-use understudy_journal::{Record, check_header, closed_segments};
+use understudy_journal::{Place, Record, SegmentFile, check_header, closed_segments};
 
 use super::Trouble;
 use super::progress::Progress;
@@ -36,15 +37,18 @@ pub(super) struct Follower {
     failure: Option<Trouble>,
     /// Bytes read so far, of all segments.
     read: u64,
+    /// Bytes of the text of closed segments, by number: they do not change.
+    lengths: BTreeMap<u64, u64>,
     progress: Progress,
 }
 
 #[derive(Debug)]
 struct Open {
-    file: File,
-    inode: u64,
+    file: SegmentFile,
     /// Where it is closed already.
     number: Option<u64>,
+    /// The number that its header says.
+    promised: Option<u64>,
     /// Bytes read of it.
     read: u64,
     header: Header,
@@ -62,9 +66,10 @@ enum Header {
 impl Open {
     /// The number that it got when it was closed; nothing while it is written, and when it is gone.
     fn number_among(&self, closed: &[(u64, PathBuf)]) -> Option<u64> {
-        self.number.or_else(|| {
-            let ours =
-                |path: &Path| fs::metadata(path).is_ok_and(|found| found.ino() == self.inode);
+        self.number.or(self.promised).or_else(|| {
+            let ours = |path: &Path| {
+                fs::metadata(path).is_ok_and(|found| found.ino() == self.file.inode())
+            };
             let found = closed.iter().find(|(_, path)| ours(path));
             found.map(|(number, _)| *number)
         })
@@ -81,8 +86,28 @@ impl Follower {
             piece: vec![0; PIECE],
             failure: None,
             read: 0,
+            lengths: BTreeMap::new(),
             progress: Progress::default(),
         }
+    }
+
+    /// Begins at a place in the middle.
+    pub(super) fn from_place(path: &Path, place: Place) -> io::Result<Self> {
+        let mut follower = Self::new(path);
+        let mut file = place.file;
+        let read = file.go_to(place.piece)?;
+        follower.open = Some(Open {
+            file,
+            number: place.promised.filter(|_| place.is_closed),
+            promised: place.promised,
+            read,
+            header: match place.piece {
+                0 => Header::Unread,
+                _ => Header::Accepted,
+            },
+        });
+        follower.read = read;
+        Ok(follower)
     }
 
     pub(super) fn progress(&self) -> Progress {
@@ -123,10 +148,10 @@ impl Follower {
     }
 
     /// Bytes of the journal that have not been read.
-    fn ahead(&self) -> io::Result<u64> {
+    fn ahead(&mut self) -> io::Result<u64> {
         let mut ahead = 0;
         if let Some(open) = &self.open {
-            ahead = open.file.metadata()?.len().saturating_sub(open.read);
+            ahead = open.file.text_bytes()?.saturating_sub(open.read);
             if !self.is_closed()? {
                 return Ok(ahead);
             }
@@ -139,10 +164,16 @@ impl Follower {
         };
         let own = self.open.as_ref();
         let own = own.and_then(|open| open.number_among(&closed));
-        let later = closed.iter().filter(|(number, _)| Some(*number) > own);
-        let paths = later.map(|(_, path)| path).chain([&self.path]);
-        let sizes = paths.filter_map(|path| fs::metadata(path).ok());
-        Ok(ahead + sizes.map(|found| found.len()).sum::<u64>())
+        let length = |path: &Path| SegmentFile::open(path).and_then(|file| file.text_bytes());
+        for (number, path) in closed.iter().filter(|(number, _)| Some(*number) > own) {
+            let known = self.lengths.get(number).copied();
+            // One that is gone is none of what is ahead.
+            if let Some(bytes) = known.or_else(|| length(path).ok()) {
+                self.lengths.insert(*number, bytes);
+                ahead += bytes;
+            }
+        }
+        Ok(ahead + length(&self.path).unwrap_or(0))
     }
 
     /// For how long the open file has not been written to.
@@ -151,7 +182,7 @@ impl Follower {
         reason = "the system says when a file was written by the calendar"
     )]
     fn age(&self) -> Option<Duration> {
-        let written = self.open.as_ref()?.file.metadata().ok()?.modified().ok()?;
+        let written = self.open.as_ref()?.file.modified().ok()?;
         // A clock that was set back makes no age.
         Some(
             SystemTime::now()
@@ -204,13 +235,12 @@ impl Follower {
 
     /// False where it is not there (any more).
     fn open(&mut self, path: &Path, number: Option<u64>) -> io::Result<bool> {
-        match File::open(path) {
+        match SegmentFile::open(path) {
             Ok(file) => {
-                let inode = file.metadata()?.ino();
                 self.open = Some(Open {
                     file,
-                    inode,
                     number,
+                    promised: None,
                     read: 0,
                     header: Header::Unread,
                 });
@@ -230,7 +260,7 @@ impl Follower {
             return Ok(true);
         }
         match fs::metadata(&self.path) {
-            Ok(metadata) => Ok(metadata.ino() != open.inode),
+            Ok(metadata) => Ok(metadata.ino() != open.file.inode()),
             // Closed, and the next one is not made yet.
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(true),
             Err(error) => Err(error),
@@ -322,10 +352,13 @@ impl Follower {
                 if open.header != Header::Accepted {
                     if open.header == Header::Unread {
                         open.header = Header::Accepted;
-                        if let Err(error) = check_header(&self.line) {
-                            open.header = Header::Refused;
-                            take(Err(error.into()));
-                            taken += 1;
+                        match check_header(&self.line) {
+                            Ok(promised) => open.promised = promised,
+                            Err(error) => {
+                                open.header = Header::Refused;
+                                take(Err(error.into()));
+                                taken += 1;
+                            }
                         }
                     }
                     self.line.clear();

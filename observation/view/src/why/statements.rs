@@ -73,7 +73,10 @@ impl<'m> Explainer<'m> {
             let sampled = steps[*at].sampled.as_ref();
             sampled.is_some_and(|sampled| sampled.fault_is_new)
         };
-        let at = (0..=place).rev().take(FARTHEST).find(is_new)?;
+        let Some(at) = (0..=place).rev().take(FARTHEST).find(is_new) else {
+            self.history.end().reach();
+            return None;
+        };
         let fault = steps[at].sampled.as_ref()?.fault?;
         let trace = self.trace(at)?;
         let mut reason = self.leaf(

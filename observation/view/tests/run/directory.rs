@@ -3,7 +3,7 @@
 use std::fs;
 
 use understudy_cluster::press_cell;
-use understudy_journal::{Journal, keep_cluster};
+use understudy_journal::{Journal, keep_cluster, place_before};
 use understudy_testing::Folder;
 use understudy_view::{Bounds, Filter, Run, find_run_of};
 
@@ -84,4 +84,49 @@ fn a_run_is_followed_while_it_is_written() {
     );
     let found = find_run_of(&folder.join("runs"), &cell).expect("the newest");
     assert_eq!(found.path(), path);
+}
+
+/// A question about one cycle of a long run is answered from a checkpoint as from the first record, wherever it lies: in a packed segment, in
+/// one that is still text, or in the file that is written.
+#[test]
+fn a_cycle_is_found_without_reading_what_is_before() {
+    let folder = Folder::new("run-places");
+    let cell = cell();
+    let source = folder.join("source");
+    fs::create_dir_all(&source).expect("a folder");
+    for file in press_cell() {
+        fs::write(source.join(file.name), file.text).expect("written");
+    }
+    let path = folder.join("run");
+    fs::create_dir_all(&path).expect("a folder");
+    keep_cluster(&path, &source.join("cluster.toml"), &cell).expect("kept");
+    let journal = path.join("journal.jsonl");
+    let mut writer = Journal::create(&journal, 8 << 20).expect("created");
+    let plain = scenario(&cell, "title = \"long\"\ncycles = 4000\n");
+    for record in records(&cell, &plain, 1) {
+        writer.write(&record);
+    }
+    assert_eq!(writer.finish().lost, 0);
+    let run = Run::open(&path).expect("a run");
+    let whole = run.read(Bounds::default()).expect("readable");
+    for cycle in [0, 700, 1500, 2500, 3300, 3999] {
+        let place = place_before(&journal, cycle).expect("readable");
+        if cycle >= 700 {
+            let found = place.expect("a checkpoint").cycle;
+            assert!(
+                (cycle - 400..=cycle).contains(&found),
+                "{found} for {cycle}"
+            );
+        }
+        for signal in ["press.move_down", "robot.grip"] {
+            let (near, far) = (run.why(signal, Some(cycle)), whole.why(signal, Some(cycle)));
+            assert_eq!(
+                near.expect("known"),
+                far.expect("known"),
+                "{signal} in {cycle}"
+            );
+        }
+    }
+    let newest = run.why("robot.grip", None).expect("known");
+    assert_eq!(newest, whole.why("robot.grip", None).expect("known"));
 }

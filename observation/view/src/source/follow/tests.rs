@@ -8,7 +8,9 @@ use understudy_testing::Folder;
 use super::*;
 
 fn line(number: u64) -> Vec<u8> {
-    let record = Record::of_run(number, RunEvent::Interrupted);
+    // What cannot be packed, so that the limit is reached.
+    let verdict = format!("{:x}", number.wrapping_mul(0x9e37_79b9_7f4a_7c15)).repeat(2);
+    let record = Record::of_run(number, RunEvent::ScenarioOver { verdict });
     let mut line = serde_json::to_vec(&record).expect("JSON");
     line.push(b'\n');
     line
@@ -21,7 +23,7 @@ fn taken(follower: &mut Follower) -> Vec<Option<u64>> {
         all.push(found.ok().map(|record| {
             assert!(matches!(
                 record.event,
-                Happening::Run(RunEvent::Interrupted)
+                Happening::Run(RunEvent::ScenarioOver { .. })
             ));
             record.at_ns
         }));
@@ -105,7 +107,7 @@ fn what_is_gone_is_said() {
 fn what_is_no_record_is_left_out() {
     let folder = Folder::new("follow-bad");
     let path = folder.join("journal.jsonl");
-    let mut bytes = [journal_header(), line(0)].concat();
+    let mut bytes = [journal_header(1), line(0)].concat();
     bytes.extend(b"{\"at_ns\":1}\n\n\xff\xfe\n");
     bytes.extend(vec![b'x'; 3 * LONGEST_LINE]);
     bytes.push(b'\n');

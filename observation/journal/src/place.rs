@@ -1,0 +1,88 @@
+//! Finds a cycle in a journal by its checkpoints, without reading it from the beginning.
+
+use std::io::{self, BufRead as _, BufReader, Read as _};
+use std::path::{Path, PathBuf};
+
+use understudy_wire::Moment;
+
+use crate::packed_file::SegmentFile;
+use crate::record::{Happening, LABORATORY, Record, RunEvent};
+use crate::segments::segments_of;
+use crate::version::{LONGEST_HEADER, check_header};
+
+/// Where a reader can begin.
+#[derive(Debug)]
+pub struct Place {
+    /// The segment; it is open, so it stays the same when it is packed or closed meanwhile.
+    pub file: SegmentFile,
+    /// The number that its header says.
+    pub promised: Option<u64>,
+    /// Whether it will not be written to any more.
+    pub is_closed: bool,
+    /// Which of its pieces; each begins with a line.
+    pub piece: usize,
+    /// A moment of the first checkpoint in it.
+    pub moment: Moment,
+    /// The cycle of the run that this is.
+    pub cycle: i64,
+}
+
+/// The last place of a journal whose checkpoint is of `cycle` or before; nothing where there is none, as in journals of version 2.
+///
+/// # Errors
+/// What the system says.
+pub fn place_before(path: &Path, cycle: i64) -> io::Result<Option<Place>> {
+    let segments = segments_of(path)?;
+    // The first segments of a run may have none, and the newest has none yet.
+    let is_before = |segment: &PathBuf| {
+        let first = SegmentFile::open(segment).map(|mut file| checkpoint_of(&mut file, 0));
+        !matches!(first, Ok(Some((_, first))) if first > cycle)
+    };
+    let end = segments.partition_point(is_before);
+    for segment in segments[..end].iter().rev() {
+        let mut file = SegmentFile::open(segment)?;
+        let Some((piece, (moment, cycle))) = piece_before(&mut file, cycle) else {
+            continue;
+        };
+        let mut header = Vec::new();
+        file.go_to(0)?;
+        BufReader::new((&mut file).take(LONGEST_HEADER)).read_until(b'\n', &mut header)?;
+        return Ok(check_header(&header).ok().map(|promised| Place {
+            is_closed: segment != path,
+            file,
+            promised,
+            piece,
+            moment,
+            cycle,
+        }));
+    }
+    Ok(None)
+}
+
+fn piece_before(file: &mut SegmentFile, cycle: i64) -> Option<(usize, (Moment, i64))> {
+    let pieces: Vec<usize> = (0..file.pieces().ok()?.len()).collect();
+    let end = pieces.partition_point(
+        |piece| !matches!(checkpoint_of(file, *piece), Some((_, found)) if found > cycle),
+    );
+    (0..end).rev().find_map(|piece| {
+        let found = checkpoint_of(file, piece)?;
+        (found.1 <= cycle).then_some((piece, found))
+    })
+}
+
+/// The first checkpoint of a piece.
+fn checkpoint_of(file: &mut SegmentFile, piece: usize) -> Option<(Moment, i64)> {
+    let text = file.text_of(piece).ok()?;
+    let mut lines = text.split(|byte| *byte == b'\n');
+    lines.find_map(|line| {
+        let name = line.iter().position(|byte| *byte == b',')?;
+        let of_run = format!(",\"name\":\"{LABORATORY}\"");
+        if !line[name..].starts_with(of_run.as_bytes()) {
+            return None;
+        }
+        match serde_json::from_slice::<Record>(line).ok()?.event {
+            Happening::Run(RunEvent::Checkpoint { moment, cycle }) => Some((moment, cycle)),
+            _ => None,
+        }
+    })
+}
