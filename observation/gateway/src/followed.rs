@@ -48,7 +48,7 @@ pub struct Observation {
     pub recent: Vec<Event>,
     /// The time at which the newest record was written.
     pub heard: Instant,
-    /// The time at which the newest cycle was recorded; for a cycle that was in the journal when the reader started, `heard` of then.
+    /// The time at which the newest cycle was recorded; for a cycle that was in the journal when the reader started, that of the newest record then.
     pub advanced: Instant,
 }
 
