@@ -20,7 +20,7 @@ use understudy_testing::skip;
 use crate::{empty_folder, understudy, understudy_in};
 
 /// A finished run of the small cluster, in virtual time: the station `tank` is silent for a hundred cycles.
-fn finished_run(name: &str) -> PathBuf {
+pub(crate) fn finished_run(name: &str) -> PathBuf {
     let folder = empty_folder(name);
     let made = understudy_in(&folder, &["init", "."]);
     assert_eq!(made.status, 0, "{}", made.errors);
@@ -82,6 +82,49 @@ fn metrics_count_what_the_journal_has() {
     assert!(silent.is_some_and(|turns| turns >= 90.0), "{silent:?}");
     let margins = metric(text, "understudy_cycle_margin_seconds_count", &[]);
     assert!(margins.is_some_and(|count| count > 100.0), "{margins:?}");
+    // The deadline of a period of 10 ms is a bound.
+    for name in [
+        "understudy_token_seconds",
+        "understudy_cycle_margin_seconds",
+    ] {
+        let bucket = format!("{name}_bucket");
+        assert!(
+            metric(text, &bucket, &["le=\"0.0065\""]).is_some(),
+            "{text}"
+        );
+    }
+    let version = format!("version=\"{}\"", env!("CARGO_PKG_VERSION"));
+    assert_eq!(
+        metric(text, "understudy_build_info", &[&version]),
+        Some(1.0)
+    );
+    let journal = fs::metadata(folder.join("runs/latest/journal.jsonl"));
+    let written = journal
+        .and_then(|journal| journal.modified())
+        .expect("a journal");
+    let written = written
+        .duration_since(std::time::UNIX_EPOCH)
+        .expect("later");
+    for name in ["last_record", "newest_cycle"] {
+        let at = metric(text, &format!("understudy_{name}_timestamp_seconds"), &[]);
+        let at = at.expect("a time");
+        assert!((at - written.as_secs_f64()).abs() < 1.0, "{name}: {at}");
+    }
+    let state = |state: &str| {
+        metric(
+            text,
+            "understudy_run_state",
+            &[&format!("state=\"{state}\"")],
+        )
+    };
+    assert_eq!(
+        (state("finished"), state("running")),
+        (Some(1.0), Some(0.0))
+    );
+    assert_eq!(
+        metric(text, "understudy_records_received", &["member=\"tank-io\""]),
+        Some(1.0)
+    );
     assert_eq!(
         metric(
             text,
@@ -348,7 +391,7 @@ fn exposed_with_alarms(folder: &Path) -> String {
 }
 
 /// The names of metrics in a text.
-fn metric_names(text: &str) -> std::collections::BTreeSet<String> {
+pub(crate) fn metric_names(text: &str) -> std::collections::BTreeSet<String> {
     let belongs = |character: char| character.is_ascii_alphanumeric() || character == '_';
     text.split(|character: char| !belongs(character))
         .filter(|word| word.starts_with("understudy_") && *word != "understudy_client")

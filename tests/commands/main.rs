@@ -1,5 +1,6 @@
 //! The command line as a person sees it: help, answers, errors, exit statuses.
 
+mod alert_rules;
 mod allocate;
 mod animate;
 mod book;

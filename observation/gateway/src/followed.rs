@@ -48,6 +48,8 @@ pub struct Observation {
     pub recent: Vec<Event>,
     /// The time at which the newest record was written.
     pub heard: Instant,
+    /// The time at which the newest cycle was recorded; for a cycle that was in the journal when the reader started, that of the newest record then.
+    pub advanced: Instant,
 }
 
 /// Events in [`Observation::recent`].
@@ -72,6 +74,7 @@ impl Observation {
             snapshot: Arc::new(snapshot),
             recent,
             heard,
+            advanced: heard,
         }
     }
 }
@@ -116,6 +119,7 @@ impl Followed {
             metrics: Arc::clone(&metrics),
             newest: Arc::clone(&newest),
             passed_on: None,
+            newest_cycle: None,
         };
         let ended = Arc::clone(&ends);
         let thread = Builder::new()
@@ -143,11 +147,11 @@ impl Followed {
     pub fn exposition(&self) -> impl Fn() -> Result<String, Reading> + Clone + use<> {
         let (metrics, newest) = (Arc::clone(&self.metrics), Arc::clone(&self.newest));
         move || {
-            let age = {
+            {
                 let newest = Newest::current(&newest)?;
-                newest.progress.age(Instant::now())
-            };
-            metrics.aged(age);
+                let now = Instant::now();
+                metrics.dated(&newest.observation, newest.progress.age(now), now);
+            }
             Ok(metrics.exposition())
         }
     }
@@ -193,6 +197,8 @@ struct Reader {
     newest: Arc<RwLock<Newest>>,
     /// Number of the newest event that was passed on; nothing before the present is known.
     passed_on: Option<u64>,
+    /// The newest cycle that was shown, and when it was recorded.
+    newest_cycle: Option<(i64, Instant)>,
 }
 
 impl Reader {
@@ -237,7 +243,12 @@ impl Reader {
         self.metrics.show(&self.model, &snapshot);
         let now = Instant::now();
         let heard = progress.age(now).and_then(|age| now.checked_sub(age));
-        let observation = Observation::new(&self.model, snapshot, heard.unwrap_or(now));
+        let heard = heard.unwrap_or(now);
+        let cycle = snapshot.cycle;
+        let mut observation = Observation::new(&self.model, snapshot, heard);
+        let shown = self.newest_cycle.filter(|(shown, _)| Some(*shown) == cycle);
+        self.newest_cycle = shown.or(cycle.map(|cycle| (cycle, heard)));
+        observation.advanced = self.newest_cycle.map_or(heard, |(_, at)| at);
         let count = self.model.event_count();
         let passed_on = self.passed_on.unwrap_or(count);
         let is_present = self.passed_on.is_some() || progress.is_at_end();

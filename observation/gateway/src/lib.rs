@@ -14,6 +14,7 @@
 )]
 
 mod error;
+mod feed;
 mod followed;
 mod groups;
 mod http;
@@ -26,6 +27,7 @@ mod register_map;
 mod writing;
 
 pub use error::GatewayError;
+pub use feed::Feed;
 pub use followed::{BOUNDS, Followed, Observation};
 pub use groups::forward_signals;
 pub use http::serve_metrics;

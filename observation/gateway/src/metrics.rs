@@ -6,13 +6,14 @@ mod values;
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use prometheus_client::encoding::text::encode;
 use prometheus_client::metrics::counter::Counter;
 use prometheus_client::metrics::family::Family;
 use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::metrics::histogram::Histogram;
+use prometheus_client::metrics::info::Info;
 use prometheus_client::registry::{Metric, Registry, Unit};
 use understudy_cluster::Cluster;
 use understudy_journal::Members;
@@ -20,13 +21,19 @@ use understudy_view::{Model, Run};
 use understudy_wire::Member;
 
 use crate::error::GatewayError;
-use crate::followed::BOUNDS;
-use crate::labels::{OfAlarm, OfAlarms, OfLacking, OfMember, OfProgram, OfSource, OfState, OfTurn};
+use crate::feed::STATES;
+use crate::followed::{BOUNDS, Observation};
+use crate::labels::{
+    OfAlarm, OfAlarms, OfLacking, OfMember, OfProgram, OfRemoteIo, OfRun, OfSource, OfState, OfTurn,
+};
 
-/// Bounds of the buckets of times, as shares of a period.
-const SHARES: [f64; 12] = [
-    0.0, 0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 1.0,
+/// Bounds of the buckets of times within a cycle, as shares of the time to the deadline.
+const SHARES: [f64; 15] = [
+    0.0, 0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0,
 ];
+
+/// Bounds of the buckets of the times between cycles, as shares of the period.
+const CYCLE_SHARES: [f64; 11] = [0.5, 0.9, 0.95, 0.99, 1.01, 1.05, 1.1, 1.5, 2.0, 5.0, 10.0];
 
 /// A table of metrics: `name field: type, help;` with the unit of those in seconds.
 macro_rules! metrics {
@@ -62,6 +69,10 @@ metrics! {
     "open_alarms" open_alarms: Gauge, "Alarms that last or are not acknowledged";
     "alarms" alarms: Family<OfAlarms, Gauge>, "Alarms on signals by state and priority";
     "alarm_state" alarm_states: Family<OfAlarm, Gauge>, "1 for the state of the alarm on a signal, 0 for the other states";
+    "run_state" run_states: Family<OfRun, Gauge>, "1 for the state of the run, 0 for the other states";
+    "output_source" output_sources: Family<OfSource, Gauge>, "1 for the source of the outputs that are applied now, 0 for the other sources; 0 for all where it is not known";
+    "remote_io_state" remote_io_states: Family<OfRemoteIo, Gauge>, "1 for the state of the remote I/O, 0 for the other states";
+    "records_received" records_received: Family<OfMember, Gauge>, "1 where the records of the member are received, 0 where not: its state is then known from others only";
     "station_state" station_states: Family<OfState, Gauge>, "1 for the state of the station, 0 for the other states";
     "awaits_release" awaits_release: Family<OfProgram, Gauge>, "1 where the operator has to release the outputs";
     "forced_signals" forced: Family<OfProgram, Gauge>, "Forced signals";
@@ -78,6 +89,8 @@ metrics! {
     "journal_left_out" left_out: Gauge, "Records that were gone or could not be read, at least";
     "host_stall" stall_seconds: Family<OfMember, Counter<f64, AtomicU64>>, "Total delay of the late wake-ups of the member" Seconds;
     "journal_age" journal_age: Gauge<f64, AtomicU64>, "Age of the newest record; it grows while the journal of a live run does not" Seconds;
+    "last_record_timestamp" record_time: Gauge<f64, AtomicU64>, "Time of the newest record, since 1970; NaN where there is none" Seconds;
+    "newest_cycle_timestamp" cycle_time: Gauge<f64, AtomicU64>, "Time at which the newest cycle was recorded, since 1970; NaN where there is none" Seconds;
 }
 
 /// All metrics of one run.
@@ -110,19 +123,18 @@ impl Metrics {
     /// Metrics of a run of `cluster`, all at 0.
     pub fn new(cluster: &Cluster) -> Self {
         let schedule = &cluster.agreement().schedule;
-        let period = schedule.period().as_secs_f64();
-        let buckets = || Histogram::new(SHARES.map(|share| share * period));
+        let (period, deadline) = (schedule.period(), schedule.deadline());
+        let within = SHARES.map(|share| deadline.mul_f64(share).as_secs_f64());
+        // A token that is not back at the deadline is late, and may be by a whole period.
+        let token = within.into_iter().chain([period.as_secs_f64()]);
         let metrics = Self {
             registry: Mutex::default(),
             members: Members::of(cluster),
             timed: AtomicI64::new(i64::MIN),
             values: Values::default(),
-            margin: buckets(),
-            token: buckets(),
-            cycle_times: Histogram::new(
-                [0.5, 0.9, 0.95, 0.99, 1.01, 1.05, 1.1, 1.5, 2.0, 5.0, 10.0]
-                    .map(|share| share * period),
-            ),
+            margin: Histogram::new(within),
+            token: Histogram::new(token),
+            cycle_times: Histogram::new(CYCLE_SHARES.map(|share| share * period.as_secs_f64())),
         };
         metrics.begin(cluster);
         metrics.registered(cluster.name())
@@ -174,6 +186,8 @@ impl Metrics {
         let labels = [("cluster".into(), cluster.to_owned().into())];
         let mut all = Registry::with_prefix_and_labels("understudy", labels.into_iter());
         self.values.register(&mut all);
+        let version = Info::new([("version", env!("CARGO_PKG_VERSION"))]);
+        all.register("build", "Version of the gateway", version);
         let times = [
             (
                 "cycle_margin",
@@ -215,11 +229,24 @@ impl Metrics {
         }
     }
 
-    /// Sets the age of the newest record.
-    pub(crate) fn aged(&self, age: Option<Duration>) {
-        self.values
-            .journal_age
-            .set(age.unwrap_or_default().as_secs_f64());
+    /// Sets what depends on the time: the state of the run, the times of the newest record, of age `age`, and of the newest cycle.
+    pub(crate) fn dated(&self, observation: &Observation, age: Option<Duration>, now: Instant) {
+        let current = observation.state(observation.feed(now));
+        for state in STATES {
+            let is_state = i64::from(state == current);
+            let run_state = self.values.run_states.get_or_create(&OfRun { state });
+            run_state.set(is_state);
+        }
+        let seconds = |time: Option<Duration>| time.map_or(f64::NAN, |time| time.as_secs_f64());
+        // Since 1970.
+        let today = SystemTime::now().duration_since(UNIX_EPOCH);
+        let today = today.unwrap_or_default();
+        let before = |age: Duration| today.saturating_sub(age);
+        let cycle_age = now.saturating_duration_since(observation.advanced);
+        let cycle_age = observation.snapshot.cycle.map(|_| cycle_age);
+        self.values.journal_age.set(seconds(age));
+        self.values.record_time.set(seconds(age.map(before)));
+        self.values.cycle_time.set(seconds(cycle_age.map(before)));
     }
 
     /// The metrics in the OpenMetrics text format.
@@ -242,6 +269,8 @@ impl Metrics {
 pub fn exposition_of(run: &Run) -> Result<String, GatewayError> {
     let metrics = Metrics::new(run.cluster());
     let (mut source, mut model) = (run.follow(), run.model(BOUNDS));
+    // Its results are there before the journal is read to its end.
+    let is_finished = run.is_finished();
     let mut read = 0;
     loop {
         let taken = source.poll(&mut |found| match found {
@@ -257,7 +286,14 @@ pub fn exposition_of(run: &Run) -> Result<String, GatewayError> {
     if let (0, Some(trouble)) = (read, source.failure()) {
         return Err(GatewayError::Journal(trouble));
     }
-    metrics.show(&model, &model.snapshot());
-    metrics.aged(source.progress().age(std::time::Instant::now()));
+    if is_finished {
+        model.end();
+    }
+    let (snapshot, now) = (model.snapshot(), Instant::now());
+    metrics.show(&model, &snapshot);
+    let age = source.progress().age(now);
+    let heard = age.and_then(|age| now.checked_sub(age));
+    let observation = Observation::new(&model, snapshot, heard.unwrap_or(now));
+    metrics.dated(&observation, age, now);
     Ok(metrics.exposition())
 }

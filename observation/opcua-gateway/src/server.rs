@@ -21,7 +21,7 @@ use opcua::types::{
 };
 use tokio::net::TcpListener;
 use understudy_bus::{Connections, Listener, relay};
-use understudy_gateway::{Followed, WriteGate, serve_until_asked};
+use understudy_gateway::{Feed, Followed, WriteGate, serve_until_asked};
 use understudy_view::{Event, Level, Run};
 use understudy_wire::Role;
 
@@ -29,7 +29,7 @@ use crate::error::OpcuaError;
 use crate::manager::{NodeManager, Writing, node_manager};
 use crate::security::{Login, Settings, certificate_and_key};
 use crate::tree::{Kind, Reading, Seen, Variable, WritableInput, message, variables};
-use crate::trust::{self, Feed};
+use crate::trust;
 
 /// Between two looks at what is newest; a run is followed no faster.
 const LOOK: Duration = Duration::from_millis(100);
@@ -307,6 +307,7 @@ struct Showing<'a> {
     index: u16,
     nodes: Vec<NodeId>,
     set: Vec<Option<Reading>>,
+    service_level: Option<u8>,
 }
 
 impl<'a> Showing<'a> {
@@ -326,6 +327,7 @@ impl<'a> Showing<'a> {
             manager,
             index,
             set: vec![None; nodes.len()],
+            service_level: None,
             nodes,
         }
     }
@@ -336,7 +338,7 @@ impl<'a> Showing<'a> {
         let observation = self.shown.followed.observation().ok();
         let seen = observation.as_deref().map(|observation| Seen {
             observation,
-            feed: trust::feed(observation, Instant::now()),
+            feed: observation.feed(Instant::now()),
         });
         let stamp = stamp(self.shown, seen.map_or(Feed::Silent, |seen| seen.feed));
         let mut changed = Vec::new();
@@ -361,6 +363,10 @@ impl<'a> Showing<'a> {
             .map(|(place, value)| (&nodes[place], None, value));
         // Every one of these nodes is there, and is a variable.
         let _ = self.manager.set_values(self.handle.subscriptions(), values);
+        let level = trust::service_level(seen.map(|seen| (seen.observation, seen.feed)));
+        if self.service_level.replace(level) != Some(level) {
+            self.handle.set_service_level(level);
+        }
         if seen.is_some() {
             let events = self.shown.followed.take_events();
             tell(self.handle, self.index, &events, stamp);

@@ -15,12 +15,12 @@ mod signals;
 
 use opcua::types::{DataTypeId, StatusCode, UAString, Variant};
 use understudy_cluster::{Cluster, Controller, InputSource};
-use understudy_gateway::Observation;
+use understudy_gateway::{Feed, Observation};
 use understudy_typed::Point;
 use understudy_view::{Event, ProgramSnapshot, StationSnapshot};
 use understudy_wire::Member;
 
-use crate::trust::{self, Feed};
+use crate::trust;
 
 /// Type of a variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -253,7 +253,7 @@ impl Tree {
         };
         self.enter(&["Run"]);
         rows! { self;
-            "State" String "starting, running, finished or interrupted" => counted(|of| Some(text(of.snapshot.run.word())));
+            "State" String "starting, running, not-current, finished or interrupted" => |seen: &Seen<'_>| seen.counted(Some(text(seen.observation.state(seen.feed))));
             "Cycle" Int64 "newest cycle, from the origin of the run" => counted(|of| of.snapshot.cycle.map(Variant::from));
             "Period" UInt64 "period of a cycle, in microseconds" => counted(|of| Some(of.snapshot.period_us.into()));
             "Mode" String "full or paper" => counted(|of| Some(text(of.snapshot.mode)));

@@ -5,41 +5,59 @@
 //! | its journal is still being read | Bad_WaitingForInitialData | Bad_WaitingForInitialData |
 //! | has not begun | Bad_WaitingForInitialData | Good |
 //! | is live | as below | Good |
-//! | is silent for 2 s and 20 cycles | Bad_NoCommunication | Uncertain_NoCommunicationLastUsableValue |
+//! | has no record or no new cycle for 2 s and 20 cycles | Bad_NoCommunication | Uncertain_NoCommunicationLastUsableValue |
 //! | has ended | Uncertain_NoCommunicationLastUsableValue, unless it was bad | Good |
 //!
 //! An output is Good where it is direct or reconstructed, which is the same value; the variable `Source` names it. Held
 //! is Uncertain_LastUsableValue, fail-safe Bad_DeviceFailure, forced Good_LocalOverride.
 
-use std::time::{Duration, Instant};
-
 use opcua::types::StatusCode;
-use understudy_gateway::Observation;
-use understudy_view::{ProgramSnapshot, RunState};
+use understudy_gateway::{Feed, Observation};
+use understudy_view::{ProgramSnapshot, Snapshot};
 
-/// Minimum time without records after which a run is silent.
-const SILENCE: Duration = Duration::from_secs(2);
-
-/// Minimum number of cycles for the same.
-const SILENT_CYCLES: u32 = 20;
-
-/// Whether records of the run arrive.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Feed {
-    Waiting,
-    Live,
-    Silent,
-    Ended,
+/// Values of `Server/ServiceLevel`, in the ranges of OPC UA part 4: 1 no data, 2 to 199 degraded, 200 to 255 healthy.
+pub(crate) mod level {
+    /// The run is current, and every program is protected.
+    pub(crate) const PROTECTED: u8 = 255;
+    /// A program is not protected, or its protection is not reported yet. All values are the present.
+    pub(crate) const UNPROTECTED: u8 = 200;
+    /// The records of a member are not received.
+    pub(crate) const NOT_RECEIVED: u8 = 150;
+    /// A program has no provable outputs.
+    pub(crate) const WITHOUT_OUTPUTS: u8 = 100;
+    /// The run has ended: the values are the last ones.
+    pub(crate) const ENDED: u8 = 10;
+    /// The journal is still being read, or the run has not begun or is not current.
+    pub(crate) const NO_DATA: u8 = 1;
 }
 
-/// What comes of `seen` at `now`.
-pub(crate) fn feed(seen: &Observation, now: Instant) -> Feed {
-    let period = Duration::from_micros(seen.snapshot.period_us);
-    match seen.snapshot.run {
-        RunState::Finished | RunState::Interrupted => Feed::Ended,
-        _ if now.duration_since(seen.heard) > SILENCE.max(period * SILENT_CYCLES) => Feed::Silent,
-        RunState::Starting => Feed::Waiting,
-        RunState::Running => Feed::Live,
+/// The level of service of `seen`; nothing where the journal is still being read.
+pub(crate) fn service_level(seen: Option<(&Observation, Feed)>) -> u8 {
+    match seen {
+        None | Some((_, Feed::Waiting | Feed::Silent)) => level::NO_DATA,
+        Some((_, Feed::Ended)) => level::ENDED,
+        Some((observation, Feed::Live)) => level_of(&observation.snapshot),
+    }
+}
+
+fn level_of(snapshot: &Snapshot) -> u8 {
+    let has_outputs = |program: &ProgramSnapshot| {
+        let is_stopped = program.fault.is_some() || program.lost.is_some();
+        outputs(program).is_good() && !is_stopped && !program.awaits_release
+    };
+    let is_protected = |program: &ProgramSnapshot| {
+        let protection = program.protection.as_ref();
+        protection.is_some_and(|protection| protection.protected)
+    };
+    let programs = &snapshot.programs;
+    if !programs.iter().all(has_outputs) {
+        level::WITHOUT_OUTPUTS
+    } else if snapshot.links().any(|(_, link)| link.detached) {
+        level::NOT_RECEIVED
+    } else if !programs.iter().all(is_protected) {
+        level::UNPROTECTED
+    } else {
+        level::PROTECTED
     }
 }
 

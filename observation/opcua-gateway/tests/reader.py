@@ -2,6 +2,7 @@
 
     reader.py clear URL
     reader.py follow URL
+    reader.py level URL
     reader.py present URL CYCLE
     reader.py secure URL FOLDER USER PASSWORD
 """
@@ -153,6 +154,27 @@ async def follow(url):
         print("seen", flush=True)
 
 
+async def level(url):
+    """Prints each service level and each state of the run, until the run has ended."""
+    heard = Heard()
+    async with Client(url) as client:
+        subscription = await client.create_subscription(50, heard)
+        service_level = client.get_node(ua.NodeId(ua.ObjectIds.Server_ServiceLevel, 0))
+        nodes = [service_level, await node(client, "Run/State")]
+        await subscription.subscribe_data_change(nodes, queuesize=1000, sampling_interval=0)
+        async with asyncio.timeout(PATIENCE_S):
+            while True:
+                identifier, value, status = await heard.values.get()
+                if identifier == "Run/State":
+                    print("state", value, status.name, flush=True)
+                else:
+                    print("level", value, flush=True)
+                    # The level is read as it is told.
+                    if value == 10:
+                        assert await service_level.read_value() == 10
+                        break
+
+
 async def present(url, cycle):
     """From the first moment on: every value waits, or is that of the last cycle."""
     print("ready", flush=True)
@@ -231,4 +253,4 @@ async def secure(url, folder, user, password):
             await reads(await client(policy, user, password, mode))
 
 
-asyncio.run({"clear": clear, "follow": follow, "present": present, "secure": secure}[sys.argv[1]](*sys.argv[2:]))
+asyncio.run({"clear": clear, "follow": follow, "level": level, "present": present, "secure": secure}[sys.argv[1]](*sys.argv[2:]))

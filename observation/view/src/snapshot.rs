@@ -31,7 +31,7 @@ pub enum RunState {
 
 impl RunState {
     /// The state as JSON writes it.
-    pub fn word(self) -> &'static str {
+    pub const fn word(self) -> &'static str {
         match self {
             Self::Starting => "starting",
             Self::Running => "running",
@@ -85,6 +85,17 @@ pub struct Snapshot {
     pub records: u64,
     /// Records that were gone or could not be read, at least.
     pub left_out: u64,
+}
+
+impl Snapshot {
+    /// The links of every member, by its name.
+    pub fn links(&self) -> impl Iterator<Item = (&str, &LinkSnapshot)> {
+        let stations = self.stations.iter().map(|of| (of.name.as_str(), &of.link));
+        let remote_ios = self.remote_ios.iter();
+        let remote_ios = remote_ios.map(|of| (of.name.as_str(), &of.link));
+        let plants = self.plants.iter().map(|of| (of.name.as_str(), &of.link));
+        stations.chain(remote_ios).chain(plants)
+    }
 }
 
 /// Links of a member.
@@ -153,6 +164,17 @@ pub enum RemoteIoState {
 }
 
 impl RemoteIoState {
+    /// Every state.
+    pub const ALL: [Self; 7] = [
+        Self::Serving,
+        Self::Listening,
+        Self::AwaitsRelease,
+        Self::StateLost,
+        Self::Suspended,
+        Self::Killed,
+        Self::Ended,
+    ];
+
     /// The state as JSON and the page write it.
     pub fn word(self) -> &'static str {
         match self {

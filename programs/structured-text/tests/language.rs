@@ -474,3 +474,17 @@ fn several_tasks_at_odd_intervals_are_refused() {
         "{found:?}"
     );
 }
+
+#[test]
+fn an_unknown_program_is_answered_with_those_of_the_file() {
+    let text = "PROGRAM fill END_PROGRAM PROGRAM drain END_PROGRAM";
+    let check = |chosen: Option<&str>, expected: &str| {
+        let found = read(text, chosen).1;
+        let helps: Vec<&str> = found.iter().filter_map(|of| of.help.as_deref()).collect();
+        assert!(found.iter().all(|of| of.code == "U1013"), "{found:?}");
+        assert_eq!(helps, [expected], "{chosen:?}");
+    };
+    check(Some("pump"), "known: fill, drain");
+    check(Some("fil"), "did you mean `fill`?");
+    check(None, "choose one with --program, of fill, drain");
+}

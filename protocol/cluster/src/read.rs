@@ -30,6 +30,7 @@
 //! | U0253 | warning: not one understudy where the mode wants one |
 //! | U0254 | warning: parts that never come |
 //! | U0255 | warning: a mark of what is to be filled in |
+//! | U0256 | warning: inputs that nothing drives |
 
 mod alarms;
 mod devices;
@@ -42,6 +43,7 @@ mod limits;
 mod marks;
 mod names;
 mod plants;
+mod undriven;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -187,6 +189,10 @@ fn build(
         &mut names,
         diagnostics,
     );
+    // What an error left out could be the source of an input.
+    if !diagnostics.iter().any(is_error) {
+        undriven::check(&members, &remote_ios, &simulated, diagnostics);
+    }
     let alarms = alarms::resolve(file.alarms, &members, period, diagnostics);
     limits::check(&members, &remote_ios, cluster.history, diagnostics);
     let mode = overrides
@@ -418,6 +424,10 @@ fn remote_ios(
         })
     };
     members.iter().enumerate().map(place).collect()
+}
+
+fn is_error(diagnostic: &Diagnostic) -> bool {
+    diagnostic.severity == understudy_text::Severity::Error
 }
 
 fn default_remote_io_name(member: &Member) -> String {

@@ -6,12 +6,15 @@ use std::sync::atomic::Ordering;
 use prometheus_client::metrics::counter::Counter;
 use understudy_cluster::Priority;
 use understudy_view::{
-    AlarmState, Counters, Model, ProcessAlarm, ProgramSnapshot, Snapshot, StationState,
+    AlarmState, Counters, Model, ProcessAlarm, ProgramSnapshot, RemoteIoState, Snapshot,
+    StationState,
 };
 use understudy_wire::{Member, ProgramId};
 
 use super::Metrics;
-use crate::labels::{OfAlarm, OfAlarms, OfLacking, OfMember, OfProgram, OfSource, OfState, OfTurn};
+use crate::labels::{
+    OfAlarm, OfAlarms, OfLacking, OfMember, OfProgram, OfRemoteIo, OfSource, OfState, OfTurn,
+};
 
 impl Metrics {
     /// Sets every metric but the times of cycles.
@@ -26,6 +29,8 @@ impl Metrics {
         self.values.records.set(whole(snapshot.records));
         self.values.left_out.set(whole(snapshot.left_out));
         self.station_states(snapshot);
+        self.remote_io_states(snapshot);
+        self.records_received(snapshot);
         self.process_alarms(snapshot);
         self.members(model.counters());
         self.turns(model.counters());
@@ -49,6 +54,33 @@ impl Metrics {
                     .get_or_create(&of_state)
                     .set(i64::from(state == station.state));
             }
+        }
+    }
+
+    fn remote_io_states(&self, snapshot: &Snapshot) {
+        for remote_io in &snapshot.remote_ios {
+            for state in RemoteIoState::ALL {
+                let of_state = OfRemoteIo {
+                    remote_io: remote_io.name.clone(),
+                    state: state.word(),
+                };
+                self.values
+                    .remote_io_states
+                    .get_or_create(&of_state)
+                    .set(i64::from(state == remote_io.state));
+            }
+        }
+    }
+
+    fn records_received(&self, snapshot: &Snapshot) {
+        for (member, link) in snapshot.links() {
+            let of_member = OfMember {
+                member: member.to_owned(),
+            };
+            self.values
+                .records_received
+                .get_or_create(&of_member)
+                .set(i64::from(!link.detached));
         }
     }
 
@@ -138,6 +170,10 @@ impl Metrics {
                 source,
             };
             set(&self.values.deadlines.get_or_create(&of_source), count);
+            self.values
+                .output_sources
+                .get_or_create(&of_source)
+                .set(i64::from(program.source == Some(source)));
         }
     }
 

@@ -8,9 +8,10 @@ use understudy_cycle::Mode;
 use understudy_gateway::BOUNDS;
 use understudy_journal::Members;
 use understudy_scenarios::{read as read_scenario, simulate};
-use understudy_view::{Model, RunState};
+use understudy_view::{Model, RunState, Snapshot};
 
 use super::*;
+use crate::trust::level;
 
 fn cell() -> Cluster {
     understudy_testing::press_cell(Mode::Full)
@@ -86,7 +87,7 @@ fn what_is_silent_is_found_out() {
     let mut observation = observed(&cluster, "", 30);
     let now = observation.heard;
     let check = |observation: &Observation, after: u64, feed: Feed| {
-        let found = trust::feed(observation, now + Duration::from_millis(after));
+        let found = observation.feed(now + Duration::from_millis(after));
         assert_eq!(found, feed, "after {after} ms");
     };
     check(&observation, 1_900, Feed::Live);
@@ -102,13 +103,65 @@ fn what_is_silent_is_found_out() {
 }
 
 #[test]
+fn the_service_level_is_that_of_the_worst_that_is_so() {
+    let cluster = cell();
+    let check = |observation: &Observation, feed: Feed, level: u8| {
+        let found = trust::service_level(Some((observation, feed)));
+        assert_eq!(found, level, "{feed:?}");
+    };
+    let robot = "[[step]]\nat = 20\naction = \"crash\"\nstation = \"robot\"\n";
+    let both = format!("{robot}[[step]]\nat = 20\naction = \"crash\"\nstation = \"understudy\"\n");
+    let mut whole = observed(&cluster, "", 30);
+    check(&whole, Feed::Live, level::PROTECTED);
+    check(&whole, Feed::Silent, level::NO_DATA);
+    check(&whole, Feed::Waiting, level::NO_DATA);
+    check(&whole, Feed::Ended, level::ENDED);
+    assert_eq!(trust::service_level(None), level::NO_DATA);
+    check(
+        &observed(&cluster, robot, 30),
+        Feed::Live,
+        level::UNPROTECTED,
+    );
+    let lost = observed(&cluster, &both, 30);
+    check(&lost, Feed::Live, level::WITHOUT_OUTPUTS);
+
+    // What each part of a snapshot does, alone.
+    let with = |change: &dyn Fn(&mut Snapshot)| {
+        let mut snapshot = (*whole.snapshot).clone();
+        change(&mut snapshot);
+        let mut observation = whole.clone();
+        observation.snapshot = Arc::new(snapshot);
+        observation
+    };
+    let not_reported = with(&|of| of.programs[1].protection = None);
+    check(&not_reported, Feed::Live, level::UNPROTECTED);
+    let detached = with(&|of| of.remote_ios[1].link.detached = true);
+    check(&detached, Feed::Live, level::NOT_RECEIVED);
+    let unknown = with(&|of| of.programs[1].source = None);
+    check(&unknown, Feed::Live, level::WITHOUT_OUTPUTS);
+    let stopped = with(&|of| of.programs[1].fault = Some("division by zero".to_owned()));
+    check(&stopped, Feed::Live, level::WITHOUT_OUTPUTS);
+    let waits = with(&|of| of.programs[0].awaits_release = true);
+    check(&waits, Feed::Live, level::WITHOUT_OUTPUTS);
+
+    // Records that arrive without a new cycle are not the present of the programs.
+    let start = whole.heard;
+    whole.heard = start + Duration::from_secs(60);
+    assert_eq!(whole.feed(whole.heard), Feed::Silent);
+    assert_eq!(whole.state(Feed::Silent), "not-current");
+    whole.advanced = whole.heard;
+    assert_eq!(whole.feed(whole.heard), Feed::Live);
+    assert_eq!(whole.state(Feed::Live), "running");
+}
+
+#[test]
 fn before_a_run_nothing_is_known() {
     let cluster = cell();
     let model = Model::new(Arc::new(cluster.clone()), BOUNDS);
     let observation = Observation::new(&model, model.snapshot(), Instant::now());
     let seen = Seen {
         observation: &observation,
-        feed: trust::feed(&observation, observation.heard),
+        feed: observation.feed(observation.heard),
     };
     assert_eq!(seen.feed, Feed::Waiting);
     for variable in variables(&cluster) {

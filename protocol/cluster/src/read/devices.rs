@@ -75,9 +75,8 @@ pub(super) fn device(
             }
         }
     }
-    let is_error = |found: &Diagnostic| found.severity == understudy_text::Severity::Error;
     let connection = section.connection.clone()?;
-    (!diagnostics[before..].iter().any(is_error)).then_some(FieldDevice {
+    (!diagnostics[before..].iter().any(super::is_error)).then_some(FieldDevice {
         connection,
         unit: section.unit,
         timeout: section.timeout,

@@ -240,6 +240,38 @@ fed_by = "belt"
 }
 
 #[test]
+fn inputs_that_nothing_drives() {
+    let operator = |inputs: &[&str]| {
+        let inputs = inputs.iter();
+        let inputs: String = inputs
+            .map(|name| format!("{name} = {{ operator = \"level\" }}\n"))
+            .collect();
+        format!("{HEAD}[[remote_io]]\ncontroller = \"robot\"\n[remote_io.inputs]\n{inputs}")
+    };
+    let check_it = |text: &str, expected: &[&str]| {
+        let found = check(text);
+        assert_eq!(found.contains("U0256"), !expected.is_empty(), "{found}");
+        assert!(expected.iter().all(|part| found.contains(part)), "{found}");
+    };
+    check_it(
+        HEAD,
+        &[
+            "inputs `there`, `lost` of `robot`",
+            "station = \"robot-io\", input = \"there\"",
+        ],
+    );
+    check_it(&operator(&["there"]), &["the input `lost` of `robot`"]);
+    check_it(&operator(&["there", "lost"]), &[]);
+    // Its own warning says what a plant leaves out, and what an error left out is not known.
+    let belt = "[[plant]]\ncontroller = \"robot\"\nladder = \"belt.ladder\"\n";
+    check_it(&format!("{HEAD}{belt}"), &[]);
+    check_it(
+        &format!("{HEAD}[[remote_io]]\ncontroller = \"gone\"\n"),
+        &[],
+    );
+}
+
+#[test]
 fn more_than_there_may_be() {
     let mut cluster = "[cluster]\nname = \"cell\"\nhistory = 32\n".to_owned();
     for index in 0..65 {

@@ -6,6 +6,8 @@
     reason = "what is waited for has a deadline on the real clock"
 )]
 
+mod level;
+
 use std::fs::{self, Permissions};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -53,6 +55,11 @@ fn finished_run(name: &str) -> PathBuf {
 }
 
 fn finished_run_of(name: &str, cycles: u64) -> PathBuf {
+    finished_run_with(name, cycles, "")
+}
+
+/// The same with more steps.
+fn finished_run_with(name: &str, cycles: u64, steps: &str) -> PathBuf {
     let folder = empty_folder(name);
     for file in press_cell() {
         fs::write(folder.join(file.name), file.text).expect("written");
@@ -62,7 +69,7 @@ fn finished_run_of(name: &str, cycles: u64) -> PathBuf {
     let cluster = cell();
     keep_cluster(&run, &folder.join("cluster.toml"), &cluster).expect("kept");
     let text = format!(
-        "title = \"A crash\"\ncycles = {cycles}\n[[step]]\nat = 20\naction = \"crash\"\nstation = \"robot\"\n"
+        "title = \"A crash\"\ncycles = {cycles}\n[[step]]\nat = 20\naction = \"crash\"\nstation = \"robot\"\n{steps}"
     );
     let scenario = read_scenario("crash.toml", &text, Some(&Members::of(&cluster)));
     let scenario = scenario.scenario.expect("it is right");
