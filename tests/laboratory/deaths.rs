@@ -1,8 +1,9 @@
 //! `kill -9` of members from outside: a fault like any other, which is recorded, masked and repaired while the run goes on.
 
-use std::fs::{self, File};
+use std::fs::{self, File, Metadata};
 use std::io::{BufRead, BufReader, Read};
-use std::path::Path;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use nix::sys::signal::Signal;
@@ -13,14 +14,17 @@ use super::{PRESS_CELL, no_orphan, running, running_with, signal};
 
 /// The journal of a run that is being written.
 pub(super) struct Records {
+    path: PathBuf,
     journal: BufReader<File>,
     line: String,
 }
 
 impl Records {
     pub(super) fn of(run: &Path) -> Self {
-        let journal = File::open(run.join("journal.jsonl")).expect("a journal");
+        let path = run.join("journal.jsonl");
+        let journal = File::open(&path).expect("a journal");
         Self {
+            path,
             journal: BufReader::new(journal),
             line: String::new(),
         }
@@ -31,8 +35,13 @@ impl Records {
         let deadline = Instant::now() + DEADLINE;
         loop {
             assert!(Instant::now() < deadline, "{what} did not come");
+            // A closed segment has all that it will ever have.
+            let is_closed = self.is_closed();
             let length = self.journal.read_line(&mut self.line).expect("text");
             if !self.line.ends_with('\n') {
+                if length == 0 && is_closed {
+                    self.journal = BufReader::new(File::open(&self.path).expect("a journal"));
+                }
                 // The rest is written soon.
                 assert!(length > 0 || self.line.len() < 1 << 20);
                 std::thread::yield_now();
@@ -44,6 +53,14 @@ impl Records {
                 return record;
             }
         }
+    }
+
+    /// Whether the journal goes on in another file.
+    fn is_closed(&self) -> bool {
+        let number = |found: std::io::Result<Metadata>| found.ok().map(|found| found.ino());
+        let (read, written) = (self.journal.get_ref().metadata(), fs::metadata(&self.path));
+        let written = number(written);
+        written.is_some() && number(read) != written
     }
 
     /// The process of a member, as its newest `ready` record says it.
