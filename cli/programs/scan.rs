@@ -16,7 +16,7 @@ use understudy_typed::{Elementary, Fault, Point, Points, Program};
 use crate::answer::{Answer, Status};
 use crate::files;
 
-/// Execute a program on inputs from a file, one scan for each line, or on random inputs
+/// Execute a program on inputs from a file or on random inputs
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:

@@ -67,7 +67,7 @@ fn an_output_goes_down_its_ramp_and_the_referee_agrees() {
     let scenario = read("ramps.toml", SCENARIO, Some(&members)).scenario;
     let scenario = scenario.expect("a scenario");
     let mut bytes = Vec::new();
-    let mut journal = Journal::new(&mut bytes);
+    let journal = Journal::new(&mut bytes);
     let program = &cluster.controllers()[1].interface.outputs;
     let point = |name: &str| program.find(name).expect("an output").clone();
     let (heater, stage) = (point("heater"), point("stage"));
