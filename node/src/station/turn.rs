@@ -131,21 +131,17 @@ impl Station {
             .all(|replica| replica.is_current(moment))
     }
 
-    /// Reports the states that it holds, every [`STATES_EVERY`]; a state of n segments n times less often.
+    /// Reports the states that it holds, every [`STATES_EVERY`]; a state of several segments is too long for a record.
     fn report_states(&mut self, moment: Moment) {
         let period = self.settings.agreement.schedule.period();
         let cycles = STATES_EVERY.as_nanos() / period.as_nanos().max(1);
-        let is_due = |segments: usize| {
-            let cycles = (cycles * segments as u128).max(1);
-            u128::from(moment.cycle.0) % cycles + 1 >= cycles
-        };
-        if !is_due(1) {
+        if u128::from(moment.cycle.0) % cycles.max(1) + 1 < cycles {
             return;
         }
         for place in 0..self.replicas.len() {
             let replica = &self.replicas[place];
             let state = replica.state().filter(|(_, state)| {
-                replica.may_publish(moment) && is_due(Segment::count(state.width()))
+                replica.may_publish(moment) && Segment::count(state.width()) == 1
             });
             if let Some((lineage, state)) = state {
                 let event = Event::Holds {
