@@ -29,7 +29,7 @@ impl Ramp {
             };
             let (start, way) = (real(from), real(to) - real(from));
             // Also where there is no number to start from.
-            if !(way.abs() > change) || !start.is_finite() {
+            if way.is_nan() || way.abs() <= change || !start.is_finite() {
                 return to;
             }
             let value = start + change.copysign(way);

@@ -35,8 +35,11 @@ fn rules(text: &str) -> Vec<[&str; 3]> {
     parts.collect()
 }
 
+/// A metric, and the labels that it is selected by with their values.
+type Selector<'a> = (&'a str, Vec<(&'a str, Vec<&'a str>)>);
+
 /// The selectors of an expression with braces: the metric, and each label with its values.
-fn selectors(expression: &str) -> Vec<(&str, Vec<(&str, Vec<&str>)>)> {
+fn selectors(expression: &str) -> Vec<Selector<'_>> {
     let pieces: Vec<&str> = expression.split('{').collect();
     let pairs = pieces.windows(2).map(|pair| {
         let belongs = |character: char| character.is_ascii_alphanumeric() || character == '_';

@@ -32,7 +32,7 @@ pub fn digest(executable: &Executable, interface: &Interface, scans: u64) -> Dig
         for point in inputs.iter() {
             if Some(point) == reset {
                 point.set(&mut read, u64::from(stopped));
-            } else if random.number() % 4 == 0 {
+            } else if random.number().is_multiple_of(4) {
                 point.set(&mut read, random.value(point));
             }
         }
