@@ -264,6 +264,11 @@ impl Account {
             (Happening::Host(HostEvent::JournalLost { records }), Some(member)) => {
                 self.unwritten(member, *records);
             }
+            (Happening::Host(HostEvent::Ready { .. }), Some(Member::RemoteIo(program))) => {
+                if let Some(referee) = self.terms.referees.get_mut(program.index()) {
+                    referee.starts_again();
+                }
+            }
             (Happening::Run(event), _) => {
                 let changes = self.alarms.fold.run(event);
                 self.alarms_changed(&changes, None);
@@ -320,6 +325,13 @@ impl Account {
             let changes = self.alarms.fold.forget(program);
             self.alarms_changed(&changes, None);
         }
+    }
+
+    /// How often a remote I/O that was killed took the records of its last samples with it, so that its outputs were not judged for a time.
+    pub(crate) fn gaps(&self) -> impl Iterator<Item = (ProgramId, u64)> {
+        let referees = self.terms.referees.iter().enumerate();
+        let gaps = referees.map(|(program, referee)| (ProgramId(program as u8), referee.gaps()));
+        gaps.filter(|(_, gaps)| *gaps > 0)
     }
 
     fn refuse(&mut self, member: Member, theirs: String, ours: String) {

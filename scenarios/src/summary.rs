@@ -409,6 +409,17 @@ fn expectations(
             });
         }
     }
+    for (program, gaps) in account.gaps() {
+        let name = account.terms.members.name(Member::RemoteIo(program));
+        list.push(ExpectationSummary {
+            expected: format!("all that {name} drove is judged"),
+            found: format!(
+                "{gaps} times it was killed before its journal had its last samples; what came after was not judged until a station reported its state"
+            ),
+            met: false,
+            needs_time: false,
+        });
+    }
     if summary.death_count > 0 && !scenario.asks_for_nothing() {
         let each: Vec<String> = summary.deaths.iter().map(ToString::to_string).collect();
         list.push(ExpectationSummary {

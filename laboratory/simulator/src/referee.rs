@@ -28,7 +28,7 @@ use std::hash::{Hash, Hasher};
 use serde::{Deserialize, Serialize};
 use understudy_executable::{Executable, Scratch};
 use understudy_remote_io::{Event, Ramp, Settings};
-use understudy_wire::{Image, Lineage, Moment, ProgramHash, Source, StationId};
+use understudy_wire::{Image, Lineage, Moment, PointValue, ProgramHash, Source, StationId};
 
 use descent::Descent;
 
@@ -40,9 +40,14 @@ const REMEMBERED_FROM_FLOOR: usize = 65_536;
 /// Different images of a plant that are remembered.
 const SEEN: usize = 16;
 
+/// Requests of operators that are remembered.
+const ASKED: usize = 4;
+
 /// Samples in a row of which a killed remote I/O has left no record, at most, and the states that they may extend.
-const UNRECORDED_SAMPLES: usize = 2;
+const UNRECORDED_SAMPLES: usize = 4;
 const RECENT_STATES: usize = 16;
+/// Lineages that are tried to find them.
+const TRIED: usize = 1 << 20;
 
 /// Samples for which a choice of the operator is waited for.
 const CHOICE_SAMPLES: u32 = 256;
@@ -69,12 +74,20 @@ pub struct Referee {
     held: u32,
     /// Records are missing, and no state after them is known yet.
     blind: bool,
+    /// The remote I/O has started again, and has not sampled since: the records of its last samples may be missing.
+    is_new: bool,
+    /// The newest sample while blind: its cycle, and the lineage that it led to.
+    unjudged: Option<(Moment, Lineage)>,
+    /// How often the records of a remote I/O that was killed did not suffice.
+    gaps: u64,
     /// What the plant showed last: any of these may have been sampled.
     seen: VecDeque<Image>,
     /// Bits of u(i) that do not come from the plant, as of the newest sample.
     sourced: Vec<(usize, bool)>,
     /// Those bits with the writes that the remote I/O has taken since: what a sample without a record may have had.
     taken: Vec<(usize, bool)>,
+    /// What operators asked for last: the record of a write that was taken may be missing too.
+    asked: VecDeque<(u16, PointValue)>,
     /// Samples for which the program may go on from a state that the operator has chosen.
     choice: u32,
     cold_starts: u64,
@@ -190,6 +203,44 @@ impl Hash for Referee {
     }
 }
 
+/// Whether `count` of these samples lead from one lineage to the other; `samples` are then their places. At most `left` lineages are tried.
+fn leads_to(
+    from: Lineage,
+    to: Lineage,
+    candidates: &[Image],
+    count: usize,
+    samples: &mut Vec<usize>,
+    left: &mut usize,
+) -> bool {
+    for (place, inputs) in candidates.iter().enumerate() {
+        if *left == 0 {
+            break;
+        }
+        *left -= 1;
+        let next = from.after(inputs);
+        samples.push(place);
+        let is_found = match count {
+            0 | 1 => next == to,
+            _ => leads_to(next, to, candidates, count - 1, samples, left),
+        };
+        if is_found {
+            return true;
+        }
+        samples.pop();
+    }
+    false
+}
+
+/// Writes a value to the input whose first bit in u(i) is `input`.
+fn set_point(bits: &mut [(usize, bool)], input: u16, value: PointValue) {
+    for (place, bit) in bits {
+        let at = place.wrapping_sub(usize::from(input));
+        if at < usize::from(value.width()) {
+            *bit = value.stored() >> at & 1 == 1;
+        }
+    }
+}
+
 fn text(image: &Option<Image>) -> String {
     image
         .as_ref()
@@ -214,9 +265,13 @@ impl Referee {
             descent: Descent::default(),
             held: 0,
             blind: false,
+            is_new: false,
+            unjudged: None,
+            gaps: 0,
             seen: VecDeque::new(),
             sourced: settings.sourced_bits().map(|bit| (bit, false)).collect(),
             taken: Vec::new(),
+            asked: VecDeque::new(),
             choice: 0,
             cold_starts: 0,
             applied: false,
@@ -239,6 +294,33 @@ impl Referee {
             self.seen.pop_front();
         }
         self.seen.push_back(inputs);
+    }
+
+    /// An operator asks to write `value` to the input whose first bit in u(i) is `input`. Like [`Self::saw`], it says what a sample without
+    /// a record may have had, and proves nothing by itself.
+    pub fn asked(&mut self, input: u16, value: PointValue) {
+        if self.asked.len() == ASKED {
+            self.asked.pop_front();
+        }
+        self.asked.push_back((input, value));
+    }
+
+    /// The remote I/O starts again.
+    pub fn starts_again(&mut self) {
+        self.is_new = true;
+    }
+
+    /// How often the remote I/O was killed with more samples that left no record than can be found: what came after was not judged, until
+    /// a state was known again.
+    pub fn gaps(&self) -> u64 {
+        self.gaps
+    }
+
+    /// A station reports the state that it holds after the sample of `moment`. It counts only where nothing else is known.
+    pub fn holds(&mut self, moment: Moment, lineage: Lineage, state: &Image) {
+        if self.unjudged == Some((moment, lineage)) && self.blind {
+            self.goes_on_from(lineage, state.clone());
+        }
     }
 
     /// Records of the remote I/O are missing here: nothing that it applies is judged until its program starts, or goes on from a state that is
@@ -310,18 +392,14 @@ impl Referee {
                     *bit = inputs.get(*place);
                 }
                 let continued = self.continue_from(*moment, *born, *before);
+                self.is_new = false;
+                self.unjudged = self.blind.then(|| (*moment, before.after(inputs)));
                 self.step(*moment, inputs);
                 self.taken.clone_from(&self.sourced);
                 continued
             }
             Event::Written { write, .. } => {
-                let first = usize::from(write.input);
-                for (place, bit) in &mut self.taken {
-                    let at = place.wrapping_sub(first);
-                    if at < usize::from(write.value.width()) {
-                        *bit = write.value.stored() >> at & 1 == 1;
-                    }
-                }
+                set_point(&mut self.taken, write.input, write.value);
                 Ok(())
             }
             Event::Applied {
@@ -406,10 +484,11 @@ impl Referee {
             self.remember(born, before, initial);
             return Ok(());
         }
-        if self.recover(before) || self.blind {
+        if self.is_new && self.recover(before) || self.blind {
             return Ok(());
         }
-        if chosen {
+        if chosen || self.is_new {
+            self.gaps += u64::from(!chosen);
             self.misses_records();
             return Ok(());
         }
@@ -420,13 +499,19 @@ impl Referee {
     }
 
     /// What a sample without a record may have had: what the plant has shown, with the values of other sources then, with those that
-    /// were written since, or with those that the stations recall.
+    /// were written or asked for since, or with those that the stations recall.
     fn unrecorded(&self) -> Vec<Image> {
         let mut images: Vec<Image> = self.seen.iter().cloned().collect();
-        for values in [&self.taken, &self.sourced] {
+        let mut sources = vec![self.taken.clone(), self.sourced.clone()];
+        for &(input, value) in &self.asked {
+            let mut asked = self.taken.clone();
+            set_point(&mut asked, input, value);
+            sources.push(asked);
+        }
+        for values in sources {
             for seen in &self.seen {
                 let mut image = seen.clone();
-                for &(place, bit) in values {
+                for &(place, bit) in &values {
                     image.set(place, bit);
                 }
                 if !images.contains(&image) {
@@ -440,29 +525,25 @@ impl Referee {
     /// Finds the samples without a record that lead to a lineage from a state that may be continued from, and goes there.
     fn recover(&mut self, lineage: Lineage) -> bool {
         let candidates = self.unrecorded();
-        let newest = (self.floor..self.states.len()).rev().take(RECENT_STATES);
-        let mut ways: Vec<(usize, Lineage, Vec<usize>)> = newest
-            .map(|from| (from, self.states[from].lineage, Vec::new()))
-            .collect();
-        for _ in 0..UNRECORDED_SAMPLES {
-            let mut longer = Vec::new();
-            for (from, known, samples) in &ways {
-                for (place, sensors) in candidates.iter().enumerate() {
-                    let samples: Vec<usize> = samples.iter().copied().chain([place]).collect();
-                    longer.push((*from, known.after(sensors), samples));
+        let mut left = TRIED;
+        let mut samples = Vec::new();
+        for most in 1..=UNRECORDED_SAMPLES {
+            for from in (self.floor..self.states.len()).rev().take(RECENT_STATES) {
+                let State {
+                    lineage: known,
+                    stepped,
+                    ..
+                } = self.states[from];
+                if !leads_to(known, lineage, &candidates, most, &mut samples, &mut left) {
+                    continue;
                 }
-            }
-            if let Some((from, _, samples)) = longer.iter().find(|(_, found, _)| *found == lineage)
-            {
-                self.newest = Some(*from);
-                let stepped = self.states[*from].stepped;
-                for &place in samples {
+                self.newest = Some(from);
+                for &place in &samples {
                     self.step(stepped, &candidates[place]);
                 }
                 self.truth = None;
                 return true;
             }
-            ways = longer;
         }
         false
     }
@@ -486,12 +567,25 @@ impl Referee {
         self.truth = Some((moment, outputs));
     }
 
+    /// Whether the state before the sample of a cycle is not known.
+    fn is_unjudged(&self, moment: Moment) -> bool {
+        self.blind || self.unjudged.is_some_and(|(of, _)| of == moment)
+    }
+
     fn judge(&mut self, moment: Moment, driven: &Image, source: Source) -> Result<(), Violation> {
         if source != Source::FailSafe {
             self.descent.begins_at(driven);
         }
         match source {
-            Source::Direct | Source::Reconstructed | Source::Held if self.blind => Ok(()),
+            Source::Held if self.blind => {
+                self.held += 1;
+                Ok(())
+            }
+            Source::Direct | Source::Reconstructed if self.is_unjudged(moment) => {
+                self.held = 0;
+                self.last_true = Some(driven.clone());
+                Ok(())
+            }
             Source::Direct | Source::Reconstructed => {
                 self.held = 0;
                 self.last_true = Some(driven.clone());

@@ -10,7 +10,7 @@ use understudy_cluster::Cluster;
 use understudy_remote_io::{Event, Missing};
 use understudy_simulator::{Referee, Violation};
 use understudy_typed::{Fault, Program as TypedProgram};
-use understudy_wire::{Image, Lineage, Moment, ProgramId, Source, StationId, StationSet};
+use understudy_wire::{Image, Lineage, Moment, ProgramId, Source, StationId, StationSet, Write};
 
 /// A sample and its effect on the program.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -188,6 +188,16 @@ impl History {
     /// What its plant shows.
     pub(crate) fn saw(&mut self, sensors: &Image) {
         self.referee.saw(sensors);
+    }
+
+    /// An operator asks to write a value.
+    pub(crate) fn asked(&mut self, write: &Write) {
+        self.referee.asked(write.input, write.value);
+    }
+
+    /// Its remote I/O starts again.
+    pub(crate) fn starts_again(&mut self) {
+        self.referee.starts_again();
     }
 
     /// Records of its remote I/O are missing; its state is known again when a station reports the state that it holds.

@@ -1,6 +1,6 @@
 //! What each event adds to the account.
 
-use understudy_journal::RunEvent;
+use understudy_journal::{Command, RunEvent};
 use understudy_node::Event as StationEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_simulator::Action;
@@ -35,6 +35,16 @@ impl Account {
                     let others = words.iter().filter(|other| other.mask != word.mask);
                     others.for_each(|other| sum.add(&other.sum));
                     trace.push(at, &sum);
+                }
+            }
+            StationEvent::Holds {
+                moment,
+                program,
+                lineage,
+                state,
+            } => {
+                if let Some(referee) = self.terms.referees.get_mut(program.index()) {
+                    referee.holds(*moment, *lineage, state);
                 }
             }
             StationEvent::Refused {
@@ -184,6 +194,16 @@ impl Account {
                     });
                 }
             }
+            RunEvent::Commanded {
+                member: Member::RemoteIo(program),
+                command: Command::Write(write),
+                ..
+            } => {
+                if let Some(referee) = self.terms.referees.get_mut(program.index()) {
+                    referee.asked(write.input, write.value);
+                }
+            }
+            RunEvent::Commanded { .. } => {}
             RunEvent::Interrupted => {
                 self.interrupted = true;
                 // The newest cycle may be cut off for some: it is none of the run any more.
@@ -195,7 +215,6 @@ impl Account {
             | RunEvent::Checkpoint { .. }
             | RunEvent::Started { .. }
             | RunEvent::Origin { .. }
-            | RunEvent::Commanded { .. }
             | RunEvent::Acknowledged(_)
             | RunEvent::Shelved(_)
             | RunEvent::Unshelved(_)

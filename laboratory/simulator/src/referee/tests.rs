@@ -265,15 +265,52 @@ fn a_sample_without_a_record_may_have_what_was_written() {
     };
     // The remote I/O was killed after the sample of cycle 2, in which the value was; a pulse is over in the next one.
     let resumed = sampled(4, &[false, true], false);
-    for is_written in [false, true] {
+    // Without the record of the write there may be that of the request.
+    for (is_asked, is_written) in [(false, false), (false, true), (true, false)] {
         let mut referee = referee_of_an_operator_input();
         referee.saw(&bit(false));
         assert_eq!(referee.observe(&sampled(1, &[], false)), Ok(()));
+        if is_asked {
+            referee.asked(0, true.into());
+        }
         if is_written {
             assert_eq!(referee.observe(&written), Ok(()));
         }
-        assert_eq!(referee.observe(&resumed).is_ok(), is_written);
+        referee.starts_again();
+        assert_eq!(referee.observe(&resumed), Ok(()));
+        assert_eq!(referee.gaps(), u64::from(!is_asked && !is_written));
     }
+}
+
+#[test]
+fn a_state_that_a_station_holds_ends_a_gap() {
+    let mut referee = referee();
+    for event in [sampled(1, &[], true), applied(1, true, Source::Direct)] {
+        assert_eq!(referee.observe(&event), Ok(()), "{event:?}");
+    }
+    // Killed with more unknown samples than can be found: x is not known. A process that was not started again is no excuse.
+    let resumed = sampled(9, &[true, true, false, true, true, false], true);
+    let mut running = referee.clone();
+    assert!(running.observe(&resumed).is_err());
+    referee.starts_again();
+    for event in [resumed, applied(9, false, Source::Direct)] {
+        assert_eq!(referee.observe(&event), Ok(()), "{event:?}");
+    }
+    assert_eq!(referee.gaps(), 1);
+    let next = [true, true, false, true, true, false, true];
+    assert_eq!(referee.observe(&sampled(10, &next, true)), Ok(()));
+    let lineage = after(&[true, true, false, true, true, false, true, true]);
+    referee.holds(moment(9), lineage, &bit(false));
+    assert_eq!(referee.standing(), None, "of another cycle");
+    referee.holds(moment(10), lineage, &bit(true));
+    assert_eq!(referee.standing(), Some((lineage, &bit(true))));
+    assert_eq!(referee.observe(&applied(10, true, Source::Direct)), Ok(()));
+    let held = applied(11, true, Source::Held);
+    assert_eq!(referee.observe(&held), Ok(()));
+    let next = [true, true, false, true, true, false, true, true];
+    assert_eq!(referee.observe(&sampled(12, &next, true)), Ok(()));
+    let wrong = referee.observe(&applied(12, true, Source::Direct));
+    assert!(wrong.is_err(), "{wrong:?}");
 }
 
 /// Outputs of a program with a ramp, driven one after the other from 10 on: whether the referee permits them all.

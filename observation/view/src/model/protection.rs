@@ -18,6 +18,9 @@ impl Model {
         let name = self.members.name(Member::RemoteIo(program)).to_owned();
         let over = [STATE_LOST, "forced"];
         self.alarms.all_over(&name, &over, self.cycles.of(None));
+        if let Some(history) = self.histories.get_mut(program.index()) {
+            history.starts_again();
+        }
     }
 
     pub(super) fn protection_changed(

@@ -1,6 +1,6 @@
 //! What the laboratory does, and what it sees of the processes that it runs.
 
-use understudy_journal::{Action, Process, Record, RunEvent};
+use understudy_journal::{Action, Command, Process, Record, RunEvent};
 use understudy_wire::Member;
 
 use super::Model;
@@ -61,6 +61,15 @@ impl Model {
             }
             RunEvent::Detached { member, .. } => {
                 self.changes.push(cycle, Change::Detached(*member));
+            }
+            RunEvent::Commanded {
+                member: Member::RemoteIo(program),
+                command: Command::Write(write),
+                ..
+            } => {
+                if let Some(history) = self.histories.get_mut(program.index()) {
+                    history.asked(write);
+                }
             }
             RunEvent::Journal { .. } | RunEvent::Checkpoint { .. } | RunEvent::Commanded { .. } => {
             }
