@@ -3,7 +3,7 @@
 use std::fs::{self, OpenOptions};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
@@ -65,23 +65,24 @@ impl Reader {
         (status.parse().expect("a number"), body.to_owned())
     }
 
-    /// The registers of the run's cycle and of the robot's state.
-    fn registers(&self) -> Result<(i64, u16), u8> {
+    /// Input registers from 0 on, by Modbus; the exception where it answers with one.
+    fn registers(&self, count: u8) -> Result<Vec<u16>, u8> {
         let mut stream = TcpStream::connect(&self.address).expect("it listens");
         stream.set_read_timeout(Some(DEADLINE)).expect("a timeout");
         stream
-            .write_all(&[0, 7, 0, 0, 0, 6, 1, 4, 0, 0, 0, 17])
+            .write_all(&[0, 7, 0, 0, 0, 6, 1, 4, 0, 0, 0, count])
             .expect("sent");
         let mut head = [0; 9];
         stream.read_exact(&mut head).expect("an answer");
         if head[7] != 4 {
             return Err(head[8]);
         }
-        let mut bytes = [0; 34];
+        let mut bytes = vec![0; 2 * usize::from(count)];
         stream.read_exact(&mut bytes).expect("all of it");
-        let word = |place: usize| u16::from_be_bytes([bytes[2 * place], bytes[2 * place + 1]]);
-        let cycle = i64::from(word(2)) << 16 | i64::from(word(3));
-        Ok((cycle, word(16)))
+        let words = bytes.chunks_exact(2);
+        Ok(words
+            .map(|word| u16::from_be_bytes([word[0], word[1]]))
+            .collect())
     }
 }
 
@@ -150,6 +151,9 @@ fn of_one_segment(journal: &Path) -> String {
     }
     text
 }
+
+/// Registers of the run itself.
+const OF_RUN: u8 = 16;
 
 /// A reader starts with the first third of the journal, and is suspended while the rest is written.
 fn check(name: &str, arguments: &[&str], listen: &str, ask: fn(&Reader) -> Option<(i64, bool)>) {
@@ -237,8 +241,12 @@ fn modbus_tells_no_past() {
         "present-modbus",
         &["gateway", "modbus"],
         "--listen",
-        |reader| match reader.registers() {
-            Ok((cycle, robot)) => Some((cycle, robot == 8)),
+        |reader| match reader.registers(OF_RUN) {
+            // Without the robot no further failure would be masked.
+            Ok(words) => {
+                let cycle = i64::from(words[2]) << 16 | i64::from(words[3]);
+                Some((cycle, words[6] == 0))
+            }
             Err(exception) => {
                 assert_eq!(exception, 6, "server device busy");
                 None
@@ -247,19 +255,45 @@ fn modbus_tells_no_past() {
     );
 }
 
-/// A viewer of a page whose run is suspended is told how old the newest record is; the page itself is not suspended.
-#[test]
-fn a_viewer_is_told_how_old_the_newest_record_is() {
-    let _turn = one_at_a_time();
-    let run = simulated_run_of(&empty_folder("present-age"), SCENARIO);
+/// A live run, some of whose records are there; the newest is an hour old.
+fn old_run(name: &str) -> PathBuf {
+    let run = simulated_run_of(&empty_folder(name), SCENARIO);
     is_live(&run);
-    let journal = OpenOptions::new()
-        .append(true)
-        .open(run.join("journal.jsonl"));
+    let journal = run.join("journal.jsonl");
+    let text = of_one_segment(&journal);
+    let cut = text.len() / 3;
+    fs::write(&journal, &text[..cut]).expect("written");
+    let journal = OpenOptions::new().append(true).open(journal);
     let long_ago = std::time::SystemTime::now() - Duration::from_secs(3600);
     journal
         .and_then(|journal| journal.set_modified(long_ago))
         .expect("it is ours");
+    run
+}
+
+/// Its inputs and outputs are not the present ones any more, so a client gets none; it can still read that the run is not current.
+#[test]
+fn modbus_tells_no_values_of_a_run_that_is_not_current() {
+    let _turn = one_at_a_time();
+    let run = old_run("present-old");
+    let reader = Reader::start(&["gateway", "modbus"], &run, "--listen");
+    let started = Instant::now();
+    let words = loop {
+        match reader.registers(OF_RUN) {
+            Ok(words) => break words,
+            Err(exception) => assert_eq!(exception, 6),
+        }
+        assert!(started.elapsed() < DEADLINE);
+    };
+    assert_eq!(words[1], 4, "not current");
+    assert_eq!(reader.registers(OF_RUN + 1), Err(6));
+}
+
+/// A viewer of a page whose run is suspended is told how old the newest record is; the page itself is not suspended.
+#[test]
+fn a_viewer_is_told_how_old_the_newest_record_is() {
+    let _turn = one_at_a_time();
+    let run = old_run("present-age");
     let mut command = understudy(&["watch", "--address", "127.0.0.1:0"]);
     command.arg(&run);
     let page = Page::start(command);

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::str::FromStr;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde_json::{Map, Value, json};
 use tokio::runtime::Runtime;
@@ -67,8 +67,9 @@ pub fn mirror(
     runtime.block_on(async {
         tokio::pin!(end);
         loop {
-            if let Ok(present) = run.snapshot() {
-                for (key, document) in documents(run.cluster(), &present) {
+            if let Ok(present) = run.observation() {
+                let state = present.state(present.feed(Instant::now()));
+                for (key, document) in documents(run.cluster(), &present.snapshot, state) {
                     let text = document.to_string();
                     if published.get(&key) != Some(&text) {
                         announcer.say(&key, &text);
@@ -115,13 +116,13 @@ fn take_writes(
 }
 
 /// Each document with the end of its key.
-fn documents(cluster: &Cluster, snapshot: &Snapshot) -> Vec<(String, Value)> {
+fn documents(cluster: &Cluster, snapshot: &Snapshot, state: &str) -> Vec<(String, Value)> {
     let mut documents = vec![
         (
             "run".to_owned(),
             json!({
                 "cluster": snapshot.cluster,
-                "run": snapshot.run,
+                "run": state,
                 "cycle": snapshot.cycle,
                 "period_us": snapshot.period_us,
                 "mode": snapshot.mode,

@@ -1,11 +1,12 @@
 //! The process image over Modbus TCP. Without a [`WriteGate`] write requests are answered by exception 1, *illegal function*. While the
-//! journal is being read, every request to read is answered by exception 6, *server device busy*.
+//! journal is being read, every request to read is answered by exception 6, *server device busy*; while the run is not current, every one
+//! but those for the registers of the run itself.
 
 use std::future::Future;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::pin::Pin;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tokio::net::{TcpListener, TcpStream};
 use tokio_modbus::server::Service;
@@ -16,6 +17,7 @@ use understudy_journal::{DECIDED_WITHIN, Refusal, RequestedValue, WriteRequest};
 use understudy_wire::{MAXIMUM_OWNER_LENGTH, Role};
 
 use crate::error::GatewayError;
+use crate::feed::Feed;
 use crate::followed::Followed;
 use crate::register_map::{ProcessImage, RegisterMap, Target};
 use crate::serve_until_asked;
@@ -105,9 +107,13 @@ impl Service for Client {
                 return Ok(confirmation(&request));
             }
             // Stale values would be mistaken for the present.
-            let present = run.snapshot();
+            let present = run.observation();
             let present = present.map_err(|_reading| ExceptionCode::ServerDeviceBusy)?;
-            answer(&map.image(&present), &request)
+            let feed = present.feed(Instant::now());
+            if feed == Feed::Silent && !is_of_run(&request) {
+                return Err(ExceptionCode::ServerDeviceBusy);
+            }
+            answer(&map.image(&present.snapshot, feed), &request)
         })
     }
 }
@@ -192,6 +198,15 @@ fn confirmation(request: &Request<'_>) -> Response {
         }
         // Others are not written.
         _ => Response::Custom(0, Vec::new().into()),
+    }
+}
+
+/// Whether a request reads the registers of the run alone.
+fn is_of_run(request: &Request<'_>) -> bool {
+    match *request {
+        Request::ReadInputRegisters(address, count)
+        | Request::ReadHoldingRegisters(address, count) => RegisterMap::is_of_run(address, count),
+        _ => false,
     }
 }
 

@@ -21,6 +21,7 @@ use understudy_view::{RunState, Snapshot, StationState, stored};
 use understudy_wire::{MAXIMUM_PROGRAMS, Member, ProgramId};
 
 use crate::error::GatewayError;
+use crate::feed::Feed;
 
 /// Version of the map, in register 0; it changes when a place changes.
 const VERSION: u16 = 1;
@@ -125,7 +126,7 @@ const PROTECTION: &str = "0 not known, 1 protected, 2 not protected: the failure
 #[rustfmt::skip]
 const OF_RUN: [(u16, u16, &str, &str); 8] = [
     (0, 1, "map.version", "1"),
-    (1, 1, "run.state", "0 starting, 1 running, 2 finished, 3 interrupted"),
+    (1, 1, "run.state", "0 starting, 1 running, 2 finished, 3 interrupted, 4 not current"),
     (2, 2, "run.cycle", "the newest cycle, from the origin"),
     (4, 2, "run.period_us", "microseconds"),
     (6, 1, "margin.survives", "remaining redundancy: any further failures of stations that would be masked"),
@@ -317,8 +318,13 @@ impl RegisterMap {
         &self.places
     }
 
-    /// The process image of a snapshot.
-    pub fn image(&self, snapshot: &Snapshot) -> ProcessImage {
+    /// Whether these registers are all of the run itself, and of no station or program.
+    pub fn is_of_run(address: u16, count: u16) -> bool {
+        usize::from(address) + usize::from(count) <= STATIONS
+    }
+
+    /// The process image of a snapshot, whose run has this feed.
+    pub fn image(&self, snapshot: &Snapshot, feed: Feed) -> ProcessImage {
         let mut image = ProcessImage {
             registers: vec![0; PROGRAMS + self.interfaces.len() * OF_PROGRAM],
             ..ProcessImage::default()
@@ -331,11 +337,12 @@ impl RegisterMap {
         let small = |value: usize| u16::try_from(value).unwrap_or(u16::MAX);
         let registers = &mut image.registers;
         registers[0] = VERSION;
-        registers[1] = match snapshot.run {
-            RunState::Starting => 0,
-            RunState::Running => 1,
-            RunState::Finished => 2,
-            RunState::Interrupted => 3,
+        registers[1] = match (feed, snapshot.run) {
+            (Feed::Silent, _) => 4,
+            (_, RunState::Starting) => 0,
+            (_, RunState::Running) => 1,
+            (_, RunState::Finished) => 2,
+            (_, RunState::Interrupted) => 3,
         };
         set(
             registers,

@@ -18,7 +18,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use serde_json::{Value, json};
 use understudy_cluster::{Cluster, Overrides, Priority, read_with_files};
-use understudy_gateway::{BOUNDS, Metrics, Observation, RegisterMap};
+use understudy_gateway::{BOUNDS, Feed, Metrics, Observation, RegisterMap};
 use understudy_opcua_gateway::variables;
 use understudy_view::{AlarmState, Bounds, Model, ProcessAlarm, Snapshot, StationState};
 use understudy_watch::page_state;
@@ -292,7 +292,7 @@ fn bits(image: Option<&str>, width: usize) -> Vec<bool> {
 
 fn check_modbus(cluster: &Cluster, top: &Snapshot, snapshot: &Snapshot, context: &str) {
     let map = RegisterMap::new(cluster).expect("it fits");
-    let image = map.image(snapshot);
+    let image = map.image(snapshot, Feed::Live);
     let register = |name: &str| {
         let mut places = map.places().iter();
         let place = places.find(|place| place.name == name).expect(name);
