@@ -21,24 +21,25 @@ use crate::files;
 use crate::overrides::OverrideArguments;
 use fix::Fixed;
 
-/// Check whether this machine is ready for a member of a cluster
+/// Check whether this machine is ready for a cluster or a member
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
+  understudy doctor
   understudy doctor cell/cluster.toml
   understudy doctor cell/cluster.toml --name robot --keys /etc/understudy/keys/robot
   sudo understudy doctor cell/cluster.toml --fix
 
-Without --name only the machine is checked; with --name also ports, keys and the connections to other members. --fix shows the commands that
+Without a cluster file the machine is checked for cycles of --period, or of 10 ms. Without --name only the machine is checked; with --name also ports, keys and the connections to other members. --fix shows the commands that
 repair the machine, asks for confirmation on a terminal, runs them as root and checks again.
 
 Exit status: 1 if a finding prevents the member from working. Possible improvements are warnings.")]
 pub(crate) struct Arguments {
     /// Cluster file
     #[arg(value_name = "CLUSTER.toml")]
-    cluster: PathBuf,
+    cluster: Option<PathBuf>,
     /// Member to run on this machine
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", requires = "cluster")]
     name: Option<String>,
     /// Folder of this member's keys
     #[arg(long, value_name = "DIR", requires = "name")]
@@ -62,12 +63,17 @@ pub(crate) struct Arguments {
 /// Certificates with fewer days left cause a warning.
 const SOON_DAYS: i64 = 30;
 
+/// Period that a machine is checked for without a cluster file.
+const PERIOD: Duration = Duration::from_millis(10);
+
 /// Minimum time to establish sessions.
 const LEAST_PATIENCE: Duration = Duration::from_secs(2);
 
 #[derive(Serialize)]
 struct Examined<'a> {
-    configuration: String,
+    /// With a cluster file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    configuration: Option<String>,
     findings: &'a [Finding],
     /// Repairs, with --fix.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -75,19 +81,26 @@ struct Examined<'a> {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
-    let (cluster, _) = files::cluster(&arguments.cluster, arguments.overrides.overrides())?;
-    let agreement = cluster.agreement();
-    let mut findings = examine_machine(agreement.schedule.period());
-    let hash = agreement.configuration;
-    findings.push(Finding::good(
-        "configuration",
-        format!("{hash}; must be equal on all machines"),
-    ));
-    if let Some(name) = &arguments.name {
-        let member = crate::member::find(&cluster, name)?;
-        findings.extend(of_member(arguments, &cluster, member)?);
+    let overrides = arguments.overrides.overrides();
+    let wanted = overrides.period.unwrap_or(PERIOD);
+    let path = arguments.cluster.as_ref();
+    let cluster = path
+        .map(|path| files::cluster(path, overrides))
+        .transpose()?;
+    let cluster = cluster.map(|(cluster, _)| cluster);
+    let agreement = cluster.as_ref().map(Cluster::agreement);
+    let period = agreement.map_or(wanted, |agreement| agreement.schedule.period());
+    let mut findings = examine_machine(period);
+    let hash = agreement.map(|agreement| agreement.configuration.to_string());
+    if let Some(hash) = &hash {
+        let found = format!("{hash}; must be equal on all machines");
+        findings.push(Finding::good("configuration", found));
     }
-    let look_again = || examine_machine(agreement.schedule.period());
+    if let (Some(name), Some(cluster)) = (&arguments.name, &cluster) {
+        let member = crate::member::find(cluster, name)?;
+        findings.extend(of_member(arguments, cluster, member)?);
+    }
+    let look_again = || examine_machine(period);
     let fixed = arguments
         .fix
         .then(|| fix::fix(&findings, &look_again, arguments.yes, console));
@@ -102,7 +115,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         Status::Done
     };
     let result = Examined {
-        configuration: hash.to_string(),
+        configuration: hash,
         findings: &findings,
         fixed: fixed.as_ref(),
     };
@@ -111,10 +124,12 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         words += &fixed.text(&found);
     }
     let answer = Answer::done(words, result).with_status(status);
-    let path = &arguments.cluster;
+    let (Some(path), Some(cluster)) = (path, &cluster) else {
+        return Ok(answer.and_next(&[&"demo"]));
+    };
     Ok(match (&arguments.name, &arguments.keys) {
         (Some(name), Some(keys)) => {
-            let command = command_of(&cluster, name)?;
+            let command = command_of(cluster, name)?;
             answer.and_next(&[&command, path, &"--name", name, &"--keys", keys])
         }
         (Some(_), None) => answer,

@@ -211,6 +211,9 @@ fn doctor_names_what_is_wrong_with_its_remedy() {
     let cluster = addressed_cell(&folder);
     let keys = folder.join("keys");
     let (cluster, keys) = (text(&cluster), text(&keys));
+    let (_, without, _) = answer(&["doctor", "--period", "20ms"]);
+    assert!(!doctor(&without, "clock", "good").is_empty());
+    assert!(doctor(&without, "configuration", "good").is_empty());
     let (status, machine, _) = answer(&["doctor", cluster]);
     assert_eq!(status, 0, "{machine:#}");
     for check in ["clock", "scheduler", "memory", "configuration"] {
