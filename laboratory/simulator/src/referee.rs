@@ -21,33 +21,27 @@
 //! stations, reports one that was not necessary.
 
 mod descent;
+mod unrecorded;
+mod violation;
 
 use std::collections::VecDeque;
 use std::hash::{Hash, Hasher};
 
-use serde::{Deserialize, Serialize};
 use understudy_executable::{Executable, Scratch};
 use understudy_remote_io::{Event, Ramp, Settings};
-use understudy_wire::{Image, Lineage, Moment, PointValue, ProgramHash, Source, StationId};
+use understudy_wire::{Image, Lineage, Moment, PointValue, ProgramHash, Source};
 
 use descent::Descent;
+use unrecorded::Unrecorded;
+pub use violation::Violation;
 
 /// States that are remembered, at most, where some of them lie before the floor; the oldest are forgotten.
 const REMEMBERED: usize = 1024;
 /// States that are remembered from the floor on: for ten minutes of 10 ms cycles of which nothing is applied. The floor is never forgotten.
 const REMEMBERED_FROM_FLOOR: usize = 65_536;
 
-/// Different images of a plant that are remembered.
-const SEEN: usize = 16;
-
-/// Requests of operators that are remembered.
-const ASKED: usize = 4;
-
-/// Samples in a row of which a killed remote I/O has left no record, at most, and the states that they may extend.
-const UNRECORDED_SAMPLES: usize = 4;
+/// States that samples without a record may extend: the newest ones.
 const RECENT_STATES: usize = 16;
-/// Lineages that are tried to find them.
-const TRIED: usize = 1 << 20;
 
 /// Samples for which a choice of the operator is waited for.
 const CHOICE_SAMPLES: u32 = 256;
@@ -80,14 +74,7 @@ pub struct Referee {
     unjudged: Option<(Moment, Lineage)>,
     /// How often the records of a remote I/O that was killed did not suffice.
     gaps: u64,
-    /// What the plant showed last: any of these may have been sampled.
-    seen: VecDeque<Image>,
-    /// Bits of u(i) that do not come from the plant, as of the newest sample.
-    sourced: Vec<(usize, bool)>,
-    /// Those bits with the writes that the remote I/O has taken since: what a sample without a record may have had.
-    taken: Vec<(usize, bool)>,
-    /// What operators asked for last: the record of a write that was taken may be missing too.
-    asked: VecDeque<(u16, PointValue)>,
+    unrecorded: Unrecorded,
     /// Samples for which the program may go on from a state that the operator has chosen.
     choice: u32,
     cold_starts: u64,
@@ -101,89 +88,6 @@ struct State {
     /// The cycle of the sample that led to it.
     stepped: Moment,
     bits: Image,
-}
-
-/// Something that must never happen.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
-#[serde(tag = "violation", rename_all = "kebab-case")]
-pub enum Violation {
-    /// An output was driven as true and is not.
-    #[error("{source_:?} output {driven} in cycle {moment}, where the reference run has {}", text(.truth))]
-    Wrong {
-        /// In this cycle.
-        moment: Moment,
-        /// As what it was driven.
-        #[serde(rename = "source")]
-        source_: Source,
-        /// What was driven.
-        driven: Image,
-        /// What was true, where that is known.
-        truth: Option<Image>,
-    },
-    /// An output was held that was not the last true one, or for longer than configured.
-    #[error("held output {driven} in cycle {moment}, for {cycles} cycles, where the last true one was {}", text(.last_true))]
-    WronglyHeld {
-        /// In this cycle.
-        moment: Moment,
-        /// What was driven.
-        driven: Image,
-        /// Cycles held in a row.
-        cycles: u32,
-        /// The last output that was true.
-        last_true: Option<Image>,
-    },
-    /// Something else than the configured values was driven as fail-safe.
-    #[error("fail-safe output {driven} in cycle {moment}, where {configured} is configured")]
-    NotTheFailSafe {
-        /// In this cycle.
-        moment: Moment,
-        /// What was driven.
-        driven: Image,
-        /// What is configured.
-        configured: Image,
-    },
-    /// The program goes on from a state before the newest sample whose outputs were applied.
-    #[error(
-        "in cycle {moment} the program continued from its state of cycle {from}, although outputs of cycle {applied} were applied"
-    )]
-    WentBack {
-        /// In this cycle.
-        moment: Moment,
-        /// The cycle of the newest sample in the state that it continued from.
-        from: Moment,
-        /// The cycle of the newest sample whose outputs were applied.
-        applied: Moment,
-    },
-    /// The program started from its initial state although a living station had a state to continue from.
-    #[error("in cycle {moment} the program started cold although station {} had its state", station.0)]
-    NeedlessColdStart {
-        /// In this cycle.
-        moment: Moment,
-        /// The station.
-        station: StationId,
-    },
-    /// A signal of another program was sampled with a value that the other program did not compute.
-    #[error(
-        "in cycle {moment} the signal at input bit {input} was sampled as {value:#x}, which the other program did not compute"
-    )]
-    WrongSignal {
-        /// In this cycle.
-        moment: Moment,
-        /// First bit in u(i), counted from 0.
-        input: u16,
-        /// The stored value.
-        value: u64,
-    },
-    /// The program goes on from a state that none of its samples led to.
-    #[error(
-        "in cycle {moment} the program continued from lineage {lineage}, which none of its samples led to"
-    )]
-    UnknownHistory {
-        /// In this cycle.
-        moment: Moment,
-        /// The lineage.
-        lineage: Lineage,
-    },
 }
 
 /// By its reference run; settings and program are given.
@@ -201,50 +105,6 @@ impl Hash for Referee {
         }
         (self.held, self.blind, self.choice, self.applied).hash(hasher);
     }
-}
-
-/// Whether `count` of these samples lead from one lineage to the other; `samples` are then their places. At most `left` lineages are tried.
-fn leads_to(
-    from: Lineage,
-    to: Lineage,
-    candidates: &[Image],
-    count: usize,
-    samples: &mut Vec<usize>,
-    left: &mut usize,
-) -> bool {
-    for (place, inputs) in candidates.iter().enumerate() {
-        if *left == 0 {
-            break;
-        }
-        *left -= 1;
-        let next = from.after(inputs);
-        samples.push(place);
-        let is_found = match count {
-            0 | 1 => next == to,
-            _ => leads_to(next, to, candidates, count - 1, samples, left),
-        };
-        if is_found {
-            return true;
-        }
-        samples.pop();
-    }
-    false
-}
-
-/// Writes a value to the input whose first bit in u(i) is `input`.
-fn set_point(bits: &mut [(usize, bool)], input: u16, value: PointValue) {
-    for (place, bit) in bits {
-        let at = place.wrapping_sub(usize::from(input));
-        if at < usize::from(value.width()) {
-            *bit = value.stored() >> at & 1 == 1;
-        }
-    }
-}
-
-fn text(image: &Option<Image>) -> String {
-    image
-        .as_ref()
-        .map_or_else(|| "none".to_owned(), Image::to_string)
 }
 
 impl Referee {
@@ -268,10 +128,7 @@ impl Referee {
             is_new: false,
             unjudged: None,
             gaps: 0,
-            seen: VecDeque::new(),
-            sourced: settings.sourced_bits().map(|bit| (bit, false)).collect(),
-            taken: Vec::new(),
-            asked: VecDeque::new(),
+            unrecorded: Unrecorded::new(settings.sourced_bits()),
             choice: 0,
             cold_starts: 0,
             applied: false,
@@ -283,26 +140,13 @@ impl Referee {
     /// A remote I/O that is killed may take the record of its last samples with it. The lineage that a station then has proves
     /// which inputs they were, if only they are among those that the plant has shown.
     pub fn saw(&mut self, sensors: &Image) {
-        let mut inputs = sensors.clone();
-        for &(place, bit) in &self.sourced {
-            inputs.set(place, bit);
-        }
-        if self.seen.contains(&inputs) {
-            return;
-        }
-        if self.seen.len() == SEEN {
-            self.seen.pop_front();
-        }
-        self.seen.push_back(inputs);
+        self.unrecorded.saw(sensors);
     }
 
     /// An operator asks to write `value` to the input whose first bit in u(i) is `input`. Like [`Self::saw`], it says what a sample without
     /// a record may have had, and proves nothing by itself.
     pub fn asked(&mut self, input: u16, value: PointValue) {
-        if self.asked.len() == ASKED {
-            self.asked.pop_front();
-        }
-        self.asked.push_back((input, value));
+        self.unrecorded.asked(input, value);
     }
 
     /// The remote I/O starts again.
@@ -388,18 +232,16 @@ impl Referee {
                 born,
                 before,
             } => {
-                for (place, bit) in &mut self.sourced {
-                    *bit = inputs.get(*place);
-                }
+                self.unrecorded.resumes(inputs);
                 let continued = self.continue_from(*moment, *born, *before);
                 self.is_new = false;
                 self.unjudged = self.blind.then(|| (*moment, before.after(inputs)));
                 self.step(*moment, inputs);
-                self.taken.clone_from(&self.sourced);
+                self.unrecorded.sampled();
                 continued
             }
             Event::Written { write, .. } => {
-                set_point(&mut self.taken, write.input, write.value);
+                self.unrecorded.written(write.input, write.value);
                 Ok(())
             }
             Event::Applied {
@@ -498,54 +340,21 @@ impl Referee {
         })
     }
 
-    /// What a sample without a record may have had: what the plant has shown, with the values of other sources then, with those that
-    /// were written or asked for since, or with those that the stations recall.
-    fn unrecorded(&self) -> Vec<Image> {
-        let mut images: Vec<Image> = self.seen.iter().cloned().collect();
-        let mut sources = vec![self.taken.clone(), self.sourced.clone()];
-        for &(input, value) in &self.asked {
-            let mut asked = self.taken.clone();
-            set_point(&mut asked, input, value);
-            sources.push(asked);
-        }
-        for values in sources {
-            for seen in &self.seen {
-                let mut image = seen.clone();
-                for &(place, bit) in &values {
-                    image.set(place, bit);
-                }
-                if !images.contains(&image) {
-                    images.push(image);
-                }
-            }
-        }
-        images
-    }
-
     /// Finds the samples without a record that lead to a lineage from a state that may be continued from, and goes there.
     fn recover(&mut self, lineage: Lineage) -> bool {
-        let candidates = self.unrecorded();
-        let mut left = TRIED;
-        let mut samples = Vec::new();
-        for most in 1..=UNRECORDED_SAMPLES {
-            for from in (self.floor..self.states.len()).rev().take(RECENT_STATES) {
-                let State {
-                    lineage: known,
-                    stepped,
-                    ..
-                } = self.states[from];
-                if !leads_to(known, lineage, &candidates, most, &mut samples, &mut left) {
-                    continue;
-                }
-                self.newest = Some(from);
-                for &place in &samples {
-                    self.step(stepped, &candidates[place]);
-                }
-                self.truth = None;
-                return true;
-            }
+        let newest = (self.floor..self.states.len()).rev().take(RECENT_STATES);
+        let from: Vec<Lineage> = newest.map(|place| self.states[place].lineage).collect();
+        let Some((start, samples)) = self.unrecorded.samples_to(lineage, &from) else {
+            return false;
+        };
+        let place = self.states.len() - 1 - start;
+        self.newest = Some(place);
+        let stepped = self.states[place].stepped;
+        for inputs in &samples {
+            self.step(stepped, inputs);
         }
-        false
+        self.truth = None;
+        true
     }
 
     fn step(&mut self, moment: Moment, inputs: &Image) {

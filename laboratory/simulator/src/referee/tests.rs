@@ -54,7 +54,7 @@ fn referee() -> Referee {
 /// The same remote I/O, whose input operators write.
 fn referee_of_an_operator_input() -> Referee {
     let mut referee = referee();
-    referee.sourced = vec![(0, false)];
+    referee.unrecorded = Unrecorded::new([0].into_iter());
     referee
 }
 

@@ -1,0 +1,93 @@
+//! What must never happen.
+
+use serde::{Deserialize, Serialize};
+use understudy_wire::{Image, Lineage, Moment, Source, StationId};
+
+/// Something that must never happen.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+#[serde(tag = "violation", rename_all = "kebab-case")]
+pub enum Violation {
+    /// An output was driven as true and is not.
+    #[error("{source_:?} output {driven} in cycle {moment}, where the reference run has {}", text(.truth))]
+    Wrong {
+        /// In this cycle.
+        moment: Moment,
+        /// As what it was driven.
+        #[serde(rename = "source")]
+        source_: Source,
+        /// What was driven.
+        driven: Image,
+        /// What was true, where that is known.
+        truth: Option<Image>,
+    },
+    /// An output was held that was not the last true one, or for longer than configured.
+    #[error("held output {driven} in cycle {moment}, for {cycles} cycles, where the last true one was {}", text(.last_true))]
+    WronglyHeld {
+        /// In this cycle.
+        moment: Moment,
+        /// What was driven.
+        driven: Image,
+        /// Cycles held in a row.
+        cycles: u32,
+        /// The last output that was true.
+        last_true: Option<Image>,
+    },
+    /// Something else than the configured values was driven as fail-safe.
+    #[error("fail-safe output {driven} in cycle {moment}, where {configured} is configured")]
+    NotTheFailSafe {
+        /// In this cycle.
+        moment: Moment,
+        /// What was driven.
+        driven: Image,
+        /// What is configured.
+        configured: Image,
+    },
+    /// The program goes on from a state before the newest sample whose outputs were applied.
+    #[error(
+        "in cycle {moment} the program continued from its state of cycle {from}, although outputs of cycle {applied} were applied"
+    )]
+    WentBack {
+        /// In this cycle.
+        moment: Moment,
+        /// The cycle of the newest sample in the state that it continued from.
+        from: Moment,
+        /// The cycle of the newest sample whose outputs were applied.
+        applied: Moment,
+    },
+    /// The program started from its initial state although a living station had a state to continue from.
+    #[error("in cycle {moment} the program started cold although station {} had its state", station.0)]
+    NeedlessColdStart {
+        /// In this cycle.
+        moment: Moment,
+        /// The station.
+        station: StationId,
+    },
+    /// A signal of another program was sampled with a value that the other program did not compute.
+    #[error(
+        "in cycle {moment} the signal at input bit {input} was sampled as {value:#x}, which the other program did not compute"
+    )]
+    WrongSignal {
+        /// In this cycle.
+        moment: Moment,
+        /// First bit in u(i), counted from 0.
+        input: u16,
+        /// The stored value.
+        value: u64,
+    },
+    /// The program goes on from a state that none of its samples led to.
+    #[error(
+        "in cycle {moment} the program continued from lineage {lineage}, which none of its samples led to"
+    )]
+    UnknownHistory {
+        /// In this cycle.
+        moment: Moment,
+        /// The lineage.
+        lineage: Lineage,
+    },
+}
+
+fn text(image: &Option<Image>) -> String {
+    image
+        .as_ref()
+        .map_or_else(|| "none".to_owned(), Image::to_string)
+}
