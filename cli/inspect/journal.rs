@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::json;
 use understudy_text::MAXIMUM_SHOWN;
-use understudy_view::{Filter, JournalLine, Listing, Run, Trouble};
+use understudy_view::{Filter, JournalLine, Listing, Run, Source, Trouble};
 
 use crate::answer::{Answer, Status};
 use crate::inspect::view::{RunArgument, several};
@@ -60,13 +60,13 @@ pub(crate) fn run(arguments: &Arguments, json: bool) -> Result<Answer, Answer> {
         to: arguments.to,
         ordinary: arguments.all,
     };
-    let listing = run.listing(filter).map_err(|errors| several(&errors))?;
+    let (listing, source) = run.listing(filter).map_err(|errors| several(&errors))?;
     if arguments.follow {
-        return Ok(followed(&run, listing, json));
+        return Ok(followed(&run, listing, source, json));
     }
     let mut lines = Vec::new();
     let (mut troubles, mut more) = (Vec::new(), 0_usize);
-    for trouble in read(&run, listing, &mut |line| lines.push(line)) {
+    for trouble in read(listing, source, &mut |line| lines.push(line)) {
         if troubles.len() < MAXIMUM_SHOWN {
             troubles.push(trouble.to_string());
         } else {
@@ -90,8 +90,11 @@ pub(crate) fn run(arguments: &Arguments, json: bool) -> Result<Answer, Answer> {
 }
 
 /// The present records, and the errors between them.
-fn read(run: &Run, mut listing: Listing, take: &mut dyn FnMut(JournalLine)) -> Vec<Trouble> {
-    let mut source = run.follow();
+fn read(
+    mut listing: Listing,
+    mut source: Source,
+    take: &mut dyn FnMut(JournalLine),
+) -> Vec<Trouble> {
     let mut troubles = Vec::new();
     loop {
         let taken = source.poll(&mut |found| match found {
@@ -106,8 +109,7 @@ fn read(run: &Run, mut listing: Listing, take: &mut dyn FnMut(JournalLine)) -> V
 }
 
 /// Prints each new line until the run ends or the reader closes the pipe.
-fn followed(run: &Run, mut listing: Listing, json: bool) -> Answer {
-    let mut source = run.follow();
+fn followed(run: &Run, mut listing: Listing, mut source: Source, json: bool) -> Answer {
     let mut output = std::io::stdout();
     let mut reader_is_there = true;
     loop {

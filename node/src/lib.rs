@@ -12,5 +12,5 @@ mod words;
 
 pub use event::Event;
 pub use settings::{Program, Settings};
-pub use station::Station;
+pub use station::{STATES_EVERY, Station};
 pub use words::{of_controller as words_of_controller, of_understudy as words_of_understudy};

@@ -20,6 +20,7 @@ mod turn;
 
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
+pub use turn::STATES_EVERY;
 
 use smallvec::SmallVec;
 use understudy_cycle::{Arrival, Input, Machine, Output, Participant};

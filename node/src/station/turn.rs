@@ -14,7 +14,7 @@ use crate::replica::{Replica, Standing};
 use crate::{generated, words};
 
 /// Time between two reports of the states that a station holds.
-const STATES_EVERY: Duration = Duration::from_secs(2);
+pub const STATES_EVERY: Duration = Duration::from_secs(2);
 
 impl Station {
     pub(super) fn receive_turn(&mut self, station: StationId, turn: &Turn) {

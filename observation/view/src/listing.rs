@@ -120,8 +120,9 @@ impl Listing {
         })
     }
 
-    pub(crate) fn origin_is(&mut self, moment: Moment) {
-        self.cycles.origin_is(moment, 0);
+    /// `moment` is cycle `cycle` of the run.
+    pub(crate) fn begins_at(&mut self, moment: Moment, cycle: i64) {
+        self.cycles.origin_is(moment, cycle);
     }
 
     pub(crate) fn has_origin(&self) -> bool {

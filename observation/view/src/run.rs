@@ -6,9 +6,10 @@ use std::sync::Arc;
 use serde_json::Value;
 use understudy_cluster::Cluster;
 use understudy_journal::{
-    Commander, JournalError, Place, Writing, check_journal, kept_cluster, place_before,
-    segments_of, writing,
+    Commander, JournalError, Writing, check_journal, kept_cluster, place_before, segments_of,
+    writing,
 };
+use understudy_node::STATES_EVERY;
 use understudy_wire::{Cycle, Epoch, Moment};
 
 use crate::error::ViewError;
@@ -210,40 +211,46 @@ impl Run {
     /// # Errors
     /// [`ViewError`].
     pub fn why(&self, signal: &str, cycle: Option<i64>) -> Result<Why, ViewError> {
-        let journal = self.path.join(JOURNAL);
-        let place = |cycle| place_before(&journal, cycle).ok().flatten();
         let until = cycle.unwrap_or(i64::MAX);
-        if let Some(newest) = place(until) {
-            let before = cycle.unwrap_or(newest.cycle).saturating_sub(BACK);
-            if let Some(place) = place(before) {
-                let model = self.read_from(Bounds::default(), Some(place), until)?;
+        let bounds = Bounds::default();
+        let remembered = i64::try_from(bounds.cycles).unwrap_or(i64::MAX);
+        if let Some(newest) = self.source_before(until) {
+            let of = cycle.unwrap_or(newest.cycle);
+            for back in [NEAR, remembered] {
+                let before = of.saturating_sub(back + self.unknown_at_first());
+                let Some(begun) = self.source_before(before) else {
+                    break;
+                };
+                let model = self.read_from(bounds, Some(begun), until)?;
                 let why = model.why(signal, cycle);
-                if why.is_ok() && !model.wanted_more() {
+                // A model of the whole run remembers no more cycles either.
+                if why.is_ok() && (!model.wanted_more() || back >= remembered) {
                     return why;
                 }
             }
         }
-        let model = self.read_from(Bounds::default(), None, until)?;
+        let model = self.read_from(bounds, None, until)?;
         model.why(signal, cycle)
+    }
+
+    /// Cycles at the beginning of a reading in which the states of the programs may not be known yet.
+    fn unknown_at_first(&self) -> i64 {
+        let period = self.cluster.agreement().schedule.period();
+        let cycles = 2 * STATES_EVERY.as_nanos() / period.as_nanos().max(1);
+        i64::try_from(cycles).unwrap_or(i64::MAX / 2) + BEHIND
     }
 
     fn read_from(
         &self,
         bounds: Bounds,
-        place: Option<Place>,
+        begun: Option<Begun>,
         cycle: i64,
     ) -> Result<Model, ViewError> {
-        let journal = self.path.join(JOURNAL);
         let mut model = self.model(bounds);
-        let found = place.and_then(|place| {
-            let (moment, cycle) = (place.moment, place.cycle);
-            let source = Source::following_from(&journal, place).ok()?;
-            Some((source, moment, cycle))
-        });
-        let mut source = match found {
-            Some((source, moment, cycle)) => {
-                model.begins_at(moment, cycle);
-                source
+        let mut source = match begun {
+            Some(begun) => {
+                model.begins_at(begun.moment, begun.cycle);
+                begun.source
             }
             None => self.follow(),
         };
@@ -274,14 +281,23 @@ impl Run {
         }
     }
 
-    /// Its journal as a list, which counts cycles from the origin also before the record of it.
+    /// Its journal as a list, with its records from a place on that is before all wanted ones. It counts cycles from the origin also before the
+    /// record of it.
     ///
     /// # Errors
     /// Every name and word of the filter that does not exist.
-    pub fn listing(&self, filter: Filter) -> Result<Listing, Vec<ViewError>> {
+    pub fn listing(&self, filter: Filter) -> Result<(Listing, Source), Vec<ViewError>> {
+        let from = filter.from;
         let mut listing = Listing::new(&self.cluster, filter)?;
+        // The state of an alarm depends on all that was before.
+        if let Some(from) = from.filter(|_| self.cluster.alarms().is_empty())
+            && let Some(found) = self.source_before(from - self.unknown_at_first())
+        {
+            listing.begins_at(found.moment, found.cycle);
+            return Ok((listing, found.source));
+        }
         if let Some(moment) = self.origin_of_summary() {
-            listing.origin_is(moment);
+            listing.begins_at(moment, 0);
         }
         let mut source = self.follow();
         while !listing.has_origin() {
@@ -294,7 +310,20 @@ impl Run {
                 break;
             }
         }
-        Ok(listing.again())
+        Ok((listing.again(), self.follow()))
+    }
+
+    /// The records from a checkpoint on that is not after `cycle`.
+    fn source_before(&self, cycle: i64) -> Option<Begun> {
+        let journal = self.path.join(JOURNAL);
+        let place = place_before(&journal, cycle).ok().flatten()?;
+        let (moment, cycle) = (place.moment, place.cycle);
+        let source = Source::following_from(&journal, place).ok()?;
+        Some(Begun {
+            source,
+            moment,
+            cycle,
+        })
     }
 
     /// The origin of the summary, for journals whose own record of it is gone.
@@ -309,8 +338,17 @@ impl Run {
     }
 }
 
-/// Cycles read before the one that is asked for. A state is known two seconds after the beginning at the latest, and most causes are near.
-const BACK: i64 = 1024;
+/// Records of a run from a checkpoint on.
+struct Begun {
+    source: Source,
+    /// A moment of the checkpoint.
+    moment: Moment,
+    /// The cycle of the run that this is.
+    cycle: i64,
+}
+
+/// Most causes of a value are in so many cycles before it.
+const NEAR: i64 = 1024;
 
 /// Lines of different members may be a few cycles apart.
 const BEHIND: i64 = 64;

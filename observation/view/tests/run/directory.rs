@@ -68,9 +68,9 @@ fn a_run_is_followed_while_it_is_written() {
     // A list counts cycles from the origin also before it was told.
     let first = run
         .listing(Filter::default())
-        .map(|mut listing| {
+        .map(|(mut listing, mut source)| {
             let mut first = None;
-            run.follow().poll(&mut |record| {
+            source.poll(&mut |record| {
                 let lines = listing.take(&record.expect("a record"));
                 first = first.take().or(lines.into_iter().next());
             });
@@ -126,6 +126,38 @@ fn a_cycle_is_found_without_reading_what_is_before() {
                 "{signal} in {cycle}"
             );
         }
+    }
+    // A list of some cycles begins there, and is the same as the part of a list of all.
+    let lines = |from, to| {
+        let filter = Filter {
+            from,
+            to,
+            ordinary: true,
+            ..Filter::default()
+        };
+        let (mut listing, mut source) = run.listing(filter).expect("no names");
+        let (mut lines, mut records) = (Vec::new(), 0);
+        let mut taken = 1;
+        while taken > 0 && !listing.is_past() {
+            taken = source.poll(&mut |record| {
+                lines.extend(listing.take(&record.expect("a record")));
+            });
+            records += taken;
+        }
+        (lines, records)
+    };
+    let (all, whole_journal) = lines(Some(0), None);
+    for from in [0, 900, 2500, 3990] {
+        let (some, read) = lines(Some(from), Some(from + 5));
+        let part = all.iter().filter(|line| {
+            let cycle = line.cycle.expect("counted");
+            (from..=from + 5).contains(&cycle)
+        });
+        assert_eq!(some, part.cloned().collect::<Vec<_>>(), "from {from}");
+        assert!(
+            from < 3000 || read < whole_journal / 3,
+            "{read} of {whole_journal}"
+        );
     }
     let newest = run.why("robot.grip", None).expect("known");
     assert_eq!(newest, whole.why("robot.grip", None).expect("known"));
