@@ -4,7 +4,8 @@
 
 use serde::de::{self, DeserializeOwned};
 use serde::{Deserialize, Deserializer, Serialize};
-use understudy_bus::{HostEvent, Noted};
+use serde_json::value::RawValue;
+use understudy_bus::HostEvent;
 use understudy_simulator::Action;
 use understudy_wire::{Member, Moment};
 
@@ -218,13 +219,13 @@ struct Line {
     at_ns: u64,
     name: String,
     member: Option<Member>,
-    event: serde_json::Value,
+    event: Box<RawValue>,
 }
 
 impl<'de> Deserialize<'de> for Record {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let line = Line::deserialize(deserializer)?;
-        let event = happening(line.member, line.event).map_err(de::Error::custom)?;
+        let event = happening(line.member, line.event.get()).map_err(de::Error::custom)?;
         Ok(Self {
             at_ns: line.at_ns,
             name: line.name,
@@ -234,24 +235,22 @@ impl<'de> Deserialize<'de> for Record {
     }
 }
 
-fn happening(
-    member: Option<Member>,
-    event: serde_json::Value,
-) -> Result<Happening, serde_json::Error> {
+fn happening(member: Option<Member>, event: &str) -> Result<Happening, serde_json::Error> {
     match member {
-        None => serde_json::from_value(event).map(Happening::Run),
-        Some(Member::Station(_)) => noted(event, Happening::Station),
-        Some(Member::RemoteIo(_)) => noted(event, Happening::RemoteIo),
-        Some(Member::Plant(_)) => noted(event, Happening::Plant),
+        None => serde_json::from_str(event).map(Happening::Run),
+        Some(Member::Station(_)) => of_member(event, Happening::Station),
+        Some(Member::RemoteIo(_)) => of_member(event, Happening::RemoteIo),
+        Some(Member::Plant(_)) => of_member(event, Happening::Plant),
     }
 }
 
-fn noted<E: DeserializeOwned>(
-    event: serde_json::Value,
+/// Nearly all events are of the member and not of its process, so these are tried first: no name is of both.
+fn of_member<E: DeserializeOwned>(
+    event: &str,
     of_member: fn(E) -> Happening,
 ) -> Result<Happening, serde_json::Error> {
-    serde_json::from_value(event).map(|noted| match noted {
-        Noted::Host(event) => Happening::Host(event),
-        Noted::Member(event) => of_member(event),
+    serde_json::from_str(event).map(of_member).or_else(|error| {
+        let of_host = serde_json::from_str(event).map(Happening::Host);
+        of_host.map_err(|_| error)
     })
 }
