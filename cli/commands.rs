@@ -78,13 +78,12 @@ pub(crate) fn groups() -> [Group; 7] {
     ]
 }
 
-/// Parses the command line of this process.
+/// Parses the command line of this process, of a program with these commands.
 ///
 /// # Errors
 /// Where the arguments are wrong, and where help or the version was asked for.
-pub(crate) fn parse() -> Result<Call, clap::Error> {
-    let groups = groups();
-    let matches = parser(&groups).try_get_matches()?;
+pub(crate) fn parse(parser: Command, groups: &[Group]) -> Result<Call, clap::Error> {
+    let matches = parser.try_get_matches()?;
     let json = matches.get_flag("json");
     let called = matches.subcommand();
     let found = called.and_then(|(name, matches)| {
@@ -108,24 +107,48 @@ pub(crate) const EXIT_STATUS: &str = "  0  success
   3  inconclusive: the host was too slow
 ";
 
-/// The whole command line.
+/// The command line of `understudy`.
 pub(crate) fn parser(groups: &[Group]) -> Command {
+    let examples = "\
+Example:
+  understudy demo          run the press cell of the paper on processes of this machine
+  understudy init cell     write a small cluster as a starting point
+
+`understudy COMMAND --help` describes a command, `understudy explain CODE` an error.";
+    let about = "A redundant array of independent controllers: RAID for PLCs";
+    with_commands("understudy", about, examples, groups)
+}
+
+/// The command line of `understudy-runtime`.
+pub(crate) fn runtime_parser(groups: &[Group]) -> Command {
+    let examples = "\
+Example:
+  understudy-runtime node cluster.toml --name robot --keys keys/robot
+  understudy-runtime doctor cluster.toml --name robot --keys keys/robot
+
+`understudy-runtime COMMAND --help` describes a command. The commands are those of `understudy`, which has all others too.";
+    let about = "The members of Understudy clusters, for machines that run nothing else";
+    with_commands("understudy-runtime", about, examples, groups)
+}
+
+fn with_commands(
+    name: &'static str,
+    about: &'static str,
+    examples: &str,
+    groups: &[Group],
+) -> Command {
     let json = Arg::new("json")
         .long("json")
         .global(true)
         .action(ArgAction::SetTrue)
         .help("Print one JSON document on standard output (docs/reference/json.md)");
-    let parser = Command::new("understudy")
+    let parser = Command::new(name)
         .version(env!("CARGO_PKG_VERSION"))
-        .about("A redundant array of independent controllers: RAID for PLCs")
+        .about(about)
         .help_template(template(groups))
         .after_help(format!(
             "\
-Example:
-  understudy demo          run the press cell of the paper on processes of this machine
-  understudy init cell     write a small cluster as a starting point
-
-`understudy COMMAND --help` describes a command, `understudy explain CODE` an error.
+{examples}
 
 Exit status:
 {EXIT_STATUS}

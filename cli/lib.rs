@@ -25,6 +25,7 @@ mod tools;
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
+use commands::Call;
 
 pub use answer::{Answer, Failure, Status};
 pub use console::Console;
@@ -36,7 +37,18 @@ pub use run::lab::{Judged, NetworkArguments, RunArguments};
 
 /// Runs the command of this process's arguments.
 pub fn main() -> ExitCode {
-    let call = match commands::parse() {
+    let groups = commands::groups();
+    called(commands::parse(commands::parser(&groups), &groups))
+}
+
+/// The same for `understudy-runtime`, which has the commands of a machine that runs members. What they do not need is not linked.
+pub fn runtime() -> ExitCode {
+    let groups = [deployment::members()];
+    called(commands::parse(commands::runtime_parser(&groups), &groups))
+}
+
+fn called(call: Result<Call, clap::Error>) -> ExitCode {
+    let call = match call {
         Ok(call) => call,
         Err(error) => return misused(&error),
     };

@@ -3,8 +3,8 @@
 #
 #   deployment/release.sh [DIRECTORY] [TARGET...]
 #
-# For each target: static binaries of `understudy` and `understudy-opcua` with their bills of materials, a Python wheel,
-# a Debian package and a container image. For all targets: the cell of compose.yaml, and SHA256SUMS. The default is both
+# For each target: static binaries of `understudy`, `understudy-runtime` and `understudy-opcua` with their bills of materials,
+# a Python wheel, a Debian package and a container image. For all targets: the cell of compose.yaml, and SHA256SUMS. The default is both
 # targets. docs/how-to/install.md describes the packages.
 #
 # The C parts (ring) need a C compiler for musl: Zig (`pip install ziglang`) for both targets, or musl-gcc (Debian:
@@ -58,17 +58,22 @@ END
 }
 
 build() {
+    target=$1
     tools=$target_directory/release-tools/$1
     name=$(echo "$1" | tr - _)
     upper=$(echo "$name" | tr '[:lower:]' '[:upper:]')
-    env "CC_$name=$tools/cc" "AR_$name=$tools/ar" \
-        "CARGO_TARGET_${upper}_LINKER=rust-lld" "CARGO_TARGET_${upper}_RUSTFLAGS=-L native=$tools $remapped" \
-        cargo build --locked --release --target "$1" \
-        -p understudy -p understudy-opcua-gateway --bin understudy --bin understudy-opcua
-    for package in understudy understudy-opcua-gateway; do
-        binary=${package%-gateway}
+    cargo_build() {
+        env "CC_$name=$tools/cc" "AR_$name=$tools/ar" \
+            "CARGO_TARGET_${upper}_LINKER=rust-lld" "CARGO_TARGET_${upper}_RUSTFLAGS=-L native=$tools $remapped" \
+            cargo build --locked --target "$target" "$@"
+    }
+    cargo_build --release -p understudy -p understudy-opcua-gateway --bin understudy --bin understudy-opcua
+    cargo_build --profile runtime --bin understudy-runtime
+    for built in release/understudy runtime/understudy-runtime release/understudy-opcua; do
+        binary=${built#*/}
+        case $binary in understudy-opcua) package=understudy-opcua-gateway ;; *) package=understudy ;; esac
         name="$work/$binary-$version-$1"
-        cp "$target_directory/$1/release/$binary" "$name"
+        cp "$target_directory/$1/$built" "$name"
         python3 deployment/bill_of_materials.py "$1" "$package" > "$name.cdx.json"
         # A static binary has no interpreter.
         if readelf --program-headers "$name" | grep -q INTERP; then
@@ -93,6 +98,7 @@ describe() {
 debian_package() {
     tree=$(mktemp -d)
     install -D -m 755 "$work/understudy-$version-$1" "$tree/usr/bin/understudy"
+    install -m 755 "$work/understudy-runtime-$version-$1" "$tree/usr/bin/understudy-runtime"
     install -m 755 "$work/understudy-opcua-$version-$1" "$tree/usr/bin/understudy-opcua"
     install -d "$tree/usr/lib/systemd/system" "$tree/etc/understudy" "$tree/DEBIAN"
     for unit in deployment/*.service; do
@@ -152,9 +158,10 @@ for target in "$@"; do
     machine=${target%%-*}
     case $machine in x86_64) debian=amd64 ;; aarch64) debian=arm64 ;; *) refuse "no packages are known for $target" ;; esac
     command="understudy=$work/understudy-$version-$target"
+    runtime="understudy-runtime=$work/understudy-runtime-$version-$target"
     opcua="understudy-opcua=$work/understudy-opcua-$version-$target"
     python3 deployment/wheel.py "$version" "$machine" "$work" "$command" "$opcua" "$work"/understudy*-"$version-$target.cdx.json"
-    python3 deployment/image.py "$version" "$debian" "$commit" "$work/understudy-$version-$machine.oci.tar" "$command" "$opcua"
+    python3 deployment/image.py "$version" "$debian" "$commit" "$work/understudy-$version-$machine.oci.tar" "$command" "$runtime" "$opcua"
     debian_package "$target" "$debian"
 done
 cell

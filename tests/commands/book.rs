@@ -334,7 +334,7 @@ fn a_release_is_copied_and_installed_once() {
     let folder = empty_folder("release_names");
     fs::create_dir(folder.join("release")).expect("a folder");
     // As deployment/release.sh names them.
-    for binary in ["understudy", "understudy-opcua"] {
+    for binary in ["understudy", "understudy-runtime", "understudy-opcua"] {
         for target in ["x86_64", "aarch64"] {
             for ending in ["", ".cdx.json"] {
                 let name = format!("{binary}-0.1.0-{target}-unknown-linux-musl{ending}");
@@ -350,7 +350,7 @@ fn a_release_is_copied_and_installed_once() {
     let matched = String::from_utf8(shell.stdout).expect("text");
     assert_eq!(
         matched,
-        "release/understudy-0.1.0-aarch64-unknown-linux-musl\n"
+        "release/understudy-runtime-0.1.0-aarch64-unknown-linux-musl\n"
     );
     let installs = page
         .lines()

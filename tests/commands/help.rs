@@ -1,5 +1,7 @@
 //! Every command has help with an example.
 
+use std::process::Command;
+
 use insta::assert_snapshot;
 
 use crate::understudy;
@@ -16,6 +18,28 @@ fn commands() -> Vec<String> {
 #[test]
 fn the_command_explains_itself() {
     assert_snapshot!(understudy(&["--help"]).shown());
+}
+
+#[test]
+fn the_runtime_has_the_commands_of_a_machine_of_the_plant() {
+    let runtime = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_understudy-runtime"));
+        let found = command.args(arguments).output().expect("it runs");
+        let text = |bytes| String::from_utf8(bytes).expect("text");
+        (found.status.code(), text(found.stdout), text(found.stderr))
+    };
+    let (status, help, _) = runtime(&["--help"]);
+    assert_eq!(status, Some(0));
+    for command in ["doctor", "node", "remote-io", "plant"] {
+        assert!(help.contains(&format!("\n  {command} ")), "{help}");
+        assert_eq!(runtime(&[command, "--help"]).0, Some(0));
+    }
+    let (status, _, error) = runtime(&["lab", "cluster.toml"]);
+    assert_eq!(status, Some(2));
+    assert!(error.contains("error[U0600]"), "{error}");
+    let (status, _, error) = runtime(&["node", "none.toml", "--name", "pump"]);
+    assert_eq!(status, Some(2));
+    assert!(error.contains("error[U0601]"), "{error}");
 }
 
 #[test]

@@ -20,7 +20,7 @@ fn units_call_commands_as_they_are() {
             let line = unit.lines().find_map(|line| line.strip_prefix(key));
             line.unwrap_or_else(|| panic!("{kind} has no {key}"))
         };
-        let called = value("ExecStart=/usr/local/bin/understudy ").replace("%i", name);
+        let called = value("ExecStart=/usr/local/bin/understudy-runtime ").replace("%i", name);
         let arguments: Vec<&str> = called.split_whitespace().collect();
         assert_eq!(arguments[0], kind);
         // Its arguments are understood; only the cluster file is not here.

@@ -46,7 +46,7 @@ impl Machine {
         let outer = Command::new("sh")
             .args(["-c", script, "sh", text(&groups), "sh"])
             .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/security/systemd.sh"))
-            .args([env!("CARGO_BIN_EXE_understudy"), text(folder)])
+            .args([env!("CARGO_BIN_EXE_understudy-runtime"), text(folder)])
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(fs::File::create(folder.join("boot.log")).expect("it is ours"))

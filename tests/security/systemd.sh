@@ -35,8 +35,8 @@ ip link set lo up
 
 chroot "$root" userdel understudy 2> /dev/null || :
 chroot "$root" useradd --system --shell /usr/sbin/nologin understudy
-: > "$root/usr/local/bin/understudy"
-mount --bind "$binary" "$root/usr/local/bin/understudy"
+: > "$root/usr/local/bin/understudy-runtime"
+mount --bind "$binary" "$root/usr/local/bin/understudy-runtime"
 cp "$folder"/cell/* "$root/etc/understudy/"
 chmod -R a+rX "$root/etc/understudy"
 chroot "$root" install -d -m 700 -o understudy -g understudy /var/lib/understudy/keys /var/log/understudy

@@ -29,6 +29,9 @@ const SEGMENT_BYTES: u64 = 8 << 20;
 /// The least limit that makes sense: some records in each segment.
 const LEAST_LIMIT: u64 = 64 * 1024;
 
+/// Stack of the thread that packs. In a member all of it is locked into memory.
+const STACK_BYTES: usize = 1 << 20;
+
 /// Writes lines to segments.
 #[derive(Debug)]
 pub struct Segments {
@@ -133,6 +136,7 @@ impl Packer {
         let pack_all = move || to_pack.iter().for_each(|text| pack(&text));
         let thread = std::thread::Builder::new()
             .name("packer".into())
+            .stack_size(STACK_BYTES)
             .spawn(pack_all)?;
         Ok(Self {
             closed: Some(closed),

@@ -33,6 +33,9 @@ fn first_version() -> u32 {
 /// Records that wait to be written, at most: some seconds of a member at 10 ms.
 pub const JOURNAL_RECORDS: usize = 4096;
 
+/// Stack of the thread that writes. All of it is locked into memory.
+const STACK_BYTES: usize = 256 * 1024;
+
 /// One line of the journal.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Record<'name, E> {
@@ -260,6 +263,7 @@ impl Journal {
         let left = Arc::clone(&lost);
         let thread = std::thread::Builder::new()
             .name("journal".into())
+            .stack_size(STACK_BYTES)
             .spawn(move || {
                 let mut output = BufWriter::new(output);
                 let mut anchors = Anchors::default();
