@@ -1,15 +1,17 @@
 //! `summary.json`: what a run came to, for machines; the table, the report and the command line read nothing else.
 
+mod expectations;
+
 use std::fmt;
 
 use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_cluster::Priority;
-use understudy_journal::{JournalState, source_word};
-use understudy_wire::{Member, ProgramId, Source};
+use understudy_journal::JournalState;
+use understudy_wire::{Member, ProgramId};
 
-use crate::account::{Account, Counts, Interval, Presence, RangeFinding, Service, Stall};
-use crate::scenario::{During, Scenario, action_text};
+use crate::account::{Account, Counts, Interval, Presence, Service, Stall};
+use crate::scenario::{Scenario, action_text};
 
 /// The whole of `summary.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -338,7 +340,7 @@ impl Summary {
             expectations: Vec::new(),
             journal,
         };
-        summary.expectations = expectations(&summary, &account, scenario);
+        summary.expectations = expectations::expectations(&summary, &account, scenario);
         let complete = summary.cycles_run == summary.cycles_asked && !summary.interrupted;
         summary.passed = complete
             && summary
@@ -381,167 +383,5 @@ impl Summary {
             total.wrong += counts.wrong;
         }
         total
-    }
-}
-
-fn expectations(
-    summary: &Summary,
-    account: &Account,
-    scenario: &Scenario,
-) -> Vec<ExpectationSummary> {
-    let expect = &scenario.expect;
-    let total = summary.total();
-    let plant_faults = summary.plants.iter().map(|plant| plant.plant_faults).sum();
-    let wrong = at_most("wrong outputs", expect.wrong, summary.violation_count, 0);
-    let mut list = vec![ExpectationSummary {
-        needs_time: false,
-        ..wrong
-    }];
-    for (member, records) in &account.unwritten {
-        if matches!(member, Member::RemoteIo(_)) {
-            list.push(ExpectationSummary {
-                expected: format!("all that {} drove is judged", account.terms.members.name(*member)),
-                found: format!(
-                    "its journal lost {records} records on a host that was too slow to write them; what came after was not judged"
-                ),
-                met: false,
-                needs_time: false,
-            });
-        }
-    }
-    for (program, gaps) in account.gaps() {
-        let name = account.terms.members.name(Member::RemoteIo(program));
-        list.push(ExpectationSummary {
-            expected: format!("all that {name} drove is judged"),
-            found: format!(
-                "{gaps} times it was killed before its journal had its last samples; what came after was not judged until a station reported its state"
-            ),
-            met: false,
-            needs_time: false,
-        });
-    }
-    if summary.death_count > 0 && !scenario.asks_for_nothing() {
-        let each: Vec<String> = summary.deaths.iter().map(ToString::to_string).collect();
-        list.push(ExpectationSummary {
-            expected: "no member ends but by a step of the scenario".to_owned(),
-            found: format!("ended unexpectedly: {}", each.join(", ")),
-            met: false,
-            needs_time: false,
-        });
-    }
-    if let Some(held) = expect.held {
-        list.push(at_most(
-            "cycles held",
-            held,
-            total.held,
-            total.held_by_stall,
-        ));
-    }
-    if let Some(fail_safe) = expect.fail_safe {
-        let by_stall = total.fail_safe_by_stall;
-        list.push(at_most(
-            "cycles fail-safe",
-            fail_safe,
-            total.fail_safe,
-            by_stall,
-        ));
-    }
-    if let Some(allowed) = expect.plant_faults {
-        list.push(at_most("plant_faults", allowed, plant_faults, 0));
-    }
-    if expect.protected {
-        let found = account.protected;
-        list.push(ExpectationSummary {
-            expected: "everybody synchronised at the end".to_owned(),
-            found: if found {
-                "synchronised"
-            } else {
-                "not synchronised"
-            }
-            .to_owned(),
-            met: found,
-            needs_time: true,
-        });
-    }
-    let plant_name = |program| account.terms.members.name(Member::Plant(program));
-    let plant = |program| {
-        let name = plant_name(program);
-        summary.plants.iter().find(|plant| plant.name == name)
-    };
-    for &program in &expect.functional {
-        let met = plant(program).is_some_and(|plant| plant.functional);
-        list.push(ExpectationSummary {
-            expected: format!("{} functional", plant_name(program)),
-            found: if met { "functional" } else { "not functional" }.to_owned(),
-            met,
-            needs_time: true,
-        });
-    }
-    for (&program, &least) in &expect.finished {
-        let finished = plant(program).map_or(0, |plant| plant.finished);
-        list.push(ExpectationSummary {
-            expected: format!("{} finishes at least {least} parts", plant_name(program)),
-            found: finished.to_string(),
-            met: finished >= least,
-            needs_time: true,
-        });
-    }
-    let ranges = account.during.iter();
-    list.extend(ranges.map(|(during, finding)| {
-        let remote_io = account
-            .terms
-            .members
-            .name(Member::RemoteIo(during.remote_io));
-        range(remote_io, during, *finding)
-    }));
-    list
-}
-
-fn at_most(what: &str, allowed: u64, found: u64, by_stall: u64) -> ExpectationSummary {
-    let expected = match allowed {
-        0 => format!("no {what}"),
-        _ => format!("at most {allowed} {what}"),
-    };
-    ExpectationSummary {
-        expected,
-        found: format!("{found}{}", apart(by_stall)),
-        met: found <= allowed,
-        needs_time: true,
-    }
-}
-
-/// Cycles that do not count, because the host stood still.
-fn apart(by_stall: u64) -> String {
-    match by_stall {
-        0 => String::new(),
-        _ => format!(" (and {by_stall} while the host stood still)"),
-    }
-}
-
-fn range(remote_io: &str, during: &During, finding: RangeFinding) -> ExpectationSummary {
-    let words: Vec<&str> = during.sources.iter().copied().map(source_word).collect();
-    let word = |source: Option<Source>| source.map_or("nothing", source_word);
-    ExpectationSummary {
-        expected: format!(
-            "{remote_io} {} in cycles {}-{}",
-            words.join(" or "),
-            during.from,
-            during.to - 1
-        ),
-        found: match finding.first {
-            None if finding.missed_by_stall == 0 => "as expected".to_owned(),
-            None => format!(
-                "as expected, but for {} while the host stood still",
-                finding.missed_by_stall
-            ),
-            Some((cycle, source)) => format!(
-                "not in {} cycles{}, first in cycle {cycle}: {}",
-                finding.missed,
-                apart(finding.missed_by_stall),
-                word(source)
-            ),
-        },
-        met: finding.missed == 0,
-        needs_time: true,
     }
 }

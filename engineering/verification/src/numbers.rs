@@ -124,7 +124,7 @@ impl System {
     fn input(&mut self, name: String, of: Elementary, range: Option<&RangeInclusive<u64>>) -> Term {
         let number = self.inputs.len() as u32;
         let term = self.terms.variable(of, Variable::Input(number));
-        let position = |stored| abstraction::position(of, stored).unwrap_or(0);
+        let position = |stored| abstraction::boundaries::position(of, stored).unwrap_or(0);
         let limits = match range {
             Some(range) => (position(*range.start()), position(*range.end())),
             None => match of {

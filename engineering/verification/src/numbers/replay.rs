@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use understudy_typed::Elementary;
 
-use super::abstraction::{Abstraction, Meaning, between, boundary_text, position};
+use super::abstraction::boundaries::{between, boundary_text, position};
+use super::abstraction::{Abstraction, Meaning};
 use super::term::{Node, Term, Terms, Variable};
 use super::{Run, System, holds_in};
 use crate::effort::{GoOn, Work};

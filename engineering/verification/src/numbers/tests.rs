@@ -4,7 +4,8 @@ use understudy_structured_text::{Options, lower};
 use understudy_testing::random::Dice;
 use understudy_typed::{Elementary, Fault, Machine, Program, Scratch};
 
-use super::abstraction::{Meaning, position};
+use super::abstraction::Meaning;
+use super::abstraction::boundaries::position;
 use super::term::{Node, Terms, Variable};
 use super::{Answer, Bounds, Code, Member, Model, Source};
 use crate::property::read_one;

@@ -1,0 +1,174 @@
+//! One scan of a program, from the cells that hold its state.
+
+use std::collections::HashMap;
+
+use understudy_typed::{Elementary, Operation, Program};
+
+use crate::numbers::System;
+use crate::numbers::execute::{Cells, Execution, Unsupported};
+use crate::numbers::term::{Term, Terms, Variable};
+/// Cells of one program, made when they are read first.
+struct ProgramCells<'s> {
+    program: &'s Program,
+    prefix: &'s str,
+    initial: Vec<u64>,
+    cells: &'s mut Vec<crate::numbers::Cell>,
+    numbers: HashMap<u64, u32>,
+    /// Whether the program is stopped, where it can be: a restart begins with the initial values.
+    stopped: Option<Term>,
+}
+
+impl ProgramCells<'_> {
+    fn number(&mut self, terms: &mut Terms, address: u64, of: Elementary) -> u32 {
+        if let Some(&known) = self.numbers.get(&address) {
+            return known;
+        }
+        let number = self.cells.len() as u32;
+        let name = match self.program.part_at(address) {
+            Some(part) => format!("{}{}", self.prefix, part.name),
+            None => format!("{}memory {}", self.prefix, address / 64),
+        };
+        let slot = self.initial.get((address / 64) as usize).copied();
+        let term = terms.variable(of, Variable::Cell(number));
+        self.cells.push(crate::numbers::Cell {
+            name,
+            of,
+            initial: slot.unwrap_or(0) >> (address % 64) & of.mask(),
+            term,
+            next: term,
+        });
+        self.numbers.insert(address, number);
+        number
+    }
+}
+
+impl Cells for ProgramCells<'_> {
+    fn before(&mut self, terms: &mut Terms, address: u64, of: Elementary) -> Term {
+        let number = self.number(terms, address, of);
+        let cell = &self.cells[number as usize];
+        let (term, initial, of) = (cell.term, cell.initial, cell.of);
+        match self.stopped {
+            Some(stopped) => {
+                let initial = terms.constant(of, initial);
+                terms.choose(stopped, initial, term)
+            }
+            None => term,
+        }
+    }
+}
+
+impl System {
+    /// One scan of a program from its cells on.
+    pub(super) fn scan(
+        &mut self,
+        scan: &Scan<'_>,
+        numbers: &mut HashMap<u64, u32>,
+    ) -> Result<Scanned, Unsupported> {
+        let Scan {
+            prefix,
+            program,
+            inputs,
+            ..
+        } = *scan;
+        let mut cells = ProgramCells {
+            program,
+            prefix,
+            initial: program.initial_state(),
+            cells: &mut self.cells,
+            numbers: std::mem::take(numbers),
+            stopped: scan.stopped,
+        };
+        let count = match scan.stopped {
+            Some(stopped) => {
+                let zero = self.terms.constant(Elementary::Ulint, 0);
+                self.terms.choose(stopped, zero, scan.scans)
+            }
+            None => scan.scans,
+        };
+        let period = self.terms.constant(Elementary::Time, program.period as u64);
+        let elapsed = self
+            .terms
+            .apply(Operation::Elapsed, Elementary::Time, &[count, period]);
+        // What is shown or read by others has a cell, whether the scan reads it or not.
+        for point in &program.outputs {
+            if point.slot != 0 {
+                cells.number(&mut self.terms, 64 * u64::from(point.slot), point.of);
+            }
+        }
+        for address in bool_variables(program) {
+            cells.number(&mut self.terms, address, Elementary::Bool);
+        }
+        let mut execution = Execution::new(program, &mut self.terms, &mut cells, elapsed);
+        for (point, &input) in program.inputs.iter().zip(inputs) {
+            if point.slot != 0 {
+                execution.put(point.slot, input);
+            }
+        }
+        for task in &program.tasks {
+            let runs = match task.every {
+                0 | 1 => execution.terms.boolean(true),
+                every => {
+                    let every = execution.terms.constant(Elementary::Ulint, every.into());
+                    let modulo = Operation::Modulo(Elementary::Ulint);
+                    let rest = execution
+                        .terms
+                        .apply(modulo, Elementary::Ulint, &[count, every]);
+                    execution.terms.equals(rest, 0)
+                }
+            };
+            execution.task(task.routine, task.own, runs)?;
+        }
+        for point in &program.outputs {
+            execution.finite(point.slot, point.of);
+        }
+        let faulted = execution.faulted;
+        let memory = execution.written();
+        *numbers = cells.numbers;
+        Ok(Scanned { memory, faulted })
+    }
+}
+
+/// How a scan begins.
+#[derive(Clone, Copy)]
+pub(super) struct Scan<'a> {
+    pub(super) prefix: &'a str,
+    pub(super) program: &'a Program,
+    pub(super) inputs: &'a [Term],
+    pub(super) scans: Term,
+    pub(super) stopped: Option<Term>,
+}
+
+/// How it ends, where no fault ends it.
+pub(super) struct Scanned {
+    pub(super) memory: HashMap<u64, Term>,
+    /// Whether a fault ends it.
+    pub(super) faulted: Term,
+}
+
+/// Most BOOL variables that properties can name.
+const NAMED: usize = 10_000;
+
+/// Addresses of the BOOLs in the state that people can see.
+fn bool_variables(program: &Program) -> Vec<u64> {
+    let mut found = Vec::new();
+    for variable in &program.variables {
+        let first = 64 * u64::from(variable.slot);
+        let mut address = first;
+        let end = first + 64 * variable.of.slots();
+        while address < end && found.len() < NAMED {
+            match program.part_at(address) {
+                Some(part) if part.address == address => match part.of.elementary() {
+                    Some(Elementary::Bool) => {
+                        found.push(address);
+                        let is_element = part.name.ends_with(']');
+                        address += if is_element { 1 } else { 64 };
+                    }
+                    Some(of) if part.name.ends_with(']') => address += u64::from(of.bits()),
+                    _ => address += 64 * part.of.slots().max(1),
+                },
+                _ => address = (address / 64 + 1) * 64,
+            }
+        }
+    }
+    found
+}
