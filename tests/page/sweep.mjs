@@ -4,7 +4,7 @@
 //
 // The page may command a laboratory whose remote I/O are named NAME-io, as in the examples press-cell and two-shuttles. Its first controller is killed.
 
-import { accessible, answer, click, evaluate, more, open, picture, run, scheme, size, text, until } from "./chromium.mjs";
+import { accessible, answer, change, click, evaluate, more, open, picture, run, scheme, size, text, until } from "./chromium.mjs";
 
 const [axe] = more;
 const SIZES = [
@@ -57,6 +57,7 @@ async function drive() {
   const name = await evaluate("fetch('/api/state').then((answer) => answer.json()).then((state) => state.members.find((member) => member.kind === 'controller').name)");
   const killed = `g.member[data-name="${name}"]`;
   await dialog(`g.member[data-name="${name}-io"]`, "force");
+  await change("#force-signal", "output 0");
   await answer();
   await click("[data-command=force]");
   await until("a message", `!document.getElementById('command').open`);
