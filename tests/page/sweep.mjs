@@ -60,6 +60,7 @@ async function drive() {
   const killed = `g.member[data-name="${name}"]`;
   await dialog(`g.member[data-name="${name}-io"]`, "force");
   await change("#force-signal", "output 0");
+  await change("#force-number", "0");
   await answer();
   await click("[data-command=force]");
   await until("a message", `!document.getElementById('command').open`);
