@@ -4,7 +4,7 @@ import { el, svg } from "/element.js";
 import { SOURCES } from "/sources.js";
 
 const item = (mark, words) => el("li", {}, mark, " ", words);
-const list = (heading, items) => el("div", { class: "legend" }, el("h3", {}, heading), el("ul", { class: "plain" }, items));
+const list = (heading, items) => el("div", { class: "legend" }, el("strong", { class: "soft" }, heading), el("ul", { class: "plain", "aria-label": heading }, items));
 
 const flow = (source) =>
   svg("svg", { class: "picture", width: 34, height: 10, "aria-hidden": "true" }, svg("line", { class: "flow", "data-source": source, x1: 0, x2: 34, y1: 5, y2: 5 }));

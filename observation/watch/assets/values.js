@@ -24,12 +24,12 @@ const id = (name) => document.getElementById(name);
 export function prepare() {
   chosen = kept("watch") ?? [];
   choice = chooser("watch", (signal) => chosen.includes(signal), toggle);
-  const heads = ["program", "signal", "kind", "type", "value", "address", "meaning", ""];
+  const heads = ["program", "signal", "kind", "type", "value", "address", "meaning", "action"];
   id("view-watch").append(
     el("section", { class: "card", "aria-labelledby": "watch-title" },
       el("h2", { id: "watch-title" }, "Watch table"),
       el("p", { id: "watch-words", class: "stamp soft", role: "status" }),
-      el("div", { class: "wide", tabindex: "0", role: "region", "aria-label": "Watch table" },
+      el("div", { class: "wide", tabindex: "0", role: "region", "aria-label": "Table of the chosen signals" },
         el("table", { id: "watch-table" }, el("thead", {}, el("tr", {}, heads.map((head) => el("th", { scope: "col" }, head)))), el("tbody"))),
       el("p", { id: "watch-tools", class: "tools" },
         el("a", { id: "watch-trends" }, "Show them as trends"), " ",
