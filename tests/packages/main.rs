@@ -186,7 +186,7 @@ fn the_container_image_runs_the_demo() {
     assert_eq!(image.architecture, architecture());
     // It has its own binaries and nothing else that could run.
     let commands = fs::read_dir(root.path("usr/bin")).expect("a folder");
-    assert_eq!(commands.count(), 2);
+    assert_eq!(commands.count(), 3);
     let command: Vec<&str> = image.command.iter().map(String::as_str).collect();
     root.demo(&image.user, &image.folder, &command);
     fs::remove_dir_all(layout).expect("it is ours");
