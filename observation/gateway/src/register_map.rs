@@ -9,6 +9,8 @@
 //!
 //! Numbers of 32 bits take two registers and numbers of 64 bits four, the most significant one first. Addresses are those on the wire, from 0.
 
+mod image;
+
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
@@ -16,12 +18,12 @@ use tokio_modbus::ExceptionCode;
 use understudy_cluster::{Cluster, OperatorDeclaration, value_text};
 use understudy_executable::Interface;
 use understudy_remote_io::OperatorInputKind;
-use understudy_typed::{Elementary, Point, Points};
-use understudy_view::{RunState, Snapshot, StationState, stored};
+use understudy_typed::{Elementary, Point};
 use understudy_wire::{MAXIMUM_PROGRAMS, Member, ProgramId};
 
 use crate::error::GatewayError;
-use crate::feed::Feed;
+
+pub use image::ProcessImage;
 
 /// Version of the map, in register 0; it changes when a place changes.
 const VERSION: u16 = 1;
@@ -96,17 +98,6 @@ pub struct RegisterMap {
     first_coil: usize,
     /// Setpoints by their first registers.
     setpoints: BTreeMap<usize, Target>,
-}
-
-/// The process image that clients read.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct ProcessImage {
-    /// Discrete inputs.
-    pub inputs: Vec<bool>,
-    /// Coils.
-    pub coils: Vec<bool>,
-    /// Input and holding registers.
-    pub registers: Vec<u16>,
 }
 
 /// The numbers of [`StationState::ALL`].
@@ -322,103 +313,6 @@ impl RegisterMap {
     pub fn is_of_run(address: u16, count: u16) -> bool {
         usize::from(address) + usize::from(count) <= STATIONS
     }
-
-    /// The process image of a snapshot, whose run has this feed.
-    pub fn image(&self, snapshot: &Snapshot, feed: Feed) -> ProcessImage {
-        let mut image = ProcessImage {
-            registers: vec![0; PROGRAMS + self.interfaces.len() * OF_PROGRAM],
-            ..ProcessImage::default()
-        };
-        let set = |registers: &mut Vec<u16>, address: usize, value: u64| {
-            let value = u32::try_from(value).unwrap_or(u32::MAX);
-            registers[address] = (value >> 16) as u16;
-            registers[address + 1] = value as u16;
-        };
-        let small = |value: usize| u16::try_from(value).unwrap_or(u16::MAX);
-        let registers = &mut image.registers;
-        registers[0] = VERSION;
-        registers[1] = match (feed, snapshot.run) {
-            (Feed::Silent, _) => 4,
-            (_, RunState::Starting) => 0,
-            (_, RunState::Running) => 1,
-            (_, RunState::Finished) => 2,
-            (_, RunState::Interrupted) => 3,
-        };
-        set(
-            registers,
-            2,
-            snapshot.cycle.unwrap_or_default().max(0) as u64,
-        );
-        set(registers, 4, snapshot.period_us);
-        registers[6] = u16::from(snapshot.margin.survives);
-        registers[7] = small(snapshot.alarms.len());
-        registers[8] = small(self.interfaces.len());
-        registers[9] = small(self.stations);
-        for (rank, station) in snapshot.stations.iter().enumerate().take(self.stations) {
-            registers[STATIONS + rank] = state_number(station.state);
-        }
-        for (index, program) in snapshot
-            .programs
-            .iter()
-            .enumerate()
-            .take(self.interfaces.len())
-        {
-            let base = PROGRAMS + index * OF_PROGRAM;
-            registers[base] = match program.source {
-                None => 0,
-                Some("direct") => 1,
-                Some("reconstructed") => 2,
-                Some("held") => 3,
-                Some(_) => 4,
-            };
-            registers[base + 1] = u16::from(program.awaits_release);
-            registers[base + 2] = small(program.forced.len());
-            registers[base + 3] = match (&program.lost, &program.protection) {
-                (Some(_), _) => 3,
-                (None, None) => 0,
-                (None, Some(protection)) if protection.protected => 1,
-                (None, Some(_)) => 2,
-            };
-            set(registers, base + 4, program.direct);
-            set(registers, base + 6, program.reconstructed);
-            set(registers, base + 8, program.held);
-            set(registers, base + 10, program.fail_safe);
-            set(registers, base + 12, program.finished.unwrap_or_default());
-            set(
-                registers,
-                base + 14,
-                program.plant_faults.unwrap_or_default(),
-            );
-        }
-        if self.numbers > 0 {
-            image.registers.resize(NUMBERS, 0);
-        }
-        for (interface, program) in self.interfaces.iter().zip(&snapshot.programs) {
-            let (inputs, outputs) = (program.inputs.as_deref(), program.outputs.as_deref());
-            add_points(
-                &interface.inputs,
-                inputs,
-                &mut image.inputs,
-                &mut image.registers,
-            );
-            add_points(
-                &interface.outputs,
-                outputs,
-                &mut image.coils,
-                &mut image.registers,
-            );
-        }
-        for target in &self.coils {
-            let Member::RemoteIo(program) = target.member else {
-                continue;
-            };
-            let program = snapshot.programs.get(program.index());
-            let inputs = program.and_then(|program| program.inputs.as_deref());
-            let value = inputs.and_then(|inputs| stored(&target.point, inputs));
-            image.coils.push(value == Some(1));
-        }
-        image
-    }
 }
 
 /// An operator input as a place of the map.
@@ -490,35 +384,9 @@ fn stored_of(of: Elementary, words: &[u16]) -> Option<u64> {
     is_whole.then_some(stored)
 }
 
-/// The points of an image that is written as bits, such as `0110`: BOOLs as bits, numbers as registers; 0 where nothing is known.
-fn add_points(points: &Points, text: Option<&str>, bits: &mut Vec<bool>, registers: &mut Vec<u16>) {
-    for point in points {
-        let stored = text
-            .and_then(|text| stored(point, text))
-            .unwrap_or_default();
-        if point.of == Elementary::Bool {
-            bits.push(stored != 0);
-            continue;
-        }
-        // A SINT keeps its sign.
-        let value = match point.of.is_signed() {
-            true => point.of.signed(stored) as u64,
-            false => stored,
-        };
-        let places = (0..registers_of(point)).rev();
-        registers.extend(places.map(|place| (value >> (16 * place)) as u16));
-    }
-}
-
 /// Registers that a number takes: one for 8 or 16 bits, two for 32, four for 64.
 fn registers_of(point: &Point) -> usize {
     point.of.bits().div_ceil(16) as usize
-}
-
-/// The place of a state in [`StationState::ALL`].
-fn state_number(state: StationState) -> u16 {
-    let place = StationState::ALL.iter().position(|known| *known == state);
-    place.map_or(0, |place| place as u16)
 }
 
 #[cfg(test)]
