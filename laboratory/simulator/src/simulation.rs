@@ -4,9 +4,9 @@
 //! member, then faults, so that a run is a function of its parts, faults and seed.
 
 mod disturbance;
+mod identity;
 mod judging;
 
-use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -484,41 +484,5 @@ impl Simulation {
             self.pace.saw(self.now, frame.header.moment);
         }
         self.links.send(self.now, self.pace.cycle(), frame);
-    }
-}
-
-/// Two simulations of equal parts on a network that leaves nothing to chance go on alike if they hash alike. What has happened in the past counts only as far as it acts on.
-impl Hash for Simulation {
-    fn hash<H: Hasher>(&self, hasher: &mut H) {
-        let Self {
-            parts: _,
-            links,
-            now: _,
-            stations,
-            remote_ios,
-            plants,
-            referees,
-            // It only judges.
-            signals: _,
-            tallies: _,
-            ready,
-            arrived,
-            holders,
-            violations,
-            faults,
-            pace,
-            founded,
-        } = self;
-        (links, stations, remote_ios, plants, referees).hash(hasher);
-        (ready, arrived, holders, violations.len(), pace, founded).hash(hasher);
-        for fault in faults {
-            (
-                fault.at_cycle,
-                fault.phase.to_bits(),
-                fault.member,
-                fault.action,
-            )
-                .hash(hasher);
-        }
     }
 }

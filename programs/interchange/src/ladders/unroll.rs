@@ -5,6 +5,7 @@
 //! only on what it has confirmed itself.
 
 mod calls;
+mod operations;
 mod places;
 mod statements;
 mod values;
