@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use understudy_interchange::plcopen::Fidelity;
 use understudy_interchange::{
-    Compared, Format, Reading, WriteError, Written, read, unknown_form, write,
+    Compared, Format, Reading, Wanted, WriteError, Written, read, typed_text, unknown_form, write,
 };
 use understudy_text::duration::parse_positive;
 use understudy_text::{Lines, MAXIMUM_SHOWN, Report, shortened};
@@ -100,17 +100,36 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     } else {
         String::new()
     };
-    let Some(program) = reading.program else {
+    let wanted = Wanted {
+        program: arguments.unit.as_deref(),
+        period: arguments.period,
+    };
+    let form = form_of_output(arguments);
+    let failed = |error: WriteError| (code(&error), error.to_string());
+    let written = match (&reading.program, form) {
+        (Some(program), form) => {
+            let period = arguments.period.or(reading.period);
+            let written = |form: Form| write(form.format(), program, period).map_err(failed);
+            Some(form.and_then(written))
+        }
+        // What is no ladder may be a program with numbers.
+        (None, Ok(Form::St)) => match typed_text(&report.name, &report.text, wanted) {
+            Ok((None, _)) => None,
+            Ok((Some(written), diagnostics)) => {
+                report.diagnostics = diagnostics;
+                Some(Ok(written))
+            }
+            Err(error) => Some(Err(failed(error))),
+        },
+        (None, _) => None,
+    };
+    let Some(written) = written else {
         let fidelity = fidelity_value(&reading.fidelity, &report, None);
         let mut answer = Answer::bad_files(vec![report]);
         answer.text = kept;
         answer.result = json!({ "file": null, "text": null, "fidelity": fidelity });
         return Err(answer);
     };
-    let period = arguments.period.or(reading.period);
-    let written = form_of_output(arguments).and_then(|form| {
-        write(form.format(), &program, period).map_err(|error| (code(&error), error.to_string()))
-    });
     let written = match written {
         Ok(written) => written,
         Err((code, message)) => {

@@ -69,7 +69,7 @@ pub(crate) fn ladder(
         Err(refusal) => {
             let message = format!("`{}` is no ladder: {}", program.name, refusal.what);
             let error = Diagnostic::error(refusal.code, message, place(refusal.line as usize));
-            let help = "a ladder has BOOLs, timers, counters and integers within bounds; `check`, `verify`, `scan` and stations take the program as it is";
+            let help = "a ladder has BOOLs, timers, counters and integers within bounds; `check`, `verify`, `scan`, stations and `convert --to st` take the program as it is";
             return (None, vec![error.with_help(help)]);
         }
     };

@@ -8,10 +8,12 @@ pub mod plcopen;
 mod source;
 mod text;
 mod twincat;
+mod typed_text;
 mod written;
 
 pub use format::{Format, Reading, parse_program, read, read_all, unknown_form};
 pub use source::{Source, SourceFile, Wanted, no_program, read_source};
+pub use typed_text::typed_text;
 pub use written::{Compared, USUAL_PERIOD, WriteError, Written, write};
 
 /// The examples of the codes of this crate are run with its own.

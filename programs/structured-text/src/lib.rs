@@ -10,6 +10,6 @@ pub mod print;
 pub mod syntax;
 
 pub use jumps::in_parts;
-pub use library::file as library;
+pub use library::{control as control_blocks, file as library};
 pub use lower::{Lowered, Options, lower};
 pub use parser::parse;

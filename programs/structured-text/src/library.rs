@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use crate::syntax::File;
+use crate::syntax::{File, Unit};
 
 /// The whole library as one text.
 pub(crate) const TEXT: &str = concat!(
@@ -10,6 +10,15 @@ pub(crate) const TEXT: &str = concat!(
     "\n",
     include_str!("library/control.st"),
 );
+
+/// Where the standard blocks end and those for control begin.
+const CONTROL: usize = include_str!("library/standard.st").len();
+
+/// The blocks for control: other compilers do not have them.
+pub fn control() -> impl Iterator<Item = &'static Unit> {
+    let units = file().units.iter();
+    units.filter(|unit| unit.span.start >= CONTROL)
+}
 
 /// The library, read once.
 pub fn file() -> &'static File {

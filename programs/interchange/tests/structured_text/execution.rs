@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use understudy_interchange::{Format, plcopen, read};
+use understudy_interchange::{Format, Wanted, plcopen, read, typed_text};
 use understudy_ladder::Program as Ladder;
 use understudy_logic::Running;
 use understudy_structured_text::syntax::File;
@@ -96,8 +96,11 @@ fn ladders_of_public_texts_do_what_their_typed_programs_do() {
         Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests")),
         &mut found,
     );
+    // Those of the project alone are few.
+    let mut least = 5;
     if let Some(folder) = std::env::var_os("UNDERSTUDY_DATA") {
         files(Path::new(&folder), &mut found);
+        least = 10;
     }
     found.sort();
     let mut compared = 0;
@@ -120,5 +123,40 @@ fn ladders_of_public_texts_do_what_their_typed_programs_do() {
             compared += 1;
         }
     }
-    assert!(compared >= 10, "{compared} programs");
+    assert!(compared >= least, "{compared} programs");
+}
+
+/// Texts of programs with numbers, of the project and of others where they are there, written as Structured Text: each does what the program does,
+/// or [`typed_text`] says so.
+#[test]
+fn programs_with_numbers_are_written_as_they_are() {
+    let mut found = Vec::new();
+    let own = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples");
+    files(Path::new(own), &mut found);
+    if let Some(folder) = std::env::var_os("UNDERSTUDY_DATA") {
+        files(&Path::new(&folder).join("programs"), &mut found);
+    }
+    found.sort();
+    let mut written = 0;
+    for path in found {
+        let ending = path.extension().and_then(|ending| ending.to_str());
+        if !ending.is_some_and(|ending| ["st", "ST", "xml", "TcPOU"].contains(&ending)) {
+            continue;
+        }
+        let Ok(text) = std::fs::read_to_string(&path) else {
+            continue;
+        };
+        let name = path.display().to_string();
+        let result = typed_text(&name, &text, Wanted::default());
+        let (found, diagnostics) = result.unwrap_or_else(|error| panic!("{name}: {error}"));
+        let Some(found) = found else {
+            continue;
+        };
+        written += 1;
+        // What is written can be read, and written again.
+        let again = typed_text("again.st", &found.text, Wanted::default());
+        let (again, found) = again.unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert!(again.is_some(), "{name}: {found:?}, {diagnostics:?}");
+    }
+    assert!(written >= 10, "{written} programs");
 }

@@ -1,0 +1,210 @@
+//! A program with numbers as Structured Text, from any form that is read.
+//!
+//! Invariant: the text is the program. It is read back, and both are executed over scans with pseudo-random inputs: every output is the same.
+
+use std::time::Duration;
+
+use understudy_executable::{Executable, Interface, digest};
+use understudy_structured_text::syntax::{Body, File, Name, ProgramInstance, Task, Unit, UnitKind};
+use understudy_structured_text::{control_blocks, parse, print};
+use understudy_text::{Diagnostic, Severity, has_errors};
+use understudy_typed::Program;
+
+use crate::format::Format;
+use crate::plcopen;
+use crate::source::Wanted;
+use crate::text::{Whole, whole};
+use crate::twincat;
+use crate::written::{Compared, USUAL_PERIOD, WriteError, Written};
+
+/// Scans in which a program and its text are compared.
+const SCANS: usize = 2_000;
+
+/// The programs, blocks and types of the file `name` as one Structured Text, which runs them by a CONFIGURATION, and what was found in the
+/// file. Nothing is written where it has errors, or is of a form that has no programs with numbers.
+///
+/// # Errors
+/// [`WriteError::Different`], where the text does something else than the program: a defect of this program.
+pub fn typed_text(
+    name: &str,
+    text: &str,
+    wanted: Wanted<'_>,
+) -> Result<(Option<Written>, Vec<Diagnostic>), WriteError> {
+    let format = Format::of(name, text);
+    let (mut file, found) = match (twincat::read(text), format) {
+        (Some(parsed), _) => parsed,
+        (None, Some(Format::StructuredText)) => parse(text),
+        (None, Some(Format::PlcOpen)) => plcopen::read_typed(text),
+        (None, _) => return Ok((None, Vec::new())),
+    };
+    let read = whole(text, (file.clone(), found), wanted.program, wanted.period);
+    let diagnostics = read.diagnostics.clone();
+    if has_errors(&diagnostics) || (read.typed.is_none() && read.checked.is_empty()) {
+        return Ok((None, diagnostics));
+    }
+    if read.typed.is_some() {
+        configure(&mut file, wanted, read.period);
+    }
+    let file = with_library(file);
+    let printed = with_written_names(&file, print::file(&file));
+    let compared = Compared {
+        scans: compare(&read, &printed, wanted)?,
+        ..Compared::default()
+    };
+    let lost = match format {
+        Some(Format::StructuredText) => lost_comments(text, &printed),
+        _ => None,
+    };
+    let written = Written {
+        losses: lost.into_iter().collect(),
+        text: printed,
+        compared,
+    };
+    Ok((Some(written), diagnostics))
+}
+
+/// Runs the program by a task, where the file does not say what runs, or another program is wanted.
+fn configure(file: &mut File, wanted: Wanted<'_>, period: Option<Duration>) {
+    let is_wanted = |unit: &&Unit| {
+        unit.kind == UnitKind::Program && wanted.program.is_none_or(|name| unit.name.is(name))
+    };
+    let chosen: Vec<Name> = file
+        .units
+        .iter()
+        .filter(is_wanted)
+        .map(|unit| unit.name.clone())
+        .collect();
+    if !file.instances.is_empty() && wanted.program.is_none() {
+        return;
+    }
+    let interval = wanted.period.or(period).unwrap_or(USUAL_PERIOD);
+    let name = |text: &str| Name::new(text, 0..0);
+    file.tasks = vec![Task {
+        name: name("Task0"),
+        interval: i64::try_from(interval.as_nanos()).ok(),
+        priority: Some(0),
+        single: None,
+    }];
+    let instances = chosen
+        .into_iter()
+        .enumerate()
+        .map(|(place, of)| ProgramInstance {
+            name: name(&format!("Instance{place}")),
+            task: Some(name("Task0")),
+            of,
+            connections: Vec::new(),
+        });
+    file.instances = instances.collect();
+}
+
+/// The file with the control blocks that it uses: other compilers do not have them.
+fn with_library(mut file: File) -> File {
+    let mut looked_at = 0;
+    while looked_at < file.units.len() {
+        let text = print::unit(&file.units[looked_at]);
+        looked_at += 1;
+        let words = text.split(|letter: char| !letter.is_alphanumeric() && letter != '_');
+        for word in words {
+            let is_known = file.units.iter().any(|unit| unit.name.is(word));
+            let found = control_blocks().find(|unit| unit.name.is(word));
+            if let Some(found) = found.filter(|_| !is_known) {
+                file.units.push(found.clone());
+            }
+        }
+    }
+    file
+}
+
+/// The text with names that can be written: the reader of drawn networks makes names with a dot, which no user can have declared.
+fn with_written_names(file: &File, text: String) -> String {
+    let mut made = Vec::new();
+    for unit in &file.units {
+        names_with_dots(unit, &mut made);
+    }
+    made.into_iter().fold(text, |text, name| {
+        let mut written = name.replace('.', "_");
+        while text.contains(&written) {
+            written.push('_');
+        }
+        replaced(&text, &name, &written)
+    })
+}
+
+fn names_with_dots(unit: &Unit, made: &mut Vec<String>) {
+    let declared = unit
+        .declarations
+        .iter()
+        .map(|declaration| &declaration.name);
+    let actions = match &unit.body {
+        Body::Chart(chart) => chart.actions.as_slice(),
+        _ => &[],
+    };
+    let actions = actions.iter().map(|action| &action.name);
+    let methods = unit.methods.iter().map(|method| &method.name);
+    let names = declared
+        .chain(actions)
+        .chain(methods)
+        .map(|name| name.as_str());
+    made.extend(names.filter(|name| name.contains('.')).map(str::to_owned));
+    unit.methods
+        .iter()
+        .for_each(|method| names_with_dots(method, made));
+}
+
+/// The text with another word in place of each `word` that is a whole one.
+fn replaced(text: &str, word: &str, by: &str) -> String {
+    let is_part = |letter: char| letter.is_alphanumeric() || letter == '_';
+    let mut result = String::with_capacity(text.len());
+    let mut done = 0;
+    for (at, _) in text.match_indices(word) {
+        let before = text[..at].chars().next_back();
+        let after = text[at + word.len()..].chars().next();
+        let is_whole =
+            !before.is_some_and(|it| is_part(it) || it == '.') && !after.is_some_and(is_part);
+        result += &text[done..at];
+        result += if is_whole { by } else { word };
+        done = at + word.len();
+    }
+    result + &text[done..]
+}
+
+/// Compares a program with its text; the number of scans.
+fn compare(read: &Whole, printed: &str, wanted: Wanted<'_>) -> Result<usize, WriteError> {
+    let again = whole(printed, parse(printed), wanted.program, None);
+    let different = |reason: String| Err(WriteError::Different(reason));
+    let mut errors = again.diagnostics.iter();
+    if let Some(error) = errors.find(|found| found.severity == Severity::Error) {
+        return different(format!("{} {}", error.code, error.message));
+    }
+    match (&read.typed, &again.typed) {
+        (None, None) if read.checked == again.checked => Ok(0),
+        (Some(before), Some(after)) => {
+            let digested = |program: &Program| {
+                let (executable, interface) = (Executable::from(program), Interface::from(program));
+                (
+                    digest(&executable, &interface, SCANS as u64),
+                    points(&interface),
+                )
+            };
+            if digested(before) != digested(after) {
+                return different("its outputs differ in scans with random inputs".to_owned());
+            }
+            Ok(SCANS)
+        }
+        _ => different("it has other programs".to_owned()),
+    }
+}
+
+/// Names and types of the inputs and outputs.
+fn points(interface: &Interface) -> Vec<(String, understudy_typed::Elementary)> {
+    let points = interface.inputs.iter().chain(interface.outputs.iter());
+    points.map(|point| (point.name.clone(), point.of)).collect()
+}
+
+/// Says how many comments of a text are not in another one: those within bodies are not kept.
+fn lost_comments(text: &str, printed: &str) -> Option<Diagnostic> {
+    let count = |text: &str| text.matches("(*").count() + text.matches("//").count();
+    let lost = count(text).saturating_sub(count(printed));
+    let message = format!("the written text lacks {lost} comments, which are within statements");
+    (lost > 0).then(|| Diagnostic::warning("U1018", message, 0..0))
+}
