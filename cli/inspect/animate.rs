@@ -44,7 +44,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         to: arguments.to,
     };
     let until = arguments.to.unwrap_or(i64::MAX);
-    let model = arguments.run.open()?.read_until(Bounds::default(), until)?;
+    let run = arguments.run.open()?;
+    let model = match arguments.from {
+        Some(from) => run.read_between(Bounds::default(), from, until)?,
+        None => run.read_until(Bounds::default(), until)?,
+    };
     let film = model.film(scene)?;
     files::write(&arguments.output, &film.to_svg())?;
     let file = arguments.output.display().to_string();

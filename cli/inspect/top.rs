@@ -9,7 +9,7 @@ use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::{self, KeyCode, KeyEventKind, KeyModifiers};
 use understudy_attach::Attached;
 use understudy_journal::{Commander, JOURNAL_LIMIT_BYTES, RunDirectory};
-use understudy_view::{Alarm, Bounds, Key, Model, Run, Screen, Source};
+use understudy_view::{Alarm, Bounds, Following, Key, Model, Run, Screen};
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
@@ -152,16 +152,15 @@ fn show(
     run: &Run,
     commander: &Commander,
 ) -> io::Result<()> {
-    let mut source: Source = run.follow();
-    let mut model = run.model(Bounds::default());
+    let (mut model, mut following) = Following::of(run, Bounds::default());
     let mut screen = Screen::default();
     loop {
         let drawn = Instant::now();
         while !screen.is_paused() {
-            let taken = source.poll(&mut |found| match found {
-                Ok(record) => model.note(&record),
-                Err(trouble) => model.trouble(&trouble),
-            });
+            let taken = following.poll(&mut |found| model.take_found(found));
+            if let Some(whole) = following.read_past() {
+                model = whole;
+            }
             if taken == 0 && run.is_finished() {
                 model.end();
             }
@@ -170,9 +169,11 @@ fn show(
                 break;
             }
         }
-        let progress = source.progress().of_ended(model.is_finished());
-        terminal.draw(|frame| screen.draw_live(frame, &model, progress, Instant::now()))?;
-        let wait = if progress.is_at_end() || screen.is_paused() {
+        let progress = following.progress().of_ended(model.is_finished());
+        let past = following.past_percent();
+        terminal.draw(|frame| screen.draw_live(frame, &model, progress, past, Instant::now()))?;
+        let is_idle = progress.is_at_end() && past.is_none();
+        let wait = if is_idle || screen.is_paused() {
             LOOK
         } else {
             Duration::ZERO
@@ -203,7 +204,8 @@ fn show(
             _ => continue,
         };
         let seen = screen.press(key, &model);
-        if !seen.is_empty() {
+        // Those of a past that is not read yet have other numbers and times.
+        if !seen.is_empty() && following.past_percent().is_none() {
             acknowledge(&seen, commander);
         }
     }

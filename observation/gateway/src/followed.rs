@@ -208,10 +208,7 @@ impl Reader {
         while !ends.load(Ordering::Relaxed) {
             let is_finished = !self.model.is_finished() && self.run.is_finished();
             let model = &mut self.model;
-            let taken = self.source.poll(&mut |found| match found {
-                Ok(record) => model.note(&record),
-                Err(trouble) => model.trouble(&trouble),
-            });
+            let taken = self.source.poll(&mut |found| model.take_found(found));
             self.metrics.times(&self.model);
             unshown |= taken > 0;
             if taken == 0 && is_finished {

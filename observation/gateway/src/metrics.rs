@@ -273,10 +273,7 @@ pub fn exposition_of(run: &Run) -> Result<String, GatewayError> {
     let is_finished = run.is_finished();
     let mut read = 0;
     loop {
-        let taken = source.poll(&mut |found| match found {
-            Ok(record) => model.note(&record),
-            Err(trouble) => model.trouble(&trouble),
-        });
+        let taken = source.poll(&mut |found| model.take_found(found));
         metrics.times(&model);
         read += taken;
         if taken == 0 {

@@ -12,7 +12,7 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::checkpoint::Checkpoints;
+use crate::continuation::Followed;
 use crate::packed_file::SegmentFile;
 use crate::record::Record;
 use crate::segments::{Segments, segments_of};
@@ -22,7 +22,9 @@ use crate::version::{WrongVersion, check_header, journal_header};
 #[derive(Debug)]
 pub struct Journal<W: Write = Segments> {
     writer: Option<W>,
-    checkpoints: Checkpoints,
+    /// Bytes of a continuation that the next line is to be written after, at most; 0 within a segment.
+    room: fn(&W) -> u64,
+    followed: Followed,
     state: JournalState,
 }
 
@@ -40,7 +42,9 @@ pub struct JournalState {
 impl Journal {
     /// A journal in a new file, of `limit_bytes` at most: the oldest records go when it is full.
     pub fn create(path: &Path, limit_bytes: u64) -> io::Result<Self> {
-        Segments::create(path, limit_bytes).map(Self::of_headed)
+        let mut journal = Segments::create(path, limit_bytes).map(Self::of_headed)?;
+        journal.room = Segments::room_to_continue;
+        Ok(journal)
     }
 }
 
@@ -59,7 +63,8 @@ impl<W: Write> Journal<W> {
     fn of_headed(writer: W) -> Self {
         Self {
             writer: Some(writer),
-            checkpoints: Checkpoints::default(),
+            room: |_| 0,
+            followed: Followed::default(),
             state: JournalState::default(),
         }
     }
@@ -70,11 +75,15 @@ impl<W: Write> Journal<W> {
             self.state.lost += 1;
             return;
         };
-        match write_line(writer, record) {
+        let continued = match (self.room)(writer) {
+            0 => Ok(()),
+            room => write_continuation(writer, &self.followed, record.at_ns, room),
+        };
+        match continued.and_then(|()| write_line(writer, record)) {
             Ok(bytes) => {
                 self.state.records += 1;
                 // It is none of the records of the run.
-                if let Some(checkpoint) = self.checkpoints.after(record, bytes)
+                if let Some(checkpoint) = self.followed.after(record, bytes)
                     && let Err(error) = write_line(writer, &checkpoint)
                 {
                     self.writer = None;
@@ -103,6 +112,23 @@ impl<W: Write> Journal<W> {
         self.state.lost += 1;
         self.state.stopped_by = Some(error.to_string());
     }
+}
+
+/// What a segment begins with that goes on after others; nothing where it does not fit into the room for it.
+fn write_continuation(
+    writer: &mut impl Write,
+    followed: &Followed,
+    at_ns: u64,
+    room: u64,
+) -> io::Result<()> {
+    let mut lines = Vec::new();
+    for record in followed.continuation(at_ns) {
+        write_line(&mut lines, &record)?;
+    }
+    if lines.len() as u64 <= room {
+        writer.write_all(&lines)?;
+    }
+    Ok(())
 }
 
 /// The number of bytes.

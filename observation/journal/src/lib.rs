@@ -4,8 +4,10 @@
 //! viewer shows all of them.
 
 mod alarm_fold;
-mod checkpoint;
 mod clock;
+mod continuation;
+mod cycles;
+mod in_effect;
 mod journal;
 mod kept;
 mod leftovers;
@@ -21,11 +23,14 @@ mod rules;
 mod run_directory;
 mod segments;
 mod source;
+mod tally;
 mod version;
 mod writer;
 
 pub use alarm_fold::{AlarmChange, AlarmFold, AlarmTransition};
 pub use clock::monotonic_ns;
+pub use continuation::{Continuation, ProgramSoFar};
+pub use cycles::Cycles;
 pub use journal::{JOURNAL_LIMIT_BYTES, Journal, JournalError, JournalState, records, records_of};
 pub use kept::{KeptError, keep_cluster, kept_cluster};
 pub use members::{Members, NamedSignal};
@@ -38,12 +43,13 @@ pub use operator::{
     force_value, new_write, write_answer,
 };
 pub use packed_file::SegmentFile;
-pub use place::{Place, place_before};
+pub use place::{CheckpointPlace, Place, continuation_before, place_before};
 pub use record::{Happening, LABORATORY, Record, RunEvent, moment};
 pub use rules::{Process, SourceCounts, is_blocked, is_provable};
 pub use run_directory::{KEYS, RunDirectory, RunDirectoryError, time_name, time_text};
 pub use segments::{Segments, closed_segments, segments_of};
 pub use source::{SOURCES, source_word};
+pub use tally::{Deadlines, Tally};
 pub use understudy_bus::JOURNAL_VERSION;
 pub use understudy_simulator::Action;
 pub use version::{WrongVersion, check_header, check_journal, check_version, journal_header};

@@ -7,10 +7,12 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
 use understudy_wire::{Epoch, Moment, ProgramId};
 
 /// Gives numbers to moments.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(from = "Written", into = "Written")]
 pub struct Numbering {
     /// For each epoch: what has to be added to its cycles.
     offsets: BTreeMap<Epoch, i64>,
@@ -19,7 +21,7 @@ pub struct Numbering {
     remote_ios: BTreeMap<ProgramId, Last>,
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 struct Last {
     moment: Moment,
     number: i64,
@@ -27,7 +29,58 @@ struct Last {
     idle: i64,
 }
 
+/// The same as it is written: JSON has no numbers as keys.
+#[derive(Serialize, Deserialize)]
+struct Written {
+    epochs: Vec<(Epoch, i64)>,
+    newest: Option<(Moment, i64)>,
+    remote_ios: Vec<(ProgramId, Last)>,
+}
+
+impl From<Numbering> for Written {
+    fn from(numbering: Numbering) -> Self {
+        Self {
+            epochs: numbering.offsets.into_iter().collect(),
+            newest: numbering.newest,
+            remote_ios: numbering.remote_ios.into_iter().collect(),
+        }
+    }
+}
+
+impl From<Written> for Numbering {
+    fn from(written: Written) -> Self {
+        let epochs = written.epochs.into_iter();
+        let remote_ios = written.remote_ios.into_iter().map(|(program, last)| {
+            let last = Last {
+                number: bounded(last.number),
+                idle: bounded(last.idle).max(0),
+                ..last
+            };
+            (program, last)
+        });
+        Self {
+            offsets: epochs
+                .map(|(epoch, offset)| (epoch, bounded(offset)))
+                .collect(),
+            newest: written
+                .newest
+                .map(|(moment, number)| (moment, bounded(number))),
+            remote_ios: remote_ios.collect(),
+        }
+    }
+}
+
 impl Numbering {
+    /// One in which `moment` has the number `number`, and nothing is known of what was before.
+    pub(crate) fn at(moment: Moment, number: i64) -> Self {
+        let number = bounded(number);
+        Self {
+            offsets: BTreeMap::from([(moment.epoch, number - cycle(moment))]),
+            newest: Some((moment, number)),
+            remote_ios: BTreeMap::new(),
+        }
+    }
+
     /// The number of a deadline that a remote I/O reports. `idle` says that no cycle was started for it.
     pub fn deadline(&mut self, remote_io: ProgramId, moment: Moment, idle: bool) -> i64 {
         if idle
@@ -55,10 +108,11 @@ impl Numbering {
 
     /// The last number that was given.
     pub fn latest(&self) -> Option<i64> {
-        self.remote_ios
-            .values()
+        let lasts = self.remote_ios.values();
+        lasts
             .map(|last| last.number.saturating_add(last.idle))
             .max()
+            .or_else(|| Some(self.newest?.1))
     }
 
     /// Whether every remote I/O that was ever there has told of a later deadline.
@@ -114,6 +168,11 @@ impl Numbering {
 
 /// No cluster lives for so long; what says so is a journal that somebody has changed.
 const MAXIMUM: i64 = i64::MAX / 4;
+
+/// The same of a number that was read.
+fn bounded(number: i64) -> i64 {
+    number.clamp(-MAXIMUM, MAXIMUM)
+}
 
 fn cycle(moment: Moment) -> i64 {
     i64::try_from(moment.cycle.0).map_or(MAXIMUM, |cycle| cycle.min(MAXIMUM))

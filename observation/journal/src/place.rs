@@ -1,4 +1,4 @@
-//! Finds a cycle in a journal by its checkpoints, without reading it from the beginning.
+//! Finds a cycle in a journal by its checkpoints and continuations, without reading it from the beginning.
 
 use std::io::{self, BufRead as _, BufReader, Read as _};
 use std::path::{Path, PathBuf};
@@ -21,17 +21,76 @@ pub struct Place {
     pub is_closed: bool,
     /// Which of its pieces; each begins with a line.
     pub piece: usize,
+}
+
+/// A place with a checkpoint.
+#[derive(Debug)]
+pub struct CheckpointPlace {
+    /// Where.
+    pub place: Place,
     /// A moment of the first checkpoint in it.
     pub moment: Moment,
     /// The cycle of the run that this is.
     pub cycle: i64,
 }
 
+impl Place {
+    /// Nothing where the header of the segment cannot be read.
+    fn of(mut file: SegmentFile, piece: usize, is_closed: bool) -> io::Result<Option<Self>> {
+        let mut header = Vec::new();
+        file.go_to(0)?;
+        BufReader::new((&mut file).take(LONGEST_HEADER)).read_until(b'\n', &mut header)?;
+        Ok(check_header(&header).ok().map(|promised| Self {
+            file,
+            promised,
+            is_closed,
+            piece,
+        }))
+    }
+}
+
+/// The last segment that continues the run after a cycle that is not after `cycle`, but none of the `newest` newest; nothing where there is none,
+/// as in journals of version 2 and in short ones.
+///
+/// # Errors
+/// What the system says.
+pub fn continuation_before(path: &Path, cycle: i64, newest: usize) -> io::Result<Option<Place>> {
+    let mut segments = segments_of(path)?;
+    segments.truncate(segments.len().saturating_sub(newest));
+    let end = segments.partition_point(|segment| {
+        let found = SegmentFile::open(segment).ok().and_then(continued_after);
+        found.is_none_or(|found| found <= cycle)
+    });
+    let Some(segment) = segments[..end].last() else {
+        return Ok(None);
+    };
+    let file = SegmentFile::open(segment)?;
+    if SegmentFile::open(segment)
+        .ok()
+        .and_then(continued_after)
+        .is_none()
+    {
+        return Ok(None);
+    }
+    Place::of(file, 0, segment != path)
+}
+
+/// The newest cycle before a segment, where its second record says it.
+fn continued_after(file: SegmentFile) -> Option<i64> {
+    let mut lines = BufReader::new(file).lines();
+    check_header(lines.next()?.ok()?.as_bytes()).ok()?;
+    let line = lines.next()?.ok()?;
+    match serde_json::from_str::<Record>(&line).ok()?.event {
+        Happening::Run(RunEvent::Continues(from)) => Some(from.cycle),
+        _ => None,
+    }
+}
+
 /// The last place of a journal whose checkpoint is of `cycle` or before; nothing where there is none, as in journals of version 2.
 ///
 /// # Errors
 /// What the system says.
-pub fn place_before(path: &Path, cycle: i64) -> io::Result<Option<Place>> {
+pub fn place_before(path: &Path, cycle: i64) -> io::Result<Option<CheckpointPlace>> {
     let segments = segments_of(path)?;
     // The first segments of a run may have none, and the newest has none yet.
     let is_before = |segment: &PathBuf| {
@@ -44,14 +103,9 @@ pub fn place_before(path: &Path, cycle: i64) -> io::Result<Option<Place>> {
         let Some((piece, (moment, cycle))) = piece_before(&mut file, cycle) else {
             continue;
         };
-        let mut header = Vec::new();
-        file.go_to(0)?;
-        BufReader::new((&mut file).take(LONGEST_HEADER)).read_until(b'\n', &mut header)?;
-        return Ok(check_header(&header).ok().map(|promised| Place {
-            is_closed: segment != path,
-            file,
-            promised,
-            piece,
+        let place = Place::of(file, piece, segment != path)?;
+        return Ok(place.map(|place| CheckpointPlace {
+            place,
             moment,
             cycle,
         }));

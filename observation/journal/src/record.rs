@@ -4,11 +4,13 @@
 
 use serde::de::{self, DeserializeOwned};
 use serde::{Deserialize, Deserializer, Serialize};
+use serde_json::Value;
 use serde_json::value::RawValue;
 use understudy_bus::HostEvent;
 use understudy_simulator::Action;
 use understudy_wire::{Member, Moment};
 
+use crate::continuation::Continuation;
 use crate::members::Members;
 use crate::operator::{Acknowledgement, Command, Shelving, Unshelving};
 
@@ -59,6 +61,16 @@ pub enum RunEvent {
         moment: Moment,
         /// Which cycle of the run it is.
         cycle: i64,
+    },
+    /// The second record of a file that continues a run, since version 3: what the files before have counted.
+    Continues(Box<Continuation>),
+    /// A record of a file before that is still in effect. They follow [`Self::Continues`], oldest first.
+    InEffect {
+        /// The cycle of the run that it belongs to.
+        cycle: i64,
+        /// The record.
+        #[serde(deserialize_with = "of_value")]
+        record: Box<Record>,
     },
     /// A member was started, for the first time or again.
     Started {
@@ -232,6 +244,17 @@ impl<'de> Deserialize<'de> for Record {
             member: line.member,
             event,
         })
+    }
+}
+
+/// A record within a record: the outer one is buffered, and [`RawValue`] cannot be taken from there.
+fn of_value<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Box<Record>, D::Error> {
+    let value = Value::deserialize(deserializer)?;
+    let record: Record = serde_json::from_str(&value.to_string()).map_err(de::Error::custom)?;
+    // One within it would be written by nobody, and nested without end by somebody.
+    match record.event {
+        Happening::Run(RunEvent::InEffect { .. }) => Err(de::Error::custom("nested")),
+        _ => Ok(Box::new(record)),
     }
 }
 

@@ -67,7 +67,7 @@ pub fn is_blocked(missing: Missing) -> bool {
 }
 
 /// Deadlines of a program by the source of the applied outputs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct SourceCounts {
     /// Outputs received from the controller.
     pub direct: u64,
@@ -82,7 +82,8 @@ pub struct SourceCounts {
 impl SourceCounts {
     /// Counts deadlines with this source.
     pub fn add(&mut self, source: Source, deadlines: u64) {
-        *self.of_mut(source) += deadlines;
+        let count = self.of_mut(source);
+        *count = count.saturating_add(deadlines);
     }
 
     /// The deadlines with this source.

@@ -87,6 +87,15 @@ impl Segments {
         self.at_line_start && self.written >= self.segment_bytes
     }
 
+    /// Bytes of what the next segment begins with before its first line, at most; 0 where the next line goes into this segment.
+    pub(crate) fn room_to_continue(&self) -> u64 {
+        if self.is_full() {
+            self.segment_bytes / 4
+        } else {
+            0
+        }
+    }
+
     fn rotate(&mut self) -> io::Result<()> {
         self.writer.flush()?;
         let closed = closed_path(&self.path, self.number);

@@ -141,6 +141,8 @@ pub(crate) struct Alarms {
     count: u64,
     /// The time of the record that is taken.
     pub(crate) now_ns: u64,
+    /// Alarms of cycles up to this one may have been raised before: the journal was not read from its first record.
+    pub(crate) found_until: Option<i64>,
 }
 
 impl Alarms {
@@ -164,7 +166,7 @@ impl Alarms {
             alarm.repeated_in = Some(cycle);
         }
         self.raise_alarm(subject, cycle, declared.text.clone(), |alarm| {
-            alarm.since_before = since_before;
+            alarm.since_before |= since_before;
             alarm.priority = Some(declared.priority);
             alarm.action.clone_from(&declared.action);
         });
@@ -199,7 +201,7 @@ impl Alarms {
             raised_ns: self.now_ns,
             acknowledged_by: None,
             acknowledged_in: None,
-            since_before: false,
+            since_before: self.found_until.is_some_and(|until| cycle <= until),
             repeated_in: None,
             priority: None,
             action: None,

@@ -86,7 +86,15 @@ pub(crate) fn describe(record: &Record, names: &Members, writes: &Writes) -> Des
         text,
         is_ordinary: matches!(
             event,
-            "published" | "holds" | "sampled" | "applied" | "stepped" | "checkpoint" | "wall-clock"
+            "published"
+                | "holds"
+                | "sampled"
+                | "applied"
+                | "stepped"
+                | "checkpoint"
+                | "continues"
+                | "in-effect"
+                | "wall-clock"
         ),
     }
 }

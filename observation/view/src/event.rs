@@ -79,6 +79,11 @@ impl Events {
         self.kept.push_back(event);
     }
 
+    /// Forgets all.
+    pub(crate) fn clear(&mut self) {
+        *self = Self::new(self.most);
+    }
+
     pub(crate) fn shift(&mut self, by: i64) {
         self.kept
             .iter_mut()

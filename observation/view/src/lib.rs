@@ -12,13 +12,13 @@
 //! in its report; those before it are negative.
 
 mod alarm;
-mod cycles;
 mod describe;
 mod diff;
 mod error;
 mod event;
 mod event_list;
 mod film;
+mod following;
 mod history;
 mod listing;
 mod margin;
@@ -46,6 +46,7 @@ pub use error::ViewError;
 pub use event::{Event, Level};
 pub use event_list::{EventFilter, EventList, EventRow};
 pub use film::{Film, Scene};
+pub use following::Following;
 pub use history::{Driven, History, Sampled, Step};
 pub use listing::{Filter, JournalLine, Listing};
 pub use margin::{Holders, Loss, Margin, Outcome};

@@ -6,12 +6,11 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_cluster::{AlarmDeclaration, Cluster};
-use understudy_journal::{AlarmFold, Happening, Members, Record, RunEvent, moment};
+use understudy_journal::{AlarmFold, Cycles, Happening, Members, Record, RunEvent, moment};
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_text::spelling::suggestion;
 use understudy_wire::{Member, Moment, ProgramId, Source};
 
-use crate::cycles::Cycles;
 use crate::describe::{PROGRAM_FAULT, Writes, alarm_event, describe, event_names};
 use crate::error::ViewError;
 use crate::event::Level;
@@ -120,8 +119,13 @@ impl Listing {
         })
     }
 
-    /// `moment` is cycle `cycle` of the run.
+    /// The records before are not read: `moment` is cycle `cycle` of the run.
     pub(crate) fn begins_at(&mut self, moment: Moment, cycle: i64) {
+        self.cycles = Cycles::at(moment, cycle);
+    }
+
+    /// `moment` is cycle `cycle` of the run.
+    pub(crate) fn origin_is(&mut self, moment: Moment, cycle: i64) {
         self.cycles.origin_is(moment, cycle);
     }
 
@@ -143,6 +147,11 @@ impl Listing {
 
     /// Takes the next record; answers with it in words and with the alarms that it changes, as far as they are wanted.
     pub fn take(&mut self, record: &Record) -> Vec<JournalLine> {
+        if let Happening::Run(RunEvent::Continues(from)) = &record.event
+            && self.cycles.latest().is_none()
+        {
+            self.cycles = Cycles::continuing(from.numbering.clone(), from.origin);
+        }
         let cycle = self.cycle_of(record);
         if let Some(shift) = self.cycles.take_shift() {
             self.alarms.shift(shift);

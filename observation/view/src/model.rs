@@ -5,24 +5,23 @@ mod changes;
 mod counters;
 mod cycle;
 mod members;
+mod past;
 mod process_alarms;
 mod programs;
 mod protection;
 mod run_events;
 mod standing;
-mod tally;
 mod turns;
 
 use std::sync::{Arc, OnceLock};
 
 use understudy_cluster::Cluster;
-use understudy_journal::{Happening, Members, Record, RunEvent};
+use understudy_journal::{Cycles, Happening, Members, Record};
 use understudy_ladder::Observer;
 use understudy_typed::Interpreter;
 use understudy_wire::{Member, Moment, ProgramId};
 
 use crate::alarm::Alarms;
-use crate::cycles::Cycles;
 use crate::describe::{Writes, describe};
 use crate::event::{Event, Events, Level};
 use crate::history::History;
@@ -92,6 +91,9 @@ pub struct Model {
     pub(crate) finished: bool,
     pub(crate) interrupted: bool,
     last_margin: LastMargin,
+    read_from: Option<i64>,
+    /// The records that are in effect follow.
+    continues: bool,
 }
 
 impl Model {
@@ -125,14 +127,15 @@ impl Model {
             finished: false,
             interrupted: false,
             last_margin: LastMargin::default(),
+            read_from: None,
+            continues: false,
             cluster,
         }
     }
 
     /// Takes the next record.
     pub fn note(&mut self, record: &Record) {
-        if matches!(record.event, Happening::Run(RunEvent::Checkpoint { .. })) {
-            // It belongs to the journal and to no moment of the run.
+        if self.is_of_journal(record) {
             return;
         }
         self.records += 1;
@@ -140,6 +143,13 @@ impl Model {
         self.at_ns = record.at_ns;
         self.alarms.now_ns = record.at_ns;
         self.counters.note(record);
+        self.take(record);
+        if let Some(shift) = self.cycles.take_shift() {
+            self.shift(shift);
+        }
+    }
+
+    fn take(&mut self, record: &Record) {
         match (&record.event, record.member) {
             (Happening::Station(event), Some(Member::Station(station))) => {
                 self.station(record, station, event);
@@ -154,8 +164,13 @@ impl Model {
             (Happening::Run(event), _) => self.run(record, event),
             _ => {}
         }
-        if let Some(shift) = self.cycles.take_shift() {
-            self.shift(shift);
+    }
+
+    /// Takes what a source has found.
+    pub fn take_found(&mut self, found: Result<Record, Trouble>) {
+        match found {
+            Ok(record) => self.note(&record),
+            Err(trouble) => self.trouble(&trouble),
         }
     }
 
@@ -179,12 +194,6 @@ impl Model {
             cause: None,
         };
         self.events.push(event);
-    }
-
-    /// The records before are not read: `moment` is cycle `cycle` of the run, and nothing is known of what was before.
-    pub(crate) fn begins_at(&mut self, moment: Moment, cycle: i64) {
-        self.origin_is(moment, cycle);
-        self.histories.iter_mut().for_each(History::misses_records);
     }
 
     /// Whether an answer needed more than is known.

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use serde_json::Value;
 use understudy_cluster::Cluster;
 use understudy_journal::{
-    Commander, JournalError, Writing, check_journal, kept_cluster, place_before, segments_of,
-    writing,
+    Commander, JournalError, Writing, check_journal, continuation_before, kept_cluster,
+    place_before, segments_of, writing,
 };
 use understudy_node::STATES_EVERY;
 use understudy_wire::{Cycle, Epoch, Moment};
@@ -180,6 +180,24 @@ impl Run {
         Source::following(&self.path.join(JOURNAL))
     }
 
+    /// Its newest records, also those that are still to be written, in a long run: a model of them knows the present when it has taken some
+    /// megabytes, and says from which cycle on it knows all. Nothing in a run that is not longer than that.
+    pub fn follow_newest(&self) -> Option<Source> {
+        self.follow_segment(i64::MAX, NEWEST)
+    }
+
+    /// Its records from some seconds before a cycle on, so that the states of the programs are known in it; nothing where that is near the first
+    /// record.
+    pub fn follow_from(&self, cycle: i64) -> Option<Source> {
+        self.follow_segment(cycle.saturating_sub(self.unknown_at_first()), 0)
+    }
+
+    fn follow_segment(&self, cycle: i64, newest: usize) -> Option<Source> {
+        let journal = self.path.join(JOURNAL);
+        let place = continuation_before(&journal, cycle, newest).ok()??;
+        Source::following_from(&journal, place).ok()
+    }
+
     /// A model that knows nothing yet of it but where its cycles are counted from.
     pub fn model(&self, bounds: Bounds) -> Model {
         let mut model = Model::new(Arc::clone(&self.cluster), bounds);
@@ -204,6 +222,15 @@ impl Run {
     /// [`ViewError::Journal`].
     pub fn read_until(&self, bounds: Bounds, cycle: i64) -> Result<Model, ViewError> {
         self.read_from(bounds, None, cycle)
+    }
+
+    /// A model of what its journal says of some cycles: their states are known, and nothing of what happened before them.
+    ///
+    /// # Errors
+    /// [`ViewError::Journal`].
+    pub fn read_between(&self, bounds: Bounds, from: i64, to: i64) -> Result<Model, ViewError> {
+        let source = self.follow_from(from).unwrap_or_else(|| self.follow());
+        self.read_source(self.model(bounds), source, to)
     }
 
     /// Why a signal had its value in a cycle, or has it in the newest one. It reads as much of the journal as the answer needs.
@@ -247,20 +274,27 @@ impl Run {
         cycle: i64,
     ) -> Result<Model, ViewError> {
         let mut model = self.model(bounds);
-        let mut source = match begun {
+        let source = match begun {
             Some(begun) => {
                 model.begins_at(begun.moment, begun.cycle);
                 begun.source
             }
             None => self.follow(),
         };
+        self.read_source(model, source, cycle)
+    }
+
+    /// Takes the records of a source up to a few cycles behind `cycle`.
+    fn read_source(
+        &self,
+        mut model: Model,
+        mut source: Source,
+        cycle: i64,
+    ) -> Result<Model, ViewError> {
         let mut any = false;
         let is_finished = self.is_finished();
         loop {
-            let taken = source.poll(&mut |found| match found {
-                Ok(record) => model.note(&record),
-                Err(trouble) => model.trouble(&trouble),
-            });
+            let taken = source.poll(&mut |found| model.take_found(found));
             any |= taken > 0;
             let past = model.has_origin()
                 && model
@@ -297,7 +331,7 @@ impl Run {
             return Ok((listing, found.source));
         }
         if let Some(moment) = self.origin_of_summary() {
-            listing.begins_at(moment, 0);
+            listing.origin_is(moment, 0);
         }
         let mut source = self.follow();
         while !listing.has_origin() {
@@ -316,13 +350,12 @@ impl Run {
     /// The records from a checkpoint on that is not after `cycle`.
     fn source_before(&self, cycle: i64) -> Option<Begun> {
         let journal = self.path.join(JOURNAL);
-        let place = place_before(&journal, cycle).ok().flatten()?;
-        let (moment, cycle) = (place.moment, place.cycle);
-        let source = Source::following_from(&journal, place).ok()?;
+        let found = place_before(&journal, cycle).ok().flatten()?;
+        let source = Source::following_from(&journal, found.place).ok()?;
         Some(Begun {
             source,
-            moment,
-            cycle,
+            moment: found.moment,
+            cycle: found.cycle,
         })
     }
 
@@ -349,6 +382,9 @@ struct Begun {
 
 /// Most causes of a value are in so many cycles before it.
 const NEAR: i64 = 1024;
+
+/// Segments of the present: the one that is written has few records when it is new.
+const NEWEST: usize = 1;
 
 /// Lines of different members may be a few cycles apart.
 const BEHIND: i64 = 64;

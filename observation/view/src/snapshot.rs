@@ -81,6 +81,9 @@ pub struct Snapshot {
     pub process_alarms: Vec<ProcessAlarm>,
     /// Events so far; the number of the newest.
     pub events: u64,
+    /// The first cycle whose records were read: events, trends, counters and some alarms of before are missing. Nothing where the journal was
+    /// read from its first record.
+    pub read_from: Option<i64>,
     /// Records read so far.
     pub records: u64,
     /// Records that were gone or could not be read, at least.

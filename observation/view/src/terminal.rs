@@ -73,6 +73,8 @@ pub struct Screen {
     help: bool,
     /// Age of the newest record, where a live run has not written one lately.
     age: Option<Duration>,
+    /// How much of the journal is read while its past is not, in percent.
+    past: Option<u8>,
 }
 
 const PAGE: usize = 10;
@@ -112,12 +114,14 @@ impl Screen {
         Vec::new()
     }
 
-    /// Draws the present; while the journal is being read, only its progress. A paused screen does not change.
+    /// Draws the present; while the journal is being read, only its progress. `past` says how much of the journal is read while its past is not. A
+    /// paused screen does not change.
     pub fn draw_live(
         &mut self,
         frame: &mut Frame<'_>,
         model: &Model,
         progress: Progress,
+        past: Option<u8>,
         now: Instant,
     ) {
         if !self.paused
@@ -129,6 +133,7 @@ impl Screen {
         }
         let age = progress.age(now).filter(|age| *age > BEHIND);
         self.age = age.filter(|_| !model.is_finished());
+        self.past = past;
         self.draw(frame, model);
     }
 
@@ -189,7 +194,10 @@ impl Screen {
         let age = self.age.map_or(String::new(), |age| {
             format!("  NO RECORD FOR {} s", age.as_secs())
         });
-        let right = format!("{run}  cycle {cycle}{age}{left_out}  h help  q quit ");
+        let past = self.past.map_or(String::new(), |percent| {
+            format!("  reading the past: {percent} %")
+        });
+        let right = format!("{run}  cycle {cycle}{past}{age}{left_out}  h help  q quit ");
         let gap = usize::from(width).saturating_sub(left.chars().count() + right.chars().count());
         let text = format!("{left}{}{right}", " ".repeat(gap.max(1)));
         Line::styled(text, Style::new().add_modifier(Modifier::REVERSED))

@@ -107,7 +107,8 @@ function again() {
 
 export function show(state, live) {
   alarms.show(state);
-  const now = live ? `${state.event_count}` : `until ${state.cycle}`;
+  const from = state.past?.from ?? "the first";
+  const now = live ? `${state.event_count} from ${from}` : `until ${state.cycle} from ${from}`;
   if (now === asked) {
     return;
   }

@@ -75,6 +75,14 @@ function head(state, live) {
   setText(button, open === 1 ? "⚠ 1 alarm" : `⚠ ${open} alarms`);
 }
 
+// A long journal is begun near its end; what is before comes behind it.
+function showPast({ past }) {
+  const place = document.getElementById("past");
+  place.hidden = !past;
+  const words = past && `Events, trends, counts of late wake-ups and alarms before cycle ${past.from} are being read: ${past.percent} %`;
+  setText(place, words ?? "");
+}
+
 // The scenario of a demo is over, and its cluster stays up: what a visitor can do now.
 function scenarioOver(state, run) {
   const place = document.getElementById("scenario-over");
@@ -131,6 +139,7 @@ async function begin() {
   document.getElementById("alarm-count").addEventListener("click", () => (location.hash = "events"));
   time.onState((state, live) => {
     head(state, live);
+    showPast(state);
     scenarioOver(state, run);
     VIEWS[current].show(state, live);
     why.show();

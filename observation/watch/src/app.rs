@@ -104,7 +104,8 @@ impl App {
             return Ok(Arc::clone(known));
         }
         let run = Run::open(&self.run).map_err(|error| Problem::of_view(&error))?;
-        let known = Arc::new(Known::of_journal(&run, cycle));
+        let known = Known::of_journal(&run, cycle).map_err(|error| Problem::of_view(&error))?;
+        let known = Arc::new(known);
         if !remembers(&known) {
             return Err(not_remembered(cycle));
         }

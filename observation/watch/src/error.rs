@@ -121,6 +121,8 @@ problems! {
     forbidden FORBIDDEN "U0684";
     /// The request comes from another page.
     foreign FORBIDDEN "U0685";
+    /// The journal is being read.
+    reading SERVICE_UNAVAILABLE "U0688";
     /// Login required.
     log_in UNAUTHORIZED "U0686";
     /// Too many requests at once.
@@ -130,8 +132,7 @@ problems! {
 impl From<Reading> for Problem {
     /// What is known so far is the past.
     fn from(reading: Reading) -> Self {
-        let words = reading.to_string();
-        Self::new(StatusCode::SERVICE_UNAVAILABLE, Reading::CODE, words)
+        Self::reading(reading.to_string())
     }
 }
 

@@ -42,7 +42,7 @@ pub(crate) fn follow(
     newest: &watch::Sender<Newest>,
     ends: &watch::Receiver<bool>,
 ) {
-    let (run, mut source) = loop {
+    let (run, mut following) = loop {
         if *ends.borrow() {
             return;
         }
@@ -50,8 +50,8 @@ pub(crate) fn follow(
             // The cluster is written before the journal begins.
             Ok(_) if !has_journal(path) => {}
             Ok(run) => {
-                let source = lock(model, |model| model.begin(&run));
-                break (run, source);
+                let following = lock(model, |model| model.begin(&run));
+                break (run, following);
             }
             Err(error) => lock(model, |model| model.waits_for = error.words()),
         }
@@ -63,11 +63,18 @@ pub(crate) fn follow(
     while !*ends.borrow() {
         // Records are read before the model is locked, so that no request waits for a disk.
         let mut found = Vec::new();
-        let taken = source.poll(&mut |record| found.push(record));
+        let taken = following.poll(&mut |record| found.push(record));
         lock(model, |model| {
             found.into_iter().for_each(|found| model.note(found))
         });
         unsaid |= taken > 0;
+        let reads_past = following.past_percent();
+        if reads_past.is_some() {
+            let whole = following.read_past();
+            let percent = following.past_percent();
+            unsaid |= reads_past != percent;
+            lock(model, |model| model.past_is_read(whole, percent));
+        }
         // A simulated run has no last record; it has results when it is over.
         if taken == 0 && !ended && run.is_finished() {
             ended = true;
@@ -76,7 +83,7 @@ pub(crate) fn follow(
         }
         let progress = lock(model, |model| {
             let has_ended = model.known().is_some_and(Known::has_ended);
-            model.progress = source.progress().of_ended(has_ended);
+            model.progress = following.progress().of_ended(has_ended);
             model.progress
         });
         let now = Instant::now();
@@ -97,7 +104,7 @@ pub(crate) fn follow(
                 false
             });
         }
-        if taken == 0 {
+        if taken == 0 && reads_past.is_none() {
             std::thread::sleep(LOOK);
         }
     }

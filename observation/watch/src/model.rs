@@ -5,7 +5,9 @@ use std::time::Instant;
 
 use understudy_cluster::Cluster;
 use understudy_journal::Record;
-use understudy_view::{Bounds, Model as RunModel, Progress, Reading, Run, Source, Trouble};
+use understudy_view::{
+    Bounds, Following, Model as RunModel, Progress, Reading, Run, Trouble, ViewError,
+};
 use understudy_wire::Member;
 
 /// The run that the page follows.
@@ -25,6 +27,8 @@ pub(crate) struct Known {
     pub(crate) run: RunModel,
     /// The run is over, and its journal was read to the end.
     ended: bool,
+    /// How much of the journal is read while its past is not, in percent.
+    pub(crate) past_percent: Option<u8>,
 }
 
 impl Model {
@@ -57,15 +61,30 @@ impl Model {
         Ok(self.known.as_ref())
     }
 
-    /// The run has started: its records are read from the returned source.
-    pub(crate) fn begin(&mut self, run: &Run) -> Source {
-        self.known = Some(Known::nothing_of(run, false));
-        run.follow()
+    /// The run has started: its records are read by the returned reader.
+    pub(crate) fn begin(&mut self, run: &Run) -> Following {
+        let (run, following) = Following::of(run, Bounds::default());
+        self.known = Some(Known {
+            run,
+            ended: false,
+            past_percent: following.past_percent(),
+        });
+        following
     }
 
     pub(crate) fn note(&mut self, found: Result<Record, Trouble>) {
         if let Some(known) = &mut self.known {
-            known.note(found);
+            known.run.take_found(found);
+        }
+    }
+
+    /// A piece of the past was read: all of it where there is the model that has read everything.
+    pub(crate) fn past_is_read(&mut self, whole: Option<RunModel>, percent: Option<u8>) {
+        if let Some(known) = &mut self.known {
+            known.past_percent = percent;
+            if let Some(whole) = whole {
+                known.run = whole;
+            }
         }
     }
 
@@ -87,32 +106,21 @@ impl Model {
 }
 
 impl Known {
-    /// Before the first record.
-    fn nothing_of(run: &Run, ended: bool) -> Self {
-        Self {
-            run: run.model(Bounds::default()),
-            ended,
-        }
+    /// What a journal says of a cycle that is not the newest.
+    ///
+    /// # Errors
+    /// [`ViewError`].
+    pub(crate) fn of_journal(run: &Run, cycle: i64) -> Result<Self, ViewError> {
+        Ok(Self {
+            run: run.read_between(Bounds::default(), cycle, cycle)?,
+            ended: run.is_finished(),
+            past_percent: None,
+        })
     }
 
-    /// All that a journal holds up to a cycle.
-    pub(crate) fn of_journal(run: &Run, until: i64) -> Self {
-        let mut known = Self::nothing_of(run, run.is_finished());
-        let mut source = run.follow();
-        while source.poll(&mut |found| known.note(found)) > 0 {
-            let past = known.run.newest().is_some_and(|newest| newest > until);
-            if past && known.run.has_origin() {
-                break;
-            }
-        }
-        known
-    }
-
-    fn note(&mut self, found: Result<Record, Trouble>) {
-        match found {
-            Ok(record) => self.run.note(&record),
-            Err(trouble) => self.run.trouble(&trouble),
-        }
+    /// The first cycle whose records were read, while what is before is read.
+    pub(crate) fn past(&self) -> Option<(i64, u8)> {
+        self.run.read_from().zip(self.past_percent)
     }
 
     pub(crate) fn has_ended(&self) -> bool {

@@ -16,7 +16,7 @@ use understudy_view::{
 use understudy_wire::{Force, Member, ProgramId, SignalPlace, StationId};
 
 use self::members::{ShownMember, members};
-use crate::model::Model;
+use crate::model::{Known, Model};
 
 /// Failures that are listed, at most.
 const LISTED_FAILURES: usize = 40;
@@ -33,6 +33,8 @@ pub(crate) struct State {
     oldest: i64,
     newest: i64,
     finished: bool,
+    /// What is missing while the past of a long journal is being read.
+    past: Option<Past>,
     /// What the scenario came to, where it is over and the cluster stays up.
     scenario_over: Option<String>,
     cycle_master: Option<String>,
@@ -45,6 +47,14 @@ pub(crate) struct State {
     alarms: Vec<ShownAlarm>,
     process_alarms: Vec<ProcessAlarm>,
     event_count: u64,
+}
+
+/// Events, trends, counters and some alarms of the cycles before `from` are not read yet.
+#[derive(Debug, Serialize)]
+struct Past {
+    from: i64,
+    /// How much of the journal is read.
+    percent: u8,
 }
 
 #[derive(Debug, Serialize)]
@@ -171,7 +181,8 @@ pub(crate) fn newest_state(model: &Model) -> String {
     let mut state = model
         .known()
         .and_then(|known| state(&known.run, known.run.newest()?, known.has_ended()));
-    if let Some(state) = &mut state {
+    if let (Some(state), Some(known)) = (&mut state, model.known()) {
+        state.past_is(known);
         let age = model.progress.age(Instant::now()).unwrap_or_default();
         state.age_ms = u64::try_from(age.as_millis()).unwrap_or(u64::MAX);
     }
@@ -184,15 +195,30 @@ pub fn page_state(run: &RunModel, cycle: i64) -> serde_json::Value {
     serde_json::to_value(state).unwrap_or_default()
 }
 
+impl State {
+    /// The alarms and events are those of a model that has read more than the one of this cycle.
+    pub(crate) fn alarms_are(&mut self, known: &Known) {
+        let (open, process) = known.run.open_alarms_at(self.cycle);
+        self.open_alarms = open.len();
+        self.alarms = shown_alarms(&known.run, self.cycle);
+        self.process_alarms = process;
+        self.event_count = known.run.event_count();
+        self.past_is(known);
+    }
+
+    /// What this model has not read.
+    pub(crate) fn past_is(&mut self, known: &Known) {
+        self.past = known.past().map(|(from, percent)| Past { from, percent });
+    }
+}
+
 /// The state of a cycle; nothing where it is not remembered.
 pub(crate) fn state(run: &RunModel, cycle: i64, finished: bool) -> Option<State> {
     let snapshot = run.snapshot_at(cycle)?;
     let (oldest, newest) = (run.oldest()?, run.newest()?);
     let programs = snapshot.programs.iter().enumerate();
-    let alarms = run.alarms_at(cycle).rev();
-    let alarms = alarms.filter(|alarm| alarm.repeated_in.is_none());
-    let alarms = alarms.take(LISTED_ALARMS);
     Some(State {
+        past: None,
         age_ms: 0,
         cycle,
         oldest,
@@ -205,7 +231,7 @@ pub(crate) fn state(run: &RunModel, cycle: i64, finished: bool) -> Option<State>
         timing: timing(run, &snapshot),
         redundancy: redundancy(&snapshot),
         open_alarms: snapshot.alarms.len(),
-        alarms: alarms.map(shown_alarm).collect(),
+        alarms: shown_alarms(run, cycle),
         process_alarms: snapshot.process_alarms,
         event_count: snapshot.events,
         cycle_master: snapshot.cycle_master,
@@ -400,6 +426,13 @@ fn failure(outcome: &OutcomeSnapshot) -> Failure {
         masked: outcome.masked,
         why: outcome.why.clone(),
     }
+}
+
+/// The newest alarms up to a cycle, newest first.
+fn shown_alarms(run: &RunModel, cycle: i64) -> Vec<ShownAlarm> {
+    let alarms = run.alarms_at(cycle).rev();
+    let alarms = alarms.filter(|alarm| alarm.repeated_in.is_none());
+    alarms.take(LISTED_ALARMS).map(shown_alarm).collect()
 }
 
 fn shown_alarm(alarm: Alarm) -> ShownAlarm {

@@ -213,6 +213,8 @@ impl Account {
             }
             RunEvent::Journal { .. }
             | RunEvent::Checkpoint { .. }
+            | RunEvent::Continues(_)
+            | RunEvent::InEffect { .. }
             | RunEvent::Started { .. }
             | RunEvent::Origin { .. }
             | RunEvent::Acknowledged(_)

@@ -60,6 +60,8 @@ fn seconds_of(step_ns: i64) -> String {
 descriptions! { run: RunEvent, members: Members;
     Journal { version, .. } => "journal" Info format!("the journal has version {version}");
     Checkpoint { cycle, .. } => "checkpoint" Info format!("cycle {cycle} of the run");
+    Continues(from) => "continues" Info format!("the journal goes on after cycle {}", from.cycle);
+    InEffect { record, .. } => "in-effect" Info format!("of {}, from before", record.name);
     Started { member } => "started" Notice format!("{} is started", members.name(*member));
     Fault { action, member, .. } => "fault" Notice fault_text(*action, *member, members);
     Commanded { member, command, owner, reason, refused } => "commanded" Notice {

@@ -11,6 +11,10 @@ use crate::process_alarm::Shelved;
 impl Model {
     /// Evaluates the alarms on signals with a record of a cycle.
     pub(super) fn fold_process_alarms(&mut self, record: &Record, cycle: i64) {
+        if self.cycles.is_fixed() {
+            // Their states follow from values, which are not known of before.
+            return;
+        }
         let changes = self.process_alarms.fold.take(record, cycle);
         self.process_alarms_changed(&record.name, cycle, &changes);
     }

@@ -1,16 +1,18 @@
 //! What remote I/Os and plants report.
 
-use understudy_journal::{Record, moment};
+use understudy_journal::{Record, Tally, moment};
 use understudy_plant::Event as PlantEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_wire::{Image, Member, Moment, ProgramId, Source, StationId, StationSet};
 
 use super::Model;
 use super::standing::{Change, ProgramChange, StationChange};
-use super::tally::Tally;
 use crate::describe::{PROGRAM_FAULT, describe, program_fault_text, source_text};
 use crate::event::{Event, Level};
 use crate::stop::{self, Stop};
+
+/// The alarm of fail-safe outputs.
+pub(super) const FAIL_SAFE: &str = "fail-safe";
 
 /// Cycles that are closed at once, at most.
 const MOST_CLOSED: i64 = 64;
@@ -19,7 +21,7 @@ const MOST_CLOSED: i64 = 64;
 #[derive(Debug, Clone)]
 pub(super) struct ProgramTrack {
     /// u(i) as last sampled.
-    inputs: Option<Image>,
+    pub(super) inputs: Option<Image>,
     source: Option<Source>,
     pub(super) tally: Tally,
     /// The stations that it received at the last two deadlines: a single frame may be lost.
@@ -27,7 +29,7 @@ pub(super) struct ProgramTrack {
     /// The newest cycle whose deadline was reported.
     pub(super) reported: Option<i64>,
     /// Whether its outputs were provable in any cycle.
-    served: bool,
+    pub(super) served: bool,
     stop: Stop,
 }
 
@@ -82,7 +84,9 @@ impl Model {
             }
             _ => self.cycles.of(moment(&record.event)),
         };
-        if let Some(violation) = self.histories[place].note(cycle, event) {
+        if !self.cycles.is_fixed()
+            && let Some(violation) = self.histories[place].note(cycle, event)
+        {
             self.violated(record, cycle, &violation.to_string());
         }
         self.fold_process_alarms(record, cycle);
@@ -203,7 +207,7 @@ impl Model {
             .applied(program, cycle, sampled.as_ref(), outputs, *source);
         self.received_at(cycle, *heard);
         let track = &mut self.programs[program.index()];
-        track.tally.push(cycle, *source);
+        track.tally.push(cycle, *source, record.at_ns);
         track.heard = [*heard, track.heard[0]];
         track.reported = track.reported.max(Some(cycle));
         if let Some(inputs) = sampled {
@@ -216,6 +220,12 @@ impl Model {
         let was_served = track.served;
         track.served |= missing.is_none();
         if before != Some(*source) && (was_served || missing.is_none()) {
+            // A source that was there before the first record was read has changed when the journal says.
+            let counted = track.tally.deadlines().filter(|_| before.is_none());
+            let (cycle, at_ns) = counted.map_or((cycle, record.at_ns), |counted| {
+                (counted.since, counted.since_ns)
+            });
+            self.alarms.now_ns = at_ns;
             self.source_changed(record, program, cycle, event);
         }
         self.close();
@@ -241,7 +251,13 @@ impl Model {
         self.alarms.over(&subject, cycle);
         if let stop::Change::Stopped(fault) = change {
             let text = program_fault_text(&self.cluster, program, fault.as_ref());
-            self.alarmed(record, cycle, PROGRAM_FAULT, text);
+            let is_first = self.programs[program.index()].source.is_none();
+            if self.read_from.is_some() && is_first {
+                // It is not known when it occurred.
+                self.alarms.raise(subject, cycle, text);
+            } else {
+                self.alarmed(record, cycle, PROGRAM_FAULT, text);
+            }
         }
     }
 
@@ -283,7 +299,7 @@ impl Model {
             }
             _ => None,
         };
-        let subject = (record.name.clone(), "fail-safe");
+        let subject = (record.name.clone(), FAIL_SAFE);
         if source == Source::FailSafe {
             let why = cause.clone().unwrap_or_else(|| text.clone());
             self.alarms.raise(subject, cycle, why);
@@ -293,7 +309,7 @@ impl Model {
         self.events.push(Event {
             number: 0,
             cycle,
-            at_ns: record.at_ns,
+            at_ns: self.alarms.now_ns,
             name: record.name.clone(),
             event: "source",
             level,

@@ -71,8 +71,11 @@ impl Model {
                     history.asked(write);
                 }
             }
-            RunEvent::Journal { .. } | RunEvent::Checkpoint { .. } | RunEvent::Commanded { .. } => {
-            }
+            RunEvent::Commanded { .. }
+            | RunEvent::Journal { .. }
+            | RunEvent::Checkpoint { .. }
+            | RunEvent::Continues(_)
+            | RunEvent::InEffect { .. } => {}
         }
         self.happened(record, cycle, None);
     }

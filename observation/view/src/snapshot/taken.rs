@@ -57,7 +57,13 @@ impl Model {
     }
 
     /// The alarms as they were in a cycle, and those of the cluster file with their states.
-    pub(crate) fn process_alarms_at(&self, cycle: i64) -> (Vec<Alarm>, Vec<ProcessAlarm>) {
+    /// Alarms that last or are not acknowledged in a cycle, without the shelved ones, and those of the cluster file, each with its state.
+    pub fn open_alarms_at(&self, cycle: i64) -> (Vec<Alarm>, Vec<ProcessAlarm>) {
+        let (alarms, process) = self.process_alarms_at(cycle);
+        (open_alarms(alarms, &process), process)
+    }
+
+    fn process_alarms_at(&self, cycle: i64) -> (Vec<Alarm>, Vec<ProcessAlarm>) {
         let alarms: Vec<Alarm> = self.alarms_at(cycle).collect();
         let until = self.recorded_until(cycle);
         let cycle = cycle.min(self.newest().unwrap_or(0));
@@ -105,7 +111,7 @@ impl Picture<'_> {
         let master = self
             .cycle
             .and_then(|cycle| model.cycle_master(self.standing, cycle));
-        let (alarms, process_alarms) = model.process_alarms_at(cycle);
+        let (alarms, process_alarms) = model.open_alarms_at(cycle);
         let timing = model.timings().rfind(|timing| timing.cycle <= cycle);
         Snapshot {
             cluster: model.cluster().name().to_owned(),
@@ -134,9 +140,10 @@ impl Picture<'_> {
                 cycle_us: timing.cycle_ns.map(|cycle| cycle as f64 / 1e3),
             }),
             host_stalls: self.host_stalls(),
-            alarms: open_alarms(alarms, &process_alarms),
+            alarms,
             process_alarms,
             events: model.event_count(),
+            read_from: model.read_from(),
             records,
             left_out,
         }

@@ -69,6 +69,11 @@ impl Progress {
         self.percent == 100
     }
 
+    /// How much of the journal was read, in percent.
+    pub(crate) fn percent(&self) -> u8 {
+        self.percent
+    }
+
     /// The age of the newest record; nothing where there is no record.
     pub fn age(&self, now: Instant) -> Option<Duration> {
         Some(now.saturating_duration_since(self.grew?))

@@ -11,6 +11,7 @@ mod fold;
 mod hostile;
 mod margin;
 mod numbers;
+mod past;
 mod process_alarms;
 mod protection;
 mod replay;

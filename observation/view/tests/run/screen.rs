@@ -45,7 +45,7 @@ fn a_journal_that_is_being_read_shows_no_values() {
     let drawn = |screen: &mut Screen, progress, now| {
         let mut terminal = Terminal::new(TestBackend::new(80, 24)).expect("a terminal");
         terminal
-            .draw(|frame| screen.draw_live(frame, &model, progress, now))
+            .draw(|frame| screen.draw_live(frame, &model, progress, None, now))
             .expect("drawn");
         terminal.backend().to_string()
     };

@@ -14,6 +14,7 @@ use super::{Answered, command::named};
 use crate::app::App;
 use crate::error::Problem;
 use crate::login::Person;
+use crate::model::Known;
 
 #[derive(Deserialize)]
 pub(super) struct Acknowledged {
@@ -31,6 +32,11 @@ pub(super) async fn acknowledge(
     let owner = named(&person, owner)?;
     if let Some(why) = App::why_not_act(&person) {
         return Err(Problem::forbidden(why));
+    }
+    if let Some((from, percent)) = app.model().known().and_then(Known::past) {
+        return Err(Problem::reading(format!(
+            "the alarms before cycle {from} are being read ({percent} %): try again in some seconds"
+        )));
     }
     let alarm = app
         .alarm(number)?

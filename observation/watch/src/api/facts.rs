@@ -255,7 +255,12 @@ pub(super) async fn state(
         let state = shown::state(&known.run, cycle, known.has_ended());
         state.ok_or_else(|| not_remembered(cycle))
     });
-    Ok(Json(state?).into_response())
+    let mut state = state?;
+    // The model of an older cycle has not read everything that is before it.
+    if let Some(known) = app.model().known() {
+        state.alarms_are(known);
+    }
+    Ok(Json(state).into_response())
 }
 
 /// Answers from the model; for a cycle that it does not remember, from the journal.

@@ -4,13 +4,31 @@
 
 use std::collections::VecDeque;
 
-use understudy_journal::SourceCounts;
+use serde::{Deserialize, Serialize};
 use understudy_wire::Source;
+
+use crate::rules::SourceCounts;
+
+/// The deadlines of a program up to now, as a journal tells them that continues another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Deadlines {
+    /// The first cycle of the newest ones in a row with one source.
+    pub since: i64,
+    /// The time of its record.
+    pub since_ns: u64,
+    /// The cycle after the newest one.
+    pub until: i64,
+    /// The source of all of these.
+    pub source: Source,
+    /// The deadlines from the origin up to `since`; none where that is before the origin.
+    pub before: SourceCounts,
+}
 
 /// Cycles in a row with one source.
 #[derive(Debug, Clone, Copy)]
 struct Row {
     from: i64,
+    from_ns: u64,
     to: i64,
     source: Source,
     /// The deadlines before `from`.
@@ -27,8 +45,9 @@ impl Row {
     }
 }
 
+/// The deadlines of one program by source.
 #[derive(Debug, Clone)]
-pub(crate) struct Tally {
+pub struct Tally {
     rows: VecDeque<Row>,
     most: usize,
     /// The deadlines before the origin.
@@ -36,7 +55,8 @@ pub(crate) struct Tally {
 }
 
 impl Tally {
-    pub(crate) fn new(most: usize) -> Self {
+    /// A tally that remembers so many rows; those before stay counted.
+    pub fn new(most: usize) -> Self {
         Self {
             rows: VecDeque::new(),
             most: most.max(1),
@@ -44,8 +64,39 @@ impl Tally {
         }
     }
 
-    /// The source in cycle `at`. A second record of a cycle, or one of an earlier cycle, is ignored.
-    pub(crate) fn push(&mut self, at: i64, source: Source) {
+    /// Goes on from deadlines that were counted before.
+    pub fn continues(&mut self, counted: &Deadlines) {
+        self.before_origin = SourceCounts::default();
+        let before = counted.until.min(0).saturating_sub(counted.since);
+        self.before_origin
+            .add(counted.source, u64::try_from(before).unwrap_or(0));
+        self.rows.clear();
+        self.rows.push_back(Row {
+            from: counted.since,
+            from_ns: counted.since_ns,
+            to: counted.until,
+            source: counted.source,
+            before: counted.before,
+        });
+    }
+
+    /// The deadlines so far; nothing before the first.
+    pub fn deadlines(&self) -> Option<Deadlines> {
+        let last = self.rows.back()?;
+        Some(Deadlines {
+            since: last.from,
+            since_ns: last.from_ns,
+            until: last.to,
+            source: last.source,
+            before: match last.from {
+                ..0 => SourceCounts::default(),
+                _ => last.before.since(self.before_origin),
+            },
+        })
+    }
+
+    /// The source in cycle `at`, by a record of the time `at_ns`. A second record of a cycle, or one of an earlier cycle, is ignored.
+    pub fn push(&mut self, at: i64, source: Source, at_ns: u64) {
         match self.rows.back_mut() {
             Some(last) if at < last.to => return,
             Some(last) if at == last.to && last.source == source => last.to = at.saturating_add(1),
@@ -56,6 +107,7 @@ impl Tally {
                 }
                 self.rows.push_back(Row {
                     from: at,
+                    from_ns: at_ns,
                     to: at.saturating_add(1),
                     source,
                     before,
@@ -68,12 +120,12 @@ impl Tally {
     }
 
     /// The deadlines from the origin up to and including `cycle`.
-    pub(crate) fn counts(&self, cycle: i64) -> SourceCounts {
+    pub fn counts(&self, cycle: i64) -> SourceCounts {
         self.until(cycle).since(self.before_origin)
     }
 
     /// The first cycle of those in a row that have the source of `cycle`.
-    pub(crate) fn since(&self, cycle: i64) -> Option<i64> {
+    pub fn since(&self, cycle: i64) -> Option<i64> {
         let row = self.row_at(cycle)?;
         (cycle < row.to).then_some(row.from)
     }
@@ -94,7 +146,7 @@ impl Tally {
     }
 
     /// Cycles are counted from somewhere else from now on.
-    pub(crate) fn shift(&mut self, by: i64) {
+    pub fn shift(&mut self, by: i64) {
         for row in &mut self.rows {
             row.from = row.from.saturating_add(by);
             row.to = row.to.saturating_add(by);
@@ -118,11 +170,32 @@ mod tests {
                 let mut tally = Tally::new(100);
                 for cycle in 0..6 {
                     if let Some(source) = source(cycle) {
-                        tally.push(i64::from(cycle), *source);
-                        tally.push(i64::from(cycle), Source::FailSafe);
+                        tally.push(i64::from(cycle), *source, 0);
+                        tally.push(i64::from(cycle), Source::FailSafe, 0);
                     }
                 }
                 tally.shift(-i64::from(origin));
+                for cut in 0..6 {
+                    // Cut anywhere, and continued.
+                    let mut first = Tally::new(100);
+                    let mut rest = Tally::new(100);
+                    for cycle in 0..6 {
+                        let to = if cycle < cut { &mut first } else { &mut rest };
+                        if cycle == cut {
+                            to.shift(0);
+                            if let Some(deadlines) = first.deadlines() {
+                                rest.continues(&deadlines);
+                            }
+                        }
+                        let to = if cycle < cut { &mut first } else { &mut rest };
+                        if let Some(source) = source(cycle) {
+                            to.push(i64::from(cycle) - i64::from(origin), *source, 0);
+                        }
+                    }
+                    let last = i64::from(5 - origin);
+                    assert_eq!(rest.counts(last), tally.counts(last), "cut at {cut}");
+                    assert_eq!(rest.since(last), tally.since(last), "cut at {cut}");
+                }
                 for until in origin..6 {
                     let mut expected = SourceCounts::default();
                     for source in (origin..=until).filter_map(source) {
@@ -138,7 +211,7 @@ mod tests {
     fn what_is_forgotten_stays_counted() {
         let mut tally = Tally::new(2);
         for cycle in -3..10 {
-            tally.push(cycle, SOURCES[cycle.rem_euclid(2) as usize]);
+            tally.push(cycle, SOURCES[cycle.rem_euclid(2) as usize], 0);
         }
         let counts = tally.counts(9);
         assert_eq!((counts.direct, counts.held), (5, 5));

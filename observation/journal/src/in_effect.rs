@@ -1,0 +1,206 @@
+//! The records that are in effect: of all that happened once, the newest of each kind about each subject, until it is over.
+//!
+//! Whoever takes them in their order knows the processes, cuts, forces, exclusions and losses of the present as whoever read everything.
+//! Invariant: their number is bounded by the members of the cluster, whatever happens in a run.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use understudy_bus::HostEvent;
+use understudy_node::Event as Station;
+use understudy_plant::Event as Plant;
+use understudy_remote_io::Event as RemoteIo;
+use understudy_simulator::Action;
+use understudy_wire::Member;
+
+use crate::record::{Happening, Record, RunEvent};
+use crate::rules::Process;
+
+/// What a record is about; the newest one about a subject is in effect.
+type Subject = (Option<Member>, &'static str, String);
+
+/// What a record does to the ones about its subject.
+enum Effect {
+    /// It takes their place.
+    Replaces(Subject),
+    /// They are over.
+    Ends(Subject),
+}
+
+#[derive(Debug, Default)]
+pub(crate) struct InEffect {
+    /// In the order of their numbers, with their cycles.
+    records: BTreeMap<u64, (i64, Record)>,
+    by_subject: BTreeMap<Subject, u64>,
+    count: u64,
+    /// Finished parts and faults of each plant, so far.
+    plants: BTreeMap<Option<Member>, (u64, u64)>,
+    /// Stations that have not published since they joined or adopted a state.
+    joining: BTreeSet<Option<Member>>,
+}
+
+/// What a station reports before its first turn, and is over with it.
+const BEFORE_TURNS: [&str; 2] = ["joins", "adopted"];
+
+impl InEffect {
+    /// Takes a record of a cycle.
+    pub(crate) fn note(&mut self, record: &Record, cycle: i64) {
+        if let Happening::Plant(Plant::Stepped { field, .. }) = &record.event {
+            let now = (field.finished, field.plant_faults);
+            let before = self.plants.insert(record.member, now);
+            if field.plant_faults > before.map_or(0, |(_, faults)| faults) {
+                self.replaces(
+                    (record.member, "plant-faults", String::new()),
+                    record,
+                    cycle,
+                );
+            } else if before != Some(now) {
+                self.replaces((record.member, "plant", String::new()), record, cycle);
+            }
+            return;
+        }
+        if let Happening::Station(Station::Published { .. }) = &record.event {
+            if self.joining.remove(&record.member) {
+                self.end_all(|(member, kind, _)| {
+                    *member == record.member && BEFORE_TURNS.contains(kind)
+                });
+            }
+            return;
+        }
+        match effect(record) {
+            Some(Effect::Replaces(subject)) => {
+                if BEFORE_TURNS.contains(&subject.1) {
+                    self.joining.insert(record.member);
+                }
+                self.replaces(subject, record, cycle);
+            }
+            Some(Effect::Ends(subject)) => {
+                if let Some(over) = self.by_subject.remove(&subject) {
+                    self.records.remove(&over);
+                }
+            }
+            None => {}
+        }
+    }
+
+    fn end_all(&mut self, is_over: impl Fn(&Subject) -> bool) {
+        for (_, number) in self
+            .by_subject
+            .extract_if(.., |subject, _| is_over(subject))
+        {
+            self.records.remove(&number);
+        }
+    }
+
+    fn replaces(&mut self, subject: Subject, record: &Record, cycle: i64) {
+        self.count += 1;
+        if let Some(before) = self.by_subject.insert(subject, self.count) {
+            self.records.remove(&before);
+        }
+        self.records.insert(self.count, (cycle, record.clone()));
+    }
+
+    /// With their cycles, oldest first.
+    pub(crate) fn records(&self) -> impl Iterator<Item = (i64, &Record)> {
+        let records = self.records.values();
+        records.map(|(cycle, record)| (*cycle, record))
+    }
+
+    pub(crate) fn shift(&mut self, by: i64) {
+        for (cycle, _) in self.records.values_mut() {
+            *cycle = cycle.saturating_add(by);
+        }
+    }
+}
+
+/// Nothing for a record that happens in every cycle, or that changes nothing of what comes after.
+fn effect(record: &Record) -> Option<Effect> {
+    let of = |kind| (record.member, kind, String::new());
+    let about = |kind, subject: &dyn std::fmt::Debug| (record.member, kind, format!("{subject:?}"));
+    let replaces = match &record.event {
+        Happening::Station(event) => match event {
+            Station::BecameCycleMaster { .. } => of("cycle-master"),
+            Station::Joins { .. } => of("joins"),
+            Station::Adopted { program, .. } => about("adopted", program),
+            Station::Excluded { program, .. } => about("excluded", program),
+            Station::Readmitted { program, .. } => about("readmitted", program),
+            Station::Refused { member, .. } => about("refused", member),
+            _ => return None,
+        },
+        Happening::RemoteIo(event) => return of_remote_io(record, event),
+        Happening::Plant(Plant::Refused { member, .. }) => about("refused", member),
+        Happening::Plant(Plant::Stepped { .. }) => return None,
+        Happening::Host(event) => match event {
+            HostEvent::Ready { .. } => of("ready"),
+            HostEvent::FieldLost { .. } | HostEvent::FieldRegained => of("field"),
+            HostEvent::FieldContested | HostEvent::FieldUncontested => of("contested"),
+            HostEvent::DuplicateFound { member } => about("duplicate", member),
+            HostEvent::DuplicateGone { member } => {
+                return Some(Effect::Ends(about("duplicate", member)));
+            }
+            HostEvent::LinkFailed { .. } | HostEvent::LinkReopened { .. } => of("link"),
+            HostEvent::WallClock { .. } | HostEvent::WallClockStepped { .. } => of("wall-clock"),
+            _ => return None,
+        },
+        Happening::Run(event) => of_run(event)?,
+    };
+    Some(Effect::Replaces(replaces))
+}
+
+fn of_remote_io(record: &Record, event: &RemoteIo) -> Option<Effect> {
+    let of = |kind| (record.member, kind, String::new());
+    let about = |kind, subject: &dyn std::fmt::Debug| (record.member, kind, format!("{subject:?}"));
+    let replaces = match event {
+        RemoteIo::StartedCold { .. } => of("started-cold"),
+        RemoteIo::AdoptedLineage { .. } => of("adopted-lineage"),
+        RemoteIo::Disputed { .. } => of("disputed"),
+        RemoteIo::StateLost { .. } => of("state-lost"),
+        RemoteIo::StateRecovered { .. } => of("state-recovered"),
+        RemoteIo::ChoiceRefused {
+            newest: Some(_), ..
+        } => of("choice-refused"),
+        RemoteIo::Protected { .. } | RemoteIo::Unprotected { .. } => of("protection"),
+        RemoteIo::Released { .. } => of("released"),
+        RemoteIo::Forced { force, .. } => about("forced", &force.signal),
+        RemoteIo::Unforced { signal, .. } => return Some(Effect::Ends(about("forced", signal))),
+        RemoteIo::SignalValidity { input, .. } => about("validity", input),
+        RemoteIo::RecalledExclusion { stations, .. } => about("recalled", &stations.bits()),
+        RemoteIo::Diagnosed { .. } => of("diagnosed"),
+        RemoteIo::Flagged { station, .. } => about("flagged", station),
+        RemoteIo::Cleared { station, .. } => return Some(Effect::Ends(about("flagged", station))),
+        RemoteIo::ValueFault { accused, .. } => about("value-fault", &accused.bits()),
+        RemoteIo::Refused { member, .. } => about("refused", member),
+        _ => return None,
+    };
+    Some(Effect::Replaces(replaces))
+}
+
+fn of_run(event: &RunEvent) -> Option<Subject> {
+    Some(match event {
+        RunEvent::Started { member } | RunEvent::Ended { member, .. } => {
+            (Some(*member), "process", String::new())
+        }
+        RunEvent::Fault { action, member, .. } => {
+            let (kind, subject) = match (action, Process::after(*action)) {
+                // None of the three undoes all that another did.
+                (Action::Stop, _) => ("suspended", String::new()),
+                (Action::Continue, _) => ("continued", String::new()),
+                (_, Some(_)) => ("process", String::new()),
+                (Action::Cut { to } | Action::Heal { to }, _) => ("cut", format!("{to:?}")),
+                // The newest is the cause that is named.
+                _ => ("action", String::new()),
+            };
+            (Some(*member), kind, subject)
+        }
+        RunEvent::Acknowledged(seen) => {
+            (None, "acknowledged", [&*seen.name, &seen.alarm].join("/"))
+        }
+        RunEvent::Shelved(shelving) => (None, "shelved", shelving.name.clone()),
+        RunEvent::Unshelved(unshelving) => (None, "shelved", unshelving.name.clone()),
+        RunEvent::Attached { member } | RunEvent::Detached { member, .. } => {
+            (Some(*member), "attached", String::new())
+        }
+        RunEvent::ScenarioOver { .. } => (None, "scenario-over", String::new()),
+        RunEvent::Interrupted => (None, "interrupted", String::new()),
+        _ => return None,
+    })
+}
