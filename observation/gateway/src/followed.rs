@@ -1,5 +1,6 @@
-//! A followed run: a thread reads its journal while it is written, and callers get the present state. While the journal is still being
-//! read there is none: every question is answered by [`Reading`].
+//! A followed run: a thread reads its journal while it is written, and callers get the present state. Until its end is reached there is none:
+//! every question is answered by [`Reading`]. A long journal is begun near its end; while its past is read, what depends on it is not
+//! told: alarms, events and the counters of the metrics.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
@@ -7,7 +8,7 @@ use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
 use understudy_cluster::Cluster;
-use understudy_view::{Bounds, Event, Model, Progress, Reading, Run, Snapshot, Source};
+use understudy_view::{Bounds, Event, Following, Model, Progress, Reading, Run, Snapshot};
 use understudy_wire::ProgramId;
 
 use crate::error::GatewayError;
@@ -46,6 +47,8 @@ pub struct Observation {
     pub states: Vec<Option<Vec<bool>>>,
     /// The newest events, oldest first.
     pub recent: Vec<Event>,
+    /// How much of the journal is read while its past is not, in percent: alarms and events of then are not known.
+    pub past_percent: Option<u8>,
     /// The time at which the newest record was written.
     pub heard: Instant,
     /// The time at which the newest cycle was recorded; for a cycle that was in the journal when the reader started, that of the newest record then.
@@ -73,6 +76,7 @@ impl Observation {
             states: programs.map(state).collect(),
             snapshot: Arc::new(snapshot),
             recent,
+            past_percent: None,
             heard,
             advanced: heard,
         }
@@ -98,13 +102,13 @@ impl Newest {
 }
 
 impl Followed {
-    /// Starts to follow `run` from its first record.
+    /// Starts to follow `run`.
     ///
     /// # Errors
     /// The system refuses a thread.
     pub fn new(run: &Run) -> Result<Self, GatewayError> {
         let metrics = Arc::new(Metrics::new(run.cluster()));
-        let model = run.model(BOUNDS);
+        let (model, following) = Following::of(run, BOUNDS);
         let heard = Instant::now();
         let newest = Arc::new(RwLock::new(Newest {
             observation: Arc::new(Observation::new(&model, model.snapshot(), heard)),
@@ -113,11 +117,12 @@ impl Followed {
         }));
         let ends = Arc::new(AtomicBool::new(false));
         let mut reader = Reader {
-            source: run.follow(),
+            following,
             run: run.clone(),
             model,
             metrics: Arc::clone(&metrics),
             newest: Arc::clone(&newest),
+            present_since_ns: None,
             passed_on: None,
             newest_cycle: None,
         };
@@ -149,6 +154,9 @@ impl Followed {
         move || {
             {
                 let newest = Newest::current(&newest)?;
+                if let Some(percent) = newest.observation.past_percent {
+                    return Err(Reading { percent });
+                }
                 let now = Instant::now();
                 metrics.dated(&newest.observation, newest.progress.age(now), now);
             }
@@ -190,12 +198,14 @@ impl Drop for Followed {
 }
 
 struct Reader {
-    source: Source,
+    following: Following,
     run: Run,
     model: Model,
     metrics: Arc<Metrics>,
     newest: Arc<RwLock<Newest>>,
-    /// Number of the newest event that was passed on; nothing before the present is known.
+    /// The time of the newest record when the present was first known.
+    present_since_ns: Option<u64>,
+    /// Number of the newest event that was passed on; nothing before the present is known and the past is read.
     passed_on: Option<u64>,
     /// The newest cycle that was shown, and when it was recorded.
     newest_cycle: Option<(i64, Instant)>,
@@ -208,15 +218,26 @@ impl Reader {
         while !ends.load(Ordering::Relaxed) {
             let is_finished = !self.model.is_finished() && self.run.is_finished();
             let model = &mut self.model;
-            let taken = self.source.poll(&mut |found| model.take_found(found));
-            self.metrics.times(&self.model);
+            let taken = self.following.poll(&mut |found| model.take_found(found));
+            let had_past = self.following.past_percent().is_some();
+            if let Some(whole) = self.following.read_past() {
+                let has_ended = self.model.is_finished();
+                self.model = whole;
+                if has_ended {
+                    self.model.end();
+                }
+                unshown = true;
+            }
+            self.metrics
+                .times(self.following.past().unwrap_or(&self.model));
             unshown |= taken > 0;
             if taken == 0 && is_finished {
                 // Its results were there before the journal was read to its end.
                 self.model.end();
                 unshown = true;
             }
-            let progress = self.source.progress().of_ended(self.model.is_finished());
+            let ended = self.model.is_finished();
+            let progress = self.following.progress().of_ended(ended);
             // The end of the journal is shown before it counts as the present.
             if unshown && (progress.is_at_end() || shown.elapsed() >= SHOW) {
                 self.show(progress);
@@ -225,7 +246,7 @@ impl Reader {
             } else {
                 self.newest_mut().progress = progress;
             }
-            if taken == 0 {
+            if taken == 0 && !had_past {
                 std::thread::sleep(LOOK);
             }
         }
@@ -237,7 +258,10 @@ impl Reader {
 
     fn show(&mut self, progress: Progress) {
         let snapshot = self.model.snapshot();
-        self.metrics.show(&self.model, &snapshot);
+        let past_percent = self.following.past_percent();
+        if past_percent.is_none() {
+            self.metrics.show(&self.model, &snapshot);
+        }
         let now = Instant::now();
         let heard = progress.age(now).and_then(|age| now.checked_sub(age));
         let heard = heard.unwrap_or(now);
@@ -246,17 +270,31 @@ impl Reader {
         let shown = self.newest_cycle.filter(|(shown, _)| Some(*shown) == cycle);
         self.newest_cycle = shown.or(cycle.map(|cycle| (cycle, heard)));
         observation.advanced = self.newest_cycle.map_or(heard, |(_, at)| at);
-        let count = self.model.event_count();
-        let passed_on = self.passed_on.unwrap_or(count);
-        let is_present = self.passed_on.is_some() || progress.is_at_end();
-        self.passed_on = is_present.then_some(count);
-        let events = self.model.events().filter(|event| event.number > passed_on);
-        let fresh: Vec<Event> = events.cloned().collect();
+        observation.past_percent = past_percent;
+        if self.present_since_ns.is_none() && progress.is_at_end() {
+            self.present_since_ns = Some(self.model.at_ns());
+        }
+        let fresh = self.fresh_events(past_percent.is_some());
         let mut newest = self.newest_mut();
         newest.observation = Arc::new(observation);
         newest.progress = progress;
         newest.events.extend(fresh);
         let over = newest.events.len().saturating_sub(BOUNDS.events);
         newest.events.drain(..over);
+    }
+
+    /// The events that were not passed on, from the present on. Their numbers are known when the past is.
+    fn fresh_events(&mut self, reads_past: bool) -> Vec<Event> {
+        let Some(since_ns) = self.present_since_ns.filter(|_| !reads_past) else {
+            return Vec::new();
+        };
+        let count = self.model.event_count();
+        let passed_on = self.passed_on.replace(count).unwrap_or_else(|| {
+            let mut before = self.model.events().rev();
+            let before = before.find(|event| event.at_ns <= since_ns);
+            before.map_or(0, |event| event.number)
+        });
+        let events = self.model.events().filter(|event| event.number > passed_on);
+        events.cloned().collect()
     }
 }

@@ -69,7 +69,10 @@ pub fn mirror(
         loop {
             if let Ok(present) = run.observation() {
                 let state = present.state(present.feed(Instant::now()));
-                for (key, document) in documents(run.cluster(), &present.snapshot, state) {
+                let known = documents(run.cluster(), &present.snapshot, state).into_iter();
+                // Alarms of the past are not known while it is read.
+                let reads_past = present.past_percent.is_some();
+                for (key, document) in known.filter(|(key, _)| !reads_past || key != "alarms") {
                     let text = document.to_string();
                     if published.get(&key) != Some(&text) {
                         announcer.say(&key, &text);

@@ -113,7 +113,7 @@ impl Service for Client {
             if feed == Feed::Silent && !is_of_run(&request) {
                 return Err(ExceptionCode::ServerDeviceBusy);
             }
-            answer(&map.image(&present.snapshot, feed), &request)
+            answer(&map.image_of(&present, feed), &request)
         })
     }
 }

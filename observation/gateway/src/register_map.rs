@@ -121,7 +121,7 @@ const OF_RUN: [(u16, u16, &str, &str); 8] = [
     (2, 2, "run.cycle", "the newest cycle, from the origin"),
     (4, 2, "run.period_us", "microseconds"),
     (6, 1, "margin.survives", "remaining redundancy: any further failures of stations that would be masked"),
-    (7, 1, "alarms.open", "alarms that last or are not acknowledged"),
+    (7, 1, "alarms.open", "alarms that last or are not acknowledged; 65535 while earlier records are read"),
     (8, 1, "cluster.programs", "number of programs"),
     (9, 1, "cluster.stations", "number of stations"),
 ];

@@ -91,6 +91,14 @@ impl Seen<'_> {
         }
     }
 
+    /// A value that depends on everything that was recorded.
+    fn recorded(&self, read: impl Fn(&Observation) -> Option<Variant>) -> Reading {
+        match self.observation.past_percent {
+            Some(_) => Reading::WAITING,
+            None => self.counted(read(self.observation)),
+        }
+    }
+
     /// A counted value.
     fn counted(&self, value: Option<Variant>) -> Reading {
         let status = match value {
@@ -251,13 +259,15 @@ impl Tree {
         let present = |read: fn(&Observation) -> Variant| {
             move |seen: &Seen<'_>| seen.present(Some(read(seen.observation)), StatusCode::Good)
         };
+        let recorded =
+            |read: fn(&Observation) -> Option<Variant>| move |seen: &Seen<'_>| seen.recorded(read);
         self.enter(&["Run"]);
         rows! { self;
             "State" String "starting, running, not-current, finished or interrupted" => |seen: &Seen<'_>| seen.counted(Some(text(seen.observation.state(seen.feed))));
             "Cycle" Int64 "newest cycle, from the origin of the run" => counted(|of| of.snapshot.cycle.map(Variant::from));
             "Period" UInt64 "period of a cycle, in microseconds" => counted(|of| Some(of.snapshot.period_us.into()));
             "Mode" String "full or paper" => counted(|of| Some(text(of.snapshot.mode)));
-            "Records" UInt64 "records of the journal that were read" => counted(|of| Some(of.snapshot.records.into()));
+            "Records" UInt64 "records of the journal that were read" => recorded(|of| Some(of.snapshot.records.into()));
             "LeftOut" UInt64 "records that were gone or could not be read" => counted(|of| Some(of.snapshot.left_out.into()));
         }
         self.enter(&["Margin"]);
@@ -268,8 +278,8 @@ impl Tree {
         }
         self.enter(&["Alarms"]);
         rows! { self;
-            "Open" UInt64 "alarms that last or are not acknowledged" => counted(|of| Some((of.snapshot.alarms.len() as u64).into()));
-            "Texts" Strings "open alarms, in words" => counted(|of| {
+            "Open" UInt64 "alarms that last or are not acknowledged" => recorded(|of| Some((of.snapshot.alarms.len() as u64).into()));
+            "Texts" Strings "open alarms, in words" => recorded(|of| {
                 let alarms = of.snapshot.alarms.iter();
                 let alarms = alarms.map(|alarm| format!("cycle {}: {}: {}", alarm.cycle, alarm.name, alarm.text));
                 Some(texts(&alarms.collect::<Vec<_>>()))
@@ -277,8 +287,8 @@ impl Tree {
         }
         self.enter(&["Events"]);
         rows! { self;
-            "Count" UInt64 "events so far" => counted(|of| Some(of.snapshot.events.into()));
-            "Recent" Strings "the newest 20 events, in words, the newest last" => counted(|of| {
+            "Count" UInt64 "events so far" => recorded(|of| Some(of.snapshot.events.into()));
+            "Recent" Strings "the newest 20 events, in words, the newest last" => recorded(|of| {
                 let recent = of.recent.iter();
                 let recent = recent.map(|event| format!("cycle {}: {}: {}", event.cycle, event.name, message(event)));
                 Some(texts(&recent.collect::<Vec<_>>()))

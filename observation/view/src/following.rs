@@ -63,6 +63,11 @@ impl Following {
         Some(past.model)
     }
 
+    /// The model of what is read of the past, while not all of it is.
+    pub fn past(&self) -> Option<&Model> {
+        Some(&self.past.as_ref()?.model)
+    }
+
     /// How much of the journal is read while its past is not, in percent.
     pub fn past_percent(&self) -> Option<u8> {
         Some(self.past.as_ref()?.source.progress().percent())

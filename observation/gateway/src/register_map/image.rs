@@ -6,6 +6,7 @@ use understudy_wire::Member;
 
 use super::{NUMBERS, OF_PROGRAM, PROGRAMS, RegisterMap, STATIONS, VERSION, registers_of};
 use crate::feed::Feed;
+use crate::followed::Observation;
 
 /// The process image that clients read.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -18,7 +19,19 @@ pub struct ProcessImage {
     pub registers: Vec<u16>,
 }
 
+/// The register of the number of open alarms.
+const OPEN_ALARMS: usize = 7;
+
 impl RegisterMap {
+    /// The process image of an observation, whose run has this feed.
+    pub(crate) fn image_of(&self, present: &Observation, feed: Feed) -> ProcessImage {
+        let mut image = self.image(&present.snapshot, feed);
+        if present.past_percent.is_some() {
+            image.registers[OPEN_ALARMS] = u16::MAX;
+        }
+        image
+    }
+
     /// The process image of a snapshot, whose run has this feed.
     pub fn image(&self, snapshot: &Snapshot, feed: Feed) -> ProcessImage {
         let mut image = ProcessImage {
@@ -47,7 +60,7 @@ impl RegisterMap {
         );
         set(registers, 4, snapshot.period_us);
         registers[6] = u16::from(snapshot.margin.survives);
-        registers[7] = small(snapshot.alarms.len());
+        registers[OPEN_ALARMS] = small(snapshot.alarms.len());
         registers[8] = small(self.interfaces.len());
         registers[9] = small(self.stations);
         for (rank, station) in snapshot.stations.iter().enumerate().take(self.stations) {

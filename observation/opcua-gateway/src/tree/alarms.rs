@@ -4,7 +4,7 @@ use opcua::types::{StatusCode, Variant};
 use understudy_cluster::AlarmDeclaration;
 use understudy_view::ProcessAlarm;
 
-use super::{Kind, Seen, Tree, text};
+use super::{Kind, Reading, Seen, Tree, text};
 
 impl Tree {
     pub(super) fn alarm(&mut self, place: usize, declared: &AlarmDeclaration) {
@@ -12,6 +12,9 @@ impl Tree {
         self.enter(&["Alarms", "Signals", &declared.name]);
         let of = move |read: fn(&ProcessAlarm) -> Option<Variant>| {
             move |seen: &Seen<'_>| {
+                if seen.observation.past_percent.is_some() {
+                    return Reading::WAITING;
+                }
                 let alarms = &seen.observation.snapshot.process_alarms;
                 seen.present(alarms.get(place).and_then(read), StatusCode::Good)
             }

@@ -44,6 +44,11 @@ impl Model {
         (self.records, self.left_out)
     }
 
+    /// Time of the newest record.
+    pub fn at_ns(&self) -> u64 {
+        self.at_ns
+    }
+
     /// The last record of the run was read.
     pub fn is_finished(&self) -> bool {
         self.finished
