@@ -1,11 +1,12 @@
 //! `understudy node`, `remote-io` and `plant`: one member as one process.
 
+use std::net::SocketAddrV4;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::json;
 use understudy_bus::Peer;
-use understudy_cluster::Cluster;
+use understudy_cluster::{Cluster, MULTICAST_GROUPS, is_multicast_range};
 use understudy_member::{
     MemberError, MemberOptions, addressed_peers, find_member, link_kind, listed_peers,
     restart_for_zenoh,
@@ -34,6 +35,9 @@ pub struct Arguments {
     /// JSON list of members with names and addresses, overrides the addresses of the cluster file
     #[arg(long, value_name = "FILE")]
     endpoints: Option<PathBuf>,
+    /// First multicast group of the frames such as 239.192.0.0:7600, or `none`; overrides the cluster file
+    #[arg(long, value_name = "ADDRESS", value_parser = parse_multicast)]
+    multicast: Option<Multicast>,
     /// Folder of the keys of this member; required unless the cluster file has `security = "off"`
     #[arg(long, value_name = "DIR")]
     keys: Option<PathBuf>,
@@ -125,6 +129,10 @@ impl Arguments {
         Ok(MemberOptions {
             name: self.name.clone(),
             peers: peers(cluster, self.endpoints.as_deref())?,
+            multicast: match self.multicast {
+                None => cluster.multicast(),
+                Some(Multicast(first)) => first,
+            },
             keys: self.keys.clone(),
             in_laboratory: self.in_laboratory,
             real_time: !self.no_real_time,
@@ -132,6 +140,20 @@ impl Arguments {
             journal_limit: self.journal_limit,
         })
     }
+}
+
+/// The first multicast group, or none.
+#[derive(Debug, Clone, Copy)]
+struct Multicast(Option<SocketAddrV4>);
+
+fn parse_multicast(text: &str) -> Result<Multicast, String> {
+    if text == "none" {
+        return Ok(Multicast(None));
+    }
+    let first = text.parse().ok().filter(|first| is_multicast_range(*first));
+    first.map(|first| Multicast(Some(first))).ok_or_else(|| {
+        format!("{text:?} is not the first of {MULTICAST_GROUPS} multicast groups: an address such as 239.192.0.0:7600, or `none`")
+    })
 }
 
 fn failed(error: &MemberError) -> Answer {

@@ -22,6 +22,8 @@ const END_PATIENCE: Duration = Duration::from_secs(3);
 impl Laboratory<'_> {
     pub(super) async fn start(&mut self, member: Member) -> Result<(), LaboratoryError> {
         let name = self.name(member);
+        let multicast = self.site.multicast();
+        let multicast = multicast.map_or("none".to_owned(), |first| first.to_string());
         let mut command = Command::new(&self.settings.program);
         command
             .arg(match member {
@@ -33,6 +35,7 @@ impl Laboratory<'_> {
             .args(["--name", &name])
             .arg("--endpoints")
             .args(self.site.endpoints(member))
+            .args(["--multicast", &multicast])
             .arg("--in-laboratory")
             .args(self.keys.arguments(&name))
             .args(&self.settings.arguments)

@@ -12,7 +12,7 @@
 
 use std::collections::BTreeMap;
 use std::io;
-use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, SocketAddrV4};
 use std::path::{Path, PathBuf};
 
 use understudy_bus::{Endpoints, LinkKind, Peer};
@@ -62,6 +62,8 @@ pub(super) struct Site {
     /// The address of each route that a member is given for another member's.
     stand_ins: Vec<SocketAddr>,
     impairment: Impairment,
+    /// The first multicast group of the frames.
+    multicast: Option<SocketAddrV4>,
 }
 
 impl Site {
@@ -115,6 +117,7 @@ impl Site {
             routes: BTreeMap::new(),
             stand_ins: Vec::new(),
             impairment,
+            multicast: None,
         };
         let only_loss = impairment
             == Impairment {
@@ -126,7 +129,10 @@ impl Site {
                 let pairs = site.pairs_of_hosts();
                 hosts.lose(&pairs, impairment.loss)?;
             }
-            None if impairment.is_none() => {}
+            None if impairment.is_none() => {
+                let wanted = link == LinkKind::Udp;
+                site.multicast = wanted.then(understudy_bus::loopback_groups).flatten();
+            }
             _ => {
                 site.route(cluster, link, &peers, hosts.as_ref(), settings.seed)?;
                 site.write_views(&peers, directory)
@@ -152,6 +158,11 @@ impl Site {
     /// The file in which the member finds the others.
     pub(super) fn endpoints(&self, member: Member) -> Option<&Path> {
         self.endpoints.get(&member).map(PathBuf::as_path)
+    }
+
+    /// The first multicast group of the frames. Between hosts of the laboratory and through its proxy each receiver has a datagram of its own.
+    pub(super) fn multicast(&self) -> Option<SocketAddrV4> {
+        self.multicast
     }
 
     /// Lets no frame of one member through to another any more, or each again. False where nothing between them can do that, so that the

@@ -1,7 +1,7 @@
 //! A cluster as all its members know it.
 
 use std::collections::BTreeSet;
-use std::net::SocketAddr;
+use std::net::{SocketAddr, SocketAddrV4};
 use std::sync::Arc;
 
 use crate::alarm::AlarmDeclaration;
@@ -180,6 +180,7 @@ pub struct PlantPlace {
 pub struct Cluster {
     pub(crate) name: String,
     pub(crate) link: Link,
+    pub(crate) multicast: Option<SocketAddrV4>,
     pub(crate) security: Security,
     pub(crate) agreement: Arc<Agreement>,
     pub(crate) canonical_text: String,
@@ -201,6 +202,11 @@ impl Cluster {
     /// What carries the frames.
     pub fn link(&self) -> Link {
         self.link
+    }
+
+    /// The first multicast group of its frames, where the network has multicast; only for UDP.
+    pub fn multicast(&self) -> Option<SocketAddrV4> {
+        self.multicast.filter(|_| self.link == Link::Udp)
     }
 
     /// Who may speak.

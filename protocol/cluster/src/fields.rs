@@ -4,7 +4,7 @@
 //! reported and the default goes on in its place, so that the rest is still checked.
 
 use std::collections::BTreeMap;
-use std::net::{IpAddr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, SocketAddrV4};
 use std::ops::Range;
 use std::time::Duration;
 
@@ -44,6 +44,15 @@ pub fn why_unreachable(address: SocketAddr) -> Option<&'static str> {
     } else {
         None
     }
+}
+
+/// Multicast groups of the frames of one cluster.
+pub const MULTICAST_GROUPS: u8 = 33;
+
+/// Whether the frames of a cluster can have multicast groups from this address on.
+pub fn is_multicast_range(first: SocketAddrV4) -> bool {
+    let last = u32::from(*first.ip()).saturating_add(u32::from(MULTICAST_GROUPS) - 1);
+    first.ip().is_multicast() && Ipv4Addr::from(last).is_multicast() && first.port() != 0
 }
 
 /// Whether a member can have this name.
@@ -221,6 +230,24 @@ impl<'a, 't> Fields<'a, 't> {
                 None
             }
         }
+    }
+
+    /// The first of the multicast groups of a cluster.
+    pub(crate) fn multicast(
+        &self,
+        name: &'static str,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Option<SocketAddrV4> {
+        let Placed { value, span } = self.text(name, diagnostics)?;
+        let first = value.parse().ok();
+        let first = first.filter(|first| is_multicast_range(*first));
+        if first.is_none() {
+            let message =
+                format!("{value:?} is not the first of {MULTICAST_GROUPS} multicast groups");
+            let help = "an IPv4 address from 224.0.0.0 to 239.255.255.223, a colon and a port; an organisation may assign 239.192.0.0 to 239.195.255.255";
+            diagnostics.push(Diagnostic::error("U0210", message, span).with_help(help));
+        }
+        first
     }
 
     /// An address, or a serial line.

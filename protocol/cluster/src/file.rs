@@ -1,7 +1,7 @@
 //! A cluster file as it was written: its sections with the places of their values, before any name is looked up.
 
 use std::collections::BTreeMap;
-use std::net::SocketAddr;
+use std::net::{SocketAddr, SocketAddrV4};
 use std::ops::Range;
 use std::time::Duration;
 
@@ -61,6 +61,7 @@ pub(crate) struct ClusterSection {
     pub(crate) listen_cycles: u32,
     /// Index into [`crate::format::LINKS`].
     pub(crate) link: usize,
+    pub(crate) multicast: Option<SocketAddrV4>,
     /// Index into [`crate::format::SECURITIES`].
     pub(crate) security: usize,
 }
@@ -249,6 +250,7 @@ fn cluster(root: &DeTable<'_>, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
         shadow_cycles: fields.count("shadow_cycles", diagnostics),
         listen_cycles: fields.count("listen_cycles", diagnostics),
         link: fields.word("link", diagnostics),
+        multicast: fields.multicast("multicast", diagnostics),
         security: fields.word("security", diagnostics),
     })
 }

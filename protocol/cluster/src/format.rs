@@ -155,6 +155,7 @@ pub(crate) static CLUSTER: Section = Section {
         key shadow_cycles: count(0, MANY_CYCLES, 3), "cycles for which a repaired station computes in shadow mode before it publishes";
         key listen_cycles: count(1, MANY_CYCLES, 4), "cycles for which a starting station listens before it founds an epoch of its own";
         key link: word(&LINKS), "the transport of the frames";
+        key multicast: Kind::Text, "with `link = \"udp\"`: the first of 33 IPv4 multicast groups and their port, such as `239.192.0.0:7600`, in a network that delivers multicast between all members; each frame is then sent once for all its receivers. Other clusters on the network need other groups or another port";
         key security: word(&SECURITIES), "whose frames are accepted: `keys`, those of members with keys of this cluster, see `understudy keys`; `off`, all frames on the network. The laboratory makes keys of its own for each run";
     },
 };

@@ -29,7 +29,9 @@ pub use cluster::{Cluster, Controller, Link, PlantPlace, RemoteIo, Security, Und
 pub use code::Code;
 pub use device::{BAUD_RATES, Binding, Connection, FieldDevice, Parity, SerialLine, Side};
 pub use draft::{Draft, DraftProgram, MAXIMUM_PROGRAM_NAME};
-pub use fields::{MAXIMUM_NAME_LENGTH, is_name, why_unreachable};
+pub use fields::{
+    MAXIMUM_NAME_LENGTH, MULTICAST_GROUPS, is_multicast_range, is_name, why_unreachable,
+};
 pub use place::{BitPlace, ByteOrder, Place, PlaceError, RegisterTable, Registers};
 pub use read::{Loaded, MAXIMUM_TEXT_BYTES, Overrides, read, read_with};
 pub use schema::schema;

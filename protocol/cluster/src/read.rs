@@ -243,6 +243,7 @@ fn build(
     let mut cluster = Cluster {
         name,
         link,
+        multicast: cluster.multicast,
         security: overrides
             .security
             .unwrap_or([Security::Keys, Security::Off][cluster.security]),

@@ -1,6 +1,6 @@
 //! Who is where; [`Roster`] says who receives what.
 
-use std::net::SocketAddr;
+use std::net::{SocketAddr, SocketAddrV4};
 
 use serde::{Deserialize, Serialize};
 use understudy_wire::{ClusterHash, Member, Roster, Topic};
@@ -25,6 +25,7 @@ pub struct Endpoints {
     own: Peer,
     others: Vec<Peer>,
     roster: Roster,
+    multicast: Option<SocketAddrV4>,
 }
 
 impl Endpoints {
@@ -56,7 +57,22 @@ impl Endpoints {
             own,
             others,
             roster,
+            multicast: None,
         })
+    }
+
+    /// The same with the address of the first multicast group, where the network between the members has multicast.
+    #[must_use]
+    pub fn with_multicast(self, first: Option<SocketAddrV4>) -> Self {
+        Self {
+            multicast: first,
+            ..self
+        }
+    }
+
+    /// The first multicast group.
+    pub(crate) fn multicast(&self) -> Option<SocketAddrV4> {
+        self.multicast
     }
 
     /// Whose frames travel.

@@ -22,6 +22,7 @@ mod interruption;
 mod journal;
 mod link;
 mod member;
+mod multicast;
 mod operator;
 mod orders;
 mod ports;
@@ -55,6 +56,7 @@ pub use journal::{
 };
 pub use link::{Link, LinkCounters, LinkKind, NoSuchLink, Reopening, ZENOH_PORT_OFFSET};
 pub use member::{MemberSettings, run_member};
+pub use multicast::loopback_groups;
 pub use operator::{Call, Request};
 pub use orders::{Control, Cuts, Order, Orders, orders};
 pub use ports::free_addresses;

@@ -67,7 +67,7 @@ pub enum LinkKind {
     /// Zenoh over TCP: it loses no frame on its way, and a lost segment delays all frames behind it.
     #[default]
     Zenoh,
-    /// Plain UDP, one datagram for each receiver.
+    /// Plain UDP, one datagram for each receiver or for each multicast group.
     Udp,
 }
 

@@ -1,6 +1,6 @@
-//! Plain UDP: one socket, one datagram for each receiver.
+//! Plain UDP: one datagram for each receiver, or one for all where the cluster has multicast groups.
 //!
-//! A datagram's sender is not looked at: what is in a frame decides. One send for each receiver, and not one sendmmsg for all,
+//! A datagram's sender is not looked at: what is in a frame decides. Without groups one send for each receiver, and not one sendmmsg for all,
 //! because on loopback the time goes into delivering each datagram and not into entering the kernel.
 
 use std::net::{SocketAddr, UdpSocket};
@@ -13,6 +13,7 @@ use understudy_wire::{Body, Frame, MAXIMUM_FRAME_BYTES, Member, Roster, Topic};
 use crate::endpoints::Endpoints;
 use crate::error::BusError;
 use crate::link::{Link, LinkCounters};
+use crate::multicast::Groups;
 
 /// Asked of the system for datagrams that wait while this member is not scheduled; the system may give less.
 pub(crate) const RECEIVE_BUFFER_BYTES: usize = 1024 * 1024;
@@ -22,6 +23,7 @@ pub(crate) struct UdpLink {
     address: SocketAddr,
     roster: Roster,
     audiences: [Vec<(Member, SocketAddr)>; Topic::ALL.len()],
+    groups: Option<Groups>,
     datagram: Box<[u8]>,
     unsent: u64,
 }
@@ -38,7 +40,10 @@ impl UdpLink {
             let peers = endpoints.audience(topic);
             peers.map(|peer| (peer.member, peer.address)).collect()
         };
+        let groups = endpoints.multicast();
+        let groups = groups.map(|first| Groups::join(endpoints, first, &socket));
         Ok(Self {
+            groups: groups.transpose()?,
             address: socket.local_addr().map_err(failed)?,
             socket,
             roster: endpoints.roster().clone(),
@@ -60,7 +65,19 @@ impl Link for UdpLink {
             Body::Transfer(transfer) => Some(Member::Station(transfer.to)),
             _ => None,
         };
-        for (member, address) in &self.audiences[self.roster.topic(frame) as usize] {
+        let topic = self.roster.topic(frame);
+        let audience = &self.audiences[topic as usize];
+        let group = self
+            .groups
+            .as_ref()
+            .and_then(|groups| groups.address(topic));
+        if let Some(group) = group.filter(|_| only.is_none() && audience.len() > 1) {
+            if self.socket.send_to(bytes, group).is_err() {
+                self.unsent += 1;
+            }
+            return;
+        }
+        for (member, address) in audience {
             if only.is_none_or(|only| only == *member)
                 && self.socket.send_to(bytes, address).is_err()
             {
@@ -70,7 +87,11 @@ impl Link for UdpLink {
     }
 
     fn receive(&mut self, bytes: &mut Vec<u8>) -> bool {
-        let Ok(length) = self.socket.recv(&mut self.datagram) else {
+        // Most frames come by the groups, where there are any.
+        let groups = self.groups.as_ref();
+        let length = groups.and_then(|groups| groups.receive(&mut self.datagram));
+        let own = || self.socket.recv(&mut self.datagram).ok();
+        let Some(length) = length.or_else(own) else {
             return false;
         };
         bytes.clear();
@@ -79,7 +100,10 @@ impl Link for UdpLink {
     }
 
     fn readiness(&self) -> BorrowedFd<'_> {
-        self.socket.as_fd()
+        match &self.groups {
+            Some(groups) => groups.readiness(),
+            None => self.socket.as_fd(),
+        }
     }
 
     fn counters(&self) -> LinkCounters {

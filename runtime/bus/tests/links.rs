@@ -11,7 +11,7 @@ mod members;
 
 use std::collections::BTreeSet;
 use std::io::{Read, Write};
-use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream, UdpSocket};
+use std::net::{Shutdown, SocketAddr, SocketAddrV4, TcpListener, TcpStream, UdpSocket};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -20,9 +20,10 @@ use std::time::{Duration, Instant};
 
 use members::{Chat, Chatter, agreement, endpoints, guard, peers, plant, remote_io, station};
 use understudy_bus::{
-    Clock, Control, EventSink, FieldDriver, Host, HostEvent, LinkKind, NoField, Noted, Order, Peer,
-    SimulatedField, Summary, free_addresses, orders,
+    Clock, Control, Endpoints, EventSink, FieldDriver, Host, HostEvent, LinkKind, NoField, Noted,
+    Order, Peer, SimulatedField, Summary, free_addresses, loopback_groups, orders,
 };
+use understudy_testing::skip;
 use understudy_wire::{Member, Time};
 
 /// Past it a test has failed; nothing waits for it otherwise.
@@ -53,7 +54,19 @@ impl Running {
         peers: &[Peer],
         reports: &Sender<(Member, Noted<Chat>)>,
     ) -> Self {
-        let mut link = link.open(&endpoints(own, peers)).expect("a free port");
+        Self::over(link, endpoints(own, peers), life, peers, reports)
+    }
+
+    /// With more that the endpoints say.
+    fn over(
+        link: LinkKind,
+        endpoints: Endpoints,
+        life: u64,
+        peers: &[Peer],
+        reports: &Sender<(Member, Noted<Chat>)>,
+    ) -> Self {
+        let own = endpoints.own().member;
+        let mut link = link.open(&endpoints).expect("a free port");
         let mut guard = guard(own, life, peers);
         let (control, orders) = orders().expect("an eventfd");
         let mut sink = Sink {
@@ -146,10 +159,13 @@ fn wait_for(
     start.elapsed()
 }
 
-fn all_hear_all_and_one_who_comes_back(link: LinkKind) {
+fn all_hear_all_and_one_who_comes_back(link: LinkKind, multicast: Option<SocketAddrV4>) {
     let peers = peers(&cell());
     let (sender, reports) = channel();
-    let start = |own, life| Running::start(own, life, link, &peers, &sender);
+    let start = |own, life| {
+        let endpoints = endpoints(own, &peers).with_multicast(multicast);
+        Running::over(link, endpoints, life, &peers, &sender)
+    };
     let mut running: Vec<Running> = cell().into_iter().map(|own| start(own, 1)).collect();
     wait_for(&reports, expected(station(0), 1), "at first");
     // One whom all others call, one in the middle, and one who calls: each comes back on its own port in another life.
@@ -172,12 +188,21 @@ fn all_hear_all_and_one_who_comes_back(link: LinkKind) {
 
 #[test]
 fn all_hear_all_over_udp() {
-    all_hear_all_and_one_who_comes_back(LinkKind::Udp);
+    all_hear_all_and_one_who_comes_back(LinkKind::Udp, None);
+}
+
+/// One datagram for all receivers: nobody misses a frame, and nobody refuses one that is not for him.
+#[test]
+fn all_hear_all_by_multicast() {
+    match loopback_groups() {
+        Some(first) => all_hear_all_and_one_who_comes_back(LinkKind::Udp, Some(first)),
+        None => skip("the loopback interface delivers no multicast"),
+    }
 }
 
 #[test]
 fn all_hear_all_over_zenoh() {
-    all_hear_all_and_one_who_comes_back(LinkKind::Zenoh);
+    all_hear_all_and_one_who_comes_back(LinkKind::Zenoh, None);
 }
 
 /// How long each of so many restarts took, from the start of the new life until it received all of its peers and all of them received it,

@@ -1,6 +1,7 @@
 //! Stations, remote I/Os and plants as the process that this is.
 
 use std::io;
+use std::net::SocketAddrV4;
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 use std::process::Command;
@@ -31,6 +32,8 @@ pub struct MemberOptions {
     pub name: String,
     /// All members and their addresses.
     pub peers: Vec<Peer>,
+    /// The first multicast group of the frames; nothing where each receiver gets a datagram of its own.
+    pub multicast: Option<SocketAddrV4>,
     /// The folder of its keys.
     pub keys: Option<PathBuf>,
     /// Whether it ends with standard input and with the process that started it.
@@ -128,6 +131,7 @@ where
     let peers = options.peers.clone();
     let endpoints = Endpoints::new(cluster.agreement().cluster, member, peers, cluster.roster());
     let endpoints = endpoints.map_err(MemberError::Endpoints)?;
+    let endpoints = endpoints.with_multicast(options.multicast);
     let keys = read_keys(options, cluster, member)?;
     let settings = MemberSettings {
         endpoints,
