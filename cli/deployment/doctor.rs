@@ -154,6 +154,7 @@ fn of_member(
     let members = crate::member::peers(cluster, arguments.endpoints.as_deref())?;
     let agreement = cluster.agreement();
     let endpoints = Endpoints::new(agreement.cluster, member, members, cluster.roster());
+    let endpoints = endpoints.map(|endpoints| endpoints.with_multicast(cluster.multicast()));
     let endpoints =
         endpoints.map_err(|error| Answer::failed(Status::BadInput, error.code(), error))?;
     let mut findings = examine_ports(&endpoints, link_kind(cluster));

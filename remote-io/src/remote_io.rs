@@ -33,6 +33,7 @@ mod writing;
 
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
+use std::time::Duration;
 
 use understudy_cycle::{Arrival, Input, Machine, Output, Participant, RemoteIoInput};
 use understudy_wire::{
@@ -382,4 +383,15 @@ impl Machine for RemoteIo {
     fn wakeup(&self) -> Time {
         self.member.wakeup()
     }
+
+    /// The turns of a cycle count at its deadline; between cycles a frame may start the next one.
+    fn patience(&self) -> Duration {
+        match self.deadline {
+            Deadline::Ahead => self.settings.agreement.schedule.period() / PATIENCE_SHARE,
+            Deadline::Passed { .. } => Duration::ZERO,
+        }
+    }
 }
+
+/// Share of a period in which the turns that arrive are taken together.
+const PATIENCE_SHARE: u32 = 32;

@@ -5,6 +5,7 @@
 //! simulator and under a model checker.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use understudy_wire::{Force, Frame, Image, SignalPlace, StateChoice, Time, Write, WriteAnswer};
 
@@ -64,4 +65,10 @@ pub trait Machine {
 
     /// When it wants [`Input::Wakeup`] at the latest.
     fn wakeup(&self) -> Time;
+
+    /// How long a frame that arrives now may wait for others, so that they are taken together; never past [`Self::wakeup`], before which all that
+    /// has arrived is taken.
+    fn patience(&self) -> Duration {
+        Duration::ZERO
+    }
 }

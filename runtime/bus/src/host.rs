@@ -105,6 +105,14 @@ struct Round {
     summary: Summary,
 }
 
+/// Until one of them is readable, or for so long.
+fn poll_for(descriptors: &mut [PollFd<'_>], time: Duration) -> Result<(), BusError> {
+    match ppoll(descriptors, Some(TimeSpec::from_duration(time)), None) {
+        Ok(_) | Err(Errno::EINTR) => Ok(()),
+        Err(error) => Err(BusError::system("to sleep until something arrives")(error)),
+    }
+}
+
 impl<M: Machine> Host<'_, M> {
     /// Runs the member on the calling thread until it is told to stop.
     ///
@@ -295,19 +303,20 @@ impl<M: Machine> Host<'_, M> {
         }
     }
 
+    /// Until something arrives; where that may wait, until more has.
     fn sleep(&self, now: Time, until: Time) -> Result<(), BusError> {
         let mut descriptors = [
-            PollFd::new(self.link.readiness(), PollFlags::POLLIN),
             PollFd::new(self.orders.readiness(), PollFlags::POLLIN),
+            PollFd::new(self.link.readiness(), PollFlags::POLLIN),
         ];
-        match ppoll(
-            &mut descriptors,
-            Some(TimeSpec::from_duration(until.since(now))),
-            None,
-        ) {
-            Ok(_) | Err(Errno::EINTR) => Ok(()),
-            Err(error) => Err(BusError::system("to sleep until something arrives")(error)),
+        poll_for(&mut descriptors, until.since(now))?;
+        let [orders, link] = &mut descriptors;
+        let patience = self.machine.patience();
+        if patience > Duration::ZERO && link.any() == Some(true) && orders.any() == Some(false) {
+            let left = until.since(self.clock.now());
+            poll_for(std::slice::from_mut(orders), patience.min(left))?;
         }
+        Ok(())
     }
 
     fn report_reopenings(&mut self, now: Time) {
