@@ -1,9 +1,10 @@
-//! Somebody on the network of a cluster that runs. He takes the address of a station that is dead, hears what the others say to it, and
-//! says to them what he likes: what he heard again, frames that he made with keys of his own, frames without keys, and nonsense.
+//! Somebody on the network of a cluster that runs. He takes the address of a station that is dead, receives what the others send to it and to
+//! their multicast groups, and sends what he likes to them and to the groups: what he received again, frames that he made with keys of his
+//! own, frames without keys, and nonsense.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::net::{SocketAddr, UdpSocket};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,6 +12,7 @@ use std::thread::spawn;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
+use socket2::{Domain, SockRef, Socket, Type};
 use understudy_seal::{FrameKey, Seal};
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Frame, Header, Member, Moment, StationId,
@@ -67,6 +69,45 @@ fn offers(heard: &[u8], kept: &[Vec<u8>]) -> Vec<Vec<u8>> {
     offers
 }
 
+/// The first multicast group of the members that run a cluster file, as their command lines say.
+fn first_group(cluster: &Path) -> Option<SocketAddrV4> {
+    let processes = fs::read_dir("/proc").ok()?.flatten();
+    let mut lines = processes.filter_map(|process| fs::read(process.path().join("cmdline")).ok());
+    lines.find_map(|line| {
+        let line = String::from_utf8_lossy(&line).into_owned();
+        let words: Vec<&str> = line.split('\0').collect();
+        let place = words.iter().position(|word| *word == "--multicast")?;
+        let is_ours = words.contains(&text(cluster));
+        words.get(place + 1)?.parse().ok().filter(|_| is_ours)
+    })
+}
+
+/// The group that all receive, two of turns and two of samples.
+fn addresses_of_groups(first: SocketAddrV4) -> impl Iterator<Item = SocketAddr> {
+    [0, 1, 2, 17, 18].into_iter().map(move |group| {
+        let address = Ipv4Addr::from(u32::from(*first.ip()) + group);
+        SocketAddr::from((address, first.port()))
+    })
+}
+
+/// A socket that receives what is sent to the groups; `sender` sends to them from now on.
+fn member_of_the_groups(first: SocketAddrV4, sender: &UdpSocket) -> UdpSocket {
+    let open = || {
+        let socket = Socket::new(Domain::IPV4, Type::DGRAM, None)?;
+        socket.set_reuse_address(true)?;
+        socket.bind(&SocketAddr::from((Ipv4Addr::UNSPECIFIED, first.port())).into())?;
+        for group in addresses_of_groups(first) {
+            if let IpAddr::V4(group) = group.ip() {
+                socket.join_multicast_v4(&group, &Ipv4Addr::LOCALHOST)?;
+            }
+        }
+        socket.set_read_timeout(Some(Duration::from_millis(200)))?;
+        SockRef::from(sender).set_multicast_if_v4(&Ipv4Addr::LOCALHOST)?;
+        Ok::<UdpSocket, std::io::Error>(socket.into())
+    };
+    open().expect("the groups that the members are in")
+}
+
 #[test]
 fn a_stranger_moves_nothing_and_the_journal_names_what_he_did() {
     let _one = some_at_a_time();
@@ -79,7 +120,8 @@ fn a_stranger_moves_nothing_and_the_journal_names_what_he_did() {
         addresses["understudy"],
         ["robot", "press", "robot-io", "press-io"],
     );
-    let others = others.map(|name| addresses[name]);
+    let mut targets = others.map(|name| addresses[name]).to_vec();
+    let file = cluster.clone();
     let done = Arc::new(AtomicBool::new(false));
     let stop = Arc::clone(&done);
     let stranger = spawn(move || {
@@ -99,16 +141,22 @@ fn a_stranger_moves_nothing_and_the_journal_names_what_he_did() {
         };
         let timeout = Some(Duration::from_millis(200));
         socket.set_read_timeout(timeout).expect("it is not zero");
+        let groups = first_group(&file);
+        let receiver = groups.map_or_else(
+            || socket.try_clone().expect("a descriptor"),
+            |first| member_of_the_groups(first, &socket),
+        );
+        targets.extend(groups.into_iter().flat_map(addresses_of_groups));
         let mut kept: Vec<Vec<u8>> = Vec::new();
         let mut bytes = [0; 4096];
         let mut said = 0_u64;
         while !stop.load(Ordering::Relaxed) {
-            let Ok(length) = socket.recv(&mut bytes) else {
+            let Ok(length) = receiver.recv(&mut bytes) else {
                 continue;
             };
             let heard = &bytes[..length];
             for offer in offers(heard, &kept) {
-                for other in others {
+                for other in &targets {
                     // Some die before the stranger does.
                     said += u64::from(socket.send_to(&offer, other).is_ok());
                 }
