@@ -37,13 +37,11 @@ fn random_scenario(random: &mut Pcg64) -> String {
         let station = *stations.choose(random).expect("some");
         let remote_io = *remote_ios.choose(random).expect("some");
         match random.random_range(0..12) {
-            0..4 if down.is_empty() || random.random_bool(0.2) => {
-                if !down.contains_key(member) {
-                    let (action, end) = [("crash", "restart"), ("stop", "continue")]
-                        [usize::from(random.random_bool(0.3))];
-                    step(at, action, member, "");
-                    down.insert(member, end);
-                }
+            0..4 if !down.contains_key(member) && (down.is_empty() || random.random_bool(0.2)) => {
+                let (action, end) = [("crash", "restart"), ("stop", "continue")]
+                    [usize::from(random.random_bool(0.3))];
+                step(at, action, member, "");
+                down.insert(member, end);
             }
             0..7 => {
                 if let Some((member, end)) = down.pop_first() {
