@@ -113,14 +113,16 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
             Some(form.and_then(written))
         }
         // What is no ladder may be a program with numbers.
-        (None, Ok(Form::St)) => match typed_text(&report.name, &report.text, wanted) {
-            Ok((None, _)) => None,
-            Ok((Some(written), diagnostics)) => {
-                report.diagnostics = diagnostics;
-                Some(Ok(written))
+        (None, Ok(form @ (Form::St | Form::Plcopen))) => {
+            match typed_text(&report.name, &report.text, wanted, form.format()) {
+                Ok((None, _)) => None,
+                Ok((Some(written), diagnostics)) => {
+                    report.diagnostics = diagnostics;
+                    Some(Ok(written))
+                }
+                Err(error) => Some(Err(failed(error))),
             }
-            Err(error) => Some(Err(failed(error))),
-        },
+        }
         (None, _) => None,
     };
     let Some(written) = written else {
@@ -161,7 +163,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
 /// Code of the error that prevented the conversion.
 pub(crate) fn code(error: &WriteError) -> &'static str {
     match error {
-        WriteError::ReadOnly | WriteError::Program(_) => "U1014",
+        WriteError::ReadOnly | WriteError::Program(_) | WriteError::NotHeld(_) => "U1014",
         WriteError::Different(_) => "U1019",
     }
 }

@@ -72,7 +72,8 @@ function head(state, live) {
   const open = state.open_alarms;
   const button = document.getElementById("alarm-count");
   button.hidden = open === 0;
-  setText(button, open === 1 ? "⚠ 1 alarm" : `⚠ ${open} alarms`);
+  const count = open === 1 ? "1 alarm" : `${open} alarms`;
+  setText(button, state.past ? `⚠ at least ${count}` : `⚠ ${count}`);
 }
 
 // A long journal is begun near its end; what is before comes behind it.

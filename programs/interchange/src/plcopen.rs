@@ -27,7 +27,7 @@ use understudy_text::{Diagnostic, Severity, has_errors};
 
 pub use fidelity::{Count, Fidelity, Note};
 pub use typed::read_typed;
-pub use write::write;
+pub use write::{write, write_typed};
 pub use xml::{MAXIMUM_BYTES, MAXIMUM_DEPTH, MAXIMUM_NODES};
 
 use crate::text::whole;

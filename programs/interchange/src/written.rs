@@ -59,6 +59,9 @@ pub enum WriteError {
     /// The program cannot run at this period.
     #[error(transparent)]
     Program(#[from] LowerError),
+    /// The form cannot hold the program, or is not written with what it has.
+    #[error("{0}")]
+    NotHeld(String),
     /// A defect of the writer.
     #[error("the written text is not the program, and was discarded: {0}")]
     Different(String),

@@ -26,6 +26,15 @@ pub fn statements(statements: &[crate::syntax::Statement]) -> String {
     printer.text
 }
 
+/// Instructions, each on its line.
+pub fn instructions(instructions: &[Instruction]) -> String {
+    let mut printer = Printer::default();
+    instructions
+        .iter()
+        .for_each(|instruction| printer.instruction(instruction));
+    printer.text
+}
+
 /// One program, function block, function or method.
 pub fn unit(unit: &Unit) -> String {
     let mut printer = Printer::default();

@@ -7,6 +7,7 @@
 
 mod sheet;
 mod tree;
+mod typed;
 
 use std::time::Duration;
 
@@ -17,6 +18,7 @@ use understudy_ladder::{
 
 use self::sheet::Sheet;
 use self::tree::Tree;
+pub use self::typed::write_typed;
 
 /// The file of a program that runs every `period`.
 ///
@@ -26,15 +28,7 @@ pub fn write(program: &Program, period: Duration) -> String {
     let mut names = StandardNames::of(program);
     let (rungs, added) = prepared(program, &mut names);
     let sheet = Sheet::of(&rungs, &program.footer, &names);
-    let mut tree = Tree::new();
-    tree.open(
-        "project",
-        &[
-            ("xmlns", "http://www.plcopen.org/xml/tc6_0201"),
-            ("xmlns:xhtml", "http://www.w3.org/1999/xhtml"),
-        ],
-    );
-    header(&mut tree, names.program());
+    let mut tree = document(names.program());
     tree.open("types", &[]);
     tree.empty("dataTypes", &[]);
     tree.open("pous", &[]);
@@ -60,6 +54,20 @@ pub fn write(program: &Program, period: Duration) -> String {
     instances(&mut tree, &mut names, period);
     tree.close("project");
     tree.finish()
+}
+
+/// A document up to its types.
+fn document(name: &str) -> Tree {
+    let mut tree = Tree::new();
+    tree.open(
+        "project",
+        &[
+            ("xmlns", "http://www.plcopen.org/xml/tc6_0201"),
+            ("xmlns:xhtml", "http://www.w3.org/1999/xhtml"),
+        ],
+    );
+    header(&mut tree, name);
+    tree
 }
 
 fn header(tree: &mut Tree, name: &str) {

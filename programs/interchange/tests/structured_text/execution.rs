@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use understudy_interchange::{Format, Wanted, plcopen, read, typed_text};
+use understudy_interchange::{Format, Wanted, WriteError, plcopen, read, typed_text};
 use understudy_ladder::Program as Ladder;
 use understudy_logic::Running;
 use understudy_structured_text::syntax::File;
@@ -126,8 +126,8 @@ fn ladders_of_public_texts_do_what_their_typed_programs_do() {
     assert!(compared >= least, "{compared} programs");
 }
 
-/// Texts of programs with numbers, of the project and of others where they are there, written as Structured Text: each does what the program does,
-/// or [`typed_text`] says so.
+/// Programs with numbers, of the project and of others where they are there, written as Structured Text and as PLCopen XML: each text does what the
+/// program does, or [`typed_text`] says so; and what the XML does not hold is named.
 #[test]
 fn programs_with_numbers_are_written_as_they_are() {
     let mut found = Vec::new();
@@ -137,7 +137,7 @@ fn programs_with_numbers_are_written_as_they_are() {
         files(&Path::new(&folder).join("programs"), &mut found);
     }
     found.sort();
-    let mut written = 0;
+    let (mut written, mut drawn) = (0, 0);
     for path in found {
         let ending = path.extension().and_then(|ending| ending.to_str());
         if !ending.is_some_and(|ending| ["st", "ST", "xml", "TcPOU"].contains(&ending)) {
@@ -147,16 +147,30 @@ fn programs_with_numbers_are_written_as_they_are() {
             continue;
         };
         let name = path.display().to_string();
-        let result = typed_text(&name, &text, Wanted::default());
+        let form = Format::StructuredText;
+        let result = typed_text(&name, &text, Wanted::default(), form);
         let (found, diagnostics) = result.unwrap_or_else(|error| panic!("{name}: {error}"));
         let Some(found) = found else {
             continue;
         };
         written += 1;
         // What is written can be read, and written again.
-        let again = typed_text("again.st", &found.text, Wanted::default());
+        let again = typed_text("again.st", &found.text, Wanted::default(), form);
         let (again, found) = again.unwrap_or_else(|error| panic!("{name}: {error}"));
         assert!(again.is_some(), "{name}: {found:?}, {diagnostics:?}");
+        match typed_text(&name, &text, Wanted::default(), Format::PlcOpen) {
+            Ok((found, _)) => {
+                let found = found.expect("it was written as text");
+                drawn += 1;
+                let again =
+                    typed_text("again.xml", &found.text, Wanted::default(), Format::PlcOpen);
+                let (again, found) = again.unwrap_or_else(|error| panic!("{name}: {error}"));
+                assert!(again.is_some(), "{name}: {found:?}");
+            }
+            Err(WriteError::NotHeld(_)) => {}
+            Err(error) => panic!("{name}: {error}"),
+        }
     }
     assert!(written >= 10, "{written} programs");
+    assert!(drawn * 10 >= written * 9, "{drawn} documents of {written}");
 }

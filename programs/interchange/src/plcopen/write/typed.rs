@@ -1,0 +1,359 @@
+//! A file with numbers as PLCopen XML 2.01: types, units with bodies in Structured Text or instruction lists, configuration.
+
+use understudy_structured_text::print;
+use understudy_structured_text::syntax::{
+    Body, Class, Declaration, File, Initializer, TypeDefinition, TypeKind, TypeName, Unit, UnitKind,
+};
+
+use super::tree::Tree;
+use super::{document, standard_time};
+
+/// Elements that the format has for types; of two names the one of the format.
+const ELEMENTARY: [(&str, &str); 23] = [
+    ("BOOL", "BOOL"),
+    ("BYTE", "BYTE"),
+    ("WORD", "WORD"),
+    ("DWORD", "DWORD"),
+    ("LWORD", "LWORD"),
+    ("SINT", "SINT"),
+    ("INT", "INT"),
+    ("DINT", "DINT"),
+    ("LINT", "LINT"),
+    ("USINT", "USINT"),
+    ("UINT", "UINT"),
+    ("UDINT", "UDINT"),
+    ("ULINT", "ULINT"),
+    ("REAL", "REAL"),
+    ("LREAL", "LREAL"),
+    ("TIME", "TIME"),
+    ("DATE", "DATE"),
+    ("DT", "DT"),
+    ("DATE_AND_TIME", "DT"),
+    ("TOD", "TOD"),
+    ("TIME_OF_DAY", "TOD"),
+    ("STRING", "string"),
+    ("WSTRING", "wstring"),
+];
+
+/// The file as a document.
+///
+/// # Errors
+/// What the format cannot hold, or is not written yet, in words.
+pub fn write_typed(file: &File, name: &str) -> Result<String, String> {
+    let mut tree = document(name);
+    tree.open("types", &[]);
+    tree.open("dataTypes", &[]);
+    for definition in &file.types {
+        data_type(&mut tree, definition)?;
+    }
+    tree.close("dataTypes");
+    tree.open("pous", &[]);
+    for unit in &file.units {
+        pou(&mut tree, unit)?;
+    }
+    tree.close("pous");
+    tree.close("types");
+    instances(&mut tree, file)?;
+    tree.close("project");
+    Ok(tree.finish())
+}
+
+fn data_type(tree: &mut Tree, definition: &TypeDefinition) -> Result<(), String> {
+    tree.open("dataType", &[("name", definition.name.as_str())]);
+    tree.open("baseType", &[]);
+    type_of(tree, &definition.of)?;
+    tree.close("baseType");
+    initial(tree, definition.initial.as_ref())?;
+    tree.close("dataType");
+    Ok(())
+}
+
+fn pou(tree: &mut Tree, unit: &Unit) -> Result<(), String> {
+    let kind = match unit.kind {
+        UnitKind::Program => "program",
+        UnitKind::FunctionBlock => "functionBlock",
+        UnitKind::Function => "function",
+        UnitKind::Method => return Err(not_held(unit, "a method")),
+    };
+    if !unit.methods.is_empty() || unit.extends.is_some() || !unit.implements.is_empty() {
+        return Err(not_held(unit, "methods, EXTENDS or IMPLEMENTS"));
+    }
+    let (language, text) = match &unit.body {
+        Body::Statements(statements) => ("ST", print::statements(statements)),
+        Body::Instructions(instructions) => ("IL", print::instructions(instructions)),
+        Body::Chart(_) => return Err(not_held(unit, "a sequential function chart")),
+    };
+    tree.open("pou", &[("name", unit.name.as_str()), ("pouType", kind)]);
+    tree.open("interface", &[]);
+    if let Some(result) = &unit.result {
+        tree.open("returnType", &[]);
+        type_of(tree, result)?;
+        tree.close("returnType");
+    }
+    let blocks = unit.declarations.chunk_by(|one, other| {
+        let key = |of: &Declaration| (of.class, of.constant, of.retained);
+        key(one) == key(other)
+    });
+    for block in blocks {
+        variables(tree, block).map_err(|what| not_held(unit, &what))?;
+    }
+    tree.close("interface");
+    tree.open("body", &[]);
+    tree.formatted(language, text.trim_end());
+    tree.close("body");
+    if !unit.comments.is_empty() {
+        tree.formatted("documentation", &unit.comments.join("\n"));
+    }
+    tree.close("pou");
+    Ok(())
+}
+
+fn not_held(unit: &Unit, what: &str) -> String {
+    format!(
+        "`{}` has {what}, which PLCopen XML is not written with: convert it to Structured Text (.st)",
+        unit.name
+    )
+}
+
+/// Variables of one block.
+fn variables(tree: &mut Tree, block: &[Declaration]) -> Result<(), String> {
+    let Some(first) = block.first() else {
+        return Ok(());
+    };
+    let list = match first.class {
+        Class::Input => "inputVars",
+        Class::Output => "outputVars",
+        Class::InOut => "inOutVars",
+        Class::Local => "localVars",
+        Class::Temporary => "tempVars",
+        Class::External => "externalVars",
+        Class::Global => "globalVars",
+        Class::Static => return Err("variables of VAR_STAT".to_owned()),
+    };
+    let mut attributes = Vec::new();
+    if first.constant {
+        attributes.push(("constant", "true"));
+    }
+    if first.retained {
+        attributes.push(("retain", "true"));
+    }
+    tree.open(list, &attributes);
+    for variable in block {
+        if variable.edge.is_some() {
+            return Err("inputs of R_EDGE or F_EDGE".to_owned());
+        }
+        let mut attributes = vec![("name", variable.name.as_str())];
+        if let Some(address) = &variable.address {
+            attributes.push(("address", address.as_str()));
+        }
+        tree.open("variable", &attributes);
+        tree.open("type", &[]);
+        type_of(tree, &variable.of)?;
+        tree.close("type");
+        initial(tree, variable.initial.as_ref())?;
+        if let Some(description) = &variable.description {
+            tree.formatted("documentation", description);
+        }
+        tree.close("variable");
+    }
+    tree.close(list);
+    Ok(())
+}
+
+fn type_of(tree: &mut Tree, of: &TypeName) -> Result<(), String> {
+    match &of.kind {
+        TypeKind::Named(name) => {
+            let known = ELEMENTARY.iter().find(|(word, _)| name.is(word));
+            match known {
+                Some((_, element)) => tree.empty(element, &[]),
+                None => tree.empty("derived", &[("name", name.as_str())]),
+            }
+        }
+        TypeKind::Subrange(base, lower, upper) => {
+            let is_unsigned = base.key().starts_with('U');
+            let element = if is_unsigned {
+                "subrangeUnsigned"
+            } else {
+                "subrangeSigned"
+            };
+            let (lower, upper) = (print::expression(lower), print::expression(upper));
+            tree.open(element, &[]);
+            tree.empty("range", &[("lower", &lower), ("upper", &upper)]);
+            tree.open("baseType", &[]);
+            tree.empty(base.key().as_str(), &[]);
+            tree.close("baseType");
+            tree.close(element);
+        }
+        TypeKind::Text { wide, length } => {
+            let element = if *wide { "wstring" } else { "string" };
+            match length.as_ref().map(|length| print::expression(length)) {
+                Some(length) => tree.empty(element, &[("length", &length)]),
+                None => tree.empty(element, &[]),
+            }
+        }
+        TypeKind::Array(dimensions, element) => {
+            tree.open("array", &[]);
+            for (lower, upper) in dimensions {
+                let (lower, upper) = (print::expression(lower), print::expression(upper));
+                tree.empty("dimension", &[("lower", &lower), ("upper", &upper)]);
+            }
+            tree.open("baseType", &[]);
+            type_of(tree, element)?;
+            tree.close("baseType");
+            tree.close("array");
+        }
+        TypeKind::Structure(fields) => {
+            tree.open("struct", &[]);
+            for field in fields {
+                tree.open("variable", &[("name", field.name.as_str())]);
+                tree.open("type", &[]);
+                type_of(tree, &field.of)?;
+                tree.close("type");
+                initial(tree, field.initial.as_ref())?;
+                if let Some(description) = &field.description {
+                    tree.formatted("documentation", description);
+                }
+                tree.close("variable");
+            }
+            tree.close("struct");
+        }
+        TypeKind::Enumeration(values, base) => {
+            tree.open("enum", &[]);
+            tree.open("values", &[]);
+            for (name, number) in values {
+                match number.as_ref().map(print::expression) {
+                    Some(number) => {
+                        tree.empty("value", &[("name", name.as_str()), ("value", &number)]);
+                    }
+                    None => tree.empty("value", &[("name", name.as_str())]),
+                }
+            }
+            tree.close("values");
+            if let Some(base) = base {
+                tree.open("baseType", &[]);
+                tree.empty(base.key().as_str(), &[]);
+                tree.close("baseType");
+            }
+            tree.close("enum");
+        }
+        TypeKind::Pointer(to) => {
+            tree.open("pointer", &[]);
+            tree.open("baseType", &[]);
+            type_of(tree, to)?;
+            tree.close("baseType");
+            tree.close("pointer");
+        }
+        TypeKind::OpenArray(..) => return Err("an ARRAY [*]".to_owned()),
+    }
+    Ok(())
+}
+
+fn initial(tree: &mut Tree, value: Option<&Initializer>) -> Result<(), String> {
+    let Some(value) = value else {
+        return Ok(());
+    };
+    tree.open("initialValue", &[]);
+    initial_value(tree, value)?;
+    tree.close("initialValue");
+    Ok(())
+}
+
+fn initial_value(tree: &mut Tree, value: &Initializer) -> Result<(), String> {
+    match value {
+        Initializer::Value(value) => {
+            tree.empty("simpleValue", &[("value", &print::expression(value))]);
+        }
+        Initializer::Array(elements, _) => {
+            tree.open("arrayValue", &[]);
+            for (count, values) in elements {
+                let count = count.as_ref().map(print::expression);
+                let [value] = values.as_slice() else {
+                    return Err("an initial value that repeats several elements".to_owned());
+                };
+                match &count {
+                    Some(count) => tree.open("value", &[("repetitionValue", count)]),
+                    None => tree.open("value", &[]),
+                }
+                initial_value(tree, value)?;
+                tree.close("value");
+            }
+            tree.close("arrayValue");
+        }
+        Initializer::Structure(fields, _) => {
+            tree.open("structValue", &[]);
+            for (member, value) in fields {
+                tree.open("value", &[("member", member.as_str())]);
+                initial_value(tree, value)?;
+                tree.close("value");
+            }
+            tree.close("structValue");
+        }
+    }
+    Ok(())
+}
+
+fn instances(tree: &mut Tree, file: &File) -> Result<(), String> {
+    tree.open("instances", &[]);
+    tree.open("configurations", &[]);
+    if !file.instances.is_empty() || !file.globals.is_empty() {
+        tree.open("configuration", &[("name", "Configuration0")]);
+        tree.open("resource", &[("name", "Resource0")]);
+        for task in &file.tasks {
+            let interval = task
+                .interval
+                .and_then(|interval| u64::try_from(interval).ok());
+            let interval =
+                interval.map(|interval| standard_time(std::time::Duration::from_nanos(interval)));
+            let single = task.single.as_ref().map(print::expression);
+            let priority = task.priority.unwrap_or(0).to_string();
+            let mut attributes = vec![("name", task.name.as_str()), ("priority", &priority)];
+            attributes.extend(interval.as_deref().map(|interval| ("interval", interval)));
+            attributes.extend(single.as_deref().map(|single| ("single", single)));
+            tree.open("task", &attributes);
+            let is_own = |task_of: &Option<understudy_structured_text::syntax::Name>| {
+                task_of.as_ref().is_some_and(|name| *name == task.name)
+            };
+            for instance in file
+                .instances
+                .iter()
+                .filter(|instance| is_own(&instance.task))
+            {
+                run(tree, instance)?;
+            }
+            tree.close("task");
+        }
+        let blocks = file.globals.chunk_by(|one, other| {
+            (one.constant, one.retained) == (other.constant, other.retained)
+        });
+        for block in blocks {
+            variables(tree, block)?;
+        }
+        for instance in file
+            .instances
+            .iter()
+            .filter(|instance| instance.task.is_none())
+        {
+            run(tree, instance)?;
+        }
+        tree.close("resource");
+        tree.close("configuration");
+    }
+    tree.close("configurations");
+    tree.close("instances");
+    Ok(())
+}
+
+fn run(
+    tree: &mut Tree,
+    instance: &understudy_structured_text::syntax::ProgramInstance,
+) -> Result<(), String> {
+    if !instance.connections.is_empty() {
+        return Err(format!(
+            "the program instance `{}` has connections, which PLCopen XML is not written with",
+            instance.name
+        ));
+    }
+    let (name, of) = (instance.name.as_str(), instance.of.as_str());
+    tree.empty("pouInstance", &[("name", name), ("typeName", of)]);
+    Ok(())
+}
