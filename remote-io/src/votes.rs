@@ -43,7 +43,7 @@ pub(crate) enum Finding {
     },
 }
 
-/// Compares them all; at most 64 stations vote.
+/// Compares them all; at most 72 stations vote.
 pub(crate) fn find(votes: &[Vote]) -> Finding {
     let Some(first) = votes.first() else {
         return Finding::Silence;

@@ -14,7 +14,7 @@ use understudy_interchange::{
     Format, Reading, USUAL_PERIOD, read_all, unknown_form, write as write_program,
 };
 use understudy_text::{Report, Severity, decode};
-use understudy_wire::MAXIMUM_STATIONS;
+use understudy_wire::MAXIMUM_PROGRAMS;
 
 use super::written;
 use crate::answer::{Answer, Failure};
@@ -237,10 +237,9 @@ impl Found {
             }
             taken.extend(members.map(|member| (member, source.as_path())));
         }
-        let most = MAXIMUM_STATIONS - Draft::other_members().len();
-        if self.programs.len() > most {
+        if self.programs.len() > MAXIMUM_PROGRAMS {
             let message = format!(
-                "{} programs: a cluster has at most {most} and its understudy; divide them into several clusters",
+                "{} programs: a cluster has at most {MAXIMUM_PROGRAMS}; divide them into several clusters",
                 self.programs.len()
             );
             failures.push(("U0625", message));

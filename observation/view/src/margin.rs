@@ -70,7 +70,7 @@ pub struct Margin {
 }
 
 impl Holders {
-    /// The remaining redundancy. It takes some thousand selections for a cluster of 64 stations.
+    /// The remaining redundancy. It takes some thousand selections for a cluster of 72 stations.
     pub fn margin(&self) -> Margin {
         let served = self.served(StationSet::EMPTY);
         let publishing: Vec<StationId> = (0..)

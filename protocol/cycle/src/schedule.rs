@@ -70,7 +70,7 @@ const STALL_PER_MILLE: u32 = 200;
 const COPIES_SPAN_PER_MILLE: u32 = 75;
 
 impl Schedule {
-    /// Checks the bounds: 200 µs to 10 s, 1 to 64 controllers, at most 64 stations, 1 to 4 copies.
+    /// Checks the bounds: 200 µs to 10 s, 1 to 64 controllers, at most 72 stations, 1 to 4 copies.
     pub fn new(
         period: Duration,
         controllers: usize,
@@ -221,7 +221,7 @@ mod tests {
         let period = Duration::from_millis(10);
         assert!(Schedule::new(Duration::from_micros(1), 1, 1, 1).is_err());
         assert!(Schedule::new(period, 0, 1, 1).is_err());
-        assert!(Schedule::new(period, 64, 1, 1).is_err());
+        assert!(Schedule::new(period, 64, 9, 1).is_err());
         assert!(Schedule::new(period, 2, 1, 0).is_err());
         assert!(Schedule::new(period, 2, 1, 5).is_err());
     }

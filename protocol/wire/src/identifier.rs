@@ -4,11 +4,11 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// Maximum number of programs in one cluster: a [`crate::ProgramSet`] is one 64-bit word.
+/// Maximum number of programs in one cluster.
 pub const MAXIMUM_PROGRAMS: usize = 64;
 
-/// Maximum number of stations in one cluster: a [`crate::StationSet`] is one 64-bit word.
-pub const MAXIMUM_STATIONS: usize = 64;
+/// Maximum number of stations in one cluster: the controllers of all programs and eight understudies.
+pub const MAXIMUM_STATIONS: usize = MAXIMUM_PROGRAMS + 8;
 
 /// A program's 0-based index in the cluster; the paper's i is `index + 1`. Controller i, remote I/O i and plant i share
 /// it.

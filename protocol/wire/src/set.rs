@@ -1,22 +1,26 @@
-//! Sets of programs and of stations, one 64-bit word each.
+//! Sets of programs and of stations, one 128-bit word each.
 
 use std::fmt;
 use std::hash::{Hash, Hasher};
 use std::marker::PhantomData;
 
-use serde::{Deserialize, Serialize};
+use serde::de::{self, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::identifier::{ProgramId, StationId};
+use crate::identifier::{MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, ProgramId, StationId};
 
-/// Member of a [`Set`]: an index below 64.
+/// Member of a [`Set`]: an index below [`Element::MAXIMUM`].
 pub trait Element: Copy {
-    /// The member with an index below 64.
+    /// Maximum number of members, at most 127.
+    const MAXIMUM: usize;
+    /// The member with an index below the maximum.
     fn from_index(index: u8) -> Self;
-    /// Its index; a member with an index of 64 or above is in no set.
+    /// Its index; a member with an index of the maximum or above is in no set.
     fn to_index(self) -> u8;
 }
 
 impl Element for ProgramId {
+    const MAXIMUM: usize = MAXIMUM_PROGRAMS;
     fn from_index(index: u8) -> Self {
         Self(index)
     }
@@ -26,6 +30,7 @@ impl Element for ProgramId {
 }
 
 impl Element for StationId {
+    const MAXIMUM: usize = MAXIMUM_STATIONS;
     fn from_index(index: u8) -> Self {
         Self(index)
     }
@@ -35,9 +40,7 @@ impl Element for StationId {
 }
 
 /// A set of members, bit k being the member with index k.
-#[derive(Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct Set<E>(u64, #[serde(skip)] PhantomData<E>);
+pub struct Set<E>(u128, PhantomData<E>);
 
 /// A set of programs, such as the mask of a parity word.
 pub type ProgramSet = Set<ProgramId>;
@@ -49,23 +52,21 @@ impl<E: Element> Set<E> {
     /// The empty set.
     pub const EMPTY: Self = Self(0, PhantomData);
 
-    /// The members of a bit mask.
-    pub fn from_bits(bits: u64) -> Self {
-        Self(bits, PhantomData)
+    const ALL: u128 = (1 << E::MAXIMUM) - 1;
+
+    /// The members of a bit mask; bits of no member are left out.
+    pub fn from_bits(bits: u128) -> Self {
+        Self(bits & Self::ALL, PhantomData)
     }
 
     /// The members as a bit mask.
-    pub fn bits(self) -> u64 {
+    pub fn bits(self) -> u128 {
         self.0
     }
 
     /// The members with an index below `count`.
     pub fn first(count: usize) -> Self {
-        Self::from_bits(if count >= 64 {
-            u64::MAX
-        } else {
-            (1 << count) - 1
-        })
+        Self::from_bits((1 << count.min(E::MAXIMUM)) - 1)
     }
 
     /// The set of one member.
@@ -129,8 +130,9 @@ impl<E: Element> Set<E> {
     }
 }
 
-fn bit<E: Element>(member: E) -> u64 {
-    1_u64.checked_shl(u32::from(member.to_index())).unwrap_or(0)
+fn bit<E: Element>(member: E) -> u128 {
+    let index = usize::from(member.to_index());
+    if index < E::MAXIMUM { 1 << index } else { 0 }
 }
 
 impl<E: Element> FromIterator<E> for Set<E> {
@@ -140,6 +142,53 @@ impl<E: Element> FromIterator<E> for Set<E> {
             set.insert(member);
         }
         set
+    }
+}
+
+// In a text, a mask of more than 64 bits is a string of hexadecimal digits: readers of JSON take integers of 64 bits.
+impl<E> Serialize for Set<E> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        if !serializer.is_human_readable() {
+            return serializer.serialize_u128(self.0);
+        }
+        match u64::try_from(self.0) {
+            Ok(bits) => serializer.serialize_u64(bits),
+            Err(_) => serializer.collect_str(&format_args!("{:x}", self.0)),
+        }
+    }
+}
+
+impl<'de, E: Element> Deserialize<'de> for Set<E> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let bits = if deserializer.is_human_readable() {
+            deserializer.deserialize_any(Mask)?
+        } else {
+            u128::deserialize(deserializer)?
+        };
+        if bits & !Self::ALL != 0 {
+            return Err(de::Error::custom("a set with a member above the maximum"));
+        }
+        Ok(Self(bits, PhantomData))
+    }
+}
+
+/// The bit mask of a set in a text.
+struct Mask;
+
+impl Visitor<'_> for Mask {
+    type Value = u128;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("a bit mask: an integer, or a string of at most 32 hexadecimal digits")
+    }
+
+    fn visit_u64<E>(self, bits: u64) -> Result<u128, E> {
+        Ok(bits.into())
+    }
+
+    fn visit_str<E: de::Error>(self, digits: &str) -> Result<u128, E> {
+        u128::from_str_radix(digits, 16)
+            .map_err(|_| E::invalid_value(de::Unexpected::Str(digits), &self))
     }
 }
 
@@ -193,14 +242,44 @@ mod tests {
         );
         assert_eq!(set.without(ProgramSet::only(ProgramId(5))).len(), 2);
         assert_eq!(ProgramSet::first(64).len(), 64);
+        assert_eq!(StationSet::first(65).len(), 65);
+        assert_eq!(StationSet::first(MAXIMUM_STATIONS).len(), MAXIMUM_STATIONS);
         assert_eq!(ProgramSet::first(0), ProgramSet::EMPTY);
     }
 
     #[test]
     fn a_member_past_the_bound_is_in_no_set() {
         let mut set = StationSet::EMPTY;
-        set.insert(StationId(64));
+        set.insert(StationId(MAXIMUM_STATIONS as u8));
         assert!(set.is_empty());
-        assert!(!StationSet::first(64).contains(StationId(200)));
+        assert!(!StationSet::first(128).contains(StationId(200)));
+        assert_eq!(
+            ProgramSet::from_bits(u128::MAX),
+            ProgramSet::first(MAXIMUM_PROGRAMS)
+        );
+    }
+
+    #[test]
+    fn a_set_in_a_text_is_an_integer_while_it_fits_and_digits_above() {
+        for (set, text) in [
+            (StationSet::EMPTY, "0"),
+            (StationSet::first(3), "7"),
+            (StationSet::first(64), "18446744073709551615"),
+            (StationSet::first(65), "\"1ffffffffffffffff\""),
+            (StationSet::only(StationId(71)), "\"800000000000000000\""),
+        ] {
+            assert_eq!(serde_json::to_string(&set).unwrap(), text);
+            assert_eq!(serde_json::from_str::<StationSet>(text).unwrap(), set);
+        }
+        for text in [
+            "-1",
+            "\"\"",
+            "\"g\"",
+            "\"1000000000000000000\"",
+            "1.5",
+            "[]",
+        ] {
+            assert!(serde_json::from_str::<StationSet>(text).is_err(), "{text}");
+        }
     }
 }

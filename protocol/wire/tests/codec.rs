@@ -4,9 +4,9 @@ use proptest::prelude::*;
 use smallvec::smallvec;
 use understudy_wire::{
     Actuation, Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Field, Frame,
-    FrameError, Header, Holding, Image, Join, Lineage, MAXIMUM_FRAME_BYTES, Member, Moment,
-    Partial, ProgramHash, ProgramId, ProgramSet, Recalled, Relayed, Sample, Segment, StationId,
-    StationSet, Transfer, Turn, Word, WriteId, decode, encode,
+    FrameError, Header, Holding, Image, Join, Lineage, MAXIMUM_FRAME_BYTES, MAXIMUM_STATIONS,
+    Member, Moment, Partial, ProgramHash, ProgramId, ProgramSet, Recalled, Relayed, Sample,
+    Segment, StationId, StationSet, Transfer, Turn, Word, WriteId, decode, encode,
 };
 
 fn moment(epoch: u64, cycle: u64) -> Moment {
@@ -195,7 +195,10 @@ fn a_frame_that_breaks_a_promise_never_leaves() {
     let station = Member::Station(StationId(2));
     let remote_io = Member::RemoteIo(ProgramId(0));
     check_refused(remote_io, Body::Sync);
-    check_refused(Member::Station(StationId(64)), Body::Sync);
+    check_refused(
+        Member::Station(StationId(MAXIMUM_STATIONS as u8)),
+        Body::Sync,
+    );
     let empty = Sample {
         born: Moment::default(),
         base: Lineage(0),

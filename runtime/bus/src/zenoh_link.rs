@@ -36,7 +36,7 @@ use crate::link::{Link, LinkCounters, LinkKind, Reopening};
 use crate::rights::raise_link_thread;
 use silence::Silence;
 
-/// Datagrams that wait for the cycle's thread, at most; one of 64 stations and 64 remote I/Os hears fewer in a cycle.
+/// Datagrams that wait for the cycle's thread, at most; one of 72 stations and 64 remote I/Os hears fewer in a cycle.
 const QUEUE_FRAMES: usize = 1024;
 
 /// How often each member publishes something.

@@ -1,6 +1,6 @@
 //! Whether what a cluster says fits into its frames.
 //!
-//! The bounds are those of the layout at its longest: an integer takes at most 9 bytes, and a frame has a header besides.
+//! The bounds are those of the layout at its longest: an integer takes at most 9 bytes, a set of members 17, and a frame has a header besides.
 
 use understudy_text::Diagnostic;
 use understudy_wire::{
@@ -13,6 +13,8 @@ use crate::code::Code;
 
 /// Of an integer as it travels.
 const INTEGER_BYTES: usize = 9;
+/// Of a set of members.
+const SET_BYTES: usize = 17;
 /// Magic, header, checksum, and the fields beside the images of any body.
 const FRAME_BYTES: usize = 256;
 /// One state that a turn speaks of.
@@ -23,7 +25,7 @@ const WRITES_BYTES: usize = MAXIMUM_SESSIONS * (INTEGER_BYTES + 5);
 
 /// At most so many bytes of an image, with the members of a word besides.
 fn image_bytes(bits: usize) -> usize {
-    (bits.div_ceil(64) + 3) * INTEGER_BYTES
+    (bits.div_ceil(64) + 2) * INTEGER_BYTES + SET_BYTES
 }
 
 /// A sample: the inputs of each cycle of its history.
@@ -39,7 +41,7 @@ fn turn_bytes(
     widest_inputs: usize,
     widest_outputs: usize,
 ) -> usize {
-    let recalled = image_bytes(widest_inputs) + 6 * INTEGER_BYTES;
+    let recalled = image_bytes(widest_inputs) + 4 * INTEGER_BYTES + 2 * SET_BYTES;
     FRAME_BYTES
         + (programs + 1) * image_bytes(widest_outputs)
         + programs * (HOLDING_BYTES + recalled)
@@ -168,8 +170,8 @@ mod tests {
                     after: Lineage(u64::MAX),
                     history: std::iter::repeat_n(ones(bits), history).collect(),
                     applied: Some(LATE),
-                    excluded: StationSet::from_bits(u64::MAX),
-                    gone: StationSet::from_bits(u64::MAX),
+                    excluded: StationSet::from_bits(u128::MAX),
+                    gone: StationSet::from_bits(u128::MAX),
                     drives: true,
                     writes: all_writes(),
                 };
@@ -177,7 +179,7 @@ mod tests {
                 check_body(Member::RemoteIo(ProgramId(63)), Body::Sample(sample), bound);
             }
             let station = Member::Station(StationId(63));
-            for programs in [1, 2, 63] {
+            for programs in [1, 2, 64] {
                 let holding = |program| Holding {
                     program: ProgramId(program),
                     born: LATE,
@@ -191,8 +193,8 @@ mod tests {
                     program: ProgramId(program),
                     witnessed: true,
                     applied: Some(LATE),
-                    excluded: StationSet::from_bits(u64::MAX),
-                    accounted_for: StationSet::from_bits(u64::MAX),
+                    excluded: StationSet::from_bits(u128::MAX),
+                    accounted_for: StationSet::from_bits(u128::MAX),
                     writes: if usize::from(program) < written {
                         all_writes()
                     } else {
@@ -205,11 +207,11 @@ mod tests {
                     sum: ones(bits),
                 };
                 let turn = Turn {
-                    heard: StationSet::first(64),
+                    heard: StationSet::first(128),
                     holdings: (0..programs as u8).map(holding).collect(),
                     words: std::iter::repeat_n(word, programs + 1).collect(),
                     recalled: (0..programs as u8).map(recalled).collect(),
-                    lacks: ProgramSet::first(64),
+                    lacks: ProgramSet::first(128),
                     relayed: Vec::new(),
                 };
                 check_body(
