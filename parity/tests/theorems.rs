@@ -74,7 +74,7 @@ fn check(outputs: &[Image], widths: &[usize]) {
     assert_eq!(sum(all, every), Some(paper.clone()), "(9)");
     let zero = syndrome(&paper, every).expect("every output is there");
     assert!(zero.is_zero(), "Theorem 1");
-    for erased in (0..1_u64 << programs).map(ProgramSet::from_bits) {
+    for erased in (0..1_u128 << programs).map(ProgramSet::from_bits) {
         let received = |program: ProgramId| every(program).filter(|_| !erased.contains(program));
         assert_eq!(sum(all, received).is_some(), erased.is_empty());
         assert_eq!(syndrome(&paper, received).is_some(), erased.is_empty());

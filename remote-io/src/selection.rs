@@ -294,7 +294,7 @@ mod tests {
     }
 
     /// An understudy without a fault, with one word over `mask` and one for each other program of `alone`.
-    fn understudy(mask: u64, alone: u64) -> Arc<Frame> {
+    fn understudy(mask: u128, alone: u128) -> Arc<Frame> {
         let holdings: Vec<Holding> = (0..3).map(|program| holding(program, TRUE, 1)).collect();
         let word = |mask: ProgramSet| {
             let mut sum = Image::default();
@@ -332,7 +332,7 @@ mod tests {
         }
     }
 
-    fn check(cases: [Controller; 3], mask: u64, alone: u64, with_understudy: bool) {
+    fn check(cases: [Controller; 3], mask: u128, alone: u128, with_understudy: bool) {
         let mut turns: Vec<Option<Arc<Frame>>> = (0..3)
             .map(|program| controller(program, cases[program]))
             .collect();
@@ -421,7 +421,7 @@ mod tests {
     /// The paper's S2: with two stations not received no output is applied, not even a received one.
     #[test]
     fn the_paper_fails_with_the_second_station() {
-        for silent in (0..16_u64).map(StationSet::from_bits) {
+        for silent in (0..16_u128).map(StationSet::from_bits) {
             let turns: Vec<Option<Arc<Frame>>> = (0..4)
                 .map(|rank| match rank {
                     _ if silent.contains(StationId(rank as u8)) => None,

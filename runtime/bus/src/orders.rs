@@ -1,9 +1,9 @@
 //! What is wanted of a running member.
 
 use std::os::fd::BorrowedFd;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use serde::{Deserialize, Serialize};
 use understudy_wire::{
@@ -68,8 +68,13 @@ impl Cuts {
 #[derive(Debug, Default)]
 struct Standing {
     stopping: AtomicBool,
-    cut_stations: AtomicU64,
-    cut_remote_ios: AtomicU64,
+    cuts: Mutex<Cuts>,
+}
+
+impl Standing {
+    fn cuts(&self) -> MutexGuard<'_, Cuts> {
+        self.cuts.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 /// The member's end.
@@ -121,13 +126,7 @@ impl Control {
             Order::Write(_) if !self.limiter.admits() => return false,
             Order::Stop => self.standing.stopping.store(true, Ordering::SeqCst),
             Order::Cut(cuts) => {
-                let standing = &self.standing;
-                standing
-                    .cut_stations
-                    .store(cuts.stations.bits(), Ordering::Relaxed);
-                standing
-                    .cut_remote_ios
-                    .store(cuts.remote_ios.bits(), Ordering::Relaxed);
+                *self.standing.cuts() = *cuts;
                 return true;
             }
             _ => {}
@@ -162,11 +161,7 @@ impl Orders {
 
     /// Whether the link from a member is cut.
     pub(crate) fn is_cut(&self, member: Member) -> bool {
-        let cuts = Cuts {
-            stations: StationSet::from_bits(self.standing.cut_stations.load(Ordering::Relaxed)),
-            remote_ios: ProgramSet::from_bits(self.standing.cut_remote_ios.load(Ordering::Relaxed)),
-        };
-        cuts.contains(member)
+        self.standing.cuts().contains(member)
     }
 
     pub(crate) fn readiness(&self) -> BorrowedFd<'_> {
