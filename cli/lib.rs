@@ -34,6 +34,7 @@ pub use member::{Arguments as MemberArguments, run_plant, run_remote_io, run_sta
 pub use overrides::OverrideArguments;
 pub use run::demo::PressCell;
 pub use run::lab::{Judged, NetworkArguments, RunArguments};
+pub use tools::proxy::{Arguments as ProxyArguments, run as run_proxy};
 
 /// Runs the command of this process's arguments.
 pub fn main() -> ExitCode {

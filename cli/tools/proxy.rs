@@ -4,7 +4,9 @@ use std::net::SocketAddr;
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use understudy_network::{Impairment, ProxyCounters, Rate, Route, Share, Transport, run_proxy};
+use understudy_network::{
+    Impairment, ProxyCounters, Rate, Route, Share, Transport, run_proxy, serve_proxy,
+};
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
@@ -18,13 +20,13 @@ Example:
 
 The proxy runs until SIGINT or SIGTERM and then prints its counters. Replies are returned to their clients. Over TCP a loss delays the stream
 by 200 ms, like a retransmission; --duplicate and --reorder have no effect.")]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// Listening address; port 0 selects a free port
-    #[arg(long, value_name = "ADDRESS", value_parser = parse_address)]
-    listen: SocketAddr,
+    #[arg(long, value_name = "ADDRESS", value_parser = parse_address, required_unless_present = "in_laboratory")]
+    listen: Option<SocketAddr>,
     /// Destination address
-    #[arg(long, value_name = "ADDRESS", value_parser = parse_address)]
-    to: SocketAddr,
+    #[arg(long, value_name = "ADDRESS", value_parser = parse_address, required_unless_present = "in_laboratory")]
+    to: Option<SocketAddr>,
     /// Transport protocol
     #[arg(long, value_enum, default_value_t = TransportArgument::Udp)]
     transport: TransportArgument,
@@ -36,6 +38,9 @@ pub(crate) struct Arguments {
     /// Seed of the random network faults
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Read the routes from standard input and run until it ends
+    #[arg(long, hide = true, exclusive = true)]
+    in_laboratory: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -102,11 +107,15 @@ struct Carried {
     counters: ProxyCounters,
 }
 
-pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
+/// Runs the proxy.
+pub fn run(arguments: &Arguments, console: &mut Console) -> Answer {
+    let (Some(listen), Some(to)) = (arguments.listen, arguments.to) else {
+        return in_laboratory();
+    };
     let impairment = arguments.impairment.impairment();
     let route = Route {
-        listen: arguments.listen,
-        to: arguments.to,
+        listen,
+        to,
         transport: match arguments.transport {
             TransportArgument::Udp => Transport::Udp,
             TransportArgument::Tcp => Transport::Tcp,
@@ -118,14 +127,11 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
             impairment
         },
     };
-    let mut listened = arguments.listen;
+    let mut listened = listen;
     let ran = run_proxy(&[route], arguments.seed, |addresses| {
         for address in addresses {
             listened = *address;
-            console.note(&format!(
-                "listening on {address}, forwarding to {}",
-                arguments.to
-            ));
+            console.note(&format!("listening on {address}, forwarding to {to}"));
         }
     });
     match ran {
@@ -136,11 +142,19 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Answer {
             );
             let carried = Carried {
                 listened,
-                to: arguments.to,
+                to,
                 counters,
             };
             Answer::done(text, carried)
         }
         Err(error) => Answer::failed(Status::Failed, error.code(), error),
+    }
+}
+
+/// Standard output is the laboratory's, so this answer is silent.
+fn in_laboratory() -> Answer {
+    match serve_proxy(std::io::stdin().lock(), std::io::stdout()) {
+        Ok(()) => Answer::done(String::new(), ()),
+        Err(error) => Answer::failed(Status::Failed, "U0529", error),
     }
 }

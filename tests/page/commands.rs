@@ -14,14 +14,19 @@ use crate::{Page, empty_folder, member, one_at_a_time, understudy};
 const PERIOD: &str = "50ms";
 
 fn started(name: &str) -> (Page, std::path::PathBuf) {
-    let cluster = "examples/press-cell/cluster.toml";
-    started_of(name, cluster, &["robot", "press", "understudy"])
+    started_with(name, &[])
 }
 
-fn started_of(name: &str, cluster: &str, stations: &[&str]) -> (Page, std::path::PathBuf) {
+fn started_with(name: &str, arguments: &[&str]) -> (Page, std::path::PathBuf) {
+    let command = [&["examples/press-cell/cluster.toml"], arguments].concat();
+    started_of(name, &command, &["robot", "press", "understudy"])
+}
+
+fn started_of(name: &str, watched: &[&str], stations: &[&str]) -> (Page, std::path::PathBuf) {
     let runs = empty_folder(name);
-    let mut command = understudy(&["watch", cluster]);
+    let mut command = understudy(&["watch"]);
     command
+        .args(watched)
         .args(["--address", "127.0.0.1:0", "--allow-commands"])
         .args(["--link", "udp", "--period", PERIOD])
         .arg("--out")
@@ -60,7 +65,17 @@ fn monotonic_ns() -> u64 {
 #[test]
 fn a_page_that_is_suspended_stops_nothing() {
     let _turn = one_at_a_time();
-    let (page, runs) = started("suspended");
+    check_suspended(started("suspended"));
+}
+
+/// The proxy of the links is a process of its own.
+#[test]
+fn a_page_that_is_suspended_stops_no_impaired_link() {
+    let _turn = one_at_a_time();
+    check_suspended(started_with("suspended-impaired", &["--delay", "1ms"]));
+}
+
+fn check_suspended((page, runs): (Page, std::path::PathBuf)) {
     let cycles = i64::try_from(SUSPENDED.as_millis() / 50).expect("a few");
     let newest = page.wait_for("a state", |state| state["cycle"].is_i64());
     let before = newest["cycle"].as_i64().expect("a cycle");
@@ -246,7 +261,7 @@ fn origin_is_known(page: &Page) {
 fn a_write_is_answered_with_its_cycle_or_a_code() {
     let _turn = one_at_a_time();
     let cluster = "examples/two-shuttles/cluster.toml";
-    let (page, _) = started_of("writes", cluster, &["left", "right", "understudy"]);
+    let (page, _) = started_of("writes", &[cluster], &["left", "right", "understudy"]);
     origin_is_known(&page);
     let facts = page.get("/api/run").json();
     assert!(facts["commands"]["write_why"].is_null(), "{facts:#}");

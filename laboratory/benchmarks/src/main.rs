@@ -17,7 +17,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use understudy::{
-    Answer, Console, MemberArguments, misused, run_plant, run_remote_io, run_station,
+    Answer, Console, MemberArguments, ProxyArguments, misused, run_plant, run_proxy, run_remote_io,
+    run_station,
 };
 
 /// Measure speed and endurance on this machine
@@ -60,6 +61,8 @@ enum Benchmark {
     RemoteIo(MemberArguments),
     #[command(hide = true)]
     Plant(MemberArguments),
+    #[command(hide = true)]
+    Proxy(Box<ProxyArguments>),
 }
 
 impl Benchmark {
@@ -76,6 +79,7 @@ impl Benchmark {
             Self::Node(arguments) => ("node", run_station(arguments).into()),
             Self::RemoteIo(arguments) => ("remote-io", run_remote_io(arguments).into()),
             Self::Plant(arguments) => ("plant", run_plant(arguments).into()),
+            Self::Proxy(arguments) => ("proxy", run_proxy(arguments, console)),
         }
     }
 }

@@ -15,6 +15,6 @@ mod tools;
 pub use error::NetworkError;
 pub use hosts::{Host, Hosts, missing_tools};
 pub use impairment::{Impairment, Rate, Share, WrittenImpairment};
-pub use proxy::{Direction, Proxy, ProxyCounters, ProxyOrder, Route, Transport};
-pub use run::run_proxy;
+pub use proxy::{Proxy, ProxyCounters, Route, Transport};
+pub use run::{ProxyPlan, ProxyReport, run_proxy, serve_proxy};
 pub use shaper::{Passed, Shaper};

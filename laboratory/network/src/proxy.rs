@@ -15,7 +15,6 @@ use std::net::{SocketAddr, TcpListener, UdpSocket};
 use std::os::fd::AsFd;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
 
 use nix::sys::eventfd::{EfdFlags, EventFd};
@@ -31,9 +30,6 @@ use crate::impairment::Impairment;
 
 /// Of SCHED_FIFO.
 const PRIORITY: u8 = 45;
-
-/// Orders that wait, at most.
-const ORDERS: usize = 4096;
 
 /// What a route carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -60,39 +56,6 @@ pub struct Route {
     pub back: Impairment,
 }
 
-/// One direction of a route.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Direction {
-    /// To where the route leads.
-    Forth,
-    /// The answers.
-    Back,
-}
-
-/// What a running proxy is told.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum ProxyOrder {
-    /// Nothing passes any more: datagrams are lost, streams stand still. Or everything does again.
-    Cut {
-        /// Of which route, by its place in the list.
-        route: usize,
-        /// Which direction.
-        direction: Direction,
-        /// Whether it is cut.
-        cut: bool,
-    },
-    /// From now on it misbehaves so; streams that are open keep what they began with.
-    Shape {
-        /// Of which route, by its place in the list.
-        route: usize,
-        /// Which direction.
-        direction: Direction,
-        /// How.
-        impairment: Impairment,
-    },
-}
-
 /// What passed a proxy, over all routes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct ProxyCounters {
@@ -110,7 +73,6 @@ pub struct ProxyCounters {
 #[derive(Debug)]
 pub struct Proxy {
     addresses: Vec<SocketAddr>,
-    orders: SyncSender<ProxyOrder>,
     shared: Arc<Shared>,
     threads: Vec<JoinHandle<()>>,
 }
@@ -118,7 +80,7 @@ pub struct Proxy {
 /// What the threads of one proxy have in common.
 #[derive(Debug)]
 pub(crate) struct Shared {
-    /// Rung for orders and for the end.
+    /// Rung for the end.
     bell: EventFd,
     ending: AtomicBool,
     came: AtomicU64,
@@ -169,7 +131,6 @@ impl Proxy {
         for route in routes {
             check(route)?;
         }
-        let (orders, taken) = sync_channel(ORDERS);
         let shared = Arc::new(Shared {
             bell: EventFd::from_flags(EfdFlags::EFD_CLOEXEC | EfdFlags::EFD_NONBLOCK)
                 .map_err(NetworkError::system("an eventfd for the proxy"))?,
@@ -192,13 +153,13 @@ impl Proxy {
                     let socket = UdpSocket::bind(route.listen).map_err(failed)?;
                     socket.set_nonblocking(true).map_err(failed)?;
                     addresses.push(socket.local_addr().map_err(failed)?);
-                    lanes.push(datagrams::Lane::new(number, socket, route, seed));
+                    lanes.push(datagrams::Lane::new(socket, route, seed));
                 }
                 Transport::Tcp => {
                     let listener = TcpListener::bind(route.listen).map_err(failed)?;
                     listener.set_nonblocking(true).map_err(failed)?;
                     addresses.push(listener.local_addr().map_err(failed)?);
-                    streams.push(streams::Way::new(number, listener, route, seed));
+                    streams.push(streams::Way::new(listener, route, seed));
                 }
             }
         }
@@ -207,12 +168,11 @@ impl Proxy {
             .name("proxy".into())
             .spawn(move || {
                 run_before_members();
-                datagrams::carry(lanes, streams, &taken, &worker);
+                datagrams::carry(lanes, streams, &worker);
             })
             .map_err(NetworkError::system("a thread for the proxy"))?;
         Ok(Self {
             addresses,
-            orders,
             shared,
             threads: vec![thread],
         })
@@ -221,13 +181,6 @@ impl Proxy {
     /// Where it listens, in the order of the routes.
     pub fn addresses(&self) -> &[SocketAddr] {
         &self.addresses
-    }
-
-    /// Gives an order; it holds from the next datagram on.
-    pub fn order(&self, order: ProxyOrder) {
-        // The thread takes orders faster than anybody can think of them; where it is gone, nothing passes anyway.
-        let _ = self.orders.send(order);
-        self.shared.ring();
     }
 
     /// What passed until now.

@@ -4,9 +4,7 @@ use std::io::{Read, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream, UdpSocket};
 use std::time::Duration;
 
-use understudy_network::{
-    Direction, Impairment, NetworkError, Proxy, ProxyOrder, Route, Share, Transport,
-};
+use understudy_network::{Impairment, NetworkError, Proxy, Route, Share, Transport};
 
 /// Past it a test has failed.
 const DEADLINE: Duration = Duration::from_secs(60);
@@ -84,41 +82,6 @@ fn doubled_and_changed_datagrams_arrive_so() {
     }
     let counters = proxy.counters();
     assert_eq!((counters.came, counters.lost, counters.refused), (1, 0, 0));
-}
-
-#[test]
-fn a_route_is_cut_and_healed_and_shaped_anew_in_each_direction_alone() {
-    let (proxy, client, server, at) = datagrams(Impairment::default());
-    let mut buffer = [0; 64];
-    let cut = |direction, cut| ProxyOrder::Cut {
-        route: 0,
-        direction,
-        cut,
-    };
-    client.send_to(b"before", at).expect("sent");
-    let (_, from) = server.recv_from(&mut buffer).expect("it arrives");
-    proxy.order(cut(Direction::Forth, true));
-    server.send_to(b"answer", from).expect("sent");
-    client.recv(&mut buffer).expect("the way back is open");
-    client.send_to(b"cut", at).expect("sent");
-    server.set_read_timeout(Some(MOMENT)).expect("a timeout");
-    assert!(server.recv(&mut buffer).is_err());
-    proxy.order(cut(Direction::Forth, false));
-    server.set_read_timeout(Some(DEADLINE)).expect("a timeout");
-    client.send_to(b"healed", at).expect("sent");
-    let length = server.recv(&mut buffer).expect("it arrives");
-    assert_eq!(&buffer[..length], b"healed");
-    proxy.order(ProxyOrder::Shape {
-        route: 0,
-        direction: Direction::Back,
-        impairment: Impairment {
-            loss: Share::new(1.0).expect("a share"),
-            ..Impairment::default()
-        },
-    });
-    server.send_to(b"lost", from).expect("sent");
-    client.set_read_timeout(Some(MOMENT)).expect("a timeout");
-    assert!(client.recv(&mut buffer).is_err());
 }
 
 #[test]

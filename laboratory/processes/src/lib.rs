@@ -12,6 +12,7 @@ mod operator;
 mod patience;
 mod process;
 mod processes;
+mod proxy;
 mod recovery;
 mod site;
 mod steps;
@@ -191,13 +192,7 @@ fn run(
 ) -> Result<LaboratoryRun, LaboratoryError> {
     refuse_what_is_simulated(scenario)?;
     let system = |what| move |source| LaboratoryError::System { what, source };
-    let site = Site::prepare(
-        cluster,
-        scenario,
-        settings.link,
-        settings.network,
-        directory,
-    )?;
+    let site = Site::prepare(cluster, scenario, &settings, directory)?;
     keep_cluster(directory.path(), &settings.cluster_file, cluster)
         .map_err(|error| system("to keep the cluster file")(std::io::Error::other(error)))?;
     let journal = Journal::create(
@@ -305,7 +300,7 @@ impl Laboratory<'_> {
         self.end(&mut receiver).await;
         drop(socket);
         self.note(RunEvent::Finished);
-        self.machine.extend(self.site.describe());
+        self.machine.extend(self.site.end());
         LaboratoryRun {
             account: self.judged.unwrap_or(self.account),
             journal: self.journal.take().map(Journal::finish).unwrap_or_default(),

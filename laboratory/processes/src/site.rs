@@ -6,8 +6,8 @@
 //! | one network namespace for each station, and for each remote I/O with its plant | the bridge between them | `nft` |
 //! | either | through the proxy, where the links are impaired | the receiver |
 //!
-//! Frames pass through the proxy, a thread of this process, only where the links lose, delay or change what they carry: a laboratory that
-//! is suspended must not stop its plants because an operator may cut a link. With the proxy each member is told of addresses at which it
+//! Frames pass through the proxy, a process of its own ([`LinkProxy`]), only where the links lose, delay or change what they carry: a laboratory
+//! that is suspended must not stop its plants. With the proxy each member is told of addresses at which it
 //! stands for the member's peers, one for each pair and direction, and knows nothing of it.
 
 use std::collections::BTreeMap;
@@ -18,12 +18,14 @@ use std::path::{Path, PathBuf};
 use understudy_bus::{Endpoints, LinkKind, Peer};
 use understudy_cluster::Cluster;
 use understudy_journal::RunDirectory;
-use understudy_network::{Hosts, Impairment, NetworkError, Proxy, Route, Share, Transport};
+use understudy_network::{Hosts, Impairment, NetworkError, ProxyPlan, Route, Share, Transport};
 use understudy_scenarios::Scenario;
 use understudy_simulator::Network;
 use understudy_wire::Member;
 
+use crate::LaboratorySettings;
 use crate::error::LaboratoryError;
+use crate::proxy::LinkProxy;
 
 /// The port of the first member of a host.
 const FIRST_PORT: u16 = 7450;
@@ -56,7 +58,7 @@ pub(super) struct Site {
     endpoints: BTreeMap<Member, PathBuf>,
     hosts: Option<Hosts>,
     host_of: BTreeMap<Member, usize>,
-    proxy: Option<Proxy>,
+    proxy: Option<LinkProxy>,
     /// From whom to whom, and the place of the route in the proxy.
     routes: BTreeMap<(Member, Member), usize>,
     /// The address of each route that a member is given for another member's.
@@ -71,10 +73,10 @@ impl Site {
     pub(super) fn prepare(
         cluster: &Cluster,
         scenario: &Scenario,
-        link: LinkKind,
-        settings: NetworkSettings,
+        laboratory: &LaboratorySettings,
         directory: &RunDirectory,
     ) -> Result<Self, LaboratoryError> {
+        let (link, settings) = (laboratory.link, laboratory.network);
         let system = |what| move |source| LaboratoryError::System { what, source };
         let members: Vec<Member> = cluster.members().collect();
         let impairment = if settings.impairment.is_none() {
@@ -134,7 +136,7 @@ impl Site {
                 site.multicast = wanted.then(understudy_bus::loopback_groups).flatten();
             }
             _ => {
-                site.route(cluster, link, &peers, hosts.as_ref(), settings.seed)?;
+                site.route(cluster, laboratory, &peers, hosts.as_ref())?;
                 site.write_views(&peers, directory)
                     .map_err(system("to write the endpoints of each member"))?;
             }
@@ -178,8 +180,8 @@ impl Site {
         }
     }
 
-    /// What a reader of the results should know.
-    pub(super) fn describe(&self) -> Vec<String> {
+    /// Ends the proxy; what a reader of the results should know.
+    pub(super) fn end(mut self) -> Vec<String> {
         let mut notes = Vec::new();
         if let Some(hosts) = &self.hosts {
             let count = hosts.hosts().len();
@@ -190,8 +192,7 @@ impl Site {
                 notes.push(format!("nft loses {} on every link", self.impairment.loss));
             }
         }
-        if let Some(proxy) = &self.proxy {
-            let counters = proxy.counters();
+        if let Some(counters) = self.proxy.as_mut().and_then(LinkProxy::end) {
             notes.push(format!(
                 "the links pass through the proxy: {} came, {} passed, {} were lost on purpose",
                 counters.came, counters.passed, counters.lost
@@ -204,11 +205,11 @@ impl Site {
     fn route(
         &mut self,
         cluster: &Cluster,
-        link: LinkKind,
+        laboratory: &LaboratorySettings,
         peers: &[Peer],
         hosts: Option<&Hosts>,
-        seed: u64,
     ) -> Result<(), LaboratoryError> {
+        let link = laboratory.link;
         let host = hosts.map_or(Ipv4Addr::LOCALHOST, |_| Hosts::SWITCH);
         let mut routes: Vec<Route> = Vec::new();
         for first in peers {
@@ -253,11 +254,17 @@ impl Site {
             route.listen = frames.map_err(LaboratoryError::Endpoints)?;
             self.stand_ins.push(stands_for);
         }
-        let start = || Proxy::start(&routes, seed);
+        let seed = laboratory.network.seed;
+        let plan = ProxyPlan { routes, seed };
+        let start = || LinkProxy::start(&laboratory.program, &plan);
         let proxy = match hosts {
-            Some(hosts) => hosts.in_switch(start)??,
-            None => start()?,
+            Some(hosts) => hosts.in_switch(start)?,
+            None => start(),
         };
+        let proxy = proxy.map_err(|source| LaboratoryError::System {
+            what: "the proxy of the links",
+            source,
+        })?;
         self.proxy = Some(proxy);
         Ok(())
     }

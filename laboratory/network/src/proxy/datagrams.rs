@@ -8,14 +8,13 @@ use std::collections::BinaryHeap;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 use std::os::fd::AsFd;
 use std::sync::Arc;
-use std::sync::mpsc::Receiver;
 
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, ppoll};
 use nix::sys::time::TimeSpec;
 
 use super::streams::Way;
-use super::{Direction, ProxyOrder, Route, Shared, now_ns};
+use super::{Route, Shared, now_ns};
 use crate::shaper::{Passed, Shaper};
 
 /// The longest datagram that UDP has.
@@ -30,20 +29,11 @@ const MAXIMUM_ON_THE_WAY: usize = 1 << 16;
 /// One route of datagrams.
 #[derive(Debug)]
 pub(super) struct Lane {
-    route: usize,
     listener: UdpSocket,
     to: SocketAddr,
-    forth: Course,
-    back: Course,
+    forth: Shaper,
+    back: Shaper,
     clients: Vec<Client>,
-}
-
-/// One direction of a lane.
-#[derive(Debug)]
-struct Course {
-    shaper: Shaper,
-    seed: u64,
-    cut: bool,
 }
 
 #[derive(Debug)]
@@ -123,24 +113,13 @@ impl Road {
     }
 }
 
-impl Course {
-    fn new(impairment: crate::impairment::Impairment, seed: u64) -> Self {
-        Self {
-            shaper: Shaper::new(impairment, seed),
-            seed,
-            cut: false,
-        }
-    }
-}
-
 impl Lane {
-    pub(super) fn new(route: usize, listener: UdpSocket, settings: &Route, seed: u64) -> Self {
+    pub(super) fn new(listener: UdpSocket, settings: &Route, seed: u64) -> Self {
         Self {
-            route,
             listener,
             to: settings.to,
-            forth: Course::new(settings.forth, seed),
-            back: Course::new(settings.back, seed + 1),
+            forth: Shaper::new(settings.forth, seed),
+            back: Shaper::new(settings.back, seed + 1),
             clients: Vec::new(),
         }
     }
@@ -184,7 +163,7 @@ impl Lane {
                 shared.sent(false);
                 continue;
             };
-            let passed: Vec<Passed> = self.forth.pass(now, &buffer[..length]);
+            let passed: Vec<Passed> = self.forth.datagram(now, &buffer[..length]).collect();
             shared.count(passed.len());
             for passed in passed {
                 if !road.enter(passed, Exit::Forth(Arc::clone(&towards))) {
@@ -213,7 +192,7 @@ impl Lane {
             let now = now_ns();
             found.used_ns = now;
             let address = found.address;
-            let passed = self.back.pass(now, &buffer[..length]);
+            let passed: Vec<Passed> = self.back.datagram(now, &buffer[..length]).collect();
             shared.count(passed.len());
             for passed in passed {
                 if !road.enter(passed, Exit::Back(place, address)) {
@@ -222,62 +201,17 @@ impl Lane {
             }
         }
     }
-
-    fn obey(&mut self, order: ProxyOrder) {
-        let (ProxyOrder::Cut {
-            route, direction, ..
-        }
-        | ProxyOrder::Shape {
-            route, direction, ..
-        }) = order;
-        if route != self.route {
-            return;
-        }
-        let course = match direction {
-            Direction::Forth => &mut self.forth,
-            Direction::Back => &mut self.back,
-        };
-        match order {
-            ProxyOrder::Cut { cut, .. } => course.cut = cut,
-            ProxyOrder::Shape { impairment, .. } => {
-                *course = Course {
-                    cut: course.cut,
-                    ..Course::new(impairment, course.seed)
-                };
-            }
-        }
-    }
-}
-
-impl Course {
-    fn pass(&mut self, now_ns: u64, bytes: &[u8]) -> Vec<Passed> {
-        if self.cut {
-            return Vec::new();
-        }
-        self.shaper.datagram(now_ns, bytes).collect()
-    }
 }
 
 /// Runs until the proxy ends.
-pub(super) fn carry(
-    mut lanes: Vec<Lane>,
-    mut streams: Vec<Way>,
-    orders: &Receiver<ProxyOrder>,
-    shared: &Arc<Shared>,
-) {
+pub(super) fn carry(mut lanes: Vec<Lane>, mut streams: Vec<Way>, shared: &Arc<Shared>) {
     let mut buffer = vec![0; MAXIMUM_DATAGRAM];
     let mut road = Road::default();
     while !shared.is_ending() {
         let ready = wait(&lanes, &streams, shared, road.next_due_ns());
         let mut ready = ready.into_iter();
-        if ready.next() == Some(true) {
-            // Emptied before the orders are taken, so that one that comes meanwhile rings again.
-            let _ = shared.bell.read();
-            for order in orders.try_iter() {
-                lanes.iter_mut().for_each(|lane| lane.obey(order));
-                streams.iter_mut().for_each(|way| way.obey(order));
-            }
-        }
+        // The bell, which rings for the end alone.
+        ready.next();
         for way in &mut streams {
             if ready.next() == Some(true) {
                 way.accept(shared);

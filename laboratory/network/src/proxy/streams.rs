@@ -4,16 +4,15 @@
 //!   client ──► reader ──(at most QUEUE pieces)──► writer ──► server      and the same back
 //! ```
 //!
-//! A full queue stops the reader, so that TCP itself slows its sender down. A cut lets nothing through until it is healed; no byte is
-//! lost. When one side closes, what is on its way arrives first.
+//! A full queue stops the reader, so that TCP itself slows its sender down. When one side closes, what is on its way arrives first.
 
 use std::io::{Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
-use super::{Direction, ProxyOrder, Route, Shared, now_ns};
+use super::{Route, Shared, now_ns};
 use crate::impairment::Impairment;
 use crate::shaper::{Passed, Shaper};
 
@@ -31,11 +30,9 @@ const LOOK: Duration = Duration::from_millis(100);
 /// One route of streams.
 #[derive(Debug)]
 pub(super) struct Way {
-    route: usize,
     listener: TcpListener,
     to: SocketAddr,
     impairments: [Impairment; 2],
-    gates: [Arc<Gate>; 2],
     seed: u64,
     open: Vec<Connection>,
 }
@@ -46,46 +43,12 @@ struct Connection {
     thread: std::thread::JoinHandle<()>,
 }
 
-/// Open or shut, for one direction.
-#[derive(Debug, Default)]
-struct Gate {
-    shut: Mutex<bool>,
-    moved: Condvar,
-}
-
-impl Gate {
-    fn set(&self, shut: bool) {
-        *self.shut.lock().unwrap_or_else(PoisonError::into_inner) = shut;
-        self.moved.notify_all();
-    }
-
-    /// Waits until `due_ns`, and then until the gate is open. False where the proxy ends.
-    fn pass(&self, due_ns: u64, shared: &Shared) -> bool {
-        let mut shut = self.shut.lock().unwrap_or_else(PoisonError::into_inner);
-        loop {
-            if shared.is_ending() {
-                return false;
-            }
-            let early = Duration::from_nanos(due_ns.saturating_sub(now_ns()));
-            let wait = match (*shut, early.is_zero()) {
-                (false, true) => return true,
-                (true, true) => LOOK,
-                (_, false) => early.min(LOOK),
-            };
-            let waited = self.moved.wait_timeout(shut, wait);
-            shut = waited.unwrap_or_else(PoisonError::into_inner).0;
-        }
-    }
-}
-
 impl Way {
-    pub(super) fn new(route: usize, listener: TcpListener, settings: &Route, seed: u64) -> Self {
+    pub(super) fn new(listener: TcpListener, settings: &Route, seed: u64) -> Self {
         Self {
-            route,
             listener,
             to: settings.to,
             impairments: [settings.forth, settings.back],
-            gates: [Arc::default(), Arc::default()],
             seed,
             open: Vec::new(),
         }
@@ -93,26 +56,6 @@ impl Way {
 
     pub(super) fn listener(&self) -> &TcpListener {
         &self.listener
-    }
-
-    pub(super) fn obey(&mut self, order: ProxyOrder) {
-        let side = |direction| match direction {
-            Direction::Forth => 0,
-            Direction::Back => 1,
-        };
-        match order {
-            ProxyOrder::Cut {
-                route,
-                direction,
-                cut,
-            } if route == self.route => self.gates[side(direction)].set(cut),
-            ProxyOrder::Shape {
-                route,
-                direction,
-                impairment,
-            } if route == self.route => self.impairments[side(direction)] = impairment,
-            _ => {}
-        }
     }
 
     /// Takes the connections that wait.
@@ -127,10 +70,10 @@ impl Way {
             };
             self.seed = self.seed.wrapping_add(0x9e37_79b9);
             let (to, seed, shared) = (self.to, self.seed, Arc::clone(shared));
-            let (impairments, gates) = (self.impairments, self.gates.clone());
+            let impairments = self.impairments;
             let thread = std::thread::Builder::new()
                 .name("proxy-stream".into())
-                .spawn(move || join(&client, to, impairments, &gates, seed, &shared));
+                .spawn(move || join(&client, to, impairments, seed, &shared));
             if let Ok(thread) = thread {
                 self.open.push(Connection {
                     client: kept,
@@ -154,7 +97,6 @@ fn join(
     client: &TcpStream,
     to: SocketAddr,
     impairments: [Impairment; 2],
-    gates: &[Arc<Gate>; 2],
     seed: u64,
     shared: &Shared,
 ) {
@@ -174,9 +116,8 @@ fn join(
         for (from, into, side) in [(client, &server, 0), (&server, client, 1)] {
             let (sender, receiver) = sync_channel(QUEUE);
             let shaper = Shaper::new(impairments[side], seed.wrapping_add(side as u64));
-            let gate = &gates[side];
             scope.spawn(move || read(from, shaper, &sender, shared));
-            scope.spawn(move || write(into, &receiver, gate, shared));
+            scope.spawn(move || write(into, &receiver, shared));
         }
     });
 }
@@ -201,14 +142,14 @@ fn read(mut from: &TcpStream, mut shaper: Shaper, into: &SyncSender<Passed>, sha
     }
 }
 
-fn write(mut into: &TcpStream, from: &Receiver<Passed>, gate: &Gate, shared: &Shared) {
+fn write(mut into: &TcpStream, from: &Receiver<Passed>, shared: &Shared) {
     loop {
         let passed = match from.recv_timeout(LOOK) {
             Ok(passed) => passed,
             Err(RecvTimeoutError::Timeout) if !shared.is_ending() => continue,
             Err(_) => break,
         };
-        if !gate.pass(passed.due_ns, shared) {
+        if !wait_until(passed.due_ns, shared) {
             break;
         }
         let taken = write_whole(&mut into, &passed.bytes, shared);
@@ -219,6 +160,18 @@ fn write(mut into: &TcpStream, from: &Receiver<Passed>, gate: &Gate, shared: &Sh
     }
     // The end of the stream is passed on as well.
     let _ = into.shutdown(Shutdown::Write);
+}
+
+/// False where the proxy ends before.
+fn wait_until(due_ns: u64, shared: &Shared) -> bool {
+    while !shared.is_ending() {
+        let early = Duration::from_nanos(due_ns.saturating_sub(now_ns()));
+        if early.is_zero() {
+            return true;
+        }
+        std::thread::sleep(early.min(LOOK));
+    }
+    false
 }
 
 /// False where the far side is gone or the proxy ends.
