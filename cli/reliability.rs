@@ -11,7 +11,7 @@ pub(crate) fn group() -> Group {
         name: "reliability",
         title: "Predict and measure reliability",
         entries: vec![
-            command("reliability", |it, _| prediction::run(&it)),
+            command("reliability", |it, console| prediction::run(&it, console)),
             command("measure", |it, console| measure::run(&it, console)),
             command("outlook", |it, _| outlook::run(&it)),
         ],

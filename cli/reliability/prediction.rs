@@ -17,6 +17,7 @@ use understudy_reliability::{
 use understudy_text::Report;
 
 use crate::answer::{Answer, Status};
+use crate::console::Console;
 use crate::files;
 use crate::run::outcome::command_line;
 
@@ -109,23 +110,29 @@ enum ConventionWord {
     Split,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
+pub(crate) fn run(arguments: &Arguments, console: &Console) -> Result<Answer, Answer> {
     match &arguments.chain {
-        Some(path) => of_chain(path, arguments.mission.as_deref()),
+        Some(path) => of_chain(path, arguments.mission.as_deref(), console),
         None => of_cluster(arguments),
     }
 }
 
-fn of_chain(path: &Path, mission: Option<&str>) -> Result<Answer, Answer> {
+fn of_chain(path: &Path, mission: Option<&str>, console: &Console) -> Result<Answer, Answer> {
     let mut times = Times::default();
     let mission = times.optional("mission", mission);
     times.finish(Vec::new())?;
-    let read = read_chain(&path.display().to_string(), &files::text(path)?);
+    let read = read_chain(&path.display().to_string(), files::text(path)?);
     let Some(chain) = read.chain else {
         return Err(Answer::bad_files(vec![read.report]));
     };
     let found = answer_chain(&chain, mission).map_err(|error| refused(&[error]))?;
-    Ok(Answer::done(found.to_text(), &found).with_reports(vec![read.report]))
+    // A document of all states takes a hundred times the memory of the chain, and a text does not show it.
+    let answer = if console.is_json() {
+        Answer::done("", &found)
+    } else {
+        Answer::done(found.to_text(), json!(null))
+    };
+    Ok(answer.with_reports(vec![read.report]))
 }
 
 fn of_cluster(arguments: &Arguments) -> Result<Answer, Answer> {

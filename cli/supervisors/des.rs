@@ -1,6 +1,7 @@
 //! `understudy des`: the operations of TCT.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
@@ -13,10 +14,12 @@ use understudy_supervisor::{
     Automaton, AutomatonError, Bounds, Event, Label, Model, State, TooLarge, synthesis_findings,
 };
 
+use understudy_text::duration;
+
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::supervisors::automata::{self, Sources, description, summary};
-use crate::supervisors::reduction::reduced;
+use crate::supervisors::reduction::{BUDGET, reduced};
 
 /// Apply the operations of TCT to automata
 #[derive(Debug, Args)]
@@ -27,8 +30,8 @@ Example:
   understudy des condat PLANT.ADS SUPER.ADS --json
 
 Files are TCT automata (.ADS) or models of one automaton (.toml). Results are written as .ADS, .toml, .dot or .svg. supcon uses the meet
-with the specification: without --lift, events outside of its alphabet are forbidden. supreduce ends after 30 s, or at Ctrl-C, with the
-smallest supervisor found.")]
+with the specification: without --lift, events outside of its alphabet are forbidden. supreduce ends after its --budget, or at Ctrl-C,
+with the smallest supervisor found.")]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     operation: Operation,
@@ -70,7 +73,13 @@ enum Operation {
     /// Controllable events that a supervisor disables in each state
     Condat { plant: PathBuf, supervisor: PathBuf },
     /// Reduced supervisor with the same effect on the plant
-    Supreduce { plant: PathBuf, supervisor: PathBuf },
+    Supreduce {
+        plant: PathBuf,
+        supervisor: PathBuf,
+        /// Time limit: the smallest supervisor so far is the result
+        #[arg(long, value_name = "TIME", default_value = BUDGET, value_parser = duration::parse)]
+        budget: Duration,
+    },
     /// Minimal automaton with the same languages
     Minstate { file: PathBuf },
     /// Whether two automata are isomorphic
@@ -189,9 +198,10 @@ impl Operation {
                 specification,
                 ..
             } => vec![plant, specification],
-            Self::Condat { plant, supervisor } | Self::Supreduce { plant, supervisor } => {
-                vec![plant, supervisor]
-            }
+            Self::Condat { plant, supervisor }
+            | Self::Supreduce {
+                plant, supervisor, ..
+            } => vec![plant, supervisor],
             Self::Isomorph { left, right } | Self::Mutex { left, right, .. } => vec![left, right],
         }
     }
@@ -211,7 +221,7 @@ impl Operation {
             Self::Trim { .. } => Outcome::of(trim(parts[0])),
             Self::Supcon { lift, .. } => supervisor(parts[0], parts[1], *lift, bounds)?,
             Self::Condat { .. } => Outcome::Answer(control_data(parts[0], parts[1], bounds)?),
-            Self::Supreduce { .. } => reduce(parts[0], parts[1], bounds, console)?,
+            Self::Supreduce { budget, .. } => reduce(parts[0], parts[1], bounds, *budget, console)?,
             Self::Minstate { .. } => Outcome::of(minstate(parts[0])),
             Self::Isomorph { .. } => Outcome::Answer(compare(parts[0], parts[1])),
             Self::Allevents { .. } => Outcome::of(allevents(parts[0].alphabet())),
@@ -405,6 +415,7 @@ fn reduce(
     plant: &Automaton,
     supervisor: &Automaton,
     bounds: Bounds,
+    budget: Duration,
     console: &mut Console,
 ) -> Result<Outcome, TooLarge> {
     let data = condat(plant, supervisor, bounds)?;
@@ -412,7 +423,7 @@ fn reduce(
     if !answer.failures.is_empty() {
         return Ok(Outcome::Answer(answer));
     }
-    Ok(match reduced(plant, supervisor, bounds, console) {
+    Ok(match reduced(plant, supervisor, bounds, budget, console) {
         Err(answer) => Outcome::Answer(answer),
         Ok((reduced, warning)) => {
             let result = json!({ "is_complete": warning.is_none() });

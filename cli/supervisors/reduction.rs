@@ -3,26 +3,28 @@
 use std::time::{Duration, Instant};
 
 use understudy_bus::Interruption;
-use understudy_supervisor::operations::{Reducing, supreduce_while};
+use understudy_supervisor::operations::{Reducing, compare_effects, supreduce_while};
 use understudy_supervisor::{Automaton, Bounds};
 
-use crate::answer::Answer;
+use crate::answer::{Answer, Status};
 use crate::console::Console;
 
-/// Time limit: the smallest supervisor so far is the result.
-const LIMIT: Duration = Duration::from_secs(30);
+/// Default time limit: the smallest supervisor so far is the result.
+pub(crate) const BUDGET: &str = "30s";
 
 /// Interval of the progress messages.
 const BETWEEN: Duration = Duration::from_secs(3);
 
-/// Reduced supervisor, with a warning if the time limit, SIGINT or SIGTERM stopped the reduction.
+/// Reduced supervisor, with a warning if the time limit, SIGINT or SIGTERM stopped the reduction. Its effect on the plant was compared
+/// with that of `supervisor`.
 ///
 /// # Errors
-/// If the product of the two exceeds the bounds.
+/// If the product of the two exceeds the bounds, or the effects differ, which is a defect of the reduction.
 pub(crate) fn reduced(
     plant: &Automaton,
     supervisor: &Automaton,
     bounds: Bounds,
+    budget: Duration,
     console: &mut Console,
 ) -> Result<(Automaton, Option<String>), Answer> {
     // Without the flag an interruption ends the command.
@@ -44,9 +46,16 @@ pub(crate) fn reduced(
             ));
         }
         interrupted = interruption.as_ref().is_some_and(Interruption::came);
-        !interrupted && begin.elapsed() < LIMIT
+        !interrupted && begin.elapsed() < budget
     };
     let made = supreduce_while(plant, supervisor, bounds, &mut go_on)?;
+    if let Some(other) = compare_effects(plant, supervisor, &made.supervisor, bounds)? {
+        let message = format!(
+            "after {} events the reduced supervisor has another effect on the plant than the given one; this is a defect of the program",
+            other.word.len()
+        );
+        return Err(Answer::failed(Status::Failed, "U0848", message));
+    }
     let warning = (!made.is_complete).then(|| {
         format!(
             "warning[U0847]: the reduction was {} after {} s at {} of {} states; the supervisor has the same effect, but may not be minimal\n",

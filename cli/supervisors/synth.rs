@@ -1,6 +1,7 @@
 //! `understudy synth`: supervisor synthesis.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
@@ -10,7 +11,7 @@ use understudy_supervisor::{
     modular_findings, specification_findings, synthesis_findings, synthesise, synthesise_modularly,
     synthesise_symbolically, write_model,
 };
-use understudy_text::Severity;
+use understudy_text::{Severity, duration};
 
 use crate::answer::{Answer, Failure, Status};
 use crate::console::Console;
@@ -42,6 +43,9 @@ pub(crate) struct Arguments {
     /// Reduce each supervisor: fewer states with the same effect on the plant
     #[arg(long)]
     reduce: bool,
+    /// Time limit to reduce a supervisor: the smallest so far is the result
+    #[arg(long, value_name = "TIME", default_value = reduction::BUDGET, value_parser = duration::parse)]
+    budget: Duration,
     /// Minimise each supervisor: merge equivalent states
     #[arg(long, conflicts_with = "reduce")]
     minstate: bool,
@@ -279,7 +283,8 @@ fn reduced(
         return Ok((supervisor, String::new()));
     }
     let plant = sync(plants, bounds)?;
-    let (supervisor, warning) = reduction::reduced(&plant, &supervisor, bounds, console)?;
+    let (supervisor, warning) =
+        reduction::reduced(&plant, &supervisor, bounds, arguments.budget, console)?;
     Ok((supervisor, warning.unwrap_or_default()))
 }
 

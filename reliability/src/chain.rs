@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 
 use crate::error::ReliabilityError;
-use crate::quantity::rate;
+use crate::quantity::{is_rate, rate};
 
 /// States of one chain, at most.
 pub const MAXIMUM_STATES: usize = 4_000_000;
@@ -15,7 +15,7 @@ pub const MAXIMUM_STATES: usize = 4_000_000;
 /// A checked chain. Rates are in compressed rows: `targets[rows[i]..rows[i + 1]]` are the successors of state i.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chain {
-    names: Vec<String>,
+    names: Names,
     rows: Vec<usize>,
     targets: Vec<u32>,
     rates: Vec<f64>,
@@ -26,10 +26,75 @@ pub struct Chain {
 /// Collects a chain; every fault is reported at the end, all at once.
 #[derive(Debug, Clone, Default)]
 pub struct ChainBuilder {
-    names: Vec<String>,
+    names: Names,
     failures: Vec<bool>,
-    transitions: Vec<(usize, usize, f64)>,
+    transitions: Vec<Transition>,
     start: usize,
+}
+
+/// From a state to a state, with a rate per hour.
+type Transition = (u32, u32, f64);
+
+/// Names of states, one behind the other.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Names {
+    text: String,
+    ends: Vec<usize>,
+}
+
+impl Names {
+    fn push(&mut self, name: &str) {
+        self.text.push_str(name);
+        self.ends.push(self.text.len());
+    }
+
+    /// The name of a state; its place where it has none.
+    fn shown(&self, place: usize) -> String {
+        let start = place.checked_sub(1).map_or(0, |before| self.ends[before]);
+        match &self.text[start..self.ends[place]] {
+            "" => format!("#{place}"),
+            name => name.to_owned(),
+        }
+    }
+}
+
+/// For each state the states from which a transition leads to it, in compressed rows.
+pub(crate) struct Sources {
+    rows: Vec<usize>,
+    sources: Vec<u32>,
+}
+
+impl Sources {
+    /// `transitions` are pairs of places, the same ones each time.
+    pub(crate) fn new<Pairs: Iterator<Item = (usize, usize)>>(
+        states: usize,
+        transitions: impl Fn() -> Pairs,
+    ) -> Self {
+        let mut rows = vec![0; states + 1];
+        for (_, to) in transitions() {
+            rows[to + 1] += 1;
+        }
+        add_up(&mut rows);
+        let mut next = rows.clone();
+        let mut sources = vec![0; rows[states]];
+        for (from, to) in transitions() {
+            sources[next[to]] = from as u32;
+            next[to] += 1;
+        }
+        Self { rows, sources }
+    }
+
+    pub(crate) fn of(&self, place: usize) -> impl Iterator<Item = usize> + '_ {
+        let row = &self.sources[self.rows[place]..self.rows[place + 1]];
+        row.iter().map(|source| *source as usize)
+    }
+}
+
+/// Where rows begin, from the number of entries of each in the place behind it.
+fn add_up(rows: &mut [usize]) {
+    for place in 1..rows.len() {
+        rows[place] += rows[place - 1];
+    }
 }
 
 impl ChainBuilder {
@@ -39,22 +104,34 @@ impl ChainBuilder {
     }
 
     /// Adds a state and returns its index. Names need not be unique; an empty name is replaced by the index.
-    pub fn state(&mut self, name: impl Into<String>) -> usize {
-        self.names.push(name.into());
+    pub fn state(&mut self, name: impl AsRef<str>) -> usize {
+        self.names.push(name.as_ref());
         self.failures.push(false);
-        self.names.len() - 1
+        self.failures.len() - 1
     }
 
     /// Adds a state in which the system has failed.
-    pub fn failure(&mut self, name: impl Into<String>) -> usize {
+    pub fn failure(&mut self, name: impl AsRef<str>) -> usize {
         let place = self.state(name);
-        self.failures[place] = true;
+        self.fails(place);
         place
+    }
+
+    /// Makes a state of this builder a failure.
+    pub(crate) fn fails(&mut self, place: usize) {
+        self.failures[place] = true;
+    }
+
+    /// Room for this number of transitions.
+    pub(crate) fn reserve(&mut self, transitions: usize) {
+        self.transitions.reserve_exact(transitions);
     }
 
     /// Adds a transition of `per_hour`; rates between the same two states add up.
     pub fn transition(&mut self, from: usize, to: usize, per_hour: f64) -> &mut Self {
-        self.transitions.push((from, to, per_hour));
+        // More states than this cannot be, and such a place is refused at the end.
+        let place = |place| u32::try_from(place).unwrap_or(u32::MAX);
+        self.transitions.push((place(from), place(to), per_hour));
         self
     }
 
@@ -70,7 +147,7 @@ impl ChainBuilder {
     /// Every fault: rates that are not positive and finite, states that are not there, loops from a state to itself, states that
     /// cannot be reached (one is named), too many states.
     pub fn build(self) -> Result<Chain, Vec<ReliabilityError>> {
-        let states = self.names.len();
+        let states = self.failures.len();
         if states > MAXIMUM_STATES {
             return Err(vec![ReliabilityError::TooManyStates {
                 maximum: MAXIMUM_STATES,
@@ -84,19 +161,18 @@ impl ChainBuilder {
             });
         }
         for &(from, to, per_hour) in &self.transitions {
+            let (from, to) = (from as usize, to as usize);
             if let Some(&place) = [from, to].iter().find(|place| **place >= states) {
                 errors.push(ReliabilityError::NoSuchState { place, states });
                 continue;
             }
-            let name = |place| state_name(&self.names, place);
             if from == to {
-                errors.push(ReliabilityError::SelfLoop { state: name(from) });
+                let state = self.names.shown(from);
+                errors.push(ReliabilityError::SelfLoop { state });
             }
-            if let Err(error) = rate(
-                &format!("the rate {} -> {}", name(from), name(to)),
-                per_hour,
-            ) {
-                errors.push(error);
+            if !is_rate(per_hour) {
+                let (from, to) = (self.names.shown(from), self.names.shown(to));
+                errors.extend(rate(&format!("the rate {from} -> {to}"), per_hour).err());
             }
         }
         if !errors.is_empty() {
@@ -114,43 +190,63 @@ impl ChainBuilder {
     }
 }
 
-fn state_name(names: &[String], place: usize) -> String {
-    match names.get(place) {
-        Some(name) if !name.is_empty() => name.clone(),
-        _ => format!("#{place}"),
-    }
-}
-
 impl Chain {
     fn from_transitions(
-        names: Vec<String>,
+        names: Names,
         failures: Vec<bool>,
         start: usize,
-        mut transitions: Vec<(usize, usize, f64)>,
+        transitions: Vec<Transition>,
     ) -> Self {
-        transitions.sort_by_key(|&(from, to, _)| (from, to));
-        transitions.dedup_by(|next, kept| {
-            let same = (next.0, next.1) == (kept.0, kept.1);
-            if same {
-                kept.2 += next.2;
-            }
-            same
-        });
-        let mut rows = vec![0; names.len() + 1];
+        let mut rows = vec![0; failures.len() + 1];
         for &(from, _, _) in &transitions {
-            rows[from + 1] += 1;
+            rows[from as usize + 1] += 1;
         }
-        for place in 0..names.len() {
-            rows[place + 1] += rows[place];
+        add_up(&mut rows);
+        let mut next = rows.clone();
+        let mut targets = vec![0; transitions.len()];
+        let mut rates = vec![0.0; transitions.len()];
+        for (from, to, rate) in transitions {
+            let place = &mut next[from as usize];
+            (targets[*place], rates[*place]) = (to, rate);
+            *place += 1;
         }
-        Self {
+        let mut chain = Self {
             names,
             rows,
-            targets: transitions.iter().map(|&(_, to, _)| to as u32).collect(),
-            rates: transitions.iter().map(|&(_, _, rate)| rate).collect(),
+            targets,
+            rates,
             failures,
             start,
+        };
+        chain.sort_rows();
+        chain
+    }
+
+    /// Orders each row by its targets, and adds up rates between the same two states.
+    fn sort_rows(&mut self) {
+        let mut row: Vec<(u32, f64)> = Vec::new();
+        let (mut first, mut kept) = (0, 0);
+        for place in 0..self.failures.len() {
+            let end = self.rows[place + 1];
+            row.clear();
+            row.extend((first..end).map(|entry| (self.targets[entry], self.rates[entry])));
+            row.sort_by_key(|&(to, _)| to);
+            row.dedup_by(|next, before| {
+                let same = next.0 == before.0;
+                if same {
+                    before.1 += next.1;
+                }
+                same
+            });
+            for &(to, rate) in &row {
+                (self.targets[kept], self.rates[kept]) = (to, rate);
+                kept += 1;
+            }
+            first = end;
+            self.rows[place + 1] = kept;
         }
+        self.targets.truncate(kept);
+        self.rates.truncate(kept);
     }
 
     /// Number of states.
@@ -160,7 +256,7 @@ impl Chain {
 
     /// The name of a state, or its place where it has none.
     pub fn name(&self, place: usize) -> String {
-        state_name(&self.names, place)
+        self.names.shown(place)
     }
 
     /// The state in which the chain starts.
@@ -216,25 +312,18 @@ impl Chain {
             return Err(ReliabilityError::NoFailureState);
         }
         let alive = self.alive();
-        let mut sources: Vec<Vec<u32>> = vec![Vec::new(); self.states()];
-        let mut doomed: Vec<usize> = Vec::new();
-        let mut reaches = vec![false; self.states()];
-        for &state in &alive {
-            for (to, _) in self.successors(state) {
-                if self.failures[to] {
-                    if !reaches[state] {
-                        reaches[state] = true;
-                        doomed.push(state);
-                    }
-                } else {
-                    sources[to].push(state as u32);
-                }
-            }
-        }
+        let sources = Sources::new(self.states(), || {
+            let leaving = |&state: &usize| self.successors(state).map(move |(to, _)| (state, to));
+            alive.iter().flat_map(leaving)
+        });
+        let mut doomed: Vec<usize> = (0..self.states())
+            .filter(|state| self.failures[*state])
+            .collect();
+        let mut reaches = self.failures.clone();
         while let Some(state) = doomed.pop() {
-            for &source in &sources[state] {
-                if !std::mem::replace(&mut reaches[source as usize], true) {
-                    doomed.push(source as usize);
+            for source in sources.of(state) {
+                if !std::mem::replace(&mut reaches[source], true) {
+                    doomed.push(source);
                 }
             }
         }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use crate::chain::Chain;
 use crate::error::ReliabilityError;
@@ -15,7 +15,7 @@ const MAXIMUM_LISTED: usize = 30;
 /// What a chain says. What is nothing does not exist for this chain, or was not asked for, as `remarks` say, or is a probability below
 /// [`MINIMUM_PROBABILITY`](crate::MINIMUM_PROBABILITY).
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ChainAnswer {
+pub struct ChainAnswer<'a> {
     /// States, failures too.
     pub states: usize,
     /// Mean time to the first failure.
@@ -28,7 +28,7 @@ pub struct ChainAnswer {
     #[serde(flatten)]
     pub mission: Option<ChainMission>,
     /// States with their probabilities.
-    pub by_state: Vec<StateAnswer>,
+    pub by_state: ByState<'a>,
     /// Why something is missing.
     pub remarks: Vec<String>,
 }
@@ -44,6 +44,33 @@ pub struct ChainMission {
     pub unreliability: Option<f64>,
     /// Probability of a failure state, where failures are repaired as the chain says.
     pub point_unavailability: Option<f64>,
+}
+
+/// The states of a chain, of which there may be millions: what is said of each is made when it is asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ByState<'a> {
+    chain: &'a Chain,
+    steady: Option<Vec<f64>>,
+    at_mission: Option<Vec<f64>>,
+}
+
+impl ByState<'_> {
+    /// The states in the order of the chain.
+    pub fn iter(&self) -> impl Iterator<Item = StateAnswer> + '_ {
+        let of = |all: &Option<Vec<f64>>, state: usize| stated(all.as_ref()?[state]);
+        (0..self.chain.states()).map(move |state| StateAnswer {
+            name: self.chain.name(state),
+            failure: self.chain.is_failure(state),
+            steady: of(&self.steady, state),
+            at_mission: of(&self.at_mission, state),
+        })
+    }
+}
+
+impl Serialize for ByState<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.iter())
+    }
 }
 
 /// One state.
@@ -66,7 +93,7 @@ pub struct StateAnswer {
 pub fn answer_chain(
     chain: &Chain,
     mission: Option<Hours>,
-) -> Result<ChainAnswer, ReliabilityError> {
+) -> Result<ChainAnswer<'_>, ReliabilityError> {
     let mut remarks = Vec::new();
     let mut kept = |found: Result<f64, ReliabilityError>| match found {
         Ok(value) => Some(value),
@@ -92,7 +119,8 @@ pub fn answer_chain(
         }
     };
     let failures = || (0..chain.states()).filter(|state| chain.is_failure(*state));
-    let later = match mission {
+    let mut at_mission = None;
+    let mission = match mission {
         Some(hours) => {
             let first = chain.transient(hours.get(), AfterFailure::Final)?;
             let later = chain.transient(hours.get(), AfterFailure::Repaired)?;
@@ -107,18 +135,11 @@ pub fn answer_chain(
                 unreliability: failed(first.failed),
                 point_unavailability: failed(later.failed),
             };
-            Some((answer, later.probabilities))
+            at_mission = Some(later.probabilities);
+            Some(answer)
         }
         None => None,
     };
-    let by_state = (0..chain.states()).map(|state| StateAnswer {
-        name: chain.name(state),
-        failure: chain.is_failure(state),
-        steady: steady.as_ref().and_then(|steady| stated(steady[state])),
-        at_mission: later
-            .as_ref()
-            .and_then(|(_, probabilities)| stated(probabilities[state])),
-    });
     Ok(ChainAnswer {
         states: chain.states(),
         mttf_hours,
@@ -127,13 +148,17 @@ pub fn answer_chain(
             None => Some(0.0),
             Some(_) => stated(failures().map(|state| steady[state]).sum()),
         }),
-        by_state: by_state.collect(),
-        mission: later.map(|(answer, _)| answer),
+        by_state: ByState {
+            chain,
+            steady,
+            at_mission,
+        },
+        mission,
         remarks,
     })
 }
 
-impl ChainAnswer {
+impl ChainAnswer<'_> {
     /// The answer for people.
     pub fn to_text(&self) -> String {
         let mut text = format!("{} states\n", self.states);

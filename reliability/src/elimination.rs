@@ -5,7 +5,7 @@
 //! of the state that was left. A return to where one came from is dropped on both sides, and so the rate of leaving is a sum.
 //! States are numbered as they are found from the start, which keeps the rates near the diagonal; only that band is stored.
 
-use crate::chain::Chain;
+use crate::chain::{Chain, Sources};
 use crate::error::ReliabilityError;
 
 /// Doubles in one band, at most: 512 MiB.
@@ -115,17 +115,15 @@ impl Chain {
     }
 
     fn check_ergodic(&self) -> Result<(), ReliabilityError> {
-        let mut sources: Vec<Vec<usize>> = vec![Vec::new(); self.states()];
-        for state in 0..self.states() {
-            for (to, _) in self.successors(state) {
-                sources[to].push(state);
-            }
-        }
+        let sources = Sources::new(self.states(), || {
+            let leaving = |state| self.successors(state).map(move |(to, _)| (state, to));
+            (0..self.states()).flat_map(leaving)
+        });
         let mut returns = vec![false; self.states()];
         let mut pending = vec![self.start()];
         returns[self.start()] = true;
         while let Some(state) = pending.pop() {
-            for &source in &sources[state] {
+            for source in sources.of(state) {
                 if !std::mem::replace(&mut returns[source], true) {
                     pending.push(source);
                 }

@@ -53,14 +53,14 @@ pub struct ReadChain {
 }
 
 /// Reads the chain in `text`; `name` is for the report.
-pub fn read_chain(name: &str, text: &str) -> ReadChain {
-    let mut reader = Reader::default();
-    let chain = reader.read(text);
-    reader.findings.sort_by_key(|finding| finding.span.start);
+pub fn read_chain(name: &str, text: impl Into<String>) -> ReadChain {
+    let text = text.into();
+    let (chain, mut diagnostics) = Reader::new(&text).read();
+    diagnostics.sort_by_key(|finding| finding.span.start);
     let report = Report {
         name: name.into(),
-        text: text.into(),
-        diagnostics: reader.findings,
+        text,
+        diagnostics,
     };
     ReadChain {
         chain: chain.filter(|_| !report.has_errors()),
@@ -68,14 +68,44 @@ pub fn read_chain(name: &str, text: &str) -> ReadChain {
     }
 }
 
+/// A chain of millions of states is read too: what there is of each state or transition is small, and names are parts of the text.
 #[derive(Default)]
-struct Reader {
+struct Reader<'a> {
+    text: &'a str,
     findings: Vec<Diagnostic>,
     constants: BTreeMap<String, Constant>,
-    states: Vec<(String, Range<usize>)>,
-    places: HashMap<String, usize>,
-    failures: Vec<bool>,
+    /// The place of each name among the states.
+    places: HashMap<&'a str, u32>,
+    /// Where each state is declared in the text.
+    declared: Vec<Span>,
+    builder: ChainBuilder,
+    /// The state that the last transition leaves.
+    last: u32,
+    /// Transitions of states that are declared later, or not at all.
+    open: Vec<Line<'a>>,
     start: Option<(usize, Range<usize>)>,
+}
+
+/// A part of a text of at most [`MAXIMUM_TEXT_BYTES`].
+#[derive(Debug, Clone, Copy)]
+struct Span {
+    start: u32,
+    end: u32,
+}
+
+impl From<&Range<usize>> for Span {
+    fn from(range: &Range<usize>) -> Self {
+        Self {
+            start: range.start as u32,
+            end: range.end as u32,
+        }
+    }
+}
+
+impl From<Span> for Range<usize> {
+    fn from(span: Span) -> Self {
+        span.start as usize..span.end as usize
+    }
 }
 
 struct Constant {
@@ -84,7 +114,7 @@ struct Constant {
     used: bool,
 }
 
-/// A transition that waits until all states are known.
+/// A transition.
 struct Line<'a> {
     from: &'a str,
     from_span: Range<usize>,
@@ -94,8 +124,17 @@ struct Line<'a> {
     rate_span: Range<usize>,
 }
 
-impl Reader {
-    fn read(&mut self, text: &str) -> Option<Chain> {
+impl<'a> Reader<'a> {
+    fn new(text: &'a str) -> Self {
+        Self {
+            text,
+            ..Self::default()
+        }
+    }
+
+    /// The chain of the text, and what was found in it.
+    fn read(mut self) -> (Option<Chain>, Vec<Diagnostic>) {
+        let text = self.text;
         if text.len() > MAXIMUM_TEXT_BYTES {
             let message = format!(
                 "the text has {} bytes, more than {MAXIMUM_TEXT_BYTES}",
@@ -103,16 +142,16 @@ impl Reader {
             );
             self.findings
                 .push(Diagnostic::error("U0730", message, 0..0));
-            return None;
+            return (None, self.findings);
         }
-        let mut lines = Vec::new();
+        self.builder.reserve(text.matches("->").count());
         let mut offset = 0;
         for line in text.split_inclusive('\n') {
             if self.findings.len() >= MAXIMUM_FINDINGS {
                 break;
             }
             let content = line.split('#').next().unwrap_or_default();
-            self.line(content, offset, &mut lines);
+            self.line(content, offset);
             offset += line.len();
         }
         let constants = self.constants.iter();
@@ -127,23 +166,22 @@ impl Reader {
             })
             .collect();
         self.findings.extend(unused);
-        self.build(&lines, text.len())
+        self.build(text.len())
     }
 
-    fn line<'a>(&mut self, line: &'a str, offset: usize, lines: &mut Vec<Line<'a>>) {
+    fn line(&mut self, line: &'a str, offset: usize) {
         let trimmed = line.trim();
         if trimmed.is_empty() {
             return;
         }
-        let whole = span_of(line, trimmed, offset);
-        let first_word = trimmed.split_whitespace().next().unwrap_or_default();
-        if let Some((from, rest)) = line.split_once("->") {
-            self.transition(line, from, rest, offset, lines);
-        } else if first_word == "state" {
+        if let Some((from, rest)) = split_at_arrow(line) {
+            self.transition(line, from, rest, offset);
+        } else if trimmed.split_whitespace().next() == Some("state") {
             self.state(line, trimmed, offset);
         } else if let Some((name, value)) = line.split_once('=') {
             self.constant(line, name, value, offset);
         } else {
+            let whole = span_of(line, trimmed, offset);
             self.findings.push(
                 Diagnostic::error("U0721", "this is not a line of a chain", whole).with_help(
                     "write `name = 10000h`, `state name`, `state name start`, `state name failure` or `from -> to : 1 / 24h`",
@@ -179,7 +217,7 @@ impl Reader {
         }
     }
 
-    fn state(&mut self, line: &str, trimmed: &str, offset: usize) {
+    fn state(&mut self, line: &'a str, trimmed: &'a str, offset: usize) {
         let mut words = trimmed.split_whitespace().skip(1);
         let Some(name) = words.next() else {
             let span = span_of(line, trimmed, offset);
@@ -191,21 +229,21 @@ impl Reader {
         if !self.check_name(name, &span) {
             return;
         }
-        if let Some(&place) = self.places.get(name) {
+        let place = self.declared.len();
+        let known = *self.places.entry(name).or_insert(place as u32) as usize;
+        if known != place {
             self.findings.push(
                 Diagnostic::error("U0722", format!("the state {name} is declared twice"), span)
-                    .with_related(self.states[place].1.clone(), "first occurrence"),
+                    .with_related(self.declared[known].into(), "first occurrence"),
             );
             return;
         }
-        let place = self.states.len();
-        self.places.insert(name.into(), place);
-        self.states.push((name.into(), span.clone()));
-        self.failures.push(false);
+        self.builder.state(name);
+        self.declared.push(Span::from(&span));
         for word in words {
             let span = span_of(line, word, offset);
             match (word, &self.start) {
-                ("failure", _) => self.failures[place] = true,
+                ("failure", _) => self.builder.fails(place),
                 ("start", None) => self.start = Some((place, span)),
                 ("start", Some((_, before))) => self.findings.push(
                     Diagnostic::error("U0726", "a chain has one start", span)
@@ -224,14 +262,7 @@ impl Reader {
         }
     }
 
-    fn transition<'a>(
-        &mut self,
-        line: &'a str,
-        from: &'a str,
-        rest: &'a str,
-        offset: usize,
-        lines: &mut Vec<Line<'a>>,
-    ) {
+    fn transition(&mut self, line: &'a str, from: &'a str, rest: &'a str, offset: usize) {
         let Some((to, rate)) = rest.split_once(':') else {
             let end = offset + line.trim_end().len();
             self.findings.push(
@@ -265,14 +296,20 @@ impl Reader {
             self.findings
                 .push(Diagnostic::error("U0724", message, rate_span.clone()));
         } else if named {
-            lines.push(Line {
+            let line = Line {
                 from,
                 from_span,
                 to,
                 to_span,
                 per_hour: value.number,
                 rate_span,
-            });
+            };
+            let from = self.place(from);
+            self.last = from.unwrap_or(self.last);
+            match (from, self.place(to)) {
+                (Some(from), Some(to)) => self.add(&line, from, to),
+                _ => self.open.push(line),
+            }
         }
     }
 
@@ -311,44 +348,42 @@ impl Reader {
         good
     }
 
-    fn build(&mut self, lines: &[Line<'_>], end: usize) -> Option<Chain> {
-        if self.states.is_empty() {
+    /// Adds a transition between two known states.
+    fn add(&mut self, line: &Line<'_>, from: u32, to: u32) {
+        if from == to {
+            let span = line.from_span.start..line.rate_span.end;
+            let message = format!("the transition from {} leads to itself", line.from);
+            self.findings
+                .push(Diagnostic::error("U0729", message, span));
+        } else {
+            let (from, to) = (from as usize, to as usize);
+            self.builder.transition(from, to, line.per_hour);
+        }
+    }
+
+    fn build(mut self, end: usize) -> (Option<Chain>, Vec<Diagnostic>) {
+        if self.declared.is_empty() {
             self.findings.push(
                 Diagnostic::error("U0726", "the chain has no state", end..end)
                     .with_help("write `state name` for each, and `state name failure` where the system has failed"),
             );
-            return None;
+            return (None, self.findings);
         }
-        let mut builder = ChainBuilder::new();
-        for ((name, _), failure) in self.states.iter().zip(&self.failures) {
-            if *failure {
-                builder.failure(name)
-            } else {
-                builder.state(name)
-            };
-        }
-        builder.start(self.start.as_ref().map_or(0, |(place, _)| *place));
-        for line in lines {
+        for line in std::mem::take(&mut self.open) {
             let (from, to) = (
-                self.place(line.from, &line.from_span),
-                self.place(line.to, &line.to_span),
+                self.declared_place(line.from, &line.from_span),
+                self.declared_place(line.to, &line.to_span),
             );
-            let (Some(from), Some(to)) = (from, to) else {
-                continue;
-            };
-            if from == to {
-                let span = line.from_span.start..line.rate_span.end;
-                let message = format!("the transition from {} leads to itself", line.from);
-                self.findings
-                    .push(Diagnostic::error("U0729", message, span));
-            } else {
-                builder.transition(from, to, line.per_hour);
+            if let (Some(from), Some(to)) = (from, to) {
+                self.add(&line, from, to);
             }
         }
         if understudy_text::has_errors(&self.findings) {
-            return None;
+            return (None, self.findings);
         }
-        match builder.build() {
+        let start = self.start.as_ref().map_or(0, |(place, _)| *place);
+        self.builder.start(start);
+        let chain = match std::mem::take(&mut self.builder).build() {
             Ok(chain) => {
                 self.warn(&chain);
                 Some(chain)
@@ -359,13 +394,30 @@ impl Reader {
                 }
                 None
             }
-        }
+        };
+        (chain, self.findings)
     }
 
-    fn place(&mut self, name: &str, span: &Range<usize>) -> Option<usize> {
-        let place = self.places.get(name).copied();
+    /// The place of a state that is declared before. Most lines name the state of the line before or a neighbour of it, so these are
+    /// compared first: a look into the table of a million names is slow.
+    fn place(&self, name: &str) -> Option<u32> {
+        let last = self.last;
+        let near = [last, last.wrapping_add(1), last.wrapping_sub(1)];
+        let is_meant = |place: &u32| self.name(*place) == Some(name);
+        let near = near.into_iter().find(is_meant);
+        near.or_else(|| self.places.get(name).copied())
+    }
+
+    fn name(&self, place: u32) -> Option<&'a str> {
+        let span = self.declared.get(place as usize)?;
+        Some(&self.text[Range::<usize>::from(*span)])
+    }
+
+    /// As [`Self::place`] when all states are declared.
+    fn declared_place(&mut self, name: &str, span: &Range<usize>) -> Option<u32> {
+        let place = self.place(name);
         if place.is_none() && self.findings.len() < MAXIMUM_FINDINGS {
-            let known = self.states.iter().map(|(name, _)| name.as_str());
+            let known = (0..self.declared.len()).filter_map(|place| self.name(place as u32));
             self.findings.push(
                 Diagnostic::error("U0723", format!("there is no state {name}"), span.clone())
                     .with_help(suggestion(name, known)),
@@ -374,13 +426,16 @@ impl Reader {
         place
     }
 
+    /// Where a state is declared.
+    fn declaration(&self, name: &str) -> Option<Range<usize>> {
+        let place = self.places.get(name)?;
+        Some(self.declared[*place as usize].into())
+    }
+
     fn refuse(&mut self, error: &ReliabilityError, end: usize) {
         let finding = match error {
             ReliabilityError::Unreachable { state } => {
-                let span = self
-                    .places
-                    .get(state)
-                    .map_or(end..end, |place| self.states[*place].1.clone());
+                let span = self.declaration(state).unwrap_or(end..end);
                 Diagnostic::error(
                     "U0727",
                     format!("the state {state} cannot be reached from the start"),
@@ -397,10 +452,7 @@ impl Reader {
     fn warn(&mut self, chain: &Chain) {
         match chain.check_fails() {
             Err(ReliabilityError::NeverFails { state }) => {
-                let span = self
-                    .places
-                    .get(&state)
-                    .map_or(0..0, |place| self.states[*place].1.clone());
+                let span = self.declaration(&state).unwrap_or(0..0);
                 let message = format!(
                     "no failure can be reached from the state {state}: the mean time to failure is infinite"
                 );
@@ -411,7 +463,7 @@ impl Reader {
                 Diagnostic::warning(
                     "U0728",
                     "no state is a failure: there is no mean time to failure",
-                    self.states[0].1.clone(),
+                    self.declared[0].into(),
                 )
                 .with_help(
                     "write `state name failure` for the states in which the system has failed",
@@ -420,6 +472,13 @@ impl Reader {
             Ok(()) => {}
         }
     }
+}
+
+/// What is before and behind the first `->`.
+fn split_at_arrow(line: &str) -> Option<(&str, &str)> {
+    let mut heads = line.match_indices('>').map(|(place, _)| place);
+    let head = heads.find(|head| line[..*head].ends_with('-'))?;
+    Some((&line[..head - 1], &line[head + 1..]))
 }
 
 /// Position of a part of a line in the text.

@@ -36,7 +36,7 @@ pub use answer::{Answer, Mission, calculate};
 pub use boxes::{UNDERSTUDIES, UnequalBoxes};
 pub use campaign::{Assessment, Campaign, SystemFailure, assess};
 pub use chain::{Chain, ChainBuilder, MAXIMUM_STATES};
-pub use chain_answer::{ChainAnswer, ChainMission, StateAnswer, answer_chain};
+pub use chain_answer::{ByState, ChainAnswer, ChainMission, StateAnswer, answer_chain};
 pub use copies::Survival;
 pub use elimination::TimeToFailure;
 pub use error::ReliabilityError;

@@ -161,7 +161,7 @@ pub(crate) fn probability(stated: Option<f64>, decimals: usize) -> String {
 /// # Errors
 /// [`ReliabilityError::Rate`] with the value.
 pub(crate) fn rate(what: &str, per_hour: f64) -> Result<f64, ReliabilityError> {
-    if per_hour > 0.0 && per_hour.is_finite() {
+    if is_rate(per_hour) {
         Ok(per_hour)
     } else {
         Err(ReliabilityError::Rate {
@@ -169,6 +169,10 @@ pub(crate) fn rate(what: &str, per_hour: f64) -> Result<f64, ReliabilityError> {
             per_hour,
         })
     }
+}
+
+pub(crate) fn is_rate(per_hour: f64) -> bool {
+    per_hour > 0.0 && per_hour.is_finite()
 }
 
 /// A number as people read it: six significant digits, thousands apart, powers of ten where it is very large or small.

@@ -1,6 +1,13 @@
 //! Automata and synthesis as a person meets them.
 
+use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+use std::process::{Command, Stdio};
+
 use insta::assert_snapshot;
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
 use serde_json::{Value, json};
 
 use crate::{Answer, empty_folder, understudy};
@@ -192,4 +199,77 @@ fn explored_states_are_not_called_the_product() {
     let specified = understudy(&["synth", model, "--engine", "specified"]);
     let said = "of 2 explored states of their product with the plants, a supervisor keeps to 1";
     assert!(specified.errors.contains(said), "{}", specified.errors);
+}
+
+/// A plant of 20,000 states, ten random transitions from each, and a supervisor that forbids a few of them. Its reduction takes long.
+fn event_rich(folder: &Path) -> [String; 2] {
+    const STATES: u64 = 20_000;
+    let mut state = 88_172_645_463_325_252_u64;
+    let mut random = |below: u64| {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        state % below
+    };
+    let mut transitions = BTreeMap::new();
+    for source in 0..STATES {
+        transitions.insert((source, random(60)), (source + 1) % STATES);
+        for _ in 0..10 {
+            let (event, target) = (random(60), random(STATES));
+            transitions.entry((source, event)).or_insert(target);
+        }
+    }
+    let mut write = |name: &str| {
+        let head = format!("{name}\nState size:\n{STATES}\nMarker states:\n*\nTransitions:\n");
+        let lines = transitions.iter();
+        let lines = lines.map(|(&(source, event), target)| format!("{source} {event} {target}\n"));
+        let path = folder.join(format!("{name}.ADS"));
+        std::fs::write(&path, head + &lines.collect::<String>()).expect("written");
+        transitions.retain(|&(_, event), _| event % 2 == 0 || random(20_000) > 0);
+        path.display().to_string()
+    };
+    [write("PLANT"), write("SUPER")]
+}
+
+#[test]
+fn a_reduction_that_ends_early_keeps_its_result() {
+    let folder = empty_folder("early");
+    let [plant, supervisor] = event_rich(&folder);
+    let out = folder.join("SIMSUP.ADS").display().to_string();
+    let files = ["supreduce", &plant, &supervisor, "-o", &out];
+    let limited = des(&[&files[..], &["--budget", "1ms"]].concat());
+    assert_eq!(limited.status, 0, "{}", limited.errors);
+    assert_eq!(limited.json()["result"]["is_complete"], json!(false));
+    let states = counts(&limited).0;
+    assert!(states < 20_000, "{states}");
+
+    std::fs::remove_file(&out).expect("it was written");
+    let mut process = Command::new(env!("CARGO_BIN_EXE_understudy"))
+        .arg("des")
+        .args(files)
+        .args(["--budget", "1h"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the binary is built");
+    let mut errors = BufReader::new(process.stderr.take().expect("a pipe"));
+    let mut line = String::new();
+    errors.read_line(&mut line).expect("text");
+    assert!(
+        line.contains("order 1 of 2: ") && line.contains(" of 20000 states tried, "),
+        "{line}"
+    );
+    let id = i32::try_from(process.id()).expect("a process id");
+    kill(Pid::from_raw(id), Signal::SIGINT).expect("it runs");
+    let mut output = String::new();
+    let mut stdout = process.stdout.take().expect("a pipe");
+    stdout.read_to_string(&mut output).expect("text");
+    let status = process.wait().expect("it ends");
+    assert!(status.success(), "{status}: {output}");
+    assert!(
+        output.contains("warning[U0847]: the reduction was interrupted after "),
+        "{output}"
+    );
+    let kept = counts(&des(&["convert", &out]));
+    assert!(kept.0 <= states, "{kept:?} after {states}");
 }

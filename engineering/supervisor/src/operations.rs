@@ -9,6 +9,7 @@
 //! | [`supcon`] | the supremal controllable, nonblocking sublanguage |
 //! | [`condat`] | which controllable events a supervisor disables where |
 //! | [`supreduce`] | a smaller supervisor with the same effect |
+//! | [`compare_effects`] | where two supervisors have different effects on a plant |
 //! | [`minstate`] | the fewest states with the same languages |
 //! | [`isomorph`] | whether two automata are one but for the numbers |
 //! | [`allevents`], [`mutex`], [`nonconflict`], [`project`] | as their names say |
@@ -20,6 +21,7 @@
 
 mod basic;
 mod condat;
+mod effect;
 mod isomorph;
 mod minstate;
 mod nonconflict;
@@ -30,6 +32,7 @@ mod supreduce;
 
 pub use basic::{AlreadyKnown, allevents, reachable, selfloop, trim};
 pub use condat::{ControlData, UncontrollablyDisabled, condat};
+pub use effect::{OtherEffect, compare_effects};
 pub use isomorph::{Difference, isomorph};
 pub use minstate::minstate;
 pub use nonconflict::{Conflict, nonconflict};

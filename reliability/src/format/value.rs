@@ -73,6 +73,13 @@ pub(super) fn evaluate(
     }
 }
 
+/// Letters, digits and _ at the beginning of a text.
+fn word(text: &str) -> &str {
+    let is_part = |character: char| character.is_alphanumeric() || character == '_';
+    let end = text.find(|character: char| !is_part(character));
+    &text[..end.unwrap_or(text.len())]
+}
+
 struct Parser<'a, Constant> {
     text: &'a str,
     at: usize,
@@ -205,10 +212,7 @@ impl<Constant: FnMut(&str) -> Option<Option<Value>>> Parser<'_, Constant> {
         let spaces =
             self.text[self.at..].len() - self.text[self.at..].trim_start_matches(' ').len();
         let unit_at = self.at + spaces;
-        let unit: String = self.text[unit_at..]
-            .chars()
-            .take_while(|c| c.is_alphanumeric() || *c == '_')
-            .collect();
+        let unit = word(&self.text[unit_at..]);
         if unit.is_empty() {
             return Ok(Value {
                 number,
@@ -218,7 +222,7 @@ impl<Constant: FnMut(&str) -> Option<Option<Value>>> Parser<'_, Constant> {
         self.at = unit_at;
         let span = self.here(unit.len());
         self.at += unit.len();
-        match unit_length(&unit) {
+        match unit_length(unit) {
             Some(length) => Ok(Value {
                 number: number * length,
                 dimension: 1,
@@ -234,13 +238,10 @@ impl<Constant: FnMut(&str) -> Option<Option<Value>>> Parser<'_, Constant> {
     }
 
     fn name(&mut self) -> Parsed {
-        let name: String = self.text[self.at..]
-            .chars()
-            .take_while(|c| c.is_alphanumeric() || *c == '_')
-            .collect();
+        let name = word(&self.text[self.at..]);
         let span = self.here(name.len());
         self.at += name.len();
-        match (self.constant)(&name) {
+        match (self.constant)(name) {
             Some(value) => Ok(value),
             None => {
                 let mut wrong = Wrong::new(
@@ -248,7 +249,7 @@ impl<Constant: FnMut(&str) -> Option<Option<Value>>> Parser<'_, Constant> {
                     format!("there is no constant {name} above this line"),
                     span,
                 );
-                wrong.unknown = Some(name);
+                wrong.unknown = Some(name.to_owned());
                 Err(wrong)
             }
         }

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use proptest::prelude::*;
-use understudy_reliability::read_chain;
+use understudy_reliability::{ChainBuilder, read_chain};
 
 const GOOD: &str = "\
 # Three controllers and an understudy.
@@ -115,5 +115,41 @@ proptest! {
     fn no_torn_text_is_too_odd(cut in 0..GOOD.len(), put in "[-+*/():=#>a-c0-9.eh \n½]{0,6}") {
         let text = format!("{}{put}{}", &GOOD[..cut], &GOOD[cut..]);
         findings(&text);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Transitions may come before the states that they name, in any order, and several times.
+    #[test]
+    fn a_chain_is_that_of_its_lines_in_any_order(
+        states in 2..9_usize,
+        transitions in proptest::collection::vec((0..8_usize, 0..8_usize, 1..9_u32, 0..9_usize), 1..30),
+    ) {
+        let transitions: Vec<_> = transitions
+            .into_iter()
+            .map(|(from, to, rate, after)| (from % states, to % states, rate, after))
+            .filter(|(from, to, ..)| from != to)
+            .collect();
+        let mut builder = ChainBuilder::new();
+        for state in 0..states - 1 {
+            builder.state(format!("s{state:x}"));
+        }
+        let last = builder.failure("failed");
+        let name = |state: usize| if state == last { "failed".to_owned() } else { format!("s{state:x}") };
+        let mut text = String::new();
+        for state in 0..=states {
+            for (from, to, rate, _) in transitions.iter().filter(|(.., after)| (*after).min(states) == state) {
+                let _ = writeln!(text, "{}->{}:{rate}/1h", name(*from), name(*to));
+            }
+            if state < states {
+                let _ = writeln!(text, "state {}{}", name(state), if state == last { " failure" } else { "" });
+            }
+        }
+        for (from, to, rate, _) in &transitions {
+            builder.transition(*from, *to, f64::from(*rate));
+        }
+        prop_assert_eq!(read_chain("a.chain", text).chain, builder.build().ok());
     }
 }

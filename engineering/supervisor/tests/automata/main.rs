@@ -9,4 +9,5 @@ mod models;
 mod modular;
 mod properties;
 mod reading;
+mod reduction;
 mod symbolic;

@@ -1,6 +1,7 @@
 //! Every operation against its definition, spelled out on tuples and words without any array.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 use proptest::prelude::*;
 use understudy_supervisor::operations::{
@@ -15,7 +16,11 @@ use understudy_supervisor::{
 const EVENTS: u32 = 5;
 
 fn automaton(labels: Vec<u32>) -> impl Strategy<Value = Automaton> {
-    let states = 1..5_u32;
+    sized(labels, 1..5)
+}
+
+/// An automaton with transitions of `labels`, and a number of states in `states`.
+pub(crate) fn sized(labels: Vec<u32>, states: Range<u32>) -> impl Strategy<Value = Automaton> {
     states.prop_flat_map(move |states| {
         let labels = labels.clone();
         let cells = states as usize * labels.len();
@@ -178,7 +183,7 @@ impl Naive<'_> {
 }
 
 /// Whether two automata have the same closed and marked languages, by words up to a length that tells them apart.
-fn same_languages(left: &Automaton, right: &Automaton) -> bool {
+pub(crate) fn same_languages(left: &Automaton, right: &Automaton) -> bool {
     let labels: Vec<Label> = left
         .alphabet()
         .labels()
