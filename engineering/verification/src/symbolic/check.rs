@@ -137,12 +137,7 @@ impl Model<'_> {
     }
 
     /// `known`, and what of `hold` comes `before` it.
-    fn enter(
-        &self,
-        known: &Diagram,
-        hold: &Diagram,
-        before: &Diagram,
-    ) -> Result<Diagram, Stopped> {
+    fn enter(&self, known: &Diagram, hold: &Diagram, before: &Diagram) -> Result<Diagram, Stopped> {
         let entering = self.diagrams.and(hold, before)?;
         Ok(self.diagrams.or(known, &entering)?)
     }

@@ -194,7 +194,9 @@ impl<'m, 'c> Tracer<'m, 'c> {
             }
             let back = self.only(&run.states[start])?;
             let rings = model.rings(inside, &back)?;
-            let returns = rings.iter().any(|ring| self.contains(&ring.states, run.last()));
+            let returns = rings
+                .iter()
+                .any(|ring| self.contains(&ring.states, run.last()));
             if returns {
                 self.descend(run, &rings)?;
                 run.states.pop();
