@@ -48,7 +48,7 @@ impl Trace {
 }
 
 /// Scans that a run may have; a longer one is cut and goes on anyhow.
-const MAXIMUM_SCANS: usize = 20_000;
+const MAXIMUM_SCANS: usize = 100_000;
 
 /// x before a scan, and u in it.
 #[derive(Debug, Clone, PartialEq, Eq)]
