@@ -12,6 +12,7 @@
 
 mod check;
 mod core;
+mod jumps;
 mod model;
 mod trace;
 
@@ -75,6 +76,9 @@ pub enum Verdict {
     Fails(Option<Trace>),
 }
 
+/// Steps of a search that are single scans.
+const SINGLE: usize = 64;
+
 /// Decides properties of one circuit.
 pub struct Checker<'c> {
     circuit: &'c Circuit,
@@ -82,6 +86,7 @@ pub struct Checker<'c> {
     nodes: usize,
     go_on: GoOn<'c>,
     reorders: bool,
+    single: usize,
     /// That of the last property, for the next one that depends on the same part of the circuit.
     model: Option<model::Model<'c>>,
     /// The part of the circuit that was too large, and why: it is not tried again.
@@ -107,6 +112,7 @@ impl<'c> Checker<'c> {
             nodes,
             go_on: ALWAYS,
             reorders: true,
+            single: SINGLE,
             model: None,
             too_large: None,
         }
@@ -125,6 +131,13 @@ impl<'c> Checker<'c> {
             reorders: false,
             ..self
         }
+    }
+
+    /// The same, but after this number of steps a search goes through many scans at once where only timers count. Verdicts are the same; runs
+    /// that show them are as short as can be as long as they have no more scans.
+    #[must_use]
+    pub fn with_single_scans(self, single: usize) -> Self {
+        Self { single, ..self }
     }
 
     /// Whether every first scan satisfies `property`: the registers as they start, the inputs any.
@@ -165,6 +178,6 @@ impl<'c> Checker<'c> {
             }
         };
         let (cone, fair) = (cone.clone(), &self.fair);
-        model::Model::new(self.circuit, cone, fair, diagrams, self.go_on)
+        model::Model::new(self.circuit, cone, fair, diagrams, self.single, self.go_on)
     }
 }

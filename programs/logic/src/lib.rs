@@ -19,7 +19,7 @@ mod scan;
 pub use circuit::{Circuit, CircuitBuilder, CircuitError, Output, Register, RegisterId};
 pub use cover::{Cover, Literal};
 pub use expression::{Expression, Graph, Operation, Variable};
-pub use lanes::{LANES, Lanes, Run, transpose};
+pub use lanes::{LANES, Lanes, Run, WIDE, transpose};
 pub use normal_form::{Monomial, NormalForm, TooManyMonomials};
 pub use packed::{bit, pack, unpack};
 pub use polynomial::Polynomial;

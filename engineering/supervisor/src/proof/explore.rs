@@ -1,10 +1,13 @@
 //! Ladder and automata side by side, scan by scan, through everything that they can reach together.
 
 use std::collections::{HashMap, HashSet};
+use std::hash::BuildHasher;
 use std::time::Duration;
 
+use hashbrown::HashTable;
+use rustc_hash::FxBuildHasher;
 use understudy_ladder::{Name, Program};
-use understudy_logic::{Circuit, LANES, Lanes, Run, Scan, bit};
+use understudy_logic::{Circuit, Lanes, Run, Scan, WIDE, pack};
 
 use super::environment::Environment;
 use super::reference::{Allowed, Happening, Joint, Reference};
@@ -13,6 +16,9 @@ use super::verdict::{Counterexample, Deviation, Proof, ProofError, ScanRecord, V
 use super::view::{Bit, Seen, View};
 use crate::ladder::{Correspondence, InputOutputMap, Mode, Modules, Partition};
 use crate::{Label, State};
+
+/// What the automata allow is remembered for this number of questions; the same ones come soon after each other.
+const REMEMBERED: usize = 1 << 14;
 
 /// How far a proof looks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -71,7 +77,7 @@ pub fn prove(
         view,
         settings,
         nodes: Vec::new(),
-        known: HashSet::new(),
+        known: HashTable::new(),
         cache: HashMap::new(),
         joint: HashSet::new(),
         used: HashSet::new(),
@@ -82,11 +88,12 @@ pub fn prove(
 
 /// A reached state, and how.
 struct Node {
-    registers: Vec<u64>,
-    kept: Vec<bool>,
+    /// The registers that are 1, ascending: of the state bits of an automaton one is.
+    on: Box<[u32]>,
+    kept: Box<[bool]>,
     state: Joint,
     positions: Box<[u8]>,
-    parent: Option<(usize, Vec<bool>)>,
+    parent: Option<(usize, Box<[bool]>)>,
 }
 
 type Question = (Joint, Box<[u8]>, Vec<Label>, Vec<Label>, bool);
@@ -99,7 +106,8 @@ struct Exploration<'a> {
     view: View,
     settings: ProofSettings,
     nodes: Vec<Node>,
-    known: HashSet<(Vec<u64>, Vec<bool>)>,
+    /// Nodes by their registers and inputs.
+    known: HashTable<usize>,
     cache: HashMap<Question, Vec<Allowed>>,
     joint: HashSet<Box<[State]>>,
     used: HashSet<Label>,
@@ -115,23 +123,35 @@ impl Exploration<'_> {
             .iter()
             .map(|states| states.first().copied())
             .collect();
-        self.nodes.push(Node {
-            registers: registers.clone(),
-            kept: vec![false; self.circuit.inputs().len()],
+        self.keep(Node {
+            on: on(&registers),
+            kept: vec![false; self.circuit.inputs().len()].into(),
             state,
             positions: vec![0; self.reference.switch_count()].into(),
             parent: None,
         });
-        self.known.insert((registers, self.nodes[0].kept.clone()));
         let mut next = 0;
         while next < self.nodes.len() {
-            if let Some(state) = &self.nodes[next].state {
-                self.joint.insert(state.clone());
+            let first = next;
+            let mut waiting = Vec::new();
+            while next < self.nodes.len() && waiting.len() < WIDE {
+                let images = self.following(next);
+                waiting.extend(images.into_iter().map(|image| (next, image)));
+                next += 1;
             }
-            if let Some(counterexample) = self.expand(next)? {
-                return Ok(Verdict::Refuted(Box::new(counterexample)));
+            for waiting in waiting.chunks(WIDE) {
+                if let Some(counterexample) = self.expand(waiting) {
+                    return Ok(Verdict::Refuted(Box::new(counterexample)));
+                }
             }
-            next += 1;
+            for node in &self.nodes[first..next] {
+                self.joint.extend(node.state.clone());
+            }
+            if self.nodes.len() > self.settings.maximum_states {
+                return Err(ProofError::TooLarge {
+                    limit: self.settings.maximum_states,
+                });
+            }
         }
         let mut events: Vec<Label> = self.used.iter().copied().collect();
         events.sort_unstable();
@@ -143,33 +163,56 @@ impl Exploration<'_> {
         }))
     }
 
-    fn expand(&mut self, index: usize) -> Result<Option<Counterexample>, ProofError> {
+    /// The input images that may follow a node.
+    fn following(&self, index: usize) -> Vec<Vec<bool>> {
         let node = &self.nodes[index];
         let is_on = |name: &Name| {
             let place = self.view.register_of.get(name.as_str());
-            place.is_some_and(|&place| bit(&node.registers, place))
+            place.is_some_and(|&place| node.on.binary_search(&(place as u32)).is_ok())
         };
-        let images = self.environment.following(&node.kept, is_on);
-        let registers = node.registers.clone();
-        for images in images.chunks(LANES) {
-            let runs = self.lanes.fan_out(&registers, images);
-            for (run, image) in runs.into_iter().zip(images) {
-                self.scans += 1;
-                if let Some(found) = self.judge(index, image, run) {
-                    return Ok(Some(found));
-                }
+        self.environment.following(&node.kept, is_on)
+    }
+
+    /// Scans from nodes with images, at most [`WIDE`] at once.
+    fn expand(&mut self, waiting: &[(usize, Vec<bool>)]) -> Option<Counterexample> {
+        let words = self.lanes.scan().initial().len();
+        let runs = waiting.iter().map(|(index, image)| {
+            let mut state = vec![0; words];
+            for &place in &self.nodes[*index].on {
+                state[place as usize / 64] |= 1 << (place % 64);
+            }
+            Run {
+                state,
+                signals: pack(image.iter().copied()),
+            }
+        });
+        let mut runs: Vec<Run> = runs.collect();
+        self.lanes.step(&mut runs);
+        for ((index, image), run) in waiting.iter().zip(&runs) {
+            self.scans += 1;
+            let found = self.judge(*index, image, run);
+            if found.is_some() {
+                return found;
             }
         }
-        if self.nodes.len() > self.settings.maximum_states {
-            return Err(ProofError::TooLarge {
-                limit: self.settings.maximum_states,
-            });
+        None
+    }
+
+    /// Keeps a node that is new.
+    fn keep(&mut self, node: Node) {
+        let hash = |node: &Node| FxBuildHasher.hash_one((&node.on, &node.kept));
+        let nodes = &self.nodes;
+        let same = |&known: &usize| nodes[known].on == node.on && nodes[known].kept == node.kept;
+        let code = hash(&node);
+        if self.known.find(code, same).is_none() {
+            self.known
+                .insert_unique(code, nodes.len(), |&known| hash(&nodes[known]));
+            self.nodes.push(node);
         }
-        Ok(None)
     }
 
     /// Compares one scan with what is allowed, and keeps where it leads.
-    fn judge(&mut self, index: usize, image: &[bool], run: Run) -> Option<Counterexample> {
+    fn judge(&mut self, index: usize, image: &[bool], run: &Run) -> Option<Counterexample> {
         let node = &self.nodes[index];
         let happening = self.environment.happening(&node.kept, image);
         if let Some(state) = &node.state {
@@ -193,6 +236,9 @@ impl Exploration<'_> {
             happening.start,
         );
         if !self.cache.contains_key(&question) {
+            if self.cache.len() >= REMEMBERED {
+                self.cache.clear();
+            }
             let allowed = self
                 .reference
                 .scan(&node.state, &node.positions, &happening);
@@ -208,16 +254,13 @@ impl Exploration<'_> {
             return Some(self.refute(index, image, &seen, deviation, &allowed));
         };
         self.used.extend(found.word.iter().copied());
-        let kept = self.environment.kept(image);
-        if self.known.insert((run.state.clone(), kept.clone())) {
-            self.nodes.push(Node {
-                registers: run.state,
-                kept,
-                state: found.state.clone(),
-                positions: found.positions.clone(),
-                parent: Some((index, image.to_vec())),
-            });
-        }
+        self.keep(Node {
+            on: on(&run.state),
+            kept: self.environment.kept(image).into(),
+            state: found.state.clone(),
+            positions: found.positions.clone(),
+            parent: Some((index, image.into())),
+        });
         None
     }
 
@@ -384,4 +427,17 @@ impl Exploration<'_> {
             states: self.state_names(seen.states.iter().map(Vec::as_slice)),
         }
     }
+}
+
+/// The places of the bits that are 1.
+fn on(image: &[u64]) -> Box<[u32]> {
+    let mut on = Vec::new();
+    for (place, &word) in (0..).zip(image) {
+        let mut word = word;
+        while word != 0 {
+            on.push(64 * place + word.trailing_zeros());
+            word &= word - 1;
+        }
+    }
+    on.into()
 }

@@ -10,6 +10,8 @@ use crate::induction::{Depth, Induction, prove_always};
 use crate::property::Formula;
 use crate::symbolic::{Checker, Resolved, Signal, Verdict};
 
+/// The first list has this share of the states that count as few: most programs have fewer, and for those with long timers diagrams do more.
+const FIRST: usize = 64;
 /// Nodes for one question: these are many, and none of them was asked for.
 const NODES: usize = 200_000;
 /// Questions for which diagrams may grow too large before they are given up.
@@ -47,7 +49,7 @@ impl<'a> Search<'a> {
     pub(super) fn new(circuit: &'a Circuit, bounds: Bounds<'a>) -> Self {
         let count = circuit.outputs().len();
         let questions: Vec<Resolved> = (0..count).map(asked).collect();
-        let few = Explicit::few(circuit).min(bounds.states);
+        let few = (Explicit::few(circuit) / FIRST).min(bounds.states);
         let (listed, seen, error) = list(circuit, few, bounds);
         Self {
             circuit,

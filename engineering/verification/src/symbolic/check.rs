@@ -1,5 +1,7 @@
 //! The sets of states that satisfy formulas, as least and greatest fixed points.
 
+use std::iter;
+
 use understudy_logic::bdd::Diagram;
 
 use super::core::Core;
@@ -7,6 +9,19 @@ use super::model::Model;
 use super::trace::Tracer;
 use super::{Resolved, Verdict};
 use crate::effort::Stopped;
+
+/// States of a search, and how they lead to those found before.
+pub(super) struct Ring {
+    pub(super) states: Diagram,
+    /// One scan, or so many with unchanged inputs.
+    pub(super) scans: usize,
+}
+
+impl Ring {
+    fn single(states: Diagram) -> Self {
+        Self { states, scans: 1 }
+    }
+}
 
 /// See [`super::Checker::check`].
 pub(super) fn check(model: &Model<'_>, property: &Resolved) -> Result<Verdict, Stopped> {
@@ -46,9 +61,9 @@ impl Model<'_> {
             Core::Always(inner) => self.always(&self.states(inner)?)?,
             Core::Reaches(scans, inner) => {
                 let end = self.fair_only(&self.states(inner)?)?;
-                self.within(*scans, &diagrams.constant(true), &end)?
+                self.within(*scans, &end)?
                     .pop()
-                    .unwrap_or(end)
+                    .map_or(end, |ring| ring.states)
             }
             Core::Stays(scans, inner) => {
                 let inner = self.states(inner)?;
@@ -68,38 +83,88 @@ impl Model<'_> {
     /// E[hold U end]. Each step goes back from all that was found, not only from what came last: that is mostly the simpler set, and most of the step is
     /// remembered from the one before.
     fn until(&self, hold: &Diagram, end: Diagram) -> Result<Diagram, Stopped> {
-        let mut found = end;
-        loop {
-            let entering = self.diagrams.and(hold, &self.before(&found)?)?;
-            let next = self.diagrams.or(&found, &entering)?;
-            if next == found {
-                return Ok(found);
-            }
-            found = next;
-        }
+        let mut found = end.clone();
+        self.search(hold, &end, &mut |_, states| found = states.clone())?;
+        Ok(found)
     }
 
-    /// E[hold U end] by the number of steps: ring k holds the states that need at most k; the last ring is the fixed point.
-    pub(super) fn rings(&self, hold: &Diagram, end: &Diagram) -> Result<Vec<Diagram>, Stopped> {
-        self.within(u32::MAX, hold, end)
+    /// E[hold U end] in rings: each holds the states that lead into the one before by its scans; the last ring is the fixed point.
+    pub(super) fn rings(&self, hold: &Diagram, end: &Diagram) -> Result<Vec<Ring>, Stopped> {
+        let mut rings = vec![Ring::single(end.clone())];
+        self.search(hold, end, &mut |scans, states| {
+            rings.push(Ring {
+                states: states.clone(),
+                scans,
+            });
+        })?;
+        Ok(rings)
     }
 
-    /// The first rings of E[hold U end], up to that of `scans` steps or the fixed point.
-    pub(super) fn within(
+    /// Shows `found` the states of E[hold U end] each time that there are more, and the scans that lead to those before: any one, or so many with
+    /// unchanged inputs.
+    fn search(
         &self,
-        scans: u32,
         hold: &Diagram,
         end: &Diagram,
-    ) -> Result<Vec<Diagram>, Stopped> {
-        let mut rings = vec![end.clone()];
+        found: &mut dyn FnMut(usize, &Diagram),
+    ) -> Result<(), Stopped> {
+        let mut known = end.clone();
+        let mut ways = None;
+        for step in 0.. {
+            let next = self.enter(&known, hold, &self.before(&known)?)?;
+            if next == known {
+                break;
+            }
+            known = next;
+            found(1, &known);
+            if step < self.single {
+                continue;
+            }
+            if ways.is_none() {
+                ways = Some(self.ways(hold)?);
+            }
+            for (jump, way) in self.jumps()?.iter().zip(ways.iter().flatten()) {
+                self.goes_on()?;
+                let before = self.diagrams.substitute(&known, &jump.step)?;
+                let next = self.enter(&known, way, &before)?;
+                if next != known {
+                    known = next;
+                    found(jump.scans, &known);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// `known`, and what of `hold` comes `before` it.
+    fn enter(&self, known: &Diagram, hold: &Diagram, before: &Diagram) -> Result<Diagram, Stopped> {
+        let entering = self.diagrams.and(hold, before)?;
+        Ok(self.diagrams.or(known, &entering)?)
+    }
+
+    /// For each jump where all its scans are in `hold`.
+    fn ways(&self, hold: &Diagram) -> Result<Vec<Diagram>, Stopped> {
+        let mut ways: Vec<Diagram> = Vec::new();
+        let jumps = self.jumps()?;
+        let steps = jumps.iter().map(|jump| &jump.step);
+        for step in iter::once(&self.step).chain(steps).take(jumps.len()) {
+            let held = ways.last().unwrap_or(hold);
+            let later = self.diagrams.substitute(held, step)?;
+            ways.push(self.diagrams.and(held, &later)?);
+        }
+        Ok(ways)
+    }
+
+    /// The first rings of E[true U end], up to that of `scans` steps or the fixed point.
+    pub(super) fn within(&self, scans: u32, end: &Diagram) -> Result<Vec<Ring>, Stopped> {
+        let mut rings = vec![Ring::single(end.clone())];
         for _ in 0..scans {
-            let last = &rings[rings.len() - 1];
-            let entering = self.diagrams.and(hold, &self.before(last)?)?;
-            let next = self.diagrams.or(last, &entering)?;
+            let last = &rings[rings.len() - 1].states;
+            let next = self.diagrams.or(last, &self.before(last)?)?;
             if next == *last {
                 break;
             }
-            rings.push(next);
+            rings.push(Ring::single(next));
         }
         Ok(rings)
     }

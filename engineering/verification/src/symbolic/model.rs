@@ -1,12 +1,13 @@
 //! The part of a circuit that a property depends on, as diagrams.
 
-use std::cell::Cell;
+use std::cell::{Cell, OnceCell};
 use std::collections::BTreeSet;
 
 use understudy_logic::bdd::{Diagram, Diagrams, Substitution, depth_first_order};
 use understudy_logic::{Circuit, Expression, Operation, Variable};
 
 use super::core::Core;
+use super::jumps::Jump;
 use super::{Resolved, Signal};
 use crate::effort::{GoOn, Stopped, Work};
 
@@ -67,14 +68,19 @@ impl Cone {
 /// A circuit's part as diagrams over (x, u).
 pub(super) struct Model<'c> {
     pub(super) circuit: &'c Circuit,
-    go_on: GoOn<'c>,
+    wanted: GoOn<'c>,
     steps: Cell<u64>,
     pub(super) cone: Cone,
     pub(super) diagrams: Diagrams,
     /// u of the cone.
     inputs: Diagram,
+    /// f of each register.
+    pub(super) next: Vec<(Variable, Diagram)>,
     /// x := f(x, u).
-    step: Substitution,
+    pub(super) step: Substitution,
+    /// Scans of a fixed point that are single ones.
+    pub(super) single: usize,
+    jumps: OnceCell<Vec<Jump>>,
     signals: Vec<(Signal, Diagram)>,
     /// Each comes again and again in a fair run.
     pub(super) fair: Vec<Diagram>,
@@ -88,6 +94,7 @@ impl<'c> Model<'c> {
         cone: Cone,
         fair: &[Resolved],
         diagrams: impl FnOnce(Vec<Variable>) -> Diagrams,
+        single: usize,
         go_on: GoOn<'c>,
     ) -> Result<Self, Stopped> {
         let graph = circuit.graph();
@@ -113,15 +120,18 @@ impl<'c> Model<'c> {
             pairs.push((Variable::Register(register), next));
         }
         drop(builder);
-        let step = diagrams.substitution(pairs)?;
+        let step = diagrams.substitution(pairs.iter().cloned())?;
         let mut model = Self {
             circuit,
-            go_on,
+            wanted: go_on,
             steps: Cell::new(0),
             cone,
             diagrams,
             inputs,
+            next: pairs,
             step,
+            single,
+            jumps: OnceCell::new(),
             signals: Vec::new(),
             fair: Vec::new(),
             fair_states: None,
@@ -166,12 +176,28 @@ impl<'c> Model<'c> {
         &found.expect("a signal of the cone").1
     }
 
+    /// Counts a step, and ends where nobody waits any more.
+    pub(super) fn goes_on(&self) -> Result<(), Stopped> {
+        self.steps.set(self.steps.get() + 1);
+        if (self.wanted)(Work::Diagrams(self.steps.get())) {
+            Ok(())
+        } else {
+            Err(Stopped::Time)
+        }
+    }
+
+    /// Made on first use.
+    pub(super) fn jumps(&self) -> Result<&[Jump], Stopped> {
+        if self.jumps.get().is_none() {
+            // Nobody else can have made them meanwhile.
+            let _ = self.jumps.set(Jump::all(self)?);
+        }
+        Ok(self.jumps.get().map_or(&[], Vec::as_slice))
+    }
+
     /// EX `set`.
     pub(super) fn before(&self, set: &Diagram) -> Result<Diagram, Stopped> {
-        self.steps.set(self.steps.get() + 1);
-        if !(self.go_on)(Work::Diagrams(self.steps.get())) {
-            return Err(Stopped::Time);
-        }
+        self.goes_on()?;
         let some_input = self.diagrams.exists(set, &self.inputs)?;
         Ok(self.diagrams.substitute(&some_input, &self.step)?)
     }

@@ -7,6 +7,7 @@ use understudy_logic::bdd::Diagram;
 use understudy_logic::{Circuit, Running, Variable, pack, unpack};
 
 use super::Signal;
+use super::check::Ring;
 use super::core::Core;
 use super::model::{Cone, Model};
 use crate::effort::Stopped;
@@ -47,7 +48,7 @@ impl Trace {
 }
 
 /// Scans that a run may have; a longer one is cut and goes on anyhow.
-const MAXIMUM_SCANS: usize = 20_000;
+const MAXIMUM_SCANS: usize = 100_000;
 
 /// x before a scan, and u in it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -107,12 +108,12 @@ impl<'m, 'c> Tracer<'m, 'c> {
             }
             Core::Reaches(scans, end) => {
                 let end = model.fair_only(&model.states(end)?)?;
-                model.within(*scans, &model.diagrams.constant(true), &end)?
+                model.within(*scans, &end)?
             }
             _ => Vec::new(),
         };
         for ring in &rings {
-            let near = model.diagrams.and(states, ring)?;
+            let near = model.diagrams.and(states, &ring.states)?;
             if !near.is_constant(false) {
                 return Ok(near);
             }
@@ -143,8 +144,7 @@ impl<'m, 'c> Tracer<'m, 'c> {
             }
             Core::Reaches(scans, end) => {
                 let last = model.fair_only(&model.states(end)?)?;
-                let everywhere = model.diagrams.constant(true);
-                let rings = model.within(*scans, &everywhere, &last)?;
+                let rings = model.within(*scans, &last)?;
                 self.descend(run, &rings)?;
                 self.extend(run, end)
             }
@@ -163,18 +163,21 @@ impl<'m, 'c> Tracer<'m, 'c> {
     }
 
     /// Walks from ring to ring until the innermost.
-    fn descend(&self, run: &mut Run, rings: &[Diagram]) -> Result<(), Stopped> {
-        let within = |ring: &&Diagram| self.contains(ring, run.last());
-        let Some(mut ring) = rings.iter().position(|ring| within(&ring)) else {
+    fn descend(&self, run: &mut Run, rings: &[Ring]) -> Result<(), Stopped> {
+        let within = |rings: &[Ring], state: &State| {
+            let mut places = rings.iter();
+            places.position(|ring| self.contains(&ring.states, state))
+        };
+        let Some(mut ring) = within(rings, run.last()) else {
             return Ok(());
         };
         while ring > 0 && run.states.len() < MAXIMUM_SCANS {
-            self.step(run, &rings[ring - 1])?;
-            let last = run.last().clone();
-            ring = rings[..ring]
-                .iter()
-                .position(|ring| self.contains(ring, &last))
-                .unwrap_or(0);
+            // The last scan of a ring may change the inputs, those before it do not.
+            for _ in 1..rings[ring].scans {
+                self.wait(run);
+            }
+            self.step(run, &rings[ring - 1].states)?;
+            ring = within(&rings[..ring], run.last()).unwrap_or(0);
         }
         Ok(())
     }
@@ -191,7 +194,9 @@ impl<'m, 'c> Tracer<'m, 'c> {
             }
             let back = self.only(&run.states[start])?;
             let rings = model.rings(inside, &back)?;
-            let returns = rings.iter().any(|ring| self.contains(ring, run.last()));
+            let returns = rings
+                .iter()
+                .any(|ring| self.contains(&ring.states, run.last()));
             if returns {
                 self.descend(run, &rings)?;
                 run.states.pop();
@@ -210,6 +215,16 @@ impl<'m, 'c> Tracer<'m, 'c> {
             run.states.push(state);
         }
         Ok(())
+    }
+
+    /// One scan on, with unchanged inputs.
+    fn wait(&self, run: &mut Run) {
+        let last = run.last();
+        let next = State {
+            registers: self.next(last),
+            inputs: last.inputs.clone(),
+        };
+        run.states.push(next);
     }
 
     /// One of `states` with these registers; inputs that do not matter are 0.

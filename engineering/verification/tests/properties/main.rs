@@ -7,3 +7,4 @@ mod reading;
 mod remarks;
 mod replay;
 mod smv;
+mod timers;

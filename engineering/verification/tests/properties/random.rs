@@ -66,7 +66,7 @@ fn of_sums(recipe: &[(u8, u8, u8)], initial: u8, inputs_each: usize) -> Circuit 
     builder.finish().expect("the names differ")
 }
 
-fn one_scan() -> BoxedStrategy<Resolved> {
+pub(crate) fn one_scan() -> BoxedStrategy<Resolved> {
     let leaf = prop_oneof![
         (0..OUTPUTS).prop_map(|output| Formula::Signal(Signal::Output(output))),
         (0..INPUTS).prop_map(|input| Formula::Signal(Signal::Input(input))),
@@ -84,7 +84,7 @@ fn path() -> impl Strategy<Value = Path> {
     prop_oneof![Just(Path::All), Just(Path::Some)]
 }
 
-fn formula() -> impl Strategy<Value = Resolved> {
+pub(crate) fn formula() -> impl Strategy<Value = Resolved> {
     one_scan().prop_recursive(3, 12, 2, |inner| {
         let pair = || (inner.clone(), inner.clone()).prop_map(|(a, b)| (Box::new(a), Box::new(b)));
         let single = || (path(), inner.clone().prop_map(Box::new));
