@@ -6,7 +6,7 @@ use crate::operation::TextOperand;
 
 /// As many ones as a value has bits.
 #[inline]
-pub(super) fn mask(bits: u16) -> u64 {
+pub(super) fn mask(bits: u8) -> u64 {
     u64::MAX >> (64 - u32::from(bits).clamp(1, 64))
 }
 
