@@ -5,7 +5,8 @@ use crate::form::Program;
 use crate::machine::Tables;
 use crate::machine::instruction::{Code, Instruction, RELATIVE};
 use crate::machine::working::{
-    apply_to_texts, extend, has_passed, load_text, mask, next, offset, store_text,
+    apply, apply_to_texts, extend, has_passed, insert, load_text, mask, next, offset, rounded,
+    saturated, store_text,
 };
 use crate::operation::real::Float;
 use crate::row::Row;
@@ -67,11 +68,8 @@ impl<O: Copy + Into<u32>, R: Row + ?Sized> Run<'_, O, R> {
         loop {
             let instruction = code[at];
             let extra = instruction.extra;
-            let (a, b, c): (u32, u32, u32) = (
-                instruction.a.into(),
-                instruction.b.into(),
-                instruction.c.into(),
-            );
+            let operands = [instruction.a, instruction.b, instruction.c];
+            let [a, b, c]: [u32; 3] = operands.map(Into::into);
             at += 1;
             macro_rules! integer {
                 ($type:ty, $function:ident) => {
@@ -294,6 +292,10 @@ impl<O: Copy + Into<u32>, R: Row + ?Sized> Run<'_, O, R> {
                 Code::MaximumLreal => best!(f64, >),
                 Code::ToReal => set!(a, (extend(get!(b), u32::from(extra)) as f32).pack()),
                 Code::ToLreal => set!(a, (extend(get!(b), u32::from(extra)) as f64).pack()),
+                Code::RoundReal => set!(a, rounded(f32::unpack(get!(b)).into(), extra)),
+                Code::RoundLreal => set!(a, rounded(f64::unpack(get!(b)), extra)),
+                Code::TruncateReal => set!(a, saturated(f32::unpack(get!(b)).into(), extra)),
+                Code::TruncateLreal => set!(a, saturated(f64::unpack(get!(b)), extra)),
                 Code::RealToLreal => set!(a, f64::from(f32::unpack(get!(b))).pack()),
                 Code::LrealToReal => set!(a, (f64::unpack(get!(b)) as f32).pack()),
                 Code::Equal => is!(u64, ==),
@@ -369,9 +371,8 @@ impl<O: Copy + Into<u32>, R: Row + ?Sized> Run<'_, O, R> {
                     jump!(has_passed(&each, get!(each.counter), limit, by));
                 }
                 Code::StoreBits => {
-                    let (value, mask, shift) = (get!(b), get!(c), extra & 63);
-                    let word = row.slot(slot!(a));
-                    *word = *word & !(mask << shift) | (value & mask) << shift;
+                    let (value, mask) = (get!(b), get!(c));
+                    insert(row.slot(slot!(a)), u64::from(extra), mask, value);
                 }
                 Code::LoadWord => {
                     let element = &tables.elements[c as usize];
@@ -395,10 +396,8 @@ impl<O: Copy + Into<u32>, R: Row + ?Sized> Run<'_, O, R> {
                     let element = &tables.elements[c as usize];
                     let offset = element!(element) + u64::from(element.bit);
                     let to = slot!(element.base) as usize + (offset / 64) as usize;
-                    let mask = element.mask;
-                    let value = get!(a) & mask;
-                    let word = &mut row.all()[to];
-                    *word = *word & !(mask << (offset % 64)) | value << (offset % 64);
+                    let value = get!(a);
+                    insert(&mut row.all()[to], offset, element.mask, value);
                 }
                 Code::LoadAt => {
                     let address = get!(b);
@@ -406,10 +405,9 @@ impl<O: Copy + Into<u32>, R: Row + ?Sized> Run<'_, O, R> {
                     set!(a, word >> (address % 64) & mask(extra));
                 }
                 Code::StoreAt => {
-                    let (address, mask) = (get!(b), mask(extra));
-                    let value = get!(a) & mask;
+                    let (address, value) = (get!(b), get!(a));
                     let word = &mut row.all()[(address / 64) as usize];
-                    *word = *word & !(mask << (address % 64)) | value << (address % 64);
+                    insert(word, address, mask(extra), value);
                 }
                 Code::LoadThrough => {
                     let address = referred!(get!(b));
@@ -418,10 +416,9 @@ impl<O: Copy + Into<u32>, R: Row + ?Sized> Run<'_, O, R> {
                 }
                 Code::StoreThrough => {
                     let address = referred!(get!(b));
-                    let mask = mask(extra);
-                    let value = get!(a) & mask;
+                    let value = get!(a);
                     let word = &mut row.all()[(address / 64) as usize];
-                    *word = *word & !(mask << (address % 64)) | value << (address % 64);
+                    insert(word, address, mask(extra), value);
                 }
                 Code::Copy => {
                     let (to, from) = ((get!(a) / 64) as usize, (get!(b) / 64) as usize);
@@ -439,22 +436,7 @@ impl<O: Copy + Into<u32>, R: Row + ?Sized> Run<'_, O, R> {
                 }
                 Code::Apply => {
                     let application = &tables.applications[b as usize];
-                    let mut operands = [0; 4];
-                    let result = match operands.get_mut(..application.operands.len()) {
-                        Some(operands) => {
-                            for (value, &operand) in operands.iter_mut().zip(&application.operands)
-                            {
-                                *value = get!(operand);
-                            }
-                            application.operation.apply(operands)
-                        }
-                        None => {
-                            let operands =
-                                application.operands.iter().map(|&operand| get!(operand));
-                            application.operation.apply(&operands.collect::<Vec<u64>>())
-                        }
-                    };
-                    match result {
+                    match apply(application, |operand| get!(operand)) {
                         Ok(result) => set!(a, result),
                         Err(cause) => stop!(cause),
                     }

@@ -120,6 +120,11 @@ pub(super) enum Code {
     /// From an integer that is sign-extended by `extra` bits.
     ToReal,
     ToLreal,
+    /// The nearest integer, or the one towards 0, of the type of number `extra`; saturating.
+    RoundReal,
+    RoundLreal,
+    TruncateReal,
+    TruncateLreal,
     RealToLreal,
     LrealToReal,
 

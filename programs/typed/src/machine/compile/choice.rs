@@ -50,11 +50,10 @@ impl Compiler<'_> {
 
 /// A condition that is a variable, or one comparison where operations are wanted.
 fn is_test(condition: &Expression, most: usize) -> bool {
-    let is_comparison = match &condition.kind {
-        ExpressionKind::Load(_) => true,
-        ExpressionKind::Apply(Operation::Compare(..), _) => true,
-        _ => false,
-    };
+    let is_comparison = matches!(
+        condition.kind,
+        ExpressionKind::Load(_) | ExpressionKind::Apply(Operation::Compare(..), _)
+    );
     is_comparison && operations(condition).is_some_and(|count| count <= 2 * most)
 }
 

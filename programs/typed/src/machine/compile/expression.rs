@@ -4,6 +4,7 @@ use super::Compiler;
 use super::place::{Location, calls};
 use crate::form::{Expression, ExpressionKind};
 use crate::machine::instruction::{Application, Code, TextSource};
+use crate::machine::working::is_saturated;
 use crate::operation::{Comparison, Operation};
 use crate::types::Elementary;
 
@@ -208,6 +209,10 @@ impl Compiler<'_> {
                 self.emit(code, to, zero, *value);
             }
             (O::Convert(from, target), [value]) => self.convert(from, target, *value, to)?,
+            (O::Truncate(from, target), [value]) => {
+                let codes = [Code::TruncateReal, Code::TruncateLreal];
+                self.whole(codes, from, target, *value, to)?;
+            }
             (O::Divide(of) | O::Modulo(of), [left, right]) => {
                 let of_type = Elementary::ALL.iter().position(|each| *each == of)?;
                 self.emit_with(binary(operation)?, of_type as u8, to, *left, *right);
@@ -228,6 +233,23 @@ impl Compiler<'_> {
         Some(())
     }
 
+    /// A real to an integer, by the code for REAL or the one for LREAL.
+    fn whole(
+        &mut self,
+        [real, lreal]: [Code; 2],
+        from: Elementary,
+        target: Elementary,
+        value: u32,
+        to: u32,
+    ) -> Option<()> {
+        let of = Elementary::ALL.iter().position(|each| *each == target)?;
+        let code = match from {
+            Elementary::Real => real,
+            _ => lreal,
+        };
+        is_saturated(target).then(|| self.emit_with(code, of as u8, to, value, 0))
+    }
+
     fn convert(&mut self, from: Elementary, target: Elementary, value: u32, to: u32) -> Option<()> {
         let unused = if from.is_signed() {
             64 - from.bits()
@@ -237,7 +259,10 @@ impl Compiler<'_> {
         match (from, target) {
             (Elementary::Real, Elementary::Lreal) => self.emit(Code::RealToLreal, to, value, 0),
             (Elementary::Lreal, Elementary::Real) => self.emit(Code::LrealToReal, to, value, 0),
-            _ if from.is_real() => return None,
+            _ if from.is_real() => {
+                let codes = [Code::RoundReal, Code::RoundLreal];
+                self.whole(codes, from, target, value, to)?;
+            }
             // Of 64 bits without a sign: not all numbers are those of an i64.
             _ if target.is_real() && !from.is_signed() && from.bits() == 64 => return None,
             (_, Elementary::Real) => {
