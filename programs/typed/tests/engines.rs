@@ -92,7 +92,7 @@ fn random_programs_fault_in_every_way_and_run_besides() {
 #[test]
 fn large_programs_mean_the_same() {
     let mut account = Account::default();
-    for seed in 0..30 {
+    for seed in 0..120 {
         let mut program = common::program(seed, 8);
         program.frames += 1 << 16;
         compare(&program, seed, 6, &mut account);

@@ -21,6 +21,7 @@ use crate::cost::Costs;
 use crate::form::{Program, RoutineId};
 use crate::machine::instruction::{Code, Instruction};
 use crate::machine::{Compiled, Tables};
+use crate::row::SLOTS;
 use crate::scan::Frame;
 
 /// Instructions up to which routines are compiled for each of their instances: what a processor keeps near.
@@ -137,8 +138,10 @@ pub(super) fn compile(program: &Program) -> Compiled {
     assert_eq!(used, second.used, "both passes take the same slots");
     let (mut tables, mut tasks) = (second.tables, second.tasks);
     jumps::straighten(&mut tables, &mut tasks);
+    let row = slot as usize + tables.constants.len();
     let narrow = tables.code.iter().map(|each| each.narrow());
     let narrow: Option<Vec<_>> = narrow.collect();
+    let narrow = narrow.filter(|_| row <= SLOTS);
     if narrow.is_some() {
         tables.code.clear();
     }
@@ -146,7 +149,7 @@ pub(super) fn compile(program: &Program) -> Compiled {
         frame: Frame::new(program),
         tasks,
         memory: memory as usize,
-        row: slot as usize + tables.constants.len(),
+        row,
         texts: text as usize,
         tables,
         narrow,
