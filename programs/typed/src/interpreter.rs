@@ -90,7 +90,7 @@ impl Interpreter {
                 Err(fault) => fault.write(state),
             }
         }
-        self.frame.pack(state, outputs);
+        self.frame.pack_state(state, outputs);
     }
 
     fn scan(&self, state: &[u64], inputs: &[u64]) -> Result<Memory, Fault> {

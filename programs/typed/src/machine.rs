@@ -9,7 +9,7 @@ mod execute;
 mod instruction;
 mod working;
 
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 
 use crate::fault::Fault;
 use crate::form::{Program, RoutineId};
@@ -17,6 +17,7 @@ use crate::machine::execute::Run;
 use crate::machine::instruction::{
     Application, Element, Instruction, Loop, Range, TextApplication,
 };
+use crate::row::{Row, SLOTS};
 use crate::scan::{Frame, SCANS};
 
 /// A compiled program; cheap to share, it holds no state.
@@ -27,6 +28,8 @@ pub struct Machine(Arc<Compiled>);
 struct Compiled {
     frame: Frame,
     tables: Tables,
+    /// The code with operands of 16 bits, in place of the one in the tables, where there is no larger and no relative operand.
+    narrow: Option<Vec<Instruction<u16>>>,
     /// Where the code of each task begins.
     tasks: Vec<u32>,
     /// Slots of state and frames, and of the whole row.
@@ -56,6 +59,8 @@ struct Tables {
 /// Working memory of a [`Machine`], whichever; one for each thread, reused.
 #[derive(Debug, Clone, Default)]
 pub struct Scratch {
+    /// The machine whose constants the row has.
+    of: Weak<Compiled>,
     row: Vec<u64>,
     texts: Vec<Vec<u8>>,
     returns: Vec<u32>,
@@ -92,7 +97,8 @@ impl Machine {
 
     /// Instructions of the program.
     pub fn instruction_count(&self) -> usize {
-        self.0.tables.code.len()
+        let narrow = self.0.narrow.as_ref().map(Vec::len);
+        narrow.unwrap_or(self.0.tables.code.len())
     }
 
     /// One scan of one run: reads u, replaces x(t) by x(t+1), writes y(t). Images are packed, unused high bits 0. After a program fault see
@@ -107,42 +113,90 @@ impl Machine {
         inputs: &[u64],
         outputs: &mut [u64],
     ) {
-        let frame = &self.0.frame;
-        if frame.begin(state, inputs) {
-            let words = self.state_words();
-            match self.scan(scratch, &state[..words], inputs) {
-                Ok(()) => state[..words].copy_from_slice(&scratch.row[..words]),
+        let compiled = &*self.0;
+        if compiled.frame.begin(state, inputs) {
+            self.prepare(scratch);
+            let state = &mut state[..self.state_words()];
+            let (texts, returns) = (&mut scratch.texts, &mut scratch.returns);
+            let working = (texts, returns);
+            let code = &compiled.tables.code;
+            let near = <&mut [u64; SLOTS]>::try_from(&mut *scratch.row);
+            let scanned = match (near, &compiled.narrow) {
+                (Ok(row), Some(code)) => {
+                    compiled.scan::<_, _, false>(code, row, working, state, inputs)
+                }
+                (Ok(row), None) => compiled.scan::<_, _, true>(code, row, working, state, inputs),
+                (Err(_), _) => {
+                    compiled.scan::<_, _, true>(code, &mut *scratch.row, working, state, inputs)
+                }
+            };
+            match scanned {
+                Ok(()) => {
+                    // Packed from slots that were written one by one: a copy of many at once has to wait for them.
+                    match <&[u64; SLOTS]>::try_from(&*scratch.row) {
+                        Ok(row) => compiled.frame.pack(row, outputs),
+                        Err(_) => compiled.frame.pack(&*scratch.row, outputs),
+                    }
+                    state.copy_from_slice(&scratch.row[..state.len()]);
+                    return;
+                }
                 Err(fault) => fault.write(state),
             }
         }
-        frame.pack(state, outputs);
+        compiled.frame.pack_state(state, outputs);
     }
 
-    fn scan(&self, scratch: &mut Scratch, state: &[u64], inputs: &[u64]) -> Result<(), Fault> {
+    /// Makes working memory ready for this machine, unless it was used for it before.
+    fn prepare(&self, scratch: &mut Scratch) {
         let compiled = &*self.0;
-        execute::prepare(scratch, compiled.row, compiled.texts);
-        let row = &mut scratch.row[..compiled.row];
-        row[..state.len()].copy_from_slice(state);
-        row[state.len()..compiled.memory].fill(0);
-        row[compiled.memory] = compiled.frame.elapsed(state);
+        scratch.returns.clear();
+        if scratch.of.as_ptr() == Arc::as_ptr(&self.0) {
+            return;
+        }
+        scratch.of = Arc::downgrade(&self.0);
+        let slots = compiled.row.max(SLOTS);
+        if scratch.row.len() != slots {
+            scratch.row = vec![0; slots];
+        }
+        let texts = compiled.texts.max(scratch.texts.len());
+        scratch.texts.resize(texts, Vec::new());
         let constants = compiled.row - compiled.tables.constants.len();
-        row[constants..].copy_from_slice(&compiled.tables.constants);
-        compiled.frame.unpack(inputs, row);
-        let scans = row[SCANS];
+        scratch.row[constants..compiled.row].copy_from_slice(&compiled.tables.constants);
+    }
+}
+
+impl Compiled {
+    /// The inputs, the tasks and the end of a scan. `OWN` is for code with relative operands, which any code may be executed as.
+    fn scan<O: Copy + Into<u32>, R: Row + ?Sized, const OWN: bool>(
+        &self,
+        code: &[Instruction<O>],
+        row: &mut R,
+        (texts, returns): (&mut Vec<Vec<u8>>, &mut Vec<u32>),
+        state: &[u64],
+        inputs: &[u64],
+    ) -> Result<(), Fault> {
+        row.all()[..state.len()].copy_from_slice(state);
+        if state.len() < self.memory {
+            row.all()[state.len()..self.memory].fill(0);
+        }
+        *row.slot(self.memory as u32) = self.frame.elapsed(state);
+        self.frame.unpack(inputs, row);
+        let scans = row.get(SCANS as u32);
         let mut run = Run {
-            tables: &compiled.tables,
+            code,
+            tables: &self.tables,
             row,
-            texts: &mut scratch.texts,
-            returns: &mut scratch.returns,
-            budget: compiled.tables.budget,
+            texts,
+            returns,
+            budget: self.tables.budget,
         };
-        for (task, &start) in compiled.frame.tasks().iter().zip(&compiled.tasks) {
-            if scans.is_multiple_of(u64::from(task.every.max(1))) {
-                let run = run.run::<false>(start, 0);
-                run.map_err(|stop| compiled.tables.fault(&stop))?;
+        for (task, &start) in self.frame.tasks().iter().zip(&self.tasks) {
+            if task.every <= 1 || scans.is_multiple_of(u64::from(task.every)) {
+                let run = run.run::<OWN>(start, 0);
+                run.map_err(|stop| self.tables.fault(&stop))?;
             }
         }
-        compiled.frame.end(run.row)
+        self.frame.end(run.row.all())
     }
 }
 

@@ -8,8 +8,9 @@
 
 use crate::fault::{Cause, Fault};
 use crate::form::{Program, Task};
-use crate::image::Points;
+use crate::image::{Point, Points};
 use crate::operation::real::Float;
+use crate::row::Row;
 use crate::types::Elementary;
 
 /// The number of scans since the start.
@@ -20,14 +21,61 @@ pub(crate) const SCANS: usize = 3;
 pub(crate) struct Frame {
     inputs: Points,
     outputs: Points,
+    /// The inputs, but for the reset.
+    given: Vec<Wire>,
+    /// The outputs of each word of their image, but for the fault.
+    taken: Vec<Vec<Wire>>,
+    /// The bits of the output image that are the fault.
+    faults: Vec<Wire>,
+    /// Outputs that may be no finite number: their places in the image, slots and types.
+    reals: Vec<(u64, u32, Elementary)>,
     initial: Vec<u64>,
     tasks: Vec<Task>,
     period: i64,
 }
 
+/// A point of an image: bits of a word, and the slot of its variable.
+#[derive(Debug, Clone, Copy)]
+struct Wire {
+    word: u32,
+    shift: u32,
+    mask: u64,
+    slot: u32,
+}
+
+impl Wire {
+    fn new(point: &Point) -> Self {
+        Self {
+            word: point.bit / 64,
+            shift: point.bit % 64,
+            mask: point.of.mask(),
+            slot: point.slot,
+        }
+    }
+}
+
+/// The points of each word of an image that are variables.
+fn words(points: &Points) -> Vec<Vec<Wire>> {
+    let mut words = vec![Vec::new(); points.width().div_ceil(64)];
+    for point in points.iter().filter(|point| point.slot != 0) {
+        words[point.bit as usize / 64].push(Wire::new(point));
+    }
+    words
+}
+
 impl Frame {
     pub(crate) fn new(program: &Program) -> Self {
+        let stored = program.inputs.iter().filter(|point| point.slot != 0);
+        let faults = program.outputs.iter().filter(|point| point.slot == 0);
+        let outputs = program.outputs.iter().zip(0..);
+        let reals = outputs.filter(|(point, _)| point.of.is_real());
         Self {
+            given: stored.map(Wire::new).collect(),
+            taken: words(&program.outputs),
+            faults: faults.map(Wire::new).collect(),
+            reals: reals
+                .map(|(point, output)| (output, point.slot, point.of))
+                .collect(),
             inputs: program.inputs.clone(),
             outputs: program.outputs.clone(),
             initial: program.initial_state(),
@@ -53,11 +101,17 @@ impl Frame {
     }
 
     /// Makes a state ready for a scan; FALSE where a fault keeps the program from it.
+    #[inline]
     pub(crate) fn begin(&self, state: &mut [u64], inputs: &[u64]) -> bool {
         let state = &mut state[..self.initial.len()];
         if state[0] == 0 {
             return true;
         }
+        self.begin_again(state, inputs)
+    }
+
+    #[cold]
+    fn begin_again(&self, state: &mut [u64], inputs: &[u64]) -> bool {
         let mut resets = self.inputs.iter().filter(|point| point.slot == 0);
         let is_reset = resets.any(|point| point.get(inputs) != 0);
         if is_reset {
@@ -67,11 +121,10 @@ impl Frame {
     }
 
     /// Stores the inputs into the slots of their variables.
-    pub(crate) fn unpack(&self, inputs: &[u64], memory: &mut [u64]) {
-        for point in &self.inputs {
-            if point.slot != 0 {
-                memory[point.slot as usize] = point.get(inputs);
-            }
+    #[inline]
+    pub(crate) fn unpack<R: Row + ?Sized>(&self, inputs: &[u64], memory: &mut R) {
+        for wire in &self.given {
+            *memory.slot(wire.slot) = inputs[wire.word as usize] >> wire.shift & wire.mask;
         }
     }
 
@@ -85,19 +138,15 @@ impl Frame {
     /// # Errors
     /// If an output is not finite.
     pub(crate) fn end(&self, memory: &mut [u64]) -> Result<(), Fault> {
-        for (output, point) in self.outputs.iter().enumerate() {
-            let value = memory[point.slot as usize];
-            let is_finite = match point.of {
+        for &(output, slot, of) in &self.reals {
+            let value = memory[slot as usize];
+            let is_finite = match of {
                 Elementary::Real => f32::unpack(value).is_finite(),
-                Elementary::Lreal => f64::unpack(value).is_finite(),
-                _ => true,
+                _ => f64::unpack(value).is_finite(),
             };
             if !is_finite {
                 return Err(Fault {
-                    cause: Cause::OutputNotFinite {
-                        output: output as u64,
-                        value,
-                    },
+                    cause: Cause::OutputNotFinite { output, value },
                     routine: None,
                     line: 0,
                 });
@@ -107,16 +156,24 @@ impl Frame {
         Ok(())
     }
 
-    /// Packs the outputs that a state holds; bits of no point are 0.
-    pub(crate) fn pack(&self, state: &[u64], outputs: &mut [u64]) {
-        outputs[..self.outputs.width().div_ceil(64)].fill(0);
-        for point in &self.outputs {
-            let stored = state[point.slot as usize];
-            let value = match point.slot {
-                0 => u64::from(stored != 0),
-                _ => stored,
-            };
-            point.set(outputs, value);
+    /// Packs the outputs of a scan without a fault; bits of no point are 0.
+    #[inline]
+    pub(crate) fn pack<R: Row + ?Sized>(&self, memory: &R, outputs: &mut [u64]) {
+        let outputs = &mut outputs[..self.taken.len()];
+        for (output, wires) in outputs.iter_mut().zip(&self.taken) {
+            *output = wires.iter().fold(0, |word, wire| {
+                word | (memory.get(wire.slot) & wire.mask) << wire.shift
+            });
+        }
+    }
+
+    /// Packs the outputs that a state holds, whether it is one of a fault or not.
+    pub(crate) fn pack_state(&self, state: &[u64], outputs: &mut [u64]) {
+        self.pack(state, outputs);
+        if state[0] != 0 {
+            for wire in &self.faults {
+                outputs[wire.word as usize] |= 1 << wire.shift;
+            }
         }
     }
 }

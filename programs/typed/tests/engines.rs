@@ -87,3 +87,39 @@ fn random_programs_fault_in_every_way_and_run_besides() {
     );
     assert!(account.resets > 20, "{account:?}");
 }
+
+/// A row of more slots than an operand of 16 bits can name.
+#[test]
+fn large_programs_mean_the_same() {
+    let mut account = Account::default();
+    for seed in 0..120 {
+        let mut program = common::program(seed, 8);
+        program.frames += 1 << 16;
+        compare(&program, seed, 6, &mut account);
+    }
+}
+
+/// Working memory that another program left behind holds nothing that this one can see.
+#[test]
+fn working_memory_is_shared_by_programs() {
+    let programs: Vec<Program> = (0..20).map(|seed| common::program(seed, 6)).collect();
+    let machines: Vec<Machine> = programs.iter().map(Machine::new).collect();
+    let run = |machine: &Machine, scratch: &mut Scratch| {
+        let mut state = machine.initial().to_vec();
+        let inputs = vec![0; machine.input_count().div_ceil(64)];
+        let mut outputs = vec![0; machine.output_count().div_ceil(64)];
+        for _ in 0..4 {
+            machine.step(scratch, &mut state, &inputs, &mut outputs);
+        }
+        (state, outputs)
+    };
+    let mut shared = Scratch::default();
+    for _ in 0..2 {
+        for machine in &machines {
+            assert_eq!(
+                run(machine, &mut shared),
+                run(machine, &mut Scratch::default())
+            );
+        }
+    }
+}

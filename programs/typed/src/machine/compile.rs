@@ -2,12 +2,15 @@
 //!
 //! A *unit* is the code of a routine on one known instance, or on whichever. Temporary values of a routine stand apart from those of the routines
 //! that it calls: routines have levels, from 0 for those that call none, and each level has slots of its own. How many is known when all is
-//! compiled, so a program is compiled twice: the first pass only measures.
+//! compiled, so a program is compiled twice: the first pass only measures. It also counts the calls of each unit: one that is called once, or is
+//! short and calls none, stands in the second pass where it is called.
 
 mod call;
+mod choice;
 mod condition;
 mod expression;
 mod fused;
+mod jumps;
 mod place;
 mod statement;
 mod text;
@@ -18,6 +21,7 @@ use crate::cost::Costs;
 use crate::form::{Program, RoutineId};
 use crate::machine::instruction::{Code, Instruction};
 use crate::machine::{Compiled, Tables};
+use crate::row::SLOTS;
 use crate::scan::Frame;
 
 /// Instructions up to which routines are compiled for each of their instances: what a processor keeps near.
@@ -36,6 +40,9 @@ struct Layout {
     texts: u32,
 }
 
+/// Instructions that all calls of a routine together may have in place of the calls.
+const INLINED: usize = 64;
+
 /// Where the variables of the routine that is compiled stand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 enum Own {
@@ -51,6 +58,29 @@ enum Own {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Label(usize);
 
+/// What is compiled at a place of the code.
+#[derive(Debug, Clone, Copy)]
+struct Context {
+    routine: RoutineId,
+    line: u32,
+    own: Own,
+    level: usize,
+    /// Temporary slots and texts in use.
+    temporaries: u32,
+    texts: u32,
+    /// Where RETURN goes in a routine that stands in place of a call.
+    end: Option<Label>,
+}
+
+/// What the first pass finds of a unit.
+#[derive(Debug, Clone, Copy, Default)]
+struct Measured {
+    calls: usize,
+    length: usize,
+}
+
+type Units<T> = HashMap<(RoutineId, Option<u32>), T>;
+
 struct Compiler<'a> {
     program: &'a Program,
     costs: &'a Costs,
@@ -62,20 +92,25 @@ struct Compiler<'a> {
     labels: Vec<u32>,
     /// Jumps, with the label that each goes to.
     jumps: Vec<(usize, Label)>,
-    units: HashMap<(RoutineId, Option<u32>), Label>,
+    units: Units<Label>,
+    /// Of each unit in this pass, and in the one before it.
+    measured: Units<Measured>,
+    before: Option<Units<Measured>>,
     queue: Vec<(RoutineId, Option<u32>)>,
     /// Temporary slots and texts that each level uses.
     used: Vec<(u32, u32)>,
 
-    routine: RoutineId,
-    line: u32,
-    own: Own,
-    level: usize,
-    /// Temporary slots and texts in use.
-    temporaries: u32,
-    texts: u32,
+    context: Context,
     /// Where CONTINUE and EXIT go, innermost last.
     loops: Vec<(Label, Label)>,
+}
+
+/// What a pass makes.
+struct Passed {
+    tables: Tables,
+    tasks: Vec<u32>,
+    used: Vec<(u32, u32)>,
+    measured: Units<Measured>,
 }
 
 /// Compiles a valid program.
@@ -89,23 +124,35 @@ pub(super) fn compile(program: &Program) -> Compiled {
         constants: 1 << 30,
         texts: 0,
     };
-    let (_, _, used) = Compiler::pass(program, &costs, &levels, layout.clone());
+    let first = Compiler::pass(program, &costs, &levels, layout.clone(), None);
+    let used = first.used;
     let (mut slot, mut text) = (memory + 1, 0);
-    for (level, (slots, texts)) in layout.levels.iter_mut().zip(used) {
+    for (level, (slots, texts)) in layout.levels.iter_mut().zip(&used) {
         *level = (slot, text);
         slot += slots;
         text += texts;
     }
     layout.constants = slot;
     layout.texts = text;
-    let (tables, tasks, _) = Compiler::pass(program, &costs, &levels, layout);
+    let second = Compiler::pass(program, &costs, &levels, layout, Some(first.measured));
+    assert_eq!(used, second.used, "both passes take the same slots");
+    let (mut tables, mut tasks) = (second.tables, second.tasks);
+    jumps::straighten(&mut tables, &mut tasks);
+    let row = slot as usize + tables.constants.len();
+    let narrow = tables.code.iter().map(|each| each.narrow());
+    let narrow: Option<Vec<_>> = narrow.collect();
+    let narrow = narrow.filter(|_| row <= SLOTS);
+    if narrow.is_some() {
+        tables.code.clear();
+    }
     Compiled {
         frame: Frame::new(program),
         tasks,
         memory: memory as usize,
-        row: slot as usize + tables.constants.len(),
+        row,
         texts: text as usize,
         tables,
+        narrow,
     }
 }
 
@@ -143,7 +190,8 @@ impl<'a> Compiler<'a> {
         costs: &'a Costs,
         levels: &'a [usize],
         layout: Layout,
-    ) -> (Tables, Vec<u32>, Vec<(u32, u32)>) {
+        before: Option<Units<Measured>>,
+    ) -> Passed {
         let mut compiler = Self {
             program,
             costs,
@@ -159,13 +207,18 @@ impl<'a> Compiler<'a> {
             labels: Vec::new(),
             jumps: Vec::new(),
             units: HashMap::new(),
+            measured: HashMap::new(),
+            before,
             queue: Vec::new(),
-            routine: RoutineId(0),
-            line: 0,
-            own: Own::Relative,
-            level: 0,
-            temporaries: 0,
-            texts: 0,
+            context: Context {
+                routine: RoutineId(0),
+                line: 0,
+                own: Own::Relative,
+                level: 0,
+                temporaries: 0,
+                texts: 0,
+                end: None,
+            },
             loops: Vec::new(),
         };
         let mut tasks = Vec::new();
@@ -173,8 +226,7 @@ impl<'a> Compiler<'a> {
             tasks.push(compiler.tables.code.len() as u32);
             compiler.clear(task.routine);
             let unit = compiler.unit(task.routine, Some(task.own));
-            compiler.jump(Code::Call, 0, 0, unit);
-            compiler.emit(Code::Return, 0, 0, 0);
+            compiler.jump(Code::Jump, 0, 0, unit);
         }
         while let Some((routine, own)) = compiler.queue.pop() {
             compiler.compile_unit(routine, own);
@@ -182,23 +234,37 @@ impl<'a> Compiler<'a> {
         for (jump, Label(label)) in std::mem::take(&mut compiler.jumps) {
             compiler.tables.code[jump].c = compiler.labels[label];
         }
-        (compiler.tables, tasks, compiler.used)
+        Passed {
+            tables: compiler.tables,
+            tasks,
+            used: compiler.used,
+            measured: compiler.measured,
+        }
     }
 
     fn compile_unit(&mut self, routine: RoutineId, own: Option<u32>) {
-        let label = self.unit(routine, own);
+        let label = self.units[&(routine, own)];
         self.place_label(label);
-        self.routine = routine;
-        self.own = own.map_or(Own::Relative, Own::At);
-        self.level = self.levels[routine.0 as usize];
-        (self.temporaries, self.texts) = (0, 0);
+        self.context = Context {
+            routine,
+            line: 0,
+            own: own.map_or(Own::Relative, Own::At),
+            level: self.levels[routine.0 as usize],
+            temporaries: 0,
+            texts: 0,
+            end: None,
+        };
+        let start = self.tables.code.len();
         let program = self.program;
         self.statements(&program.routine(routine).body);
         self.emit(Code::Return, 0, 0, 0);
+        let length = self.tables.code.len() - start;
+        self.measured.entry((routine, own)).or_default().length = length;
     }
 
     /// The code of a routine on an instance; it is compiled later.
     fn unit(&mut self, routine: RoutineId, own: Option<u32>) -> Label {
+        self.measured.entry((routine, own)).or_default().calls += 1;
         if let Some(&label) = self.units.get(&(routine, own)) {
             return label;
         }
@@ -208,23 +274,37 @@ impl<'a> Compiler<'a> {
         label
     }
 
-    /// The same on an instance that is known, while there is room; else `None`.
-    fn special_unit(&mut self, routine: RoutineId, own: u32) -> Option<Label> {
+    /// Whether a routine is compiled for an instance that is known: while there is room.
+    fn is_special(&self, routine: RoutineId, own: u32) -> bool {
+        let unit = (routine, Some(own));
+        if let Some(before) = &self.before {
+            return before.contains_key(&unit);
+        }
         let planned = self.tables.code.len() + self.queue.len() * ESTIMATE;
-        let is_there = self.units.contains_key(&(routine, Some(own)));
-        (is_there || planned < SPECIAL).then(|| self.unit(routine, Some(own)))
+        self.units.contains_key(&unit) || planned < SPECIAL
+    }
+
+    /// Whether the code of a unit stands where it is called.
+    fn is_inlined(&self, routine: RoutineId, own: Option<u32>) -> bool {
+        let unit = self.before.as_ref().and_then(|it| it.get(&(routine, own)));
+        unit.is_some_and(|unit| {
+            let is_last = self.levels[routine.0 as usize] == 0;
+            unit.calls == 1 || is_last && unit.calls * unit.length <= INLINED
+        })
     }
 
     fn emit(&mut self, code: Code, a: u32, b: u32, c: u32) {
         self.emit_with(code, 0, a, b, c);
     }
 
-    fn emit_with(&mut self, code: Code, extra: u16, a: u32, b: u32, c: u32) {
-        let statement = (self.routine, self.line);
+    fn emit_with(&mut self, code: Code, extra: u8, a: u32, b: u32, c: u32) {
+        let statement = (self.context.routine, self.context.line);
         let last = self.tables.lines.last();
         if last.is_none_or(|&(_, routine, line)| (routine, line) != statement) {
             let first = self.tables.code.len() as u32;
-            self.tables.lines.push((first, self.routine, self.line));
+            self.tables
+                .lines
+                .push((first, self.context.routine, self.context.line));
         }
         self.tables.code.push(Instruction {
             code,
@@ -263,28 +343,28 @@ impl<'a> Compiler<'a> {
     }
 
     fn temporaries_of(&mut self, count: u32) -> u32 {
-        let (first, _) = self.layout.levels[self.level];
-        let slot = first + self.temporaries;
-        self.temporaries += count;
-        let used = &mut self.used[self.level].0;
-        *used = self.temporaries.max(*used);
+        let (first, _) = self.layout.levels[self.context.level];
+        let slot = first + self.context.temporaries;
+        self.context.temporaries += count;
+        let used = &mut self.used[self.context.level].0;
+        *used = self.context.temporaries.max(*used);
         slot
     }
 
     fn new_text(&mut self) -> u32 {
-        let (_, first) = self.layout.levels[self.level];
-        let text = first + self.texts;
-        self.texts += 1;
-        let used = &mut self.used[self.level].1;
-        *used = self.texts.max(*used);
+        let (_, first) = self.layout.levels[self.context.level];
+        let text = first + self.context.texts;
+        self.context.texts += 1;
+        let used = &mut self.used[self.context.level].1;
+        *used = self.context.texts.max(*used);
         text
     }
 
     /// Does something and gives back the temporary slots and texts that it took.
     fn scope<T>(&mut self, inner: impl FnOnce(&mut Self) -> T) -> T {
-        let before = (self.temporaries, self.texts);
+        let before = (self.context.temporaries, self.context.texts);
         let result = inner(self);
-        (self.temporaries, self.texts) = before;
+        (self.context.temporaries, self.context.texts) = before;
         result
     }
 

@@ -2,18 +2,21 @@
 
 use crate::fault::Cause;
 use crate::form::Program;
+use crate::machine::Tables;
 use crate::machine::instruction::{Code, Instruction, RELATIVE};
 use crate::machine::working::{
-    apply_to_texts, extend, has_passed, load_text, mask, next, offset, store_text,
+    apply, apply_to_texts, extend, has_passed, insert, load_text, mask, next, offset, rounded,
+    saturated, store_text,
 };
-use crate::machine::{Scratch, Tables};
 use crate::operation::real::Float;
+use crate::row::Row;
 use crate::types::Elementary;
 
 /// A scan that runs.
-pub(super) struct Run<'a> {
+pub(super) struct Run<'a, O, R: ?Sized> {
+    pub(super) code: &'a [Instruction<O>],
     pub(super) tables: &'a Tables,
-    pub(super) row: &'a mut [u64],
+    pub(super) row: &'a mut R,
     pub(super) texts: &'a mut Vec<Vec<u8>>,
     pub(super) returns: &'a mut Vec<u32>,
     pub(super) budget: u64,
@@ -25,33 +28,33 @@ pub(super) struct Stop {
     pub(super) cause: Cause,
 }
 
-impl Run<'_> {
+impl<O: Copy + Into<u32>, R: Row + ?Sized> Run<'_, O, R> {
     /// Executes from an instruction to the return that ends it. Without `OWN` no operand is relative.
     pub(super) fn run<const OWN: bool>(&mut self, start: u32, own: u32) -> Result<(), Stop> {
         let tables = self.tables;
-        let code: &[Instruction] = &tables.code;
-        let row: &mut [u64] = self.row;
+        let code = self.code;
+        let row: &mut R = self.row;
         let floor = self.returns.len();
         let mut at = start as usize;
         macro_rules! slot {
             ($operand:expr) => {{
                 let operand = $operand;
                 if OWN && operand & RELATIVE != 0 {
-                    (operand & !RELATIVE).wrapping_add(own) as usize
+                    (operand & !RELATIVE).wrapping_add(own)
                 } else {
-                    operand as usize
+                    operand
                 }
             }};
         }
         macro_rules! get {
             ($operand:expr) => {
-                row[slot!($operand)]
+                row.get(slot!($operand))
             };
         }
         macro_rules! set {
             ($operand:expr, $value:expr) => {{
                 let value: u64 = $value;
-                row[slot!($operand)] = value;
+                *row.slot(slot!($operand)) = value;
             }};
         }
         macro_rules! stop {
@@ -64,7 +67,9 @@ impl Run<'_> {
         }
         loop {
             let instruction = code[at];
-            let Instruction { extra, a, b, c, .. } = instruction;
+            let extra = instruction.extra;
+            let operands = [instruction.a, instruction.b, instruction.c];
+            let [a, b, c]: [u32; 3] = operands.map(Into::into);
             at += 1;
             macro_rules! integer {
                 ($type:ty, $function:ident) => {
@@ -98,9 +103,15 @@ impl Run<'_> {
             }
             macro_rules! fourth {
                 () => {{
-                    let operand = code[at].a;
+                    let operand: u32 = code[at].a.into();
                     at += 1;
                     operand
+                }};
+            }
+            macro_rules! add_product {
+                ($type:ty) => {{
+                    let product = (get!(b) as $type).wrapping_mul(get!(c) as $type);
+                    set!(a, (get!(fourth!()) as $type).wrapping_add(product) as u64)
                 }};
             }
             macro_rules! with_product {
@@ -122,6 +133,14 @@ impl Run<'_> {
                     let (first, next) = (<$type>::unpack(get!(b)), <$type>::unpack(get!(c)));
                     let best = if next $operator first { next } else { first };
                     set!(a, best.pack())
+                }};
+            }
+            macro_rules! best_signed {
+                ($operator:tt) => {{
+                    let (first, next) = (get!(b), get!(c));
+                    let unused = u32::from(extra);
+                    let is_better = extend(next, unused) $operator extend(first, unused);
+                    set!(a, if is_better { next } else { first })
                 }};
             }
             macro_rules! is {
@@ -161,18 +180,27 @@ impl Run<'_> {
                     }
                 };
             }
-            macro_rules! step_up {
+            macro_rules! next_turn {
                 ($type:ty, $unsigned:ty) => {{
-                    let each = &tables.loops[a as usize];
-                    let (limit, by) = (get!(each.limit) as $type, get!(each.by) as $type);
-                    let counter = &mut row[slot!(each.counter)];
-                    if let Some(next) = (*counter as $type).checked_add(by) {
-                        *counter = next as $unsigned as u64;
-                        if next <= limit {
-                            charge!(each.turn);
-                            at = c as usize;
-                        }
+                    let turn = fourth!();
+                    let counter = get!(a) as $type;
+                    if counter < get!(b) as $type {
+                        set!(a, (counter + 1) as $unsigned as u64);
+                        charge!(get!(turn));
+                        at = c as usize;
+                    } else if let Some(next) = counter.checked_add(1) {
+                        set!(a, next as $unsigned as u64);
                     }
+                }};
+            }
+            macro_rules! referred {
+                ($address:expr) => {{
+                    let address = $address;
+                    let end = address.saturating_add(get!(c));
+                    if address < 64 * u64::from(Program::HEADER) || end > tables.memory {
+                        stop!(Cause::UnboundReference { address });
+                    }
+                    address
                 }};
             }
             macro_rules! element {
@@ -186,9 +214,9 @@ impl Run<'_> {
             match instruction.code {
                 Code::Move => set!(a, get!(b)),
                 Code::MoveIf => {
-                    if get!(c) != 0 {
-                        set!(a, get!(b));
-                    }
+                    // Bit by bit, without a jump.
+                    let (before, chosen) = (get!(a), u64::from(get!(c) != 0).wrapping_neg());
+                    set!(a, before ^ ((before ^ get!(b)) & chosen));
                 }
                 Code::Add8 => integer!(u8, wrapping_add),
                 Code::Add16 => integer!(u16, wrapping_add),
@@ -214,10 +242,9 @@ impl Run<'_> {
                 Code::Or => set!(a, get!(b) | get!(c)),
                 Code::Xor => set!(a, get!(b) ^ get!(c)),
                 Code::AndNot => set!(a, get!(b) & !get!(c)),
-                Code::MultiplyAdd32 => {
-                    let product = (get!(b) as u32).wrapping_mul(get!(c) as u32);
-                    set!(a, u64::from((get!(fourth!()) as u32).wrapping_add(product)));
-                }
+                Code::MultiplyAdd16 => add_product!(u16),
+                Code::MultiplyAdd32 => add_product!(u32),
+                Code::MultiplyAdd64 => add_product!(u64),
                 Code::MultiplyAddReal => with_product!(f32, add),
                 Code::MultiplyAddLreal => with_product!(f64, add),
                 Code::MultiplySubtractReal => with_product!(f32, subtract),
@@ -235,12 +262,20 @@ impl Run<'_> {
                 }
                 Code::Extract => set!(a, get!(b) >> (extra & 63) & get!(c)),
                 Code::Extend => set!(a, extend(get!(b), u32::from(extra)) as u64 & get!(c)),
+                Code::MinimumS => best_signed!(<),
+                Code::MaximumS => best_signed!(>),
+                Code::MinimumU => set!(a, get!(b).min(get!(c))),
+                Code::MaximumU => set!(a, get!(b).max(get!(c))),
                 Code::AddReal => real!(f32, add),
                 Code::SubtractReal => real!(f32, subtract),
                 Code::MultiplyReal => real!(f32, multiply),
                 Code::DivideReal => real!(f32, divide),
                 Code::NegateReal => one_real!(f32, negate),
                 Code::AbsoluteReal => one_real!(f32, absolute),
+                Code::DistanceReal => {
+                    let difference = <f32>::unpack(get!(b)).subtract(<f32>::unpack(get!(c)));
+                    set!(a, difference.absolute().pack());
+                }
                 Code::MinimumReal => best!(f32, <),
                 Code::MaximumReal => best!(f32, >),
                 Code::AddLreal => real!(f64, add),
@@ -249,10 +284,18 @@ impl Run<'_> {
                 Code::DivideLreal => real!(f64, divide),
                 Code::NegateLreal => one_real!(f64, negate),
                 Code::AbsoluteLreal => one_real!(f64, absolute),
+                Code::DistanceLreal => {
+                    let difference = <f64>::unpack(get!(b)).subtract(<f64>::unpack(get!(c)));
+                    set!(a, difference.absolute().pack());
+                }
                 Code::MinimumLreal => best!(f64, <),
                 Code::MaximumLreal => best!(f64, >),
                 Code::ToReal => set!(a, (extend(get!(b), u32::from(extra)) as f32).pack()),
                 Code::ToLreal => set!(a, (extend(get!(b), u32::from(extra)) as f64).pack()),
+                Code::RoundReal => set!(a, rounded(f32::unpack(get!(b)).into(), extra)),
+                Code::RoundLreal => set!(a, rounded(f64::unpack(get!(b)), extra)),
+                Code::TruncateReal => set!(a, saturated(f32::unpack(get!(b)).into(), extra)),
+                Code::TruncateLreal => set!(a, saturated(f64::unpack(get!(b)), extra)),
                 Code::RealToLreal => set!(a, f64::from(f32::unpack(get!(b))).pack()),
                 Code::LrealToReal => set!(a, (f64::unpack(get!(b)) as f32).pack()),
                 Code::Equal => is!(u64, ==),
@@ -308,14 +351,14 @@ impl Run<'_> {
                     jump!(i128::from(range.low) <= value && value <= i128::from(range.high));
                 }
                 Code::Charge => charge!(get!(a)),
-                Code::StepS16 => step_up!(i16, u16),
-                Code::StepS32 => step_up!(i32, u32),
-                Code::StepS64 => step_up!(i64, u64),
+                Code::Next16 => next_turn!(i16, u16),
+                Code::Next32 => next_turn!(i32, u32),
+                Code::Next64 => next_turn!(i64, u64),
                 Code::Step => {
                     let each = tables.loops[a as usize];
                     let (counter, by) = (slot!(each.counter), get!(each.by));
-                    if let Some(next) = next(&each, row[counter], by) {
-                        row[counter] = next;
+                    if let Some(next) = next(&each, *row.slot(counter), by) {
+                        *row.slot(counter) = next;
                         if !has_passed(&each, next, get!(each.limit), by) {
                             charge!(each.turn);
                             at = c as usize;
@@ -327,89 +370,73 @@ impl Run<'_> {
                     let (limit, by) = (get!(each.limit), get!(each.by));
                     jump!(has_passed(&each, get!(each.counter), limit, by));
                 }
-                Code::LoadBits => set!(a, get!(b) >> (extra & 63) & get!(c)),
                 Code::StoreBits => {
-                    let (value, mask, shift) = (get!(b), get!(c), extra & 63);
-                    let word = &mut row[slot!(a)];
-                    *word = *word & !(mask << shift) | (value & mask) << shift;
+                    let (value, mask) = (get!(b), get!(c));
+                    insert(row.slot(slot!(a)), u64::from(extra), mask, value);
                 }
                 Code::LoadWord => {
                     let element = &tables.elements[c as usize];
                     let offset = element!(element);
-                    let from = slot!(element.base) + (offset / 64) as usize;
-                    set!(a, row[from]);
+                    let from = slot!(element.base) as usize + (offset / 64) as usize;
+                    set!(a, row.all()[from]);
                 }
                 Code::StoreWord => {
                     let element = &tables.elements[c as usize];
                     let offset = element!(element);
-                    let to = slot!(element.base) + (offset / 64) as usize;
-                    row[to] = get!(a);
+                    let to = slot!(element.base) as usize + (offset / 64) as usize;
+                    row.all()[to] = get!(a);
                 }
                 Code::LoadPacked => {
                     let element = &tables.elements[c as usize];
                     let offset = element!(element) + u64::from(element.bit);
-                    let from = slot!(element.base) + (offset / 64) as usize;
-                    set!(a, row[from] >> (offset % 64) & element.mask);
+                    let from = slot!(element.base) as usize + (offset / 64) as usize;
+                    set!(a, row.all()[from] >> (offset % 64) & element.mask);
                 }
                 Code::StorePacked => {
                     let element = &tables.elements[c as usize];
                     let offset = element!(element) + u64::from(element.bit);
-                    let to = slot!(element.base) + (offset / 64) as usize;
-                    let mask = element.mask;
-                    let value = get!(a) & mask;
-                    let word = &mut row[to];
-                    *word = *word & !(mask << (offset % 64)) | value << (offset % 64);
+                    let to = slot!(element.base) as usize + (offset / 64) as usize;
+                    let value = get!(a);
+                    insert(&mut row.all()[to], offset, element.mask, value);
                 }
                 Code::LoadAt => {
                     let address = get!(b);
-                    let word = row[(address / 64) as usize];
+                    let word = row.all()[(address / 64) as usize];
                     set!(a, word >> (address % 64) & mask(extra));
                 }
                 Code::StoreAt => {
-                    let (address, mask) = (get!(b), mask(extra));
-                    let value = get!(a) & mask;
-                    let word = &mut row[(address / 64) as usize];
-                    *word = *word & !(mask << (address % 64)) | value << (address % 64);
+                    let (address, value) = (get!(b), get!(a));
+                    let word = &mut row.all()[(address / 64) as usize];
+                    insert(word, address, mask(extra), value);
+                }
+                Code::LoadThrough => {
+                    let address = referred!(get!(b));
+                    let word = row.all()[(address / 64) as usize];
+                    set!(a, word >> (address % 64) & mask(extra));
+                }
+                Code::StoreThrough => {
+                    let address = referred!(get!(b));
+                    let value = get!(a);
+                    let word = &mut row.all()[(address / 64) as usize];
+                    insert(word, address, mask(extra), value);
                 }
                 Code::Copy => {
                     let (to, from) = ((get!(a) / 64) as usize, (get!(b) / 64) as usize);
-                    row.copy_within(from..from + c as usize, to);
+                    row.all().copy_within(from..from + c as usize, to);
                 }
                 Code::OwnAddress => set!(a, 64 * (u64::from(own) + u64::from(b))),
-                Code::Reference => {
-                    let (address, reach) = (get!(b), get!(c));
-                    let end = address.saturating_add(reach);
-                    if address < 64 * u64::from(Program::HEADER) || end > tables.memory {
-                        stop!(Cause::UnboundReference { address });
-                    }
-                    set!(a, address);
-                }
+                Code::Reference => set!(a, referred!(get!(b))),
                 Code::Index => {
                     let offset = element!(&tables.elements[c as usize]);
                     set!(a, get!(a).wrapping_add(offset));
                 }
                 Code::Clear => {
-                    let first = slot!(a);
-                    row[first..first + b as usize].fill(0);
+                    let first = slot!(a) as usize;
+                    row.all()[first..first + b as usize].fill(0);
                 }
                 Code::Apply => {
                     let application = &tables.applications[b as usize];
-                    let mut operands = [0; 4];
-                    let result = match operands.get_mut(..application.operands.len()) {
-                        Some(operands) => {
-                            for (value, &operand) in operands.iter_mut().zip(&application.operands)
-                            {
-                                *value = get!(operand);
-                            }
-                            application.operation.apply(operands)
-                        }
-                        None => {
-                            let operands =
-                                application.operands.iter().map(|&operand| get!(operand));
-                            application.operation.apply(&operands.collect::<Vec<u64>>())
-                        }
-                    };
-                    match result {
+                    match apply(application, |operand| get!(operand)) {
                         Ok(result) => set!(a, result),
                         Err(cause) => stop!(cause),
                     }
@@ -421,7 +448,7 @@ impl Run<'_> {
                 }
                 Code::TextLoad => {
                     let first = (get!(b) / 64) as usize;
-                    load_text(&row[first..], c as usize, &mut self.texts[a as usize]);
+                    load_text(&row.all()[first..], c as usize, &mut self.texts[a as usize]);
                 }
                 Code::TextStore => {
                     let first = (get!(b) / 64) as usize;
@@ -432,7 +459,7 @@ impl Run<'_> {
                             capacity: u64::from(c),
                         });
                     }
-                    store_text(&mut row[first..], c as usize, text);
+                    store_text(&mut row.all()[first..], c as usize, text);
                 }
                 Code::TextApply => {
                     let application = &tables.text_applications[a as usize];
@@ -450,6 +477,7 @@ impl Run<'_> {
                 Code::CallOn => {
                     let own = (get!(a) / 64) as u32;
                     let mut inner = Run {
+                        code,
                         row: &mut *row,
                         tables,
                         texts: &mut *self.texts,
@@ -468,15 +496,4 @@ impl Run<'_> {
             }
         }
     }
-}
-
-/// Grows a row and its texts to what a program needs.
-pub(super) fn prepare(scratch: &mut Scratch, slots: usize, texts: usize) {
-    if scratch.row.len() < slots {
-        scratch.row.resize(slots, 0);
-    }
-    if scratch.texts.len() < texts {
-        scratch.texts.resize(texts, Vec::new());
-    }
-    scratch.returns.clear();
 }

@@ -15,18 +15,33 @@ use crate::types::Elementary;
 pub(super) const RELATIVE: u32 = 1 << 31;
 
 /// An instruction. What the operands mean is said at the operation: mostly `a` is the target, `b` and `c` are read; a jump goes to `c`.
+///
+/// Operands of 16 bits are what nearly every program can have: then it takes 8 bytes, and so fewer steps of the processor.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Instruction {
+pub(super) struct Instruction<O = u32> {
     pub(super) code: Code,
-    pub(super) extra: u16,
-    pub(super) a: u32,
-    pub(super) b: u32,
-    pub(super) c: u32,
+    pub(super) extra: u8,
+    pub(super) a: O,
+    pub(super) b: O,
+    pub(super) c: O,
+}
+
+impl Instruction {
+    /// The same with operands of 16 bits, where they fit.
+    pub(super) fn narrow(self) -> Option<Instruction<u16>> {
+        Some(Instruction {
+            code: self.code,
+            extra: self.extra,
+            a: self.a.try_into().ok()?,
+            b: self.b.try_into().ok()?,
+            c: self.c.try_into().ok()?,
+        })
+    }
 }
 
 /// What an instruction does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[repr(u16)]
+#[repr(u8)]
 pub(super) enum Code {
     /// a := b
     Move,
@@ -59,7 +74,9 @@ pub(super) enum Code {
     /// a := b AND NOT c
     AndNot,
     /// a := d + b · c, where d is operand a of the [`Code::Data`] that follows; each operation is rounded.
+    MultiplyAdd16,
     MultiplyAdd32,
+    MultiplyAdd64,
     MultiplyAddReal,
     MultiplyAddLreal,
     /// a := d − b · c
@@ -75,12 +92,20 @@ pub(super) enum Code {
     /// Sign extension by `extra` bits, masked by c.
     Extend,
 
+    /// The lesser of b and c, the first where they are equal; signed ones are sign-extended by `extra` bits.
+    MinimumS,
+    MaximumS,
+    MinimumU,
+    MaximumU,
+
     AddReal,
     SubtractReal,
     MultiplyReal,
     DivideReal,
     NegateReal,
     AbsoluteReal,
+    /// |b − c|, each operation rounded.
+    DistanceReal,
     MinimumReal,
     MaximumReal,
     AddLreal,
@@ -89,11 +114,17 @@ pub(super) enum Code {
     DivideLreal,
     NegateLreal,
     AbsoluteLreal,
+    DistanceLreal,
     MinimumLreal,
     MaximumLreal,
     /// From an integer that is sign-extended by `extra` bits.
     ToReal,
     ToLreal,
+    /// The nearest integer, or the one towards 0, of the type of number `extra`; saturating.
+    RoundReal,
+    RoundLreal,
+    TruncateReal,
+    TruncateLreal,
     RealToLreal,
     LrealToReal,
 
@@ -154,17 +185,16 @@ pub(super) enum Code {
 
     /// Charges the constant a.
     Charge,
-    /// The loop a, upwards, with a counter of such a type: the step behind a turn, the test and the charge; to c for the next turn.
-    StepS16,
-    StepS32,
-    StepS64,
-    /// The same, whatever the type and the direction.
+    /// The step by 1 behind a turn of a loop, with the signed counter a and the limit b, and the test; to c for the next turn, which operand a of the
+    /// [`Code::Data`] that follows is charged for.
+    Next16,
+    Next32,
+    Next64,
+    /// The same of the loop a, whatever the type, the step and the direction.
     Step,
     /// To c where the counter of loop a has passed its end.
     Passed,
 
-    /// a := the bits from `extra` on of slot b, as many as c has.
-    LoadBits,
     /// Bits of slot a from `extra` on := b, as many as c has.
     StoreBits,
     /// a := the element of the array c with index b.
@@ -179,6 +209,10 @@ pub(super) enum Code {
     LoadAt,
     /// What lies at address b := a; `extra` bits.
     StoreAt,
+    /// a := what lies at the address in slot b, c bits from which must lie in memory; `extra` bits.
+    LoadThrough,
+    /// What lies at the address in slot b := a, in the same way.
+    StoreThrough,
     /// Copies c slots from address b to address a.
     Copy,
     /// a := the address of b slots from the instance.
@@ -206,6 +240,16 @@ pub(super) enum Code {
     /// The same on the instance at address a.
     CallOn,
     Return,
+}
+
+impl Code {
+    /// Whether c is an instruction that may be executed next.
+    pub(super) fn has_target(self) -> bool {
+        let jumps = Self::Jump as u8..=Self::JumpInRange as u8;
+        let steps = Self::Next16 as u8..=Self::Passed as u8;
+        let is_call = matches!(self, Self::Call | Self::CallOn);
+        jumps.contains(&(self as u8)) || steps.contains(&(self as u8)) || is_call
+    }
 }
 
 /// An array with one computed index.

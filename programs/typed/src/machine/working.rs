@@ -1,12 +1,14 @@
 //! What several instructions need: masks, indices, counters, texts in slots.
 
 use crate::fault::Cause;
-use crate::machine::instruction::{Element, Loop, TextApplication, TextSource};
+use crate::machine::instruction::{Application, Element, Loop, TextApplication, TextSource};
 use crate::operation::TextOperand;
+use crate::operation::real::Float;
+use crate::types::Elementary;
 
 /// As many ones as a value has bits.
 #[inline]
-pub(super) fn mask(bits: u16) -> u64 {
+pub(super) fn mask(bits: u8) -> u64 {
     u64::MAX >> (64 - u32::from(bits).clamp(1, 64))
 }
 
@@ -14,6 +16,37 @@ pub(super) fn mask(bits: u16) -> u64 {
 #[inline]
 pub(super) fn extend(value: u64, unused: u32) -> i64 {
     (value << (unused & 63)) as i64 >> (unused & 63)
+}
+
+/// Bits of a word from `at` (modulo 64) on := as many of `value` as the mask has.
+#[inline]
+pub(super) fn insert(word: &mut u64, at: u64, mask: u64, value: u64) {
+    let shift = at % 64;
+    *word = *word & !(mask << shift) | (value & mask) << shift;
+}
+
+/// Whether [`saturated`] gives numbers of a type: those of 64 bits without a sign do not fit into its i64.
+pub(super) fn is_saturated(of: Elementary) -> bool {
+    let is_whole = !of.is_real() && of != Elementary::Bool;
+    is_whole && (of.is_signed() || of.bits() < 64)
+}
+
+/// The nearest number to a whole one that a type has, stored; the type is that of such a number. NaN is 0.
+#[inline]
+pub(super) fn saturated(whole: f64, of: u8) -> u64 {
+    let of = Elementary::ALL[usize::from(of)];
+    let mask = of.mask();
+    let (least, greatest) = match of.is_signed() {
+        true => (-((mask >> 1) as i64) - 1, (mask >> 1) as i64),
+        false => (0, mask as i64),
+    };
+    (whole as i64).clamp(least, greatest) as u64 & mask
+}
+
+/// The same of the nearest whole number, half to even.
+#[inline]
+pub(super) fn rounded(value: f64, of: u8) -> u64 {
+    saturated(Float::round(value), of)
 }
 
 /// Bits from the first element of an array to the one of an index.
@@ -71,6 +104,21 @@ pub(super) fn store_text(slots: &mut [u64], capacity: usize, text: &[u8]) {
         let mut word = [0; 8];
         word[..bytes.len()].copy_from_slice(bytes);
         *slot = u64::from_le_bytes(word);
+    }
+}
+
+/// Applies an operation that has no instruction of its own to operands that `get` reads.
+pub(super) fn apply(application: &Application, get: impl Fn(u32) -> u64) -> Result<u64, Cause> {
+    let given = application.operands.iter().map(|&operand| get(operand));
+    let mut few = [0; 4];
+    match few.get_mut(..application.operands.len()) {
+        Some(operands) => {
+            for (operand, value) in operands.iter_mut().zip(given) {
+                *operand = value;
+            }
+            application.operation.apply(operands)
+        }
+        None => application.operation.apply(&given.collect::<Vec<u64>>()),
     }
 }
 

@@ -32,6 +32,13 @@ pub(crate) trait Float: Copy + PartialOrd {
     fn truncate(self) -> i128;
 }
 
+/// The bits of the canonical NaN: out of the way of numbers, which need not wait for the test.
+#[cold]
+#[inline(never)]
+fn rare(nan: u64) -> u64 {
+    nan
+}
+
 macro_rules! float {
     ($float:ident, $bits:ident, $nan:literal, $power:ident, $sin:ident, $cos:ident, $tan:ident, $asin:ident, $acos:ident, $atan:ident, $exp:ident, $log:ident, $log10:ident) => {
         impl Float for $float {
@@ -43,7 +50,7 @@ macro_rules! float {
             #[inline]
             fn pack(self) -> u64 {
                 if self.is_nan() {
-                    return $nan;
+                    return rare($nan);
                 }
                 u64::from(self.to_bits())
             }

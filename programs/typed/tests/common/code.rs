@@ -113,7 +113,8 @@ impl Writer<'_> {
                 4..=6 if self.loops > 0 => StatementKind::Continue,
                 _ => self.assign(),
             },
-            9..=12 => {
+            9 => self.guarded(),
+            10..=12 => {
                 let branches = (0..1 + self.below(2))
                     .map(|_| Branch {
                         condition: self.number(Elementary::Bool, 3),
@@ -155,7 +156,7 @@ impl Writer<'_> {
         Statement { line, kind }
     }
 
-    fn assign(&mut self) -> StatementKind {
+    pub(super) fn assign(&mut self) -> StatementKind {
         let of = self.to.random.pick(&self.to.types).clone();
         match self.place(&of, true) {
             Some(place) => {

@@ -3,6 +3,7 @@
 #![allow(dead_code)]
 
 mod code;
+mod guarded;
 mod operations;
 mod places;
 

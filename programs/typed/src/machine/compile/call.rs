@@ -2,7 +2,7 @@
 
 use super::place::{Location, calls, place_calls};
 use super::text::capacity;
-use super::{Compiler, Own};
+use super::{Compiler, Context, Own};
 use crate::form::{Argument, Call, Place, Root, RoutineId};
 use crate::machine::instruction::Code;
 use crate::types::{Elementary, Type};
@@ -28,7 +28,7 @@ impl Compiler<'_> {
     /// Where the variables of an instance are.
     fn instance(&mut self, place: &Place) -> Own {
         let is_known = place.indices.is_empty();
-        match (place.root, self.own) {
+        match (place.root, self.context.own) {
             (Root::Global(slot), _) if is_known => Own::At(slot + place.offset),
             (Root::Frame(slot), _) if is_known => Own::At(self.program.state + slot + place.offset),
             (Root::Own(slot), Own::At(own)) if is_known => Own::At(own + slot + place.offset),
@@ -38,18 +38,22 @@ impl Compiler<'_> {
 
     /// Goes to the code of a routine.
     fn enter(&mut self, routine: RoutineId, own: Option<Own>) {
-        let special = match own {
-            Some(Own::At(slot)) => self.special_unit(routine, slot),
+        let known = match own {
+            Some(Own::At(slot)) if self.is_special(routine, slot) => Some(slot),
             _ => None,
         };
-        if let Some(unit) = special {
+        if known.is_some() || own.is_none() {
+            if self.is_inlined(routine, known) {
+                self.inline(routine, known);
+                return;
+            }
+            let unit = self.unit(routine, known);
             self.jump(Code::Call, 0, 0, unit);
             return;
         }
         let unit = self.unit(routine, None);
         match own {
-            None => self.jump(Code::Call, 0, 0, unit),
-            Some(Own::Relative) => panic!("an instance has a slot or an address"),
+            None | Some(Own::Relative) => panic!("an instance has a slot or an address"),
             Some(Own::Address(address)) => self.jump(Code::CallOn, address, 0, unit),
             Some(Own::At(slot)) => {
                 let address = self.constant(64 * u64::from(slot));
@@ -58,16 +62,37 @@ impl Compiler<'_> {
         }
     }
 
+    /// The code of a routine in place of a call.
+    fn inline(&mut self, routine: RoutineId, own: Option<u32>) {
+        let end = self.label();
+        let inner = Context {
+            routine,
+            line: 0,
+            own: own.map_or(Own::Relative, Own::At),
+            level: self.levels[routine.0 as usize],
+            temporaries: 0,
+            texts: 0,
+            end: Some(end),
+        };
+        let outer = std::mem::replace(&mut self.context, inner);
+        let loops = std::mem::take(&mut self.loops);
+        let program = self.program;
+        self.statements(&program.routine(routine).body);
+        self.loops = loops;
+        self.context = outer;
+        self.place_label(end);
+    }
+
     /// Does something with the variables of a called routine.
     pub(super) fn in_routine<T>(
         &mut self,
         own: Option<Own>,
         inner: impl FnOnce(&mut Self) -> T,
     ) -> T {
-        let outer = self.own;
-        self.own = own.unwrap_or(outer);
+        let outer = self.context.own;
+        self.context.own = own.unwrap_or(outer);
         let result = inner(self);
-        self.own = outer;
+        self.context.own = outer;
         result
     }
 
@@ -78,7 +103,7 @@ impl Compiler<'_> {
         let mut taken = Vec::with_capacity(call.outputs.len());
         for (_, to) in &call.outputs {
             taken.push(match to.of.elementary() {
-                Some(of) if to.indices.is_empty() => self.location(to, of),
+                Some(of) if to.indices.is_empty() && !to.is_by_reference() => self.location(to, of),
                 _ => Location::Address(self.address(to)),
             });
         }

@@ -140,7 +140,7 @@ fn jumping(code: Code, wanted: bool) -> (Code, bool) {
 }
 
 /// Whether an expression can neither change anything nor be a fault, so that it need not be evaluated.
-fn is_plain(expression: &Expression) -> bool {
+pub(super) fn is_plain(expression: &Expression) -> bool {
     let mut plain = true;
     crate::visit::in_expression(expression, &mut |inner| {
         plain &= match &inner.kind {

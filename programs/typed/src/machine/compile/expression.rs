@@ -4,6 +4,7 @@ use super::Compiler;
 use super::place::{Location, calls};
 use crate::form::{Expression, ExpressionKind};
 use crate::machine::instruction::{Application, Code, TextSource};
+use crate::machine::working::is_saturated;
 use crate::operation::{Comparison, Operation};
 use crate::types::Elementary;
 
@@ -78,6 +79,9 @@ impl Compiler<'_> {
             ExpressionKind::Apply(Operation::Text(operation), operands) => {
                 self.apply_to_texts(*operation, operands, TextSource::Number(to));
             }
+            ExpressionKind::Apply(operation, operands) if keeps_bits(*operation) => {
+                self.into(&operands[0], to);
+            }
             ExpressionKind::Apply(operation, operands) => {
                 if self.apply_two(*operation, operands, to).is_some() {
                     return;
@@ -140,6 +144,11 @@ impl Compiler<'_> {
         self.emit(Code::Move, to, address, 0);
     }
 
+    /// Adds to an integer in a slot.
+    pub(super) fn add(&mut self, of: Elementary, slot: u32, added: u32) {
+        self.apply(Operation::Add(of), &[slot, added], slot);
+    }
+
     fn apply(&mut self, operation: Operation, operands: &[u32], to: u32) {
         if self.apply_fast(operation, operands, to).is_some() {
             return;
@@ -157,16 +166,16 @@ impl Compiler<'_> {
         use Operation as O;
         match (operation, operands) {
             (_, [value]) if keeps_bits(operation) => self.emit(Code::Move, to, *value, 0),
-            (O::Minimum(of) | O::Maximum(of), [first, second]) => {
-                let is_least = matches!(operation, O::Minimum(_));
-                let code = match (of, is_least) {
-                    (Elementary::Real, true) => Code::MinimumReal,
-                    (Elementary::Real, false) => Code::MaximumReal,
-                    (Elementary::Lreal, true) => Code::MinimumLreal,
-                    (Elementary::Lreal, false) => Code::MaximumLreal,
-                    _ => return None,
-                };
-                self.emit(code, to, *first, *second);
+            (O::Minimum(of) | O::Maximum(of), [first, between @ .., last]) => {
+                let code = extreme(of, matches!(operation, O::Minimum(_)));
+                let unused = if of.is_signed() { 64 - of.bits() } else { 0 };
+                let mut best = *first;
+                for next in between {
+                    let better = self.temporary();
+                    self.emit_with(code, unused as u8, better, best, *next);
+                    best = better;
+                }
+                self.emit_with(code, unused as u8, to, best, *last);
             }
             (O::Compare(comparison, of), [left, right]) => {
                 let Compared { code, is_exchanged } = comparing(comparison, of);
@@ -181,10 +190,10 @@ impl Compiler<'_> {
                 self.emit(Code::MoveIf, to, *second, *condition);
             }
             (O::ShiftLeft(of), [value, by]) => {
-                self.emit_with(Code::ShiftLeft, of.bits() as u16, to, *value, *by);
+                self.emit_with(Code::ShiftLeft, of.bits() as u8, to, *value, *by);
             }
             (O::ShiftRight(of), [value, by]) => {
-                self.emit_with(Code::ShiftRight, of.bits() as u16, to, *value, *by);
+                self.emit_with(Code::ShiftRight, of.bits() as u8, to, *value, *by);
             }
             (O::Not(of), [value]) => {
                 let mask = self.constant(of.mask());
@@ -192,7 +201,7 @@ impl Compiler<'_> {
             }
             (O::Extract { to: part, at, .. }, [value]) => {
                 let mask = self.constant(part.mask());
-                self.emit_with(Code::Extract, u16::from(at), to, *value, mask);
+                self.emit_with(Code::Extract, at, to, *value, mask);
             }
             (O::Negate(of), [value]) if !of.is_real() => {
                 let zero = self.constant(0);
@@ -200,9 +209,13 @@ impl Compiler<'_> {
                 self.emit(code, to, zero, *value);
             }
             (O::Convert(from, target), [value]) => self.convert(from, target, *value, to)?,
+            (O::Truncate(from, target), [value]) => {
+                let codes = [Code::TruncateReal, Code::TruncateLreal];
+                self.whole(codes, from, target, *value, to)?;
+            }
             (O::Divide(of) | O::Modulo(of), [left, right]) => {
                 let of_type = Elementary::ALL.iter().position(|each| *each == of)?;
-                self.emit_with(binary(operation)?, of_type as u16, to, *left, *right);
+                self.emit_with(binary(operation)?, of_type as u8, to, *left, *right);
             }
             (_, [left, right]) => self.emit(binary(operation)?, to, *left, *right),
             (_, [value]) => {
@@ -220,6 +233,23 @@ impl Compiler<'_> {
         Some(())
     }
 
+    /// A real to an integer, by the code for REAL or the one for LREAL.
+    fn whole(
+        &mut self,
+        [real, lreal]: [Code; 2],
+        from: Elementary,
+        target: Elementary,
+        value: u32,
+        to: u32,
+    ) -> Option<()> {
+        let of = Elementary::ALL.iter().position(|each| *each == target)?;
+        let code = match from {
+            Elementary::Real => real,
+            _ => lreal,
+        };
+        is_saturated(target).then(|| self.emit_with(code, of as u8, to, value, 0))
+    }
+
     fn convert(&mut self, from: Elementary, target: Elementary, value: u32, to: u32) -> Option<()> {
         let unused = if from.is_signed() {
             64 - from.bits()
@@ -229,14 +259,17 @@ impl Compiler<'_> {
         match (from, target) {
             (Elementary::Real, Elementary::Lreal) => self.emit(Code::RealToLreal, to, value, 0),
             (Elementary::Lreal, Elementary::Real) => self.emit(Code::LrealToReal, to, value, 0),
-            _ if from.is_real() => return None,
+            _ if from.is_real() => {
+                let codes = [Code::RoundReal, Code::RoundLreal];
+                self.whole(codes, from, target, value, to)?;
+            }
             // Of 64 bits without a sign: not all numbers are those of an i64.
             _ if target.is_real() && !from.is_signed() && from.bits() == 64 => return None,
             (_, Elementary::Real) => {
-                self.emit_with(Code::ToReal, unused as u16, to, value, 0);
+                self.emit_with(Code::ToReal, unused as u8, to, value, 0);
             }
             (_, Elementary::Lreal) => {
-                self.emit_with(Code::ToLreal, unused as u16, to, value, 0);
+                self.emit_with(Code::ToLreal, unused as u8, to, value, 0);
             }
             (_, Elementary::Bool) => {
                 let zero = self.constant(0);
@@ -244,10 +277,24 @@ impl Compiler<'_> {
             }
             _ => {
                 let mask = self.constant(target.mask());
-                self.emit_with(Code::Extend, unused as u16, to, value, mask);
+                self.emit_with(Code::Extend, unused as u8, to, value, mask);
             }
         }
         Some(())
+    }
+}
+
+/// The instruction for the lesser or the greater of two.
+fn extreme(of: Elementary, is_least: bool) -> Code {
+    match (of, is_least) {
+        (Elementary::Real, true) => Code::MinimumReal,
+        (Elementary::Real, false) => Code::MaximumReal,
+        (Elementary::Lreal, true) => Code::MinimumLreal,
+        (Elementary::Lreal, false) => Code::MaximumLreal,
+        (_, true) if of.is_signed() => Code::MinimumS,
+        (_, false) if of.is_signed() => Code::MaximumS,
+        (_, true) => Code::MinimumU,
+        (_, false) => Code::MaximumU,
     }
 }
 

@@ -19,11 +19,19 @@ pub(super) enum Location {
     Packed(u32, u32),
     /// What lies at the address in a slot.
     Address(u32),
+    /// The same, of a reference: the slot, and the bits from the address on that are used.
+    Through(u32, u64),
 }
 
 impl Compiler<'_> {
     /// Where an elementary value is.
     pub(super) fn location(&mut self, place: &Place, of: Elementary) -> Location {
+        if place.is_by_reference()
+            && place.indices.is_empty()
+            && (place.offset, place.bit) == (0, 0)
+        {
+            return Location::Through(self.reference(place.root), place.reach());
+        }
         let Some(slot) = self.slot(place.root, place.offset) else {
             return Location::Address(self.address(place));
         };
@@ -55,7 +63,7 @@ impl Compiler<'_> {
 
     /// The operand of a slot; `None` where only an address leads to it.
     fn slot(&self, root: Root, offset: u32) -> Option<u32> {
-        match (root, self.own) {
+        match (root, self.context.own) {
             (Root::Global(slot), _) => Some(slot + offset),
             (Root::Frame(slot), _) => Some(self.program.state + slot + offset),
             (Root::Own(slot), Own::At(own)) => Some(own + slot + offset),
@@ -84,18 +92,12 @@ impl Compiler<'_> {
     /// A slot with the address of a place.
     pub(super) fn address(&mut self, place: &Place) -> u32 {
         let within = 64 * u64::from(place.offset) + u64::from(place.bit);
-        let mut address = match (place.root, self.own) {
-            (Root::OwnReference(slot) | Root::FrameReference(slot), _) => {
-                let root = match place.root {
-                    Root::OwnReference(_) => Root::Own(slot),
-                    _ => Root::Frame(slot),
-                };
-                let holder = Place::new(root, Type::Elementary(Elementary::Lword));
-                let holder = self.location(&holder, Elementary::Lword);
+        let mut address = match (place.root, self.context.own) {
+            (Root::OwnReference(_) | Root::FrameReference(_), _) => {
+                let holder = self.reference(place.root);
                 let address = self.temporary();
-                self.load(holder, Elementary::Lword, address);
                 let reach = self.constant(place.reach());
-                self.emit(Code::Reference, address, address, reach);
+                self.emit(Code::Reference, address, holder, reach);
                 self.moved(address, within)
             }
             (Root::Own(slot), Own::Address(own)) => self.moved(own, 64 * u64::from(slot) + within),
@@ -132,6 +134,25 @@ impl Compiler<'_> {
         address
     }
 
+    /// The operand with the address that a reference holds.
+    fn reference(&mut self, root: Root) -> u32 {
+        let root = match root {
+            Root::OwnReference(slot) => Root::Own(slot),
+            Root::FrameReference(slot) => Root::Frame(slot),
+            other => other,
+        };
+        match self.slot(root, 0) {
+            Some(slot) => slot,
+            None => {
+                let holder = Place::new(root, Type::Elementary(Elementary::Lword));
+                let address = self.address(&holder);
+                let held = self.temporary();
+                self.load(Location::Address(address), Elementary::Lword, held);
+                held
+            }
+        }
+    }
+
     /// A slot with an address so many bits further.
     fn moved(&mut self, address: u32, bits: u64) -> u32 {
         if bits == 0 {
@@ -149,12 +170,16 @@ impl Compiler<'_> {
             Location::Slot(slot) => self.emit(Code::Move, to, slot, 0),
             Location::Bits(slot, bit) => {
                 let mask = self.constant(of.mask());
-                self.emit_with(Code::LoadBits, bit as u16, to, slot, mask);
+                self.emit_with(Code::Extract, bit as u8, to, slot, mask);
             }
             Location::Word(table, index) => self.emit(Code::LoadWord, to, index, table),
             Location::Packed(table, index) => self.emit(Code::LoadPacked, to, index, table),
             Location::Address(address) => {
-                self.emit_with(Code::LoadAt, of.bits() as u16, to, address, 0);
+                self.emit_with(Code::LoadAt, of.bits() as u8, to, address, 0);
+            }
+            Location::Through(holder, reach) => {
+                let reach = self.constant(reach);
+                self.emit_with(Code::LoadThrough, of.bits() as u8, to, holder, reach);
             }
         }
     }
@@ -165,12 +190,16 @@ impl Compiler<'_> {
             Location::Slot(slot) => self.emit(Code::Move, slot, value, 0),
             Location::Bits(slot, bit) => {
                 let mask = self.constant(of.mask());
-                self.emit_with(Code::StoreBits, bit as u16, slot, value, mask);
+                self.emit_with(Code::StoreBits, bit as u8, slot, value, mask);
             }
             Location::Word(table, index) => self.emit(Code::StoreWord, value, index, table),
             Location::Packed(table, index) => self.emit(Code::StorePacked, value, index, table),
             Location::Address(address) => {
-                self.emit_with(Code::StoreAt, of.bits() as u16, value, address, 0);
+                self.emit_with(Code::StoreAt, of.bits() as u8, value, address, 0);
+            }
+            Location::Through(holder, reach) => {
+                let reach = self.constant(reach);
+                self.emit_with(Code::StoreThrough, of.bits() as u8, value, holder, reach);
             }
         }
     }

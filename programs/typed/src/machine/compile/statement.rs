@@ -10,7 +10,7 @@ use crate::types::{Elementary, Type};
 impl Compiler<'_> {
     pub(super) fn statements(&mut self, statements: &[Statement]) {
         for statement in statements {
-            self.line = statement.line;
+            self.context.line = statement.line;
             self.scope(|compiler| compiler.statement(statement));
         }
     }
@@ -31,10 +31,13 @@ impl Compiler<'_> {
             StatementKind::Invoke(routine, place) => self.invoke(*routine, place),
             StatementKind::Evaluate(expression) => self.evaluate(expression),
             StatementKind::If(branches, otherwise) => {
+                if self.assign_if(branches, otherwise).is_some() {
+                    return;
+                }
                 let end = self.label();
                 for branch in branches {
                     let next = self.label();
-                    self.line = statement.line;
+                    self.context.line = statement.line;
                     self.scope(|compiler| compiler.condition(&branch.condition, next, false));
                     self.statements(&branch.body);
                     self.jump(Code::Jump, 0, 0, end);
@@ -54,7 +57,7 @@ impl Compiler<'_> {
                 self.charge(&statement.kind);
                 self.body(body, next, end);
                 self.place_label(next);
-                self.line = statement.line;
+                self.context.line = statement.line;
                 self.scope(|compiler| compiler.condition(condition, turn, true));
                 self.place_label(end);
             }
@@ -64,7 +67,7 @@ impl Compiler<'_> {
                 self.charge(&statement.kind);
                 self.body(body, next, end);
                 self.place_label(next);
-                self.line = statement.line;
+                self.context.line = statement.line;
                 self.scope(|compiler| compiler.condition(condition, turn, false));
                 self.place_label(end);
             }
@@ -76,7 +79,10 @@ impl Compiler<'_> {
                 let (next, _) = *self.loops.last().expect("CONTINUE is in a loop");
                 self.jump(Code::Jump, 0, 0, next);
             }
-            StatementKind::Return => self.emit(Code::Return, 0, 0, 0),
+            StatementKind::Return => match self.context.end {
+                Some(end) => self.jump(Code::Jump, 0, 0, end),
+                None => self.emit(Code::Return, 0, 0, 0),
+            },
         }
     }
 
@@ -177,9 +183,10 @@ impl Compiler<'_> {
 
     fn repeat_for(&mut self, statement: &Statement, each: &For) {
         let of = each.counter.of.elementary().unwrap_or(Elementary::Lint);
-        let counter = match each.counter.indices.is_empty() {
+        let is_plain = each.counter.indices.is_empty() && !each.counter.is_by_reference();
+        let counter = match is_plain {
             true => self.location(&each.counter, of),
-            false => Location::Address(self.address(&each.counter)),
+            _ => Location::Address(self.address(&each.counter)),
         };
         // The counter's own slot, or a copy of what lies elsewhere.
         let slot = match counter {
@@ -194,12 +201,13 @@ impl Compiler<'_> {
         let limit = self.kept(limit);
         let by = self.operand(&each.by);
         let by = self.kept(by);
+        let charge = self.costs.turn(&statement.kind).unwrap_or(0);
         self.tables.loops.push(Loop {
             of,
             counter: slot,
             limit,
             by,
-            turn: self.costs.turn(&statement.kind).unwrap_or(0),
+            turn: charge,
         });
         let table = self.tables.loops.len() as u32 - 1;
         let (turn, next, end) = (self.label(), self.label(), self.label());
@@ -211,9 +219,16 @@ impl Compiler<'_> {
         self.put_back(counter, of, slot);
         self.body(&each.body, next, end);
         self.place_label(next);
-        self.line = statement.line;
+        self.context.line = statement.line;
         self.fetch(counter, of, slot);
-        self.jump(self.step(each, of), table, 0, turn);
+        match next_by_one(each, of) {
+            Some(code) => {
+                self.jump(code, slot, limit, turn);
+                let charge = self.constant(charge);
+                self.emit(Code::Data, charge, 0, 0);
+            }
+            None => self.jump(Code::Step, table, 0, turn),
+        }
         self.put_back(counter, of, slot);
         self.place_label(end);
     }
@@ -230,18 +245,15 @@ impl Compiler<'_> {
             self.load(counter, of, slot);
         }
     }
+}
 
-    /// The instruction for the step of a loop.
-    fn step(&self, each: &For, of: Elementary) -> Code {
-        let is_up = match each.by.kind {
-            ExpressionKind::Constant(by) => of.signed(by) > 0,
-            _ => false,
-        };
-        match (is_up && of.is_signed(), of.bits()) {
-            (true, 16) => Code::StepS16,
-            (true, 32) => Code::StepS32,
-            (true, 64) => Code::StepS64,
-            _ => Code::Step,
-        }
+/// The instruction for the step of a loop by 1.
+fn next_by_one(each: &For, of: Elementary) -> Option<Code> {
+    let is_one = matches!(each.by.kind, ExpressionKind::Constant(1));
+    match (is_one && of.is_signed(), of.bits()) {
+        (true, 16) => Some(Code::Next16),
+        (true, 32) => Some(Code::Next32),
+        (true, 64) => Some(Code::Next64),
+        _ => None,
     }
 }
