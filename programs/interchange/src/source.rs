@@ -75,12 +75,15 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
     let parsed = plcopen::read_typed(text);
     let mut found = source(whole(text, parsed, wanted.program, wanted.period));
     found.period = period.or(found.period);
-    // Of two readings of a document that both have errors, the one with fewer is nearer to what was meant.
+    // Of two readings of a document that both have errors, the one with fewer is nearer to what was meant; a ladder has no circles, no library
+    // and no document of the first edition.
     let errors = |found: &[Diagnostic]| {
         let errors = found.iter();
         errors.filter(|it| it.severity == Severity::Error).count()
     };
-    if found.source.is_none() && errors(&diagnostics) <= errors(&found.diagnostics) {
+    let is_other = |found: &Diagnostic| ["U1001", "U1006", "U1013"].contains(&found.code);
+    let is_ladder = !diagnostics.iter().any(is_other);
+    if found.source.is_none() && is_ladder && errors(&diagnostics) <= errors(&found.diagnostics) {
         return SourceFile {
             diagnostics,
             ..found

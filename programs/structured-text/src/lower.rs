@@ -140,6 +140,8 @@ struct Lowering<'a> {
     global_declarations: HashMap<String, &'a crate::syntax::Declaration>,
     /// Variables at addresses.
     addresses: HashMap<String, Symbol>,
+    /// What of the memory they take.
+    extents: Vec<addresses::Extent>,
     constants: HashMap<(Option<Owner>, String), ConstantState>,
     routines: HashMap<Key, Rc<Routine>>,
     /// Bodies that are still to be lowered.
@@ -196,6 +198,7 @@ impl<'a> Lowering<'a> {
             globals: HashMap::new(),
             global_declarations: HashMap::new(),
             addresses: HashMap::new(),
+            extents: Vec::new(),
             constants: HashMap::new(),
             routines: HashMap::new(),
             queue: Vec::new(),

@@ -1,6 +1,6 @@
 //! The inputs of standard functions, by place and by name.
 
-use super::{comparison, operator};
+use super::{comparison, operator, pointed_inputs};
 use crate::lower::Lowering;
 use crate::syntax::{self, Argument, Span};
 
@@ -101,6 +101,8 @@ fn inputs(key: &str) -> (&'static [&'static str], usize, bool) {
         "UPPER_BOUND" | "LOWER_BOUND" => (&["ARR", "DIM"], 2, false),
         "CONCAT_DATE_TOD" | "CONCAT_DATE_LTOD" => (&["IN1", "IN2"], 2, false),
         "TIME" | "LTIME" => (&[], 0, false),
+        _ if pointed_inputs(key) == Some(3) => (&["IN", "AT", "OF"], 3, false),
+        _ if pointed_inputs(key) == Some(4) => (&["IN", "AT", "OF", "BY"], 4, false),
         _ => (&["IN"], 1, false),
     }
 }
