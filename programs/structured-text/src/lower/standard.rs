@@ -8,6 +8,7 @@ mod reals;
 mod selection;
 mod texts;
 mod times;
+mod typed;
 
 use understudy_typed::{Comparison, Elementary, Expression, Operation, RealFunction, Type};
 
@@ -119,6 +120,8 @@ pub(super) const NAMES: [&str; 92] = [
 /// Whether a name in capitals is that of a standard function.
 pub(super) fn is_standard(key: &str) -> bool {
     NAMES.contains(&key)
+        || typed::of(key).is_some()
+        || typed::marked(key).is_some()
         || pointed_inputs(key).is_some()
         || conversions::Conversion::of(key).is_some()
 }
@@ -188,7 +191,10 @@ impl Lowering<'_> {
         let Some(values) = self.values(key, arguments, span) else {
             return Operand::Faulty;
         };
-        let operand = self.standard_value(key, &values.of, hint, span);
+        let operand = match typed::of(key) {
+            Some(typed) => self.typed_function(&typed, &values.of, span),
+            None => self.standard_value(key, &values.of, hint, span),
+        };
         if values.enable.is_none() {
             return operand;
         }
@@ -205,6 +211,10 @@ impl Lowering<'_> {
         hint: Option<&Type>,
         span: &Span,
     ) -> Operand {
+        if let Some(of) = typed::marked(key) {
+            let value = self.expression(values[0], &Type::Elementary(of));
+            return value.map_or(Operand::Faulty, Operand::Typed);
+        }
         if let Some((operator, _)) = operator(key) {
             return self.operator_call(operator, values, hint);
         }

@@ -81,6 +81,9 @@ impl Lowering<'_> {
 
 /// The names of a function's inputs, how many it needs, and whether it takes more.
 fn inputs(key: &str) -> (&'static [&'static str], usize, bool) {
+    if let Some(typed) = super::typed::of(key) {
+        return inputs(typed.function);
+    }
     match key {
         _ if operator(key).is_some_and(|(_, extensible)| extensible) => (&["IN1", "IN2"], 1, true),
         _ if operator(key).is_some() => (&["IN1", "IN2"], 2, false),
@@ -109,7 +112,18 @@ fn inputs(key: &str) -> (&'static [&'static str], usize, bool) {
 
 /// The place of an input by its name.
 fn input(name: &str, names: &[&str], extensible: bool) -> Option<usize> {
-    if let Some(at) = names.iter().position(|known| *known == name) {
+    // TwinCAT and CODESYS have names of their own.
+    let codesys = |known: &str| match (names.len(), known) {
+        (1..=3, "IN") => name == "STR",
+        (2.., "IN1") => name == "STR1",
+        (2.., "IN2") => name == "STR2",
+        (2, "L") => name == "SIZE",
+        (3, "L") => name == "LEN",
+        (3.., "P") => name == "POS",
+        _ => false,
+    };
+    let is_it = |known: &&str| **known == *name || codesys(known);
+    if let Some(at) = names.iter().position(is_it) {
         return Some(at);
     }
     if names == ["IN"] {
