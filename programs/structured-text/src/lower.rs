@@ -11,6 +11,7 @@ mod body;
 mod callees;
 mod calls;
 mod chains;
+mod connections;
 mod constants;
 mod convert;
 mod expand;

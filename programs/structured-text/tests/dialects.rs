@@ -282,3 +282,58 @@ fn results_of_lists_go_on_behind_labels() {
         &["U1017", "no result yet"],
     );
 }
+
+#[test]
+fn a_value_behind_a_named_one_is_for_the_input_at_its_place() {
+    check(
+        "FUNCTION LESS : INT VAR_INPUT a, b : INT; END_VAR LESS := a - b; END_FUNCTION
+         PROGRAM main VAR_OUTPUT x : INT; y : INT; END_VAR VAR s : T_MaxString := 'a.b'; END_VAR
+           x := LESS(a := 7, 2); y := FIND(STR1 := s, '.');
+         END_PROGRAM",
+        &[(&[], "5 2")],
+    );
+    refused(
+        "FUNCTION LESS : INT VAR_INPUT a, b : INT; END_VAR LESS := a - b; END_FUNCTION
+         PROGRAM main VAR x : INT; END_VAR x := LESS(b := 7, 2); END_PROGRAM",
+        &["U1049", "given twice"],
+    );
+    refused(
+        "PROGRAM main VAR p : PYTHON_EVAL; END_VAR END_PROGRAM",
+        &["U1040", "PYTHON_EVAL is not supported"],
+    );
+}
+
+#[test]
+fn an_event_runs_a_task() {
+    let text = |task: &str| {
+        format!(
+            "PROGRAM counting VAR_EXTERNAL n : INT; END_VAR n := n + 1; END_PROGRAM
+             PROGRAM main VAR_INPUT go : BOOL; END_VAR VAR_OUTPUT y : INT; END_VAR VAR_EXTERNAL begin : BOOL; n : INT; END_VAR
+               begin := go; y := n;
+             END_PROGRAM
+             CONFIGURATION c VAR_GLOBAL begin : BOOL; n : INT; END_VAR
+               RESOURCE r ON plc
+                 TASK event({task}PRIORITY := 1); TASK cyclic(INTERVAL := T#10ms, PRIORITY := 0);
+                 PROGRAM p WITH event : counting; PROGRAM q WITH cyclic : main;
+               END_RESOURCE
+             END_CONFIGURATION"
+        )
+    };
+    check(
+        &text("SINGLE := begin, "),
+        &[
+            (&[0], "0"),
+            (&[1], "0"),
+            (&[1], "1"),
+            (&[1], "1"),
+            (&[0], "1"),
+            (&[1], "1"),
+            (&[0], "2"),
+        ],
+    );
+    refused(
+        &text("SINGLE := begin, INTERVAL := T#20ms, "),
+        &["U1084", "has an INTERVAL and an event"],
+    );
+    refused(&text("SINGLE := unknown, "), &["U1041", "unknown"]);
+}

@@ -67,7 +67,11 @@ impl Lowering<'_> {
                     }
                 }
                 Argument::Given(input, value) => match find(input) {
-                    Some(at) if inputs(parameters[at].class) => bound.given.push((at, value)),
+                    Some(at) if inputs(parameters[at].class) => {
+                        // A value behind it is for the input at its own place in the call.
+                        placed += 1;
+                        bound.given.push((at, value));
+                    }
                     Some(_) => {
                         let message = format!("`{input}` is an output of `{name}`");
                         let help = format!("write `{input} => variable`");

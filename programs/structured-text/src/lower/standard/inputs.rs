@@ -33,7 +33,10 @@ impl Lowering<'_> {
                     continue;
                 }
                 Argument::Given(name, value) => match input(&name.key(), names, extensible) {
-                    Some(at) => (at, value),
+                    Some(at) => {
+                        placed += 1;
+                        (at, value)
+                    }
                     None => {
                         let message = format!("{key} has no input `{name}`");
                         let help = format!("its inputs: {}", names.join(", "));
