@@ -88,8 +88,8 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
     }
     let mut found = source(read);
     found.period = period.or(found.period);
-    // Of two readings of a document that both have errors, the one with fewer is nearer to what was meant; a ladder has no circles, no library
-    // and no document of the first edition.
+    // Of two readings of a document that both have errors, the one with fewer is nearer to what was meant; a ladder has
+    // no circles, no library and no document of the first edition.
     let errors = |found: &[Diagnostic]| {
         let errors = found.iter();
         errors.filter(|it| it.severity == Severity::Error).count()

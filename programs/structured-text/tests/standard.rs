@@ -45,7 +45,7 @@ fn every_conversion_is_there() {
             let variables = format!("a : {from}; b : {to};");
             for body in [
                 format!("b := {from}_TRUNC_{to}(a);"),
-                format!("b := TRUNC(a);"),
+                "b := TRUNC(a);".to_owned(),
                 format!("b := TRUNC_{to}(a);"),
             ] {
                 table += &wrong(&variables, &body);

@@ -1,6 +1,7 @@
 //! Files of all forms that other people wrote: each is taken whole, or refused with the reason.
 //!
-//! `UNDERSTUDY_SURVEY=FOLDER cargo test -p understudy-interchange --test people -- --nocapture` prints the same table of any folder.
+//! `UNDERSTUDY_SURVEY=FOLDER cargo test -p understudy-interchange --test people -- --nocapture` prints the same table
+//! of any folder.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -170,7 +171,7 @@ const EDITORS: [(&str, &str); 6] = [
     ),
 ];
 
-/// Of the 69 files of iec-checker and ironplc those that are refused: most are no legal program by themselves, on purpose.
+/// Of the 69 files of iec-checker and ironplc those that are refused: almost all are not legal by themselves, on purpose.
 const COMPILERS: [(&str, &str); 33] = [
     ("array-use", "`gvl` is not declared"),
     ("comments-86b512", "undeclared variables"),

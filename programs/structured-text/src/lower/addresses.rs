@@ -14,8 +14,8 @@ use super::types::Resolved;
 /// Points that one variable may have.
 const MAXIMUM_POINTS: usize = 1_000;
 
-/// What of a memory a variable at an address takes, counted in two ways: by the size in the address, as CODESYS counts, and by bytes, as
-/// Siemens counts.
+/// The part of the memory that a variable at an address takes, counted in two ways: by the size in the address, as
+/// CODESYS counts, and by bytes, as Siemens counts.
 #[derive(Clone)]
 pub(super) struct Extent {
     name: String,
@@ -161,7 +161,8 @@ impl Lowering<'_> {
         })))
     }
 
-    /// The points of a variable: itself, or the parts of a structure and the elements of arrays of structures. Whether all of it has one.
+    /// The points of a variable: itself, or the parts of a structure and the elements of arrays of structures. Whether
+    /// all of it has one.
     fn points_of(
         &self,
         of: &Type,

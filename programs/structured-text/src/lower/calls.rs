@@ -335,7 +335,7 @@ impl Lowering<'_> {
         self.permitted(value, enable)
     }
 
-    /// The standard function that is meant where a function of the file has its name, and not the inputs that are given.
+    /// The standard function that is meant where a function of the file has its name, and not the given inputs.
     fn overloaded(
         &mut self,
         callee: &Callee,

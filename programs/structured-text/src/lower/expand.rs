@@ -1,4 +1,5 @@
-//! What is written as plain Structured Text before anything is lowered: charts, instruction lists, pointers into one variable.
+//! What is written as plain Structured Text before anything is lowered: charts, instruction lists, pointers into one
+//! variable.
 
 mod charts;
 mod instructions;

@@ -6,8 +6,8 @@ use understudy_text::Diagnostic;
 
 use super::Typed;
 
-/// Blocks that have no effect on what a program does: their words, their declaration, and what is said. Python has no outputs here, so
-/// a program that reads its answer is refused.
+/// Blocks that have no effect on what a program does: their names, their declaration, and the warning. Python has no
+/// outputs here, so a program that reads its answer is refused.
 const BLOCKS: [(&[&str], &str, &str); 3] = [
     (
         &["LOGGER", "LOGLEVEL"],

@@ -8,8 +8,8 @@
 //! ST   y          y := a AND (b OR NOT c);
 //! ```
 //!
-//! A list with labels becomes a loop over a CASE whose cases are the parts between labels; where the part behind a label uses the result, every
-//! way to the label stores it.
+//! A list with labels becomes a loop over a CASE whose cases are the parts between labels; where the part behind a
+//! label uses the result, every way to the label stores it.
 
 mod carried;
 

@@ -1,5 +1,5 @@
-//! Pointers that need none: one that only ever points into one variable is a distance from its start, and one that is an input and is only
-//! followed is a VAR_IN_OUT. Any other pointer stays, and is refused where it is declared.
+//! Pointers that need no address: one that only ever points into one variable is a distance from its start, and one
+//! that is an input and is only followed is a VAR_IN_OUT. Any other pointer stays, and is refused at its declaration.
 //!
 //! ```text
 //! pt := ADR(name) + 2;    pt := 0 + 2;

@@ -17,7 +17,7 @@ const FUNCTIONS: [&str; 37] = [
 /// Functions that are there for times as well: ADD_TIME and its like are functions of their own.
 const OF_TIMES: [&str; 6] = ["MOVE", "SEL", "MUX", "MAX", "MIN", "LIMIT"];
 
-/// What stands in front of the name of a type in the function that gives a value that type. With a dot, no person writes it.
+/// Start of the name of the function that gives a value a type. It has a dot, so no program can call it.
 const MARK: &str = "TYPED.";
 
 /// A function for one type.

@@ -1,4 +1,4 @@
-//! Results that go on behind a label: every way to it stores its result in one variable.
+//! Results that continue behind a label: every way to it stores its result in one variable.
 
 use std::collections::HashMap;
 
@@ -85,7 +85,8 @@ impl Writer<'_> {
             ExpressionKind::Literal(Literal::Integer { of: None, .. })
         );
         if of.is_none() && !is_open {
-            let message = format!("the type of the result that goes on at `{label}` is not known");
+            let message =
+                format!("the type of the result that continues at `{label}` is not known");
             let found = Diagnostic::error("U1017", message, span.clone());
             let help = "store it in a variable, and load that behind the label";
             self.diagnostics.push(found.with_help(help));
@@ -96,7 +97,7 @@ impl Writer<'_> {
         {
             let known = variable.of.get_or_insert_with(|| of.clone());
             if !is_same(known, &of) {
-                let message = format!("results of different types go on at `{label}`");
+                let message = format!("results of different types continue at `{label}`");
                 let found = Diagnostic::error("U1017", message, span.clone());
                 let help = "convert one of them, such as with INT_TO_REAL";
                 self.diagnostics.push(found.with_help(help));
