@@ -64,7 +64,8 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
         diagnostics,
         ..
     } = read(format, name, text, wanted.program);
-    if program.is_some() || format != Format::PlcOpen {
+    let are_several = wanted.program.is_none() && text.matches("<pouInstance").nth(1).is_some();
+    if program.is_some() && !are_several || format != Format::PlcOpen {
         return SourceFile {
             source: program.map(Source::Ladder),
             period,
@@ -73,14 +74,29 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
     }
     // What no ladder can hold may be a program with numbers, or a library.
     let parsed = plcopen::read_typed(text);
-    let mut found = source(whole(text, parsed, wanted.program, wanted.period));
+    let read = whole(text, parsed, wanted.program, wanted.period);
+    let runs_several = read
+        .typed
+        .as_ref()
+        .is_some_and(|typed| typed.tasks.len() > 1);
+    if program.is_some() && !runs_several {
+        return SourceFile {
+            source: program.map(Source::Ladder),
+            period,
+            diagnostics,
+        };
+    }
+    let mut found = source(read);
     found.period = period.or(found.period);
-    // Of two readings of a document that both have errors, the one with fewer is nearer to what was meant.
+    // Of two readings of a document that both have errors, the one with fewer is nearer to what was meant; a ladder has
+    // no circles, no library and no document of the first edition.
     let errors = |found: &[Diagnostic]| {
         let errors = found.iter();
         errors.filter(|it| it.severity == Severity::Error).count()
     };
-    if found.source.is_none() && errors(&diagnostics) <= errors(&found.diagnostics) {
+    let is_other = |found: &Diagnostic| ["U1001", "U1006", "U1013"].contains(&found.code);
+    let is_ladder = !diagnostics.iter().any(is_other);
+    if found.source.is_none() && is_ladder && errors(&diagnostics) <= errors(&found.diagnostics) {
         return SourceFile {
             diagnostics,
             ..found

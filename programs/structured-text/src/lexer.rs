@@ -106,6 +106,13 @@ const CONDITIONS: [&str; 8] = [
     "if", "elsif", "else", "end_if", "define", "undefine", "#if", "#ifdef",
 ];
 
+/// Whether a pragma is C code, which matiec copies into its own.
+fn is_foreign_code(content: &str) -> bool {
+    content.contains("__SET_VAR")
+        || content.contains("__GET_VAR")
+        || content.trim_end().ends_with(';')
+}
+
 /// All lexemes of `text`, and what was wrong.
 pub(crate) fn lex(text: &str) -> Lexemes<'_> {
     let mut lexer = Lexer {
@@ -134,6 +141,23 @@ pub(crate) fn lex(text: &str) -> Lexemes<'_> {
         if character.is_whitespace() || character == '\u{feff}' {
             line_broken |= character == '\n';
             lexer.place += character.len_utf8();
+        } else if let Some(name) = lexer.current_time() {
+            let start = lexer.place - name.within.len();
+            let words = [
+                Lexeme::Word(name.variable),
+                Lexeme::Sign(":="),
+                Lexeme::Word("TIME"),
+            ];
+            let signs = ["(", ")", ";"].map(Lexeme::Sign);
+            for lexeme in words.into_iter().chain(signs) {
+                placed.push(Placed {
+                    lexeme,
+                    span: start..lexer.place,
+                    within: start..lexer.place,
+                    starts_line: std::mem::take(&mut line_broken),
+                    comments: boxed(&mut above),
+                });
+            }
         } else if let Some(comment) = lexer.comment().or_else(|| lexer.region()) {
             match placed.last_mut().filter(|_| !line_broken) {
                 Some(last) if comment.is_some() => {
@@ -170,6 +194,12 @@ pub(crate) fn lex(text: &str) -> Lexemes<'_> {
         has_local_marks: lexer.has_local_marks,
         diagnostics: lexer.diagnostics,
     }
+}
+
+/// The pragma by which the standard blocks of matiec read the time.
+struct CurrentTime<'a> {
+    within: &'a str,
+    variable: &'a str,
 }
 
 fn boxed(above: &mut Vec<String>) -> Option<Box<Comments>> {
@@ -220,12 +250,34 @@ impl<'a> Lexer<'a> {
             .push(Diagnostic::warning("U1055", message, span));
     }
 
+    /// `{__SET_VAR(data__->,CURRENT_TIME,,__CURRENT_TIME)}`, which is `CURRENT_TIME := TIME();`.
+    fn current_time(&mut self) -> Option<CurrentTime<'a>> {
+        let rest = self.rest();
+        let content = rest.strip_prefix("{__SET_VAR(data__->,")?;
+        let length = content.find(|next: char| !next.is_ascii_alphanumeric() && next != '_')?;
+        let (variable, behind) = content.split_at(length);
+        let behind = behind.strip_prefix(",,__CURRENT_TIME)")?;
+        let behind = behind
+            .strip_prefix(';')
+            .unwrap_or(behind)
+            .strip_prefix('}')?;
+        let within = &rest[..rest.len() - behind.len()];
+        self.place += within.len();
+        Some(CurrentTime { within, variable })
+    }
+
     /// Takes a comment or a pragma; the inner option is what it says, if anything.
     fn comment(&mut self) -> Option<Option<String>> {
         let rest = self.rest();
-        let (opening, closing) = [("(*", "*)"), ("/*", "*/"), ("//", "\n"), ("{", "}")]
-            .into_iter()
-            .find(|(opening, _)| rest.starts_with(opening))?;
+        let (opening, closing) = [
+            ("(*", "*)"),
+            ("/*", "*/"),
+            ("//", "\n"),
+            ("{{", "}}"),
+            ("{", "}"),
+        ]
+        .into_iter()
+        .find(|(opening, _)| rest.starts_with(opening))?;
         let start = self.place;
         let content = &rest[opening.len()..];
         let length = match self.comment_length(content, opening, closing) {
@@ -233,7 +285,10 @@ impl<'a> Lexer<'a> {
             None if closing == "\n" => content.len(),
             None => {
                 self.place = start + opening.len();
-                let what = if opening == "{" { "pragma" } else { "comment" };
+                let what = match opening {
+                    "{" | "{{" => "pragma",
+                    _ => "comment",
+                };
                 let message = format!("a {what} that `{opening}` opens does not end");
                 self.error("U1031", message, start);
                 self.place = self.text.len();
@@ -244,6 +299,10 @@ impl<'a> Lexer<'a> {
         let closing_length = if closing == "\n" { 0 } else { closing.len() };
         self.place += opening.len() + length + closing_length;
         let content = &content[..length];
+        if opening == "{{" || opening == "{" && is_foreign_code(content) {
+            self.foreign_code(content, start);
+            return Some(None);
+        }
         if opening == "{" {
             self.pragma(content, start);
             return Some(None);
@@ -290,6 +349,20 @@ impl<'a> Lexer<'a> {
         }
         self.nests = false;
         Some(first)
+    }
+
+    /// C code of Beremiz and matiec: what can write a variable is refused, since nothing executes it here.
+    fn foreign_code(&mut self, content: &str, start: usize) {
+        let writes = ["SET", "Set", "data__", "&"];
+        if writes.iter().any(|word| content.contains(word)) {
+            let message = "C code that can write variables is not supported";
+            let found = Diagnostic::error("U1040", message, start..self.place);
+            let help = "write it in Structured Text, or do it outside of the program";
+            self.diagnostics.push(found.with_help(help));
+            return;
+        }
+        let message = "this C code is not executed; it writes no variable of the program";
+        self.warn(message.to_owned(), start);
     }
 
     /// Reads past a pragma where that changes nothing.

@@ -11,6 +11,7 @@ mod body;
 mod callees;
 mod calls;
 mod chains;
+mod connections;
 mod constants;
 mod convert;
 mod expand;
@@ -140,6 +141,8 @@ struct Lowering<'a> {
     global_declarations: HashMap<String, &'a crate::syntax::Declaration>,
     /// Variables at addresses.
     addresses: HashMap<String, Symbol>,
+    /// What of the memory they take.
+    extents: Vec<addresses::Extent>,
     constants: HashMap<(Option<Owner>, String), ConstantState>,
     routines: HashMap<Key, Rc<Routine>>,
     /// Bodies that are still to be lowered.
@@ -196,6 +199,7 @@ impl<'a> Lowering<'a> {
             globals: HashMap::new(),
             global_declarations: HashMap::new(),
             addresses: HashMap::new(),
+            extents: Vec::new(),
             constants: HashMap::new(),
             routines: HashMap::new(),
             queue: Vec::new(),

@@ -8,11 +8,10 @@ use understudy_structured_text::parse;
 use understudy_text::{Lines, Severity};
 
 /// Files that have an error on purpose or by what they are, and why.
-const REFUSED: [(&str, &str); 4] = [
+const REFUSED: [(&str, &str); 3] = [
     ("binary_file-", "no text"),
     ("strings-", "a text of another encoding, read as UTF-8"),
     ("references-", "assignments of references"),
-    ("pointer_to_rendered-", "the address of a variable"),
 ];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {

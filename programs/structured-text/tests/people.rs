@@ -11,7 +11,7 @@ use understudy_text::{Severity, decode};
 use understudy_typed::Program;
 
 /// Files that are taken whole today; the number may rise, and not fall.
-const TAKEN: usize = 77;
+const TAKEN: usize = 78;
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();

@@ -296,3 +296,62 @@ fn both_readers_agree_scan_by_scan() {
     }
     assert!(compared >= 1, "{compared} documents compared");
 }
+
+#[test]
+fn all_programs_of_the_tasks_run() {
+    let unit = |name: &str, variables: &str, body: &str| {
+        format!(
+            r#"<pou name="{name}" pouType="program"><interface><localVars>{variables}</localVars></interface><body><ST><p>{body}</p></ST></body></pou>"#
+        )
+    };
+    let bool = |name, address| variable(name, address, "BOOL");
+    let first = unit(
+        "first",
+        &(bool("a", "%IX0.0") + &bool("y", "%QX0.0")),
+        "y := a;",
+    );
+    let second = unit(
+        "second",
+        &(bool("b", "%IX0.1") + &bool("z", "%QX0.1")),
+        "z := NOT b;",
+    );
+    let text = format!(
+        r#"<project xmlns="http://www.plcopen.org/xml/tc6_0201"><types><dataTypes/><pous>{first}{second}</pous></types>
+<instances><configurations><configuration name="c"><resource name="r"><task name="t" priority="0" interval="T#20ms">
+<pouInstance name="i" typeName="first"/><pouInstance name="j" typeName="second"/></task></resource></configuration></configurations></instances></project>"#
+    );
+    let read = understudy_interchange::read_source("two.xml", &text, Default::default());
+    let Some(understudy_interchange::Source::Typed(program)) = read.source else {
+        panic!("{:#?}", read.diagnostics);
+    };
+    assert_eq!(program.tasks.len(), 2);
+    let mut scans = Scans::new((*program).clone());
+    assert_eq!(scans.scan(&[1, 0]), [1, 1]);
+    assert_eq!(scans.scan(&[0, 1]), [0, 0]);
+    let wanted = understudy_interchange::Wanted {
+        program: Some("second"),
+        period: None,
+    };
+    let read = understudy_interchange::read_source("two.xml", &text, wanted);
+    assert!(matches!(
+        read.source,
+        Some(understudy_interchange::Source::Ladder(ladder)) if ladder.name.as_str() == "second"
+    ));
+}
+
+#[test]
+fn python_whose_answer_nothing_reads_has_no_effect() {
+    let declared = r#"<variable name="poll"><type><derived name="python_poll"/></type></variable>"#;
+    let variables = variable("n", "%QW0", "INT") + declared;
+    let body = |more: &str| {
+        format!("<ST><p>poll(TRIG := TRUE, CODE := 'f()'); n := n + 1; {more}</p></ST>")
+    };
+    let text = document(&variables, &body(""));
+    assert_eq!(run(&text, &[&[], &[]]), [[1], [2]]);
+    let answered = document(&variables, &body("IF poll.ACK THEN n := 0; END_IF;"));
+    let found = typed(&answered, PERIOD).expect_err("an answer that nothing gives");
+    assert!(
+        found.iter().any(|found| found.message.contains("ACK")),
+        "{found:#?}"
+    );
+}

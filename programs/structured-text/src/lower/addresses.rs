@@ -4,12 +4,70 @@ use std::rc::Rc;
 
 use understudy_typed::{Elementary, Root, Type};
 
-use crate::syntax::{Class, Declaration, Name};
+use crate::syntax::{Class, Declaration, Name, Span};
 
 use super::Lowering;
 use super::images::initial;
 use super::names::{Symbol, Variable};
 use super::types::Resolved;
+
+/// Points that one variable may have.
+const MAXIMUM_POINTS: usize = 1_000;
+
+/// The part of the memory that a variable at an address takes, counted in two ways: by the size in the address, as
+/// CODESYS counts, and by bytes, as Siemens counts.
+#[derive(Clone)]
+pub(super) struct Extent {
+    name: String,
+    span: Span,
+    /// The levels in front of the last one, which tell modules apart.
+    levels: Vec<u64>,
+    bits: u64,
+    ranges: [(u64, u64); 2],
+}
+
+impl Extent {
+    /// `%MW3` for a variable of so many bytes; none for what is not in the memory, or has no complete address.
+    fn of(name: &Name, address: &Name, bytes: Option<u64>) -> Option<Self> {
+        let key = normal(address.as_str());
+        let numbers = key.strip_prefix("%M")?.get(1..)?;
+        let numbers: Result<Vec<u64>, _> = numbers.split('.').map(str::parse).collect();
+        let mut levels = numbers.ok()?;
+        let last = levels.pop()?;
+        let bits = match key.chars().nth(2)? {
+            'B' => 8,
+            'W' => 16,
+            'D' => 32,
+            'L' => 64,
+            _ => 1,
+        };
+        let length = bytes.map_or(bits, |bytes| bits.max(bytes.saturating_mul(8)));
+        let starts = match bits {
+            // A bit has its byte in front.
+            1 => {
+                let byte = levels.pop().unwrap_or(0);
+                [byte.saturating_mul(8).saturating_add(last); 2]
+            }
+            _ => [last.saturating_mul(bits), last.saturating_mul(8)],
+        };
+        Some(Self {
+            name: name.as_str().to_owned(),
+            span: address.span(),
+            levels,
+            bits,
+            ranges: starts.map(|start| (start, start.saturating_add(length))),
+        })
+    }
+
+    fn overlaps(&self, other: &Self) -> bool {
+        let meet = |at: usize| {
+            let ((start, end), (from, to)) = (self.ranges[at], other.ranges[at]);
+            start < to && from < end
+        };
+        // Addresses of one size are counted in that size.
+        self.levels == other.levels && (meet(0) || self.bits != other.bits && meet(1))
+    }
+}
 
 impl Lowering<'_> {
     /// A variable at an address: `%I` is an input point, `%Q` an output point, `%M` memory.
@@ -63,10 +121,12 @@ impl Lowering<'_> {
             return None;
         }
         let elementary = resolved.of.elementary();
-        if is_point && elementary.is_none() {
+        let mut points = Vec::new();
+        if is_point && !self.points_of(&resolved.of, name.as_str(), 0, &mut points) {
             let found = self.describe(&resolved.of);
-            let message =
-                format!("`{name}` at {address} is {found}; a point is one number, bit or time");
+            let message = format!(
+                "`{name}` at {address} is {found}; a point is a number, a bit or a time, or a structure of them"
+            );
             let help = "declare each element as a variable with an address of its own";
             self.error_with("U1083", message, name.span(), help);
             return None;
@@ -74,21 +134,21 @@ impl Lowering<'_> {
         if let Some(of) = elementary {
             self.fits_address(name, address, of);
         }
+        self.overlap(name, address, resolved)?;
         let slot = self.state(resolved.of.slots(), &name.span())?;
         self.program.initial.extend(initial(&resolved.image, slot));
-        if let Some(of) = elementary.filter(|_| is_point) {
-            let points = match is_input {
+        for (mut shown, of, offset) in points {
+            let known = match is_input {
                 true => &mut self.program.inputs,
                 false => &mut self.program.outputs,
             };
-            let mut shown = name.as_str().to_owned();
-            if points
+            if known
                 .iter()
                 .any(|point| point.name.eq_ignore_ascii_case(&shown))
             {
-                shown = format!("{name} {address}");
+                shown = format!("{shown} {address}");
             }
-            points.push(shown, of, slot);
+            known.push(shown, of, slot + offset);
         }
         Some(Symbol::Variable(Rc::new(Variable {
             name: name.as_str().to_owned(),
@@ -99,6 +159,73 @@ impl Lowering<'_> {
             is_point: is_input,
             span: name.span(),
         })))
+    }
+
+    /// The points of a variable: itself, or the parts of a structure and the elements of arrays of structures. Whether
+    /// all of it has one.
+    fn points_of(
+        &self,
+        of: &Type,
+        name: &str,
+        slot: u32,
+        points: &mut Vec<(String, Elementary, u32)>,
+    ) -> bool {
+        if points.len() >= MAXIMUM_POINTS {
+            return false;
+        }
+        if let Some(of) = of.elementary() {
+            points.push((name.to_owned(), of, slot));
+            return true;
+        }
+        match of {
+            Type::Structure(id, _) => {
+                let is_data = self.structures[id.0 as usize].unit.is_none();
+                let mut fields = self.program.structures[id.0 as usize].fields.iter();
+                is_data
+                    && fields.all(|field| {
+                        let name = format!("{name}.{}", field.name);
+                        self.points_of(&field.of, &name, slot + field.slot, points)
+                    })
+            }
+            // Elements that share a slot have no point of their own.
+            Type::Array(array) => match array.ranges.as_slice() {
+                [(low, high)] if array.stride().is_multiple_of(64) => {
+                    let slots = (array.stride() / 64) as u32;
+                    (*low..=*high).zip(0..).all(|(at, place)| {
+                        let name = format!("{name}[{at}]");
+                        self.points_of(&array.element, &name, slot + place * slots, points)
+                    })
+                }
+                _ => false,
+            },
+            _ => false,
+        }
+    }
+
+    /// Refuses a memory that shares a part of another one: no two compilers agree on which.
+    fn overlap(&mut self, name: &Name, address: &Name, resolved: &Resolved) -> Option<()> {
+        let bytes = match resolved.of.elementary() {
+            Some(Elementary::Bool) => None,
+            _ => Some(self.bytes(&resolved.of)),
+        };
+        let Some(extent) = Extent::of(name, address, bytes) else {
+            return Some(());
+        };
+        let other = self.extents.iter().find(|other| other.overlaps(&extent));
+        let Some(other) = other.cloned() else {
+            self.extents.push(extent);
+            return Some(());
+        };
+        let message = format!(
+            "`{name}` at {address} and `{}` share a part of the memory, and are of different sizes",
+            other.name
+        );
+        let found = understudy_text::Diagnostic::error("U1083", message, address.span());
+        let found = found.with_related(other.span, "the other one");
+        self.report(found.with_help(
+            "give them addresses apart, or read a part of one variable, such as `word.3` or `word.%B1`",
+        ));
+        None
     }
 
     /// Warns where the size in an address is not that of the variable.

@@ -67,7 +67,11 @@ impl Lowering<'_> {
                     }
                 }
                 Argument::Given(input, value) => match find(input) {
-                    Some(at) if inputs(parameters[at].class) => bound.given.push((at, value)),
+                    Some(at) if inputs(parameters[at].class) => {
+                        // A value behind it is for the input at its own place in the call.
+                        placed += 1;
+                        bound.given.push((at, value));
+                    }
                     Some(_) => {
                         let message = format!("`{input}` is an output of `{name}`");
                         let help = format!("write `{input} => variable`");
@@ -140,7 +144,7 @@ impl Lowering<'_> {
                 continue;
             };
             self.silent += 1;
-            let found = self.typed(value, Some(&parameter.of));
+            let found = self.typed(addressed(value), Some(&parameter.of));
             self.silent -= 1;
             let found = found.map(|value| value.of);
             let fits = match (&found, &parameter.of) {
@@ -175,7 +179,7 @@ impl Lowering<'_> {
         value: &syntax::Expression,
         parameter: &Parameter,
     ) -> Option<Place> {
-        let syntax::ExpressionKind::Variable(path) = &value.kind else {
+        let syntax::ExpressionKind::Variable(path) = &addressed(value).kind else {
             let message = format!("`{}` is a VAR_IN_OUT and needs a variable", parameter.name);
             let help = "assign the value to a variable, and give that";
             self.error_with("U1049", message, value.span.clone(), help);
@@ -252,5 +256,20 @@ impl Lowering<'_> {
         });
         self.scope = outside;
         Some(Rc::from(parameters?))
+    }
+}
+
+/// The variable whose address is given: a pointer that is only followed is a VAR_IN_OUT.
+fn addressed(value: &syntax::Expression) -> &syntax::Expression {
+    match &value.kind {
+        syntax::ExpressionKind::Call(path, arguments)
+            if path.steps.is_empty() && (path.root.is("ADR") || path.root.is("REF")) =>
+        {
+            match arguments.as_slice() {
+                [Argument::Placed(inner)] => inner,
+                _ => value,
+            }
+        }
+        _ => value,
     }
 }

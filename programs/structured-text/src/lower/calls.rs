@@ -294,6 +294,9 @@ impl Lowering<'_> {
         if let Callee::Standard(key) = callee {
             return self.standard(&key, arguments, hint, span);
         }
+        if let Some(key) = self.overloaded(&callee, path, arguments, span) {
+            return self.standard(&key, arguments, hint, span);
+        }
         if self.scope.symbols.is_none() {
             let message = "a call of a function is not known when the program is read";
             self.error("U1082", message, span.clone());
@@ -330,6 +333,31 @@ impl Lowering<'_> {
             kind: ExpressionKind::Call(Box::new(call)),
         };
         self.permitted(value, enable)
+    }
+
+    /// The standard function that is meant where a function of the file has its name, and not the given inputs.
+    fn overloaded(
+        &mut self,
+        callee: &Callee,
+        path: &Path,
+        arguments: &[Argument],
+        span: &Span,
+    ) -> Option<String> {
+        let key = path.root.key();
+        let Callee::Function(unit) = callee else {
+            return None;
+        };
+        if !path.steps.is_empty() || !super::standard::is_standard(&key) {
+            return None;
+        }
+        self.silent += 1;
+        let fits = self.routine_call(Callee::Function(*unit), arguments, span);
+        let is_other = fits.is_none() && {
+            let value = self.standard(&key, arguments, None, span);
+            !matches!(value, Operand::Faulty)
+        };
+        self.silent -= 1;
+        is_other.then_some(key)
     }
 
     /// A value where EN permits it, else 0.

@@ -251,6 +251,13 @@ impl Lowering<'_> {
                 let help = format!("write {from}_TO_{target}(…) if that is meant");
                 self.warn("U1080", message, span.clone(), help);
             }
+            // Other compilers warn, and keep the low bits.
+            Fit::No if is_whole(from) && is_whole(target) && !is_constant => {
+                let message =
+                    format!("{found} becomes {target}, which is narrower: its low bits are kept");
+                let help = format!("write {from}_TO_{target}(…) if that is meant");
+                self.warn("U1080", message, span.clone(), help);
+            }
             Fit::No => return self.mismatch(&found, to, span),
         }
         Some(fold::convert(value, target))

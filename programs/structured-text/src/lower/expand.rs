@@ -1,19 +1,26 @@
-//! Bodies that are not Structured Text, written as such before anything is lowered: charts and instruction lists.
+//! What is written as plain Structured Text before anything is lowered: charts, instruction lists, pointers into one
+//! variable.
 
 mod charts;
 mod instructions;
+mod pointers;
 mod written;
 
 use std::borrow::Cow;
 
 use understudy_text::Diagnostic;
 
-use crate::syntax::{Body, File, Unit};
+use crate::syntax::{Body, File, TypeKind, Unit};
+
+pub(super) use pointers::{POINTED, STORED};
 
 /// The file with statements in the place of charts and lists.
 pub(super) fn expand<'a>(file: &'a File, diagnostics: &mut Vec<Diagnostic>) -> Cow<'a, File> {
     let is_other = |unit: &Unit| !matches!(unit.body, Body::Statements(_));
-    let needs = |unit: &Unit| is_other(unit) || unit.methods.iter().any(is_other);
+    let needs = |unit: &Unit| {
+        let mut bodies = std::iter::once(unit).chain(&unit.methods);
+        bodies.any(|body| is_other(body) || has_pointers(body))
+    };
     if !file.units.iter().any(needs) {
         return Cow::Borrowed(file);
     }
@@ -22,9 +29,16 @@ pub(super) fn expand<'a>(file: &'a File, diagnostics: &mut Vec<Diagnostic>) -> C
         body(unit, diagnostics);
         for method in &mut unit.methods {
             body(method, diagnostics);
+            pointers::resolve(method);
         }
+        pointers::resolve(unit);
     }
     Cow::Owned(file)
+}
+
+fn has_pointers(unit: &Unit) -> bool {
+    let mut declarations = unit.declarations.iter();
+    declarations.any(|found| matches!(found.of.kind, TypeKind::Pointer(_)))
 }
 
 fn body(unit: &mut Unit, diagnostics: &mut Vec<Diagnostic>) {

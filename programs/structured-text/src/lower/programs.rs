@@ -3,29 +3,27 @@
 use std::rc::Rc;
 
 use understudy_text::spelling;
-use understudy_typed::{
-    Root, Routine as Lowered, RoutineId, RoutineKind, Statement, StatementKind, Task, Type,
-    Variable as Shown,
-};
+use understudy_typed::{Root, Task, Type, Variable as Shown};
 
-use crate::syntax::{Argument, Class, Declaration, File, Name, Span, Unit, UnitKind};
+use crate::syntax::{Argument, Class, Declaration, Expression, File, Name, Span, Unit, UnitKind};
 
-use super::blocks::{Block, Key, Routine};
+use super::blocks::{Block, Key};
 use super::images::initial;
 use super::names::{Owner, Symbol, Variable};
-use super::places::{load, place};
 use super::types::TypeState;
 use super::{DEFAULT_PERIOD, Lowering, Options};
 
 /// A PROGRAM that is run.
-struct Instance<'a> {
-    name: &'a Name,
+pub(super) struct Instance<'a> {
+    pub(super) name: &'a Name,
     unit: usize,
     /// Nanoseconds, and how urgent it is.
     interval: Option<i64>,
     priority: i64,
     /// What its inputs and outputs are connected to.
-    connections: &'a [Argument],
+    pub(super) connections: &'a [Argument],
+    /// The event that runs it, SINGLE.
+    pub(super) event: Option<&'a Expression>,
 }
 
 impl<'a> Lowering<'a> {
@@ -174,6 +172,7 @@ impl<'a> Lowering<'a> {
             interval: None,
             priority: 0,
             connections: &[],
+            event: None,
         };
         if let Some(chosen) = options.program {
             let found = programs.iter().find(|program| program.name.is(chosen));
@@ -229,13 +228,15 @@ impl<'a> Lowering<'a> {
                     self.error_with("U1041", message, name.span(), help);
                     continue;
                 };
-                if task.single.is_some() && task.interval.is_none() {
-                    let message = format!("the task `{name}` is run by an event (SINGLE)");
-                    let help = "give it an INTERVAL, and look for the event with R_TRIG";
+                if task.single.is_some() && task.interval.is_some_and(|interval| interval > 0) {
+                    let message =
+                        format!("the task `{name}` has an INTERVAL and an event (SINGLE)");
+                    let help = "give it one of them";
                     self.error_with("U1084", message, task.name.span(), help);
                     continue;
                 }
-                instance.interval = task.interval;
+                instance.event = task.single.as_ref();
+                instance.interval = task.interval.filter(|_| instance.event.is_none());
                 instance.priority = task.priority.unwrap_or(i64::MAX);
             }
             instances.push(instance);
@@ -295,59 +296,6 @@ impl<'a> Lowering<'a> {
             false => String::new(),
         };
         self.program_variables(&block, own, &prefix, instance.connections);
-    }
-
-    /// A routine that copies what the program is connected to, before and behind its body.
-    fn connected(
-        &mut self,
-        instance: &Instance<'a>,
-        routine: &Routine,
-        block: &Block,
-    ) -> Option<RoutineId> {
-        if instance.connections.is_empty() {
-            return None;
-        }
-        let id = RoutineId(self.program.routines.len() as u32);
-        self.scope.symbols = Some(Rc::default());
-        self.scope.routine = id.0;
-        let whole = place(Root::Own(0), block.of.clone());
-        let name = instance.name.as_str();
-        let bound = self.bind(
-            name,
-            &routine.parameters,
-            instance.connections,
-            &instance.name.span(),
-        );
-        let mut body = Vec::new();
-        let line = self.line(&instance.name.span());
-        if let Some(bound) = bound {
-            for (at, value) in &bound.given {
-                let parameter = &routine.parameters[*at];
-                let to = place(Root::Own(parameter.slot), parameter.of.clone());
-                let value = self.expression(value, &parameter.of);
-                let kind = value.map(|value| StatementKind::Assign(to, value));
-                body.extend(kind.map(|kind| Statement { line, kind }));
-            }
-            let kind = StatementKind::Invoke(routine.id, whole);
-            body.push(Statement { line, kind });
-            for (at, path, negated) in &bound.taken {
-                let parameter = &routine.parameters[*at];
-                let value = load(place(Root::Own(parameter.slot), parameter.of.clone()));
-                let kind = self.take_output(value, path, *negated);
-                body.extend(kind.map(|kind| Statement { line, kind }));
-            }
-        }
-        self.scope = super::names::Scope::default();
-        self.calls.push(vec![(routine.id.0, instance.name.span())]);
-        self.names.library.push(false);
-        self.program.routines.push(Lowered {
-            name: name.to_owned(),
-            kind: RoutineKind::Block,
-            frame: (self.program.frames, 0),
-            initial: Vec::new(),
-            body,
-        });
-        Some(id)
     }
 
     fn program_variables(

@@ -3,10 +3,12 @@
 mod alike;
 mod conversions;
 mod inputs;
+mod pointed;
 mod reals;
 mod selection;
 mod texts;
 mod times;
+mod typed;
 
 use understudy_typed::{Comparison, Elementary, Expression, Operation, RealFunction, Type};
 
@@ -14,12 +16,13 @@ use crate::syntax::{self, Argument, Operator, Span};
 
 use super::Lowering;
 use super::convert::{as_bits, is_whole};
+use super::expand::{POINTED, STORED};
 use super::fold::{apply, boolean, choose, convert, reinterpret};
 use super::names::number;
 use super::numbers::{Number, Operand};
 
 /// The names that are known here, for suggestions; conversions come on top.
-pub(super) const NAMES: [&str; 91] = [
+pub(super) const NAMES: [&str; 92] = [
     "ABS",
     "SQRT",
     "LN",
@@ -104,6 +107,7 @@ pub(super) const NAMES: [&str; 91] = [
     "UPPER_BOUND",
     "LOWER_BOUND",
     "ADR",
+    "REF",
     "FRAC",
     "BCD_TO_INT",
     "INT_TO_BCD",
@@ -115,7 +119,19 @@ pub(super) const NAMES: [&str; 91] = [
 
 /// Whether a name in capitals is that of a standard function.
 pub(super) fn is_standard(key: &str) -> bool {
-    NAMES.contains(&key) || conversions::Conversion::of(key).is_some()
+    NAMES.contains(&key)
+        || typed::of(key).is_some()
+        || typed::marked(key).is_some()
+        || pointed_inputs(key).is_some()
+        || conversions::Conversion::of(key).is_some()
+}
+
+/// The inputs of a function that stands for a pointer.
+fn pointed_inputs(key: &str) -> Option<usize> {
+    [(POINTED, 3), (STORED, 4)]
+        .iter()
+        .find(|(name, _)| key.eq_ignore_ascii_case(name))
+        .map(|(_, inputs)| *inputs)
 }
 
 fn real_function(key: &str) -> Option<RealFunction> {
@@ -175,7 +191,10 @@ impl Lowering<'_> {
         let Some(values) = self.values(key, arguments, span) else {
             return Operand::Faulty;
         };
-        let operand = self.standard_value(key, &values.of, hint, span);
+        let operand = match typed::of(key) {
+            Some(typed) => self.typed_function(&typed, &values.of, span),
+            None => self.standard_value(key, &values.of, hint, span),
+        };
         if values.enable.is_none() {
             return operand;
         }
@@ -192,6 +211,10 @@ impl Lowering<'_> {
         hint: Option<&Type>,
         span: &Span,
     ) -> Operand {
+        if let Some(of) = typed::marked(key) {
+            let value = self.expression(values[0], &Type::Elementary(of));
+            return value.map_or(Operand::Faulty, Operand::Typed);
+        }
         if let Some((operator, _)) = operator(key) {
             return self.operator_call(operator, values, hint);
         }
@@ -218,12 +241,14 @@ impl Lowering<'_> {
                 "CONCAT_DATE_TOD" | "CONCAT_DATE_LTOD" => self.date_and_time(values),
                 "SIZEOF" => return self.size_of(values[0]),
                 "UPPER_BOUND" | "LOWER_BOUND" => return self.array_bound(key, values),
-                "ADR" => {
+                "ADR" | "REF" => {
                     let help = "pass the variable as VAR_IN_OUT";
-                    let message = "addresses and pointers are not supported";
+                    let message = "an address is supported only for a pointer that always points into one variable";
                     self.error_with("U1040", message, span.clone(), help);
                     None
                 }
+                _ if pointed_inputs(key) == Some(3) => self.pointed(values, span),
+                _ if pointed_inputs(key) == Some(4) => self.pointed_stored(values, span),
                 _ => self.text_call(key, values, hint),
             }
         };
@@ -361,7 +386,7 @@ impl Lowering<'_> {
     }
 
     /// Bytes of a type as other compilers count them, without gaps.
-    fn bytes(&self, of: &Type) -> u64 {
+    pub(super) fn bytes(&self, of: &Type) -> u64 {
         match of {
             Type::Elementary(of) | Type::Enumeration(_, of) => u64::from(of.bits().div_ceil(8)),
             Type::Text(capacity) => u64::from(*capacity) + 1,

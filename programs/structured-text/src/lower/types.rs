@@ -60,6 +60,13 @@ pub(super) fn elementary(key: &str) -> Option<Elementary> {
     })
 }
 
+/// Blocks of Beremiz that Python or files of the controller answer.
+fn is_extension(key: &str) -> bool {
+    ["PYTHON_", "CSV_"]
+        .iter()
+        .any(|start| key.starts_with(start))
+}
+
 impl<'a> Lowering<'a> {
     /// The type of a declaration; `None` where an error is reported.
     pub(super) fn resolve(&mut self, name: &TypeName) -> Option<Resolved> {
@@ -131,6 +138,10 @@ impl<'a> Lowering<'a> {
         if matches!(key.as_str(), "STRING" | "WSTRING") {
             return Some(Type::Text(DEFAULT_CAPACITY).into());
         }
+        // What the libraries of TwinCAT call a text.
+        if key == "T_MAXSTRING" && !self.unit_names.contains_key(&key) {
+            return Some(Type::Text(255).into());
+        }
         if let Some(&unit) = self.unit_names.get(&key) {
             let block = self.block_type(unit, name.span())?;
             return Some(block);
@@ -143,6 +154,9 @@ impl<'a> Lowering<'a> {
         let key = name.key();
         let unsupported = match key.as_str() {
             "CHAR" | "WCHAR" => Some("use BYTE or STRING[1]"),
+            _ if is_extension(&key) => {
+                Some("it runs outside of the program: give what it answers as an input")
+            }
             "RTC" => Some("read the date and time from an input point"),
             "VARIANT" | "ANY" | "POINTER" | "REF_TO" => Some("use a type of constant size"),
             _ if key.starts_with("ANY_") => Some("use a type of constant size"),

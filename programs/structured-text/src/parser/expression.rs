@@ -9,12 +9,10 @@ use crate::syntax::{
 };
 
 /// Functions of other dialects that work on addresses or on memory made at run time.
-const REFUSED_FUNCTIONS: [&str; 9] = [
-    "ADR",
+const REFUSED_FUNCTIONS: [&str; 7] = [
     "ADRINST",
     "BITADR",
     "INDEXOF",
-    "REF",
     "__NEW",
     "__DELETE",
     "__QUERYINTERFACE",

@@ -196,7 +196,6 @@ fn instruction_lists() {
 #[test]
 fn what_is_not_supported_is_named() {
     for text in [
-        "p := ADR(x);",
         "p REF= x;",
         "p ?= x;",
         "p := __NEW(T);",

@@ -154,7 +154,10 @@ impl Parser<'_> {
         self.declaration_blocks(&mut unit.declarations);
         self.members(&mut unit.methods);
         self.declaration_blocks(&mut unit.declarations);
-        self.take_word("BEGIN");
+        // Of Siemens; elsewhere a variable may be called so.
+        if !matches!(self.ahead(1), Lexeme::Sign(":=" | "(" | "." | "[")) {
+            self.take_word("BEGIN");
+        }
         if !(self.headers_only && self.at_end()) {
             unit.body = self.body(&[end]);
             while !self.at_word(end) && !self.at_end() && !self.at_start() {

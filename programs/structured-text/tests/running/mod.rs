@@ -136,3 +136,39 @@ pub(crate) fn stored(of: Elementary, text: &str) -> u64 {
         text.parse::<i128>().expect("a decimal number") as u64 & of.mask()
     }
 }
+
+/// Runs a program: a line of inputs for each scan, and the outputs that are expected, as decimal numbers.
+pub(crate) fn check(text: &str, scans: &[(&[i64], &str)]) {
+    let mut running = Running::new(program(text));
+    let (inputs, outputs) = (running.inputs(), running.outputs());
+    for (scan, (given, expected)) in scans.iter().enumerate() {
+        let values = inputs.iter().zip(*given);
+        let values: Vec<u64> = values
+            .map(|(point, value)| match point.of {
+                of if of.is_real() => (*value as f64).to_bits(),
+                of => *value as u64 & of.mask(),
+            })
+            .collect();
+        let found = running.scan(&values);
+        assert_eq!(running.fault(), None, "{text}");
+        let found = outputs
+            .iter()
+            .zip(found)
+            .map(|(point, value)| match point.of {
+                of if of.bits() == 64 && of.is_real() => f64::from_bits(value).to_string(),
+                of if of.is_real() => f32::from_bits(value as u32).to_string(),
+                of => written(of, value),
+            });
+        let found: Vec<String> = found.collect();
+        assert_eq!(found.join(" "), *expected, "scan {scan} of {text}");
+    }
+}
+
+/// One scan of statements over an INT `a` and an INT `b` as inputs.
+pub(crate) fn once(outputs: &str, variables: &str, body: &str, expected: &str) {
+    let text = format!(
+        "PROGRAM main VAR_INPUT a : INT; b : INT; END_VAR VAR_OUTPUT {outputs} END_VAR
+         VAR {variables} END_VAR {body} END_PROGRAM"
+    );
+    check(&text, &[(&[7, -3], expected)]);
+}

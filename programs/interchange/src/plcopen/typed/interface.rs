@@ -276,13 +276,15 @@ fn quoted(written: &str, of: &TypeName) -> String {
 
 /// What the types of variables are that Beremiz shows on a panel.
 fn panel(name: &str) -> Option<&'static str> {
-    Some(match name {
-        "HMI_BOOL" | "HMI_NODE" => "BOOL",
-        "HMI_INT" => "INT",
-        "HMI_REAL" => "REAL",
-        "HMI_STRING" => "STRING",
-        _ => return None,
-    })
+    let of = name.strip_prefix("HMI_")?;
+    match of {
+        "NODE" => Some("BOOL"),
+        "STRING" => Some("STRING"),
+        _ => understudy_typed::Elementary::ALL
+            .into_iter()
+            .map(understudy_typed::Elementary::name)
+            .find(|known| *known == of),
+    }
 }
 
 /// The documentation of an element on one line.

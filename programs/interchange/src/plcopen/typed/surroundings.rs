@@ -6,25 +6,45 @@ use understudy_text::Diagnostic;
 
 use super::Typed;
 
-/// A log has no effect on what a program does.
+/// Blocks that have no effect on what a program does: their names, their declaration, and the warning. Python has no
+/// outputs here, so a program that reads its answer is refused.
+const BLOCKS: [(&[&str], &str, &str); 3] = [
+    (
+        &["LOGGER", "LOGLEVEL"],
+        LOG,
+        "what a LOGGER writes is not kept: there is no log here",
+    ),
+    (
+        &["PYTHON_EVAL"],
+        "FUNCTION_BLOCK PYTHON_EVAL VAR_INPUT TRIG : BOOL; CODE : STRING; END_VAR END_FUNCTION_BLOCK",
+        "Python is not executed here, and so has no outputs",
+    ),
+    (
+        &["PYTHON_POLL"],
+        "FUNCTION_BLOCK PYTHON_POLL VAR_INPUT TRIG : BOOL; CODE : STRING; END_VAR END_FUNCTION_BLOCK",
+        "Python is not executed here, and so has no outputs",
+    ),
+];
+
 const LOG: &str = "TYPE LOGLEVEL : (CRITICAL, WARNING, INFO, DEBUG) := INFO; END_TYPE
 FUNCTION_BLOCK LOGGER VAR_INPUT TRIG : BOOL; MSG : STRING; LEVEL : LOGLEVEL := LOGLEVEL#INFO; END_VAR END_FUNCTION_BLOCK";
 
 impl Typed {
     /// Declares what a document uses and its editor provides, and says so.
     pub(super) fn surroundings(&mut self) {
-        let log = self.first_use("LOGGER").or(self.first_use("LOGLEVEL"));
-        let has_own = self.file.units.iter().any(|unit| unit.name.is("LOGGER"))
-            || self.file.types.iter().any(|of| of.name.is("LOGLEVEL"));
-        if let Some(span) = log
-            && !has_own
-        {
-            let (file, _) = parse_declarations_at(LOG, &|_| span.clone());
-            self.file.units.extend(file.units);
-            self.file.types.extend(file.types);
-            let message = "what a LOGGER writes is not kept: there is no log here";
-            let found = Diagnostic::warning("U1023", message, span);
-            self.diagnostics.push(found);
+        for (words, text, message) in BLOCKS {
+            let units = self.file.units.iter().map(|unit| &unit.name);
+            let mut names = units.chain(self.file.types.iter().map(|of| &of.name));
+            if names.any(|name| words.iter().any(|word| name.is(word))) {
+                continue;
+            }
+            if let Some(span) = words.iter().find_map(|word| self.first_use(word)) {
+                let (file, _) = parse_declarations_at(text, &|_| span.clone());
+                self.file.units.extend(file.units);
+                self.file.types.extend(file.types);
+                let found = Diagnostic::warning("U1023", message, span);
+                self.diagnostics.push(found);
+            }
         }
         let mut missing: Vec<Declaration> = Vec::new();
         for variable in self.variables_of_units() {

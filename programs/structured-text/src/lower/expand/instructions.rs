@@ -8,7 +8,10 @@
 //! ST   y          y := a AND (b OR NOT c);
 //! ```
 //!
-//! A list with labels becomes a loop over a CASE whose cases are the parts between labels; the result is not known behind a label.
+//! A list with labels becomes a loop over a CASE whose cases are the parts between labels; where the part behind a
+//! label uses the result, every way to the label stores it.
+
+mod carried;
 
 use std::collections::HashMap;
 
@@ -21,6 +24,8 @@ use crate::syntax::{
 };
 
 use crate::jumps::in_parts;
+
+use carried::Carried;
 
 use super::written::{
     assign, boolean, declare, elementary, integer, join, not, path, statement, variable, when,
@@ -52,6 +57,9 @@ struct Writer<'a> {
     /// Where the result was made that nothing has taken yet.
     idle: Option<Span>,
     open: Vec<Open>,
+    carried: Carried,
+    /// The instruction before is a jump that is always taken.
+    is_over: bool,
     diagnostics: &'a mut Vec<Diagnostic>,
 }
 
@@ -69,6 +77,8 @@ pub(super) fn statements(
         result: None,
         idle: None,
         open: Vec::new(),
+        carried: Carried::of(list),
+        is_over: false,
         diagnostics,
     };
     for label in list
@@ -82,11 +92,15 @@ pub(super) fn statements(
         }
     }
     for instruction in list {
-        if instruction.label.is_some() {
+        if let Some(label) = &instruction.label {
+            if !writer.is_over {
+                writer.carry(label, &label.span());
+            }
             writer.lost();
-            writer.result = None;
+            writer.result = writer.arrived(label);
             writer.parts.push(Vec::new());
         }
+        writer.is_over = matches!(instruction.operator.as_str(), "JMP" | "RET");
         writer.instruction(instruction);
     }
     writer.lost();
@@ -94,6 +108,7 @@ pub(super) fn statements(
         let message = "a bracket of the instruction list is not closed";
         writer.error("U1017", message.to_owned(), unit.name.span());
     }
+    writer.declare_carried();
     writer.finish()
 }
 
@@ -361,6 +376,7 @@ impl Writer<'_> {
             return self.error("U1016", message, name.span());
         };
         let condition = self.condition(word, "JMP", span);
+        self.carry(&name, span);
         let next = assign(path(NEXT, None, span), integer(part, span), span);
         let go = statement(StatementKind::Continue, span);
         self.conditional(condition, vec![next, go], span);

@@ -1,6 +1,6 @@
 //! The inputs of standard functions, by place and by name.
 
-use super::{comparison, operator};
+use super::{comparison, operator, pointed_inputs};
 use crate::lower::Lowering;
 use crate::syntax::{self, Argument, Span};
 
@@ -33,7 +33,10 @@ impl Lowering<'_> {
                     continue;
                 }
                 Argument::Given(name, value) => match input(&name.key(), names, extensible) {
-                    Some(at) => (at, value),
+                    Some(at) => {
+                        placed += 1;
+                        (at, value)
+                    }
                     None => {
                         let message = format!("{key} has no input `{name}`");
                         let help = format!("its inputs: {}", names.join(", "));
@@ -81,6 +84,9 @@ impl Lowering<'_> {
 
 /// The names of a function's inputs, how many it needs, and whether it takes more.
 fn inputs(key: &str) -> (&'static [&'static str], usize, bool) {
+    if let Some(typed) = super::typed::of(key) {
+        return inputs(typed.function);
+    }
     match key {
         _ if operator(key).is_some_and(|(_, extensible)| extensible) => (&["IN1", "IN2"], 1, true),
         _ if operator(key).is_some() => (&["IN1", "IN2"], 2, false),
@@ -101,13 +107,26 @@ fn inputs(key: &str) -> (&'static [&'static str], usize, bool) {
         "UPPER_BOUND" | "LOWER_BOUND" => (&["ARR", "DIM"], 2, false),
         "CONCAT_DATE_TOD" | "CONCAT_DATE_LTOD" => (&["IN1", "IN2"], 2, false),
         "TIME" | "LTIME" => (&[], 0, false),
+        _ if pointed_inputs(key) == Some(3) => (&["IN", "AT", "OF"], 3, false),
+        _ if pointed_inputs(key) == Some(4) => (&["IN", "AT", "OF", "BY"], 4, false),
         _ => (&["IN"], 1, false),
     }
 }
 
 /// The place of an input by its name.
 fn input(name: &str, names: &[&str], extensible: bool) -> Option<usize> {
-    if let Some(at) = names.iter().position(|known| *known == name) {
+    // TwinCAT and CODESYS have names of their own.
+    let codesys = |known: &str| match (names.len(), known) {
+        (1..=3, "IN") => name == "STR",
+        (2.., "IN1") => name == "STR1",
+        (2.., "IN2") => name == "STR2",
+        (2, "L") => name == "SIZE",
+        (3, "L") => name == "LEN",
+        (3.., "P") => name == "POS",
+        _ => false,
+    };
+    let is_it = |known: &&str| **known == *name || codesys(known);
+    if let Some(at) = names.iter().position(is_it) {
         return Some(at);
     }
     if names == ["IN"] {

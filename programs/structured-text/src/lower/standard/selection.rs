@@ -7,7 +7,7 @@ use understudy_typed::{
 
 use crate::syntax::{self, Span};
 
-use super::Lowering;
+use super::{Lowering, lint};
 use crate::lower::blocks::Key;
 use crate::lower::convert::common;
 use crate::lower::fold::{apply, choose, convert, text};
@@ -43,12 +43,20 @@ impl Lowering<'_> {
             "MUX" => {
                 let number = self.long(values[0]);
                 let (values, of) = self.alike(&values[1..], hint)?;
+                if let Type::Text(_) = of {
+                    return self.text_of_number(number?, values, &of, span);
+                }
                 let elementary = self.plain(key, &of, span)?;
                 let operands = std::iter::once(number?).chain(values).collect();
                 Some(apply(Operation::Multiplex(elementary), operands, of))
             }
             "LIMIT" => {
                 let (values, of) = self.alike(values, hint)?;
+                if let Type::Text(_) = of {
+                    let [least, value, most] = <[_; 3]>::try_from(values).ok()?;
+                    let raised = self.extreme_text("MAX", vec![least, value], &of)?;
+                    return self.extreme_text("MIN", vec![most, raised], &of);
+                }
                 let elementary = self.plain(key, &of, span)?;
                 let [least, value, most] = <[_; 3]>::try_from(values).ok()?;
                 let raised = apply(
@@ -89,6 +97,40 @@ impl Lowering<'_> {
             self.error_with("U1043", message, span.clone(), "use IF or CASE");
         }
         elementary
+    }
+
+    /// The text of a number; another number is a fault.
+    fn text_of_number(
+        &mut self,
+        number: Expression,
+        values: Vec<Expression>,
+        of: &Type,
+        span: &Span,
+    ) -> Option<Expression> {
+        // It is evaluated more than once.
+        if matches!(number.kind, ExpressionKind::Call(_)) {
+            let message = "MUX of texts by the result of a call is not supported";
+            let help = "assign the result to a variable first";
+            self.error_with("U1040", message, span.clone(), help);
+            return None;
+        }
+        let long = Type::Elementary(Elementary::Lint);
+        let numbers = (0..values.len() as i64).map(lint);
+        let operands = std::iter::once(number).chain(numbers).collect();
+        let number = apply(Operation::Multiplex(Elementary::Lint), operands, long);
+        let bool = Type::Elementary(Elementary::Bool);
+        let mut values = values.into_iter();
+        let first = values.next()?;
+        let chosen = values.zip(1..).fold(first, |chosen, (value, at)| {
+            let equal = Operation::Compare(Comparison::Equal, Elementary::Lint);
+            let is_it = apply(equal, vec![number.clone(), lint(at)], bool.clone());
+            text(
+                TextOperation::Select,
+                vec![is_it, chosen, value],
+                of.clone(),
+            )
+        });
+        Some(chosen)
     }
 
     fn extreme_text(
