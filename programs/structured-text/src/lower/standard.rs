@@ -8,6 +8,8 @@ mod selection;
 mod texts;
 mod times;
 
+pub use inputs::input_names;
+
 use understudy_typed::{Comparison, Elementary, Expression, Operation, RealFunction, Type};
 
 use crate::syntax::{self, Argument, Operator, Span};
