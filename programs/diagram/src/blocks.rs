@@ -6,7 +6,8 @@ pub use layout::{BlockPlan, Placed, Wire, lay_out};
 
 /// What is connected, and perhaps one scan of it.
 ///
-/// Invariants, which the layout relies on: an object is connected only to objects before it, and an output to at most one input.
+/// Invariants, which the layout relies on: an object is connected only to objects before it, an output to at most one input, and an object to
+/// at most one block; targets come on top.
 #[derive(Debug, Clone, Default)]
 pub struct Network {
     /// Lines above it.
@@ -67,11 +68,20 @@ pub struct Output {
 impl Network {
     /// Adds an expression that is read; its place.
     pub fn value(&mut self, text: impl Into<String>) -> usize {
-        self.add(Kind::Value(text.into()), Vec::new(), vec![Output::default()])
+        self.add(
+            Kind::Value(text.into()),
+            Vec::new(),
+            vec![Output::default()],
+        )
     }
 
     /// Adds a variable that is assigned; its place.
-    pub fn target(&mut self, text: impl Into<String>, from: (usize, usize), negated: bool) -> usize {
+    pub fn target(
+        &mut self,
+        text: impl Into<String>,
+        from: (usize, usize),
+        negated: bool,
+    ) -> usize {
         let input = Input {
             name: String::new(),
             negated,

@@ -92,7 +92,11 @@ impl Picture {
         for wire in &plan.wires {
             let (from, output) = wire.from;
             let value = network.objects[from].outputs[output].value.as_deref();
-            let class = if value == Some("TRUE") { "live" } else { "wire" };
+            let class = if value == Some("TRUE") {
+                "live"
+            } else {
+                "wire"
+            };
             self.line(class, &wire.points);
         }
         for place in 0..network.objects.len() {
@@ -113,7 +117,10 @@ impl Picture {
                 self.rectangle("field", place);
                 let x = place.x + CHARACTER / 2;
                 self.text("name", x, place.y + place.height / 2, text);
-                let value = object.outputs.first().and_then(|output| output.value.as_ref());
+                let value = object
+                    .outputs
+                    .first()
+                    .and_then(|output| output.value.as_ref());
                 if let Some(value) = value {
                     let x = x + width(text) + CHARACTER;
                     self.text(class_of(value), x, place.y + place.height / 2, value);
@@ -151,7 +158,10 @@ impl Picture {
         for (input, row) in object.inputs.iter().zip(&placed.inputs) {
             if input.negated {
                 let (x, y) = (placed.place.x - 4, placed.place.y + row);
-                let _ = writeln!(self.body, r#"<circle class="box" cx="{x}" cy="{y}" r="4"/>"#);
+                let _ = writeln!(
+                    self.body,
+                    r#"<circle class="box" cx="{x}" cy="{y}" r="4"/>"#
+                );
             }
         }
     }
@@ -176,7 +186,11 @@ impl Picture {
         match part {
             Part::Step(step) => {
                 let step = &chart.steps[step];
-                let class = if step.active == Some(true) { "active" } else { "box" };
+                let class = if step.active == Some(true) {
+                    "active"
+                } else {
+                    "box"
+                };
                 self.rectangle(class, place);
                 if step.is_initial {
                     let inner = Place {
@@ -280,7 +294,10 @@ impl Picture {
 
     fn line(&mut self, class: &str, points: &[Point]) {
         let mut path = String::new();
-        for (point, letter) in points.iter().zip(std::iter::once('M').chain(std::iter::repeat('L'))) {
+        for (point, letter) in points
+            .iter()
+            .zip(std::iter::once('M').chain(std::iter::repeat('L')))
+        {
             let _ = write!(path, "{letter}{} {}", point.x, point.y);
         }
         let _ = writeln!(self.body, r#"<path class="{class}" d="{path}"/>"#);

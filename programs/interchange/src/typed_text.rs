@@ -35,11 +35,8 @@ pub fn typed_text(
     bodies: Bodies,
 ) -> Result<(Option<Written>, Vec<Diagnostic>), WriteError> {
     let format = Format::of(name, text);
-    let (mut file, found) = match (twincat::read(text), format) {
-        (Some(parsed), _) => parsed,
-        (None, Some(Format::StructuredText)) => parse(text),
-        (None, Some(Format::PlcOpen)) => plcopen::read_typed(text),
-        (None, _) => return Ok((None, Vec::new())),
+    let Some((mut file, found)) = parsed(name, text) else {
+        return Ok((None, Vec::new()));
     };
     let read = whole(text, (file.clone(), found), wanted.program, wanted.period);
     let diagnostics = read.diagnostics.clone();
@@ -92,6 +89,18 @@ pub fn typed_text(
     Ok((Some(written), diagnostics))
 }
 
+/// The syntax of the file `name`, and what was found in it; nothing for a form that has no programs with numbers.
+pub(crate) fn parsed(name: &str, text: &str) -> Option<(File, Vec<Diagnostic>)> {
+    if let Some(parsed) = twincat::read(text) {
+        return Some(parsed);
+    }
+    match Format::of(name, text) {
+        Some(Format::StructuredText) => Some(parse(text)),
+        Some(Format::PlcOpen) => Some(plcopen::read_typed(text)),
+        _ => None,
+    }
+}
+
 /// What statements are written as, where the form has several languages.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Bodies {
@@ -107,11 +116,18 @@ fn in_text(reasons: &[String]) -> Option<Diagnostic> {
     if reasons.is_empty() {
         return None;
     }
-    let mut listed = reasons.iter().take(8).cloned().collect::<Vec<_>>().join(", ");
+    let mut listed = reasons
+        .iter()
+        .take(8)
+        .cloned()
+        .collect::<Vec<_>>()
+        .join(", ");
     if let Some(more @ 1..) = reasons.len().checked_sub(8) {
         listed = format!("{listed} and {more} more");
     }
-    let message = format!("PLCopen XML has these bodies as Structured Text, not as function blocks: {listed}");
+    let message = format!(
+        "PLCopen XML has these bodies as Structured Text, not as function blocks: {listed}"
+    );
     Some(Diagnostic::warning("U1018", message, 0..0))
 }
 

@@ -289,7 +289,10 @@ impl<'n> Layout<'n> {
         let shown = &self.network.objects[object];
         match &shown.kind {
             Kind::Value(text) => {
-                let value = shown.outputs.first().and_then(|output| output.value.as_ref());
+                let value = shown
+                    .outputs
+                    .first()
+                    .and_then(|output| output.value.as_ref());
                 let value = value.map_or(0, |value| width(value) + CHARACTER);
                 width(text) + value + CHARACTER
             }
@@ -323,7 +326,9 @@ impl<'n> Layout<'n> {
     fn place_targets(&mut self, object: usize) -> i64 {
         let own = self.objects[object].place.right();
         let targets = self.targets[object].clone();
-        let labels = targets.iter().map(|(_, output)| self.label(object, *output));
+        let labels = targets
+            .iter()
+            .map(|(_, output)| self.label(object, *output));
         let is_block = self.is_block(object);
         let label = labels.max().filter(|_| is_block).unwrap_or(0);
         let x = own + label + 2 * CHANNEL;

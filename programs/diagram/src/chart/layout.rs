@@ -92,15 +92,15 @@ pub fn lay_out(chart: &Chart, top: i64) -> ChartPlan {
     let roots: Vec<usize> = initial.chain(0..chart.steps.len()).collect();
     for step in roots {
         if !layout.placed.contains(&step) {
-            let band = layout.run(None, step, left, top, false);
-            let band = layout.merge(vec![band], false);
+            let band = layout.run(None, step, left, top);
+            let band = layout.merge(vec![band]);
             left = band.right + COLUMN;
             waiting.right = waiting.right.max(band.right);
             waiting.bottom = waiting.bottom.max(band.bottom);
             waiting.ends.extend(band.ends);
         }
     }
-    let last = layout.merge(vec![waiting], false);
+    let last = layout.merge(vec![waiting]);
     ChartPlan {
         objects: layout.objects,
         right: last.right,
@@ -150,11 +150,22 @@ impl Band {
     }
 }
 
+/// A divergence whose branches are being placed.
+#[derive(Debug, Default)]
+struct Around {
+    /// The first steps of the branches that have no place yet.
+    later: Vec<usize>,
+    /// Steps that branches wait for.
+    awaited: HashSet<usize>,
+}
+
 struct Layout<'c> {
     chart: &'c Chart,
     objects: Vec<ChartObject>,
     /// Steps that have a place.
     placed: HashSet<usize>,
+    /// The divergences around the branch that is being placed, the innermost last.
+    around: Vec<Around>,
     /// The transitions that leave each step.
     leaving: Vec<Vec<usize>>,
     /// How many transitions enter each step.
@@ -180,6 +191,7 @@ impl<'c> Layout<'c> {
             chart,
             objects: Vec::new(),
             placed: HashSet::new(),
+            around: Vec::new(),
             leaving,
             entering,
             step: (names.unwrap_or(0) + 3 * CHARACTER).max(64) / 2 * 2,
@@ -234,14 +246,7 @@ impl<'c> Layout<'c> {
     }
 
     /// Places a step and what is behind it, as far as it leads on.
-    fn run(
-        &mut self,
-        mut open: Option<Open>,
-        mut step: usize,
-        left: i64,
-        mut y: i64,
-        nested: bool,
-    ) -> Band {
+    fn run(&mut self, mut open: Option<Open>, mut step: usize, left: i64, mut y: i64) -> Band {
         let mut band = Band::at(left, y);
         loop {
             let object = self.step(open, step, &mut band, y);
@@ -250,21 +255,23 @@ impl<'c> Layout<'c> {
             y = band.bottom + GAP;
             let next = match leaving.as_slice() {
                 [] => return band,
-                [only] => self.leave(below, *only, &mut band, y, nested),
+                [only] => self.leave(below, *only, &mut band, y),
                 _ => {
                     let branch = |layout: &mut Self, open, left, y, at: usize| {
                         let mut band = Band::at(left, y);
-                        match layout.leave(open, leaving[at], &mut band, y, true) {
+                        match layout.leave(open, leaving[at], &mut band, y) {
                             Some((open, step)) => {
                                 let y = band.bottom + GAP;
-                                joined(band, layout.run(Some(open), step, left, y, true))
+                                joined(band, layout.run(Some(open), step, left, y))
                             }
                             None => band,
                         }
                     };
                     let part = Part::SelectionDivergence;
-                    let inner = self.diverge(part, below, (left, y), leaving.len(), branch);
-                    return joined(band, self.merge(inner, nested));
+                    let to = |at: &usize| self.chart.transitions[*at].to.clone();
+                    let firsts = leaving.iter().map(to).collect();
+                    let inner = self.diverge(part, below, (left, y), firsts, branch);
+                    return joined(band, self.merge(inner));
                 }
             };
             let Some((from, next)) = next else {
@@ -304,7 +311,10 @@ impl<'c> Layout<'c> {
                 x: place.right(),
                 y: y + STEP / 2,
             };
-            let end = Point { x: aside.x, y: at.y };
+            let end = Point {
+                x: aside.x,
+                y: at.y,
+            };
             self.objects.push(ChartObject {
                 part: Part::Actions(step),
                 place: aside,
@@ -328,7 +338,6 @@ impl<'c> Layout<'c> {
         transition: usize,
         band: &mut Band,
         y: i64,
-        nested: bool,
     ) -> Option<(Open, usize)> {
         if self.chart.transitions[transition].from.len() > 1 {
             let goal = Goal::Join(transition);
@@ -336,7 +345,7 @@ impl<'c> Layout<'c> {
             band.right = band.right.max(band.left + self.step);
             return None;
         }
-        self.transition(&[open], transition, band, y, nested)
+        self.transition(&[open], transition, band, y)
     }
 
     fn transition(
@@ -345,7 +354,6 @@ impl<'c> Layout<'c> {
         transition: usize,
         band: &mut Band,
         y: i64,
-        nested: bool,
     ) -> Option<(Open, usize)> {
         let axis = self.axis(band.left);
         let place = Place {
@@ -363,21 +371,20 @@ impl<'c> Layout<'c> {
         let y = band.bottom + GAP;
         match shown.to.as_slice() {
             [] => None,
-            [only] => self.enter(below, *only, band, y, nested),
+            [only] => self.enter(below, *only, band, y),
             several => {
                 let several = several.to_vec();
                 let branch = |layout: &mut Self, open, left, y, at: usize| {
                     let mut band = Band::at(left, y);
-                    match layout.enter(open, several[at], &mut band, y, true) {
-                        Some((open, step)) => {
-                            joined(band, layout.run(Some(open), step, left, y, true))
-                        }
+                    match layout.enter(open, several[at], &mut band, y) {
+                        Some((open, step)) => joined(band, layout.run(Some(open), step, left, y)),
                         None => band,
                     }
                 };
                 let part = Part::SimultaneousDivergence;
-                let inner = self.diverge(part, below, (band.left, y), several.len(), branch);
-                let inner = self.merge(inner, nested);
+                let firsts = several.iter().map(|step| vec![*step]).collect();
+                let inner = self.diverge(part, below, (band.left, y), firsts, branch);
+                let inner = self.merge(inner);
                 *band = joined(band.clone(), inner);
                 None
             }
@@ -385,25 +392,39 @@ impl<'c> Layout<'c> {
     }
 
     /// The step, where it is to be placed in this column; a jump to one that has its place.
-    fn enter(
-        &mut self,
-        open: Open,
-        step: usize,
-        band: &mut Band,
-        y: i64,
-        nested: bool,
-    ) -> Option<(Open, usize)> {
+    fn enter(&mut self, open: Open, step: usize, band: &mut Band, y: i64) -> Option<(Open, usize)> {
         if self.placed.contains(&step) {
             self.jump(open, step, band, y);
             return None;
         }
-        if nested && self.entering[step] > 1 {
+        if self.entering[step] > 1 && self.is_awaited(step) {
             let goal = Goal::Step(step);
             band.ends.push(End { open, goal });
             band.right = band.right.max(band.left + self.step);
             return None;
         }
         Some((open, step))
+    }
+
+    /// Whether other branches of the divergence lead to a step too.
+    fn is_awaited(&mut self, step: usize) -> bool {
+        let Some(around) = self.around.last_mut() else {
+            return false;
+        };
+        let mut seen = HashSet::new();
+        let mut waiting = around.later.clone();
+        let mut is_awaited = around.awaited.contains(&step);
+        while let Some(next) = waiting.pop() {
+            is_awaited |= next == step;
+            if !self.placed.contains(&next) && seen.insert(next) {
+                let behind = self.leaving[next].iter();
+                waiting.extend(behind.flat_map(|at| &self.chart.transitions[*at].to));
+            }
+        }
+        if is_awaited {
+            around.awaited.insert(step);
+        }
+        is_awaited
     }
 
     fn jump(&mut self, open: Open, step: usize, band: &mut Band, y: i64) {
@@ -425,10 +446,15 @@ impl<'c> Layout<'c> {
         part: Part,
         from: Open,
         (left, y): (i64, i64),
-        count: usize,
+        firsts: Vec<Vec<usize>>,
         branch: impl Fn(&mut Self, Open, i64, i64, usize) -> Band,
     ) -> Vec<Band> {
-        let height = if part == Part::SelectionDivergence { 2 } else { 6 };
+        let count = firsts.len();
+        let height = if part == Part::SelectionDivergence {
+            2
+        } else {
+            6
+        };
         let place = Place {
             x: self.axis(left) - BEYOND,
             y,
@@ -443,7 +469,11 @@ impl<'c> Layout<'c> {
         }
         let mut bands = Vec::with_capacity(count);
         let mut left = left;
+        self.around.push(Around::default());
         for output in 0..count {
+            if let Some(around) = self.around.last_mut() {
+                around.later = firsts[output + 1..].concat();
+            }
             let at = Point {
                 x: self.axis(left),
                 y: place.bottom(),
@@ -454,6 +484,7 @@ impl<'c> Layout<'c> {
             left = band.right + COLUMN;
             bands.push(band);
         }
+        self.around.pop();
         bands
     }
 }

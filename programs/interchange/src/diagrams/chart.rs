@@ -37,8 +37,9 @@ pub(crate) fn chart(of: &syntax::Chart) -> Result<(Chart, Vec<usize>), String> {
         }
     });
     let places = of.steps.iter().enumerate();
-    let places: HashMap<String, usize> =
-        places.map(|(place, step)| (step.name.key(), place)).collect();
+    let places: HashMap<String, usize> = places
+        .map(|(place, step)| (step.name.key(), place))
+        .collect();
     let found = |names: &[Name]| -> Vec<usize> {
         let mut found = Vec::new();
         for place in names.iter().filter_map(|name| places.get(&name.key())) {

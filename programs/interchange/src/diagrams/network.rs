@@ -100,7 +100,12 @@ impl Maker<'_> {
     /// Takes the last networks into this one, where the statement reads the outputs of their blocks.
     fn join(&mut self, statement: &Statement, network: &mut Network) {
         let text = print::statements(std::slice::from_ref(statement)).to_uppercase();
-        let reads = |open: &Open| names(&text, &open.instance);
+        let networks = &self.networks;
+        let reads = |open: &Open| {
+            let network = networks.get(open.network);
+            let is_last = network.is_some_and(|network| !feeds_a_block(network, open.object));
+            is_last && names(&text, &open.instance)
+        };
         let first = self.open.iter().filter(|open| reads(open));
         let Some(first) = first.map(|open| open.network).min() else {
             return;
@@ -176,7 +181,14 @@ impl Maker<'_> {
                 let value = self.source(value, network);
                 let from = match enable {
                     Some(enable) => enabled(value, enable, network),
-                    None if value.negated => function("NOT", &[Value { negated: false, ..value }], network),
+                    None if value.negated => function(
+                        "NOT",
+                        &[Value {
+                            negated: false,
+                            ..value
+                        }],
+                        network,
+                    ),
                     None => value.from,
                 };
                 network.target(print_path(path), from, false);
@@ -215,10 +227,14 @@ impl Maker<'_> {
         };
         let name = print_path(path);
         let Some(called) = called.filter(|called| called.kind == UnitKind::FunctionBlock) else {
-            return Err(format!("the call `{name}`, which is not of a function block"));
+            return Err(format!(
+                "the call `{name}`, which is not of a function block"
+            ));
         };
         let pins = self.pins(called, arguments, &name)?;
-        let takes = arguments.iter().any(|it| matches!(it, Argument::Taken { .. }));
+        let takes = arguments
+            .iter()
+            .any(|it| matches!(it, Argument::Taken { .. }));
         if takes && enable.is_some() {
             return Err("a block with `=>` under a condition".to_owned());
         }
@@ -234,7 +250,9 @@ impl Maker<'_> {
         };
         let mut outputs = Vec::new();
         outputs.extend(enable.map(|_| output("ENO")));
-        outputs.extend(of_class(called, &[Class::Output, Class::InOut]).map(|it| output(it.name.as_str())));
+        outputs.extend(
+            of_class(called, &[Class::Output, Class::InOut]).map(|it| output(it.name.as_str())),
+        );
         let object = network.add(kind, inputs, outputs);
         for argument in arguments {
             if let Argument::Taken { from, to, negated } = argument {
@@ -248,7 +266,11 @@ impl Maker<'_> {
                     negated: false,
                     is_function: false,
                 };
-                let from = if *negated { function("NOT", &[value], network) } else { value.from };
+                let from = if *negated {
+                    function("NOT", &[value], network)
+                } else {
+                    value.from
+                };
                 network.target(print_path(to), from, false);
             }
         }
@@ -300,10 +322,20 @@ fn names(text: &str, instance: &str) -> bool {
     })
 }
 
+/// Whether a block is connected to an object.
+fn feeds_a_block(network: &Network, object: usize) -> bool {
+    let blocks = network.objects.iter();
+    let blocks = blocks.filter(|other| matches!(other.kind, Kind::Block { .. }));
+    let mut inputs = blocks.flat_map(|other| &other.inputs);
+    inputs.any(|input| input.from.is_some_and(|(from, _)| from == object))
+}
+
 /// Whether nothing is connected to an output.
 fn is_free(network: &Network, output: Source) -> bool {
     let inputs = network.objects.iter().flat_map(|object| &object.inputs);
-    inputs.filter_map(|input| input.from).all(|from| from != output)
+    inputs
+        .filter_map(|input| input.from)
+        .all(|from| from != output)
 }
 
 /// Whether an expression calls a function that may do more than answer.
@@ -344,7 +376,10 @@ fn output(name: &str) -> Output {
 /// A standard function whose inputs are known by their places.
 fn function(name: &str, values: &[Value], network: &mut Network) -> Source {
     let names = understudy_structured_text::input_names(name, values.len());
-    let inputs = names.iter().zip(values).map(|(name, value)| pin(name, *value));
+    let inputs = names
+        .iter()
+        .zip(values)
+        .map(|(name, value)| pin(name, *value));
     let inputs = inputs.collect();
     let kind = Kind::Block {
         of: name.to_owned(),
@@ -357,7 +392,14 @@ fn function(name: &str, values: &[Value], network: &mut Network) -> Source {
 fn enabled(value: Value, enable: Value, network: &mut Network) -> Source {
     let (object, output_of) = match (value.is_function, value.negated) {
         (true, false) => value.from,
-        (_, true) => function("NOT", &[Value { negated: false, ..value }], network),
+        (_, true) => function(
+            "NOT",
+            &[Value {
+                negated: false,
+                ..value
+            }],
+            network,
+        ),
         (false, false) => function("MOVE", &[value], network),
     };
     let shown = &mut network.objects[object];

@@ -1,8 +1,8 @@
 //! A program with numbers as a picture: each unit with its variables and its body, in the language that it has.
 
 use understudy_diagram::Picture;
+use understudy_structured_text::print;
 use understudy_structured_text::syntax::{Body, File, Unit, UnitKind};
-use understudy_structured_text::{parse, print};
 use understudy_text::{Diagnostic, has_errors};
 
 use super::{chart, networks};
@@ -10,8 +10,7 @@ use crate::format::Format;
 use crate::plcopen;
 use crate::source::Wanted;
 use crate::text::whole;
-use crate::twincat;
-use crate::typed_text::Bodies;
+use crate::typed_text::{Bodies, parsed};
 
 /// The units of the file `name` as SVG, and what was found in the file; nothing where it has errors, or is of a form that has no programs with
 /// numbers. Statements that were drawn, or are to be drawn as blocks, are networks as far as these hold them; all others are listed.
@@ -21,19 +20,10 @@ pub fn draw_typed(
     wanted: Wanted<'_>,
     bodies: Bodies,
 ) -> (Option<String>, Vec<Diagnostic>) {
-    let format = Format::of(name, text);
-    let (file, found) = match (twincat::read(text), format) {
-        (Some(parsed), _) => parsed,
-        (None, Some(Format::StructuredText)) => parse(text),
-        (None, Some(Format::PlcOpen)) => plcopen::read_typed(text),
-        (None, _) => return (None, Vec::new()),
+    let (Some(file), mut diagnostics) = read(name, text, wanted) else {
+        return (None, Vec::new());
     };
-    let read = whole(text, (file.clone(), found), wanted.program, wanted.period);
-    let mut diagnostics = read.diagnostics;
-    if has_errors(&diagnostics) {
-        return (None, diagnostics);
-    }
-    let drawn = match format {
+    let drawn = match Format::of(name, text) {
         Some(Format::PlcOpen) => plcopen::drawn_units(text),
         _ => Default::default(),
     };
@@ -51,6 +41,22 @@ pub fn draw_typed(
     (Some(picture.svg(name)), diagnostics)
 }
 
+/// The units of the file `name` as Structured Text, and what was found in the file; nothing as for [`draw_typed`].
+pub fn listing(name: &str, text: &str, wanted: Wanted<'_>) -> (Option<String>, Vec<Diagnostic>) {
+    let (file, diagnostics) = read(name, text, wanted);
+    (file.map(|file| print::file(&file)), diagnostics)
+}
+
+/// A file of a program with numbers without errors, and what was found in it.
+fn read(name: &str, text: &str, wanted: Wanted<'_>) -> (Option<File>, Vec<Diagnostic>) {
+    let Some((file, found)) = parsed(name, text) else {
+        return (None, Vec::new());
+    };
+    let read = whole(text, (file.clone(), found), wanted.program, wanted.period);
+    let is_right = !has_errors(&read.diagnostics);
+    (is_right.then_some(file), read.diagnostics)
+}
+
 /// Draws a unit; the finding on a body that is listed in place of a drawing.
 fn draw(picture: &mut Picture, file: &File, unit: &Unit, as_blocks: bool) -> Option<Diagnostic> {
     let word = match unit.kind {
@@ -60,7 +66,11 @@ fn draw(picture: &mut Picture, file: &File, unit: &Unit, as_blocks: bool) -> Opt
         UnitKind::Method => "METHOD",
     };
     picture.heading(&format!("{word} {}", unit.name));
-    let comments: String = unit.comments.iter().map(|line| format!("{line}\n")).collect();
+    let comments: String = unit
+        .comments
+        .iter()
+        .map(|line| format!("{line}\n"))
+        .collect();
     picture.note(&comments);
     picture.note(&print::declarations(&unit.declarations));
     let mut finding = None;
@@ -69,17 +79,15 @@ fn draw(picture: &mut Picture, file: &File, unit: &Unit, as_blocks: bool) -> Opt
         finding = Some(Diagnostic::warning("U1018", message, unit.name.span()));
     };
     match &unit.body {
-        Body::Statements(statements) => {
-            match as_blocks.then(|| networks(file, unit, statements)) {
-                Some(Ok(networks)) => networks.iter().for_each(|it| picture.network(it)),
-                other => {
-                    if let Some(Err(reason)) = other {
-                        refused(reason);
-                    }
-                    picture.listing(&print::statements(statements));
+        Body::Statements(statements) => match as_blocks.then(|| networks(file, unit, statements)) {
+            Some(Ok(networks)) => networks.iter().for_each(|it| picture.network(it)),
+            other => {
+                if let Some(Err(reason)) = other {
+                    refused(reason);
                 }
+                picture.listing(&print::statements(statements));
             }
-        }
+        },
         Body::Instructions(list) => picture.listing(&print::instructions(list)),
         Body::Chart(of) => {
             match chart(of) {

@@ -7,7 +7,7 @@ use crate::Place;
 
 impl Layout<'_> {
     /// Ends branches: in steps of their own, in jumps, in convergences. What is left waits for branches elsewhere.
-    pub(super) fn merge(&mut self, mut bands: Vec<Band>, nested: bool) -> Band {
+    pub(super) fn merge(&mut self, mut bands: Vec<Band>) -> Band {
         loop {
             if self.end_alone(&mut bands) {
                 continue;
@@ -15,7 +15,7 @@ impl Layout<'_> {
             let Some(goal) = self.common(&bands) else {
                 break;
             };
-            let band = self.converge(&mut bands, goal, nested);
+            let band = self.converge(&mut bands, goal);
             bands.push(band);
         }
         let all = bands.into_iter().reduce(joined);
@@ -26,6 +26,7 @@ impl Layout<'_> {
     fn end_alone(&mut self, bands: &mut [Band]) -> bool {
         let counts = counts(bands);
         let right = bands.iter().map(|band| band.right).max().unwrap_or(0);
+        let bottom = bands.iter().map(|band| band.bottom).max().unwrap_or(0);
         // Where branches come together in several steps, one of these is behind a convergence, and the others are entered once.
         let mut ends = bands.iter().flat_map(|band| &band.ends);
         let is_common = |goal: &Goal| match goal {
@@ -41,17 +42,16 @@ impl Layout<'_> {
                     continue;
                 }
                 band.ends.remove(at);
-                let y = band.bottom.max(open.at.y) + GAP;
-                if self.placed.contains(&step) {
-                    self.jump(open, step, band, y);
+                // A column that others are next to cannot become wider: the step has one of its own, elsewhere.
+                let is_straight = band.ends.is_empty()
+                    && band.right == right
+                    && self.axis(band.left) == open.at.x;
+                if self.placed.contains(&step) || !is_straight {
+                    self.jump(open, step, band, bottom + GAP);
                     return true;
                 }
-                let is_straight = band.ends.is_empty() && self.axis(band.left) == open.at.x;
-                let left = match is_straight {
-                    true => band.left,
-                    false => right + COLUMN,
-                };
-                let behind = self.run(Some(open), step, left, y, true);
+                let (left, y) = (band.left, band.bottom + GAP);
+                let behind = self.run(Some(open), step, left, y);
                 *band = joined(band.clone(), behind);
                 return true;
             }
@@ -73,7 +73,7 @@ impl Layout<'_> {
     }
 
     /// A convergence of all that lead to a goal, and what is behind it.
-    fn converge(&mut self, bands: &mut [Band], goal: Goal, nested: bool) -> Band {
+    fn converge(&mut self, bands: &mut [Band], goal: Goal) -> Band {
         let mut opens: Vec<Open> = Vec::new();
         for band in bands.iter_mut() {
             band.ends.retain(|end| {
@@ -109,8 +109,8 @@ impl Layout<'_> {
         let y = place.bottom() + GAP;
         let mut band = Band::at(left, place.bottom());
         let next = match goal {
-            Goal::Step(step) => self.enter(below, step, &mut band, y, false),
-            Goal::Join(transition) => self.transition(&[below], transition, &mut band, y, nested),
+            Goal::Step(step) => Some((below, step)),
+            Goal::Join(transition) => self.transition(&[below], transition, &mut band, y),
         };
         match next {
             Some((open, step)) => {
@@ -118,7 +118,7 @@ impl Layout<'_> {
                     Goal::Step(_) => y,
                     Goal::Join(_) => band.bottom + GAP,
                 };
-                joined(band, self.run(Some(open), step, left, y, nested))
+                joined(band, self.run(Some(open), step, left, y))
             }
             None => band,
         }

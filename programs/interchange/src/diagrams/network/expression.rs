@@ -7,7 +7,9 @@ use understudy_structured_text::syntax::{
 use understudy_structured_text::{input_names, print};
 use understudy_typed::Comparison;
 
-use super::{Maker, Source, Value, function, is_free, of_class, output, pin, print_path};
+use super::{
+    Maker, Source, Value, feeds_a_block, function, is_free, of_class, output, pin, print_path,
+};
 use crate::plcopen::typed::values::unit;
 
 impl Maker<'_> {
@@ -51,9 +53,13 @@ impl Maker<'_> {
         // It was taken into this network.
         let is_own = matches!(&object.kind, Kind::Block { instance: Some(own), .. } if own.to_uppercase() == instance);
         let is_own = is_own && open.network == self.networks.len();
-        let place = object.outputs.iter().position(|output| pin.is(&output.name))?;
+        let place = object
+            .outputs
+            .iter()
+            .position(|output| pin.is(&output.name))?;
         let from = (open.object, place);
-        (is_own && is_free(network, from)).then_some(from)
+        let is_last = is_own && !feeds_a_block(network, open.object);
+        (is_last && is_free(network, from)).then_some(from)
     }
 
     /// Operators of one rank; those of one kind that follow each other are one function where it takes many inputs.

@@ -99,7 +99,10 @@ fn pou(
     };
     let is_chart = matches!(unit.body, Body::Chart(_));
     // The methods of a chart are its conditions and actions.
-    if !(unit.methods.is_empty() || is_chart) || unit.extends.is_some() || !unit.implements.is_empty() {
+    if !(unit.methods.is_empty() || is_chart)
+        || unit.extends.is_some()
+        || !unit.implements.is_empty()
+    {
         return Err(not_held(unit, "methods, EXTENDS or IMPLEMENTS"));
     }
     tree.open("pou", &[("name", unit.name.as_str()), ("pouType", kind)]);
