@@ -87,7 +87,8 @@ fn typed(
     };
     let (text, found) = match form {
         Form::Digraph => {
-            let message = "a digraph is made of a ladder, and the program has numbers: use --as svg";
+            let message =
+                "a digraph is made of a ladder, and the program has numbers: use --as svg";
             let answer = Answer::failed(Status::BadInput, "U0438", message);
             return Err(answer.with_reports(vec![report]));
         }

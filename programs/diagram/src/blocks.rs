@@ -27,6 +27,8 @@ pub struct Object {
     pub outputs: Vec<Output>,
     /// Whether the scan executed it; nothing where no scan is shown.
     pub executed: Option<bool>,
+    /// Where its statement begins in the text; nothing where another statement stands there.
+    pub source: Option<usize>,
 }
 
 /// What a part of a network is.
@@ -97,6 +99,7 @@ impl Network {
             inputs,
             outputs,
             executed: None,
+            source: None,
         });
         self.objects.len() - 1
     }

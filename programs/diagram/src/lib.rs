@@ -1,7 +1,8 @@
 //! Function block diagrams and sequential function charts: where their parts are, and pictures of them.
 //!
 //! [`blocks::Network`] and [`chart::Chart`] say what is drawn, [`blocks::lay_out`] and [`chart::lay_out`] where it is. Files of other
-//! tools take the places from there, and [`Picture`] paints them as SVG. No two parts overlap, and no wire crosses a part.
+//! tools take the places from there, and [`Picture`] paints them as SVG. No two parts overlap, and no wire crosses a block, a variable,
+//! a step, an action or a condition.
 
 pub mod blocks;
 pub mod chart;

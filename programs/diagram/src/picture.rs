@@ -11,7 +11,7 @@ use crate::{CHARACTER, Place, Point, width};
 const STYLE: &str = ".paper { fill: #fff; }\n\
 text { font: 13px ui-monospace, 'DejaVu Sans Mono', Menlo, Consolas, monospace; fill: #1c2733; white-space: pre; }\n\
 .heading { font-weight: bold; font-size: 17px; }\n.title { font-weight: bold; }\n.soft { fill: #51606f; }\n\
-.name { fill: #0b4f8a; }\n.wire { stroke: #41505f; stroke-width: 1.5; fill: none; }\n\
+.name { fill: #0b4f8a; }\n.wire, .data { stroke: #41505f; stroke-width: 1.5; fill: none; }\n\
 .bar { stroke: #1c2733; stroke-width: 2; fill: none; }\n.box { stroke: #1c2733; stroke-width: 1.5; fill: #f3f7fb; }\n\
 .field { stroke: #8a98a6; stroke-width: 1; fill: #fff; }\n.live { stroke: #0a7a33; stroke-width: 3.5; fill: none; }\n\
 .active { stroke: #0a7a33; stroke-width: 3.5; fill: #d9efdf; }\n.one { fill: #0a7a33; font-weight: bold; }\n.zero { fill: #51606f; }\n\
@@ -92,10 +92,10 @@ impl Picture {
         for wire in &plan.wires {
             let (from, output) = wire.from;
             let value = network.objects[from].outputs[output].value.as_deref();
-            let class = if value == Some("TRUE") {
-                "live"
-            } else {
-                "wire"
+            let class = match value {
+                Some("TRUE") => "live",
+                Some("FALSE") => "wire",
+                _ => "data",
             };
             self.line(class, &wire.points);
         }
@@ -172,7 +172,7 @@ impl Picture {
         self.fit(plan.right, plan.bottom);
         for object in &plan.objects {
             for link in &object.inputs {
-                self.line("wire", &link.points);
+                self.line("data", &link.points);
             }
         }
         for object in &plan.objects {
@@ -244,7 +244,7 @@ impl Picture {
             self.rectangle("box", row);
             let x = place.x + column;
             let bottom = y + height;
-            self.line("wire", &[Point { x, y }, Point { x, y: bottom }]);
+            self.line("data", &[Point { x, y }, Point { x, y: bottom }]);
             let middle = y + height / 2;
             self.text("pin", place.x + CHARACTER / 2, middle, when);
             self.text("name", x + CHARACTER / 2, middle, what);

@@ -6,4 +6,4 @@ mod picture;
 
 pub(crate) use chart::chart;
 pub(crate) use network::networks;
-pub use picture::{draw_typed, listing};
+pub use picture::{DrawnBody, DrawnUnit, draw_typed, drawn_units, listing};

@@ -12,7 +12,7 @@ mod twincat;
 mod typed_text;
 mod written;
 
-pub use diagrams::{draw_typed, listing};
+pub use diagrams::{DrawnBody, DrawnUnit, draw_typed, drawn_units, listing};
 pub use format::{Format, Reading, parse_program, read, read_all, unknown_form};
 pub use source::{Source, SourceFile, Wanted, no_program, read_source};
 pub use typed_text::{Bodies, typed_text};

@@ -185,51 +185,53 @@ impl<'n> Layout<'n> {
         let head = HEAD + instance.as_ref().map_or(0, |_| INSTANCE);
         let sources: Vec<Option<(usize, usize)>> =
             shown.inputs.iter().map(|input| input.from).collect();
-        // The first row is that of what feeds the first input, or lower.
         let mut first = top + head;
-        let mut before = None;
-        if let Some((source, output)) = sources.first().copied().flatten()
-            && self.is_block(source)
-        {
-            let mut reached = self.block(source, top);
-            let down = (first - self.row((source, output))).max(0);
-            self.shift(source, down);
-            reached.bottom += down;
-            first = self.row((source, output));
-            before = Some(reached);
-        }
-        let row_of = |input: usize| first + ROW * i64::try_from(input).unwrap_or(0);
         let mut free = top;
-        let mut right = MARGIN;
-        let mut rows = Vec::with_capacity(sources.len());
+        // The right edge of the blocks that feed it, and the width of the values, which are in a column behind these.
+        let (mut blocks, mut values) = (None, 0);
+        let mut rows: Vec<i64> = Vec::with_capacity(sources.len());
+        let mut last: Option<i64> = None;
         for (input, source) in sources.iter().enumerate() {
-            let mut row = row_of(input);
+            let pin = first + ROW * i64::try_from(input).unwrap_or(0);
+            // No source is above its pin, nor above the source before it: so no wire crosses another.
+            let least = last.map_or(pin, |last| pin.max(last + ROW));
+            let mut row = least;
             match source {
                 Some((source, output)) if self.is_block(*source) => {
-                    let reached = match before.take() {
-                        Some(reached) => reached,
-                        None => self.block(*source, free),
-                    };
+                    let mut reached = self.block(*source, free);
+                    let down = (least - self.row((*source, *output))).max(0);
+                    self.shift(*source, down);
+                    reached.bottom += down;
                     row = self.row((*source, *output));
                     free = reached.bottom + GAP;
-                    right = right.max(reached.right + self.label(*source, *output));
+                    let right = reached.right + self.label(*source, *output);
+                    blocks = blocks.max(Some(right));
                 }
-                Some((source, _)) => {
-                    row = row.max(free + HEIGHT / 2);
-                    free = row + HEIGHT / 2 + (ROW - HEIGHT);
-                    // Its left edge follows when the block has a place.
-                    let text = self.text(*source);
-                    right = right.max(MARGIN + text);
+                Some((source, _)) => values = values.max(self.text(*source)),
+                None => {
+                    rows.push(pin);
+                    continue;
                 }
-                None => {}
             }
+            if input == 0 {
+                first = row;
+            }
+            last = Some(row);
             rows.push(row);
         }
-        let mut x = right + CHANNEL;
-        self.bends[object] = self.lanes(&rows, &row_of, x);
+        let right = match blocks {
+            Some(blocks) if values > 0 => blocks + CHANNEL + values,
+            Some(blocks) => blocks,
+            None => MARGIN + values,
+        };
+        let row_of = |input: usize| first + ROW * i64::try_from(input).unwrap_or(0);
         let bends = rows.iter().enumerate();
-        let count = bends.filter(|(input, row)| **row != row_of(*input)).count();
-        x += LANE * i64::try_from(count).unwrap_or(0) + CHANNEL;
+        let bends: Vec<bool> = bends.map(|(input, row)| *row > row_of(input)).collect();
+        let before = |input: usize| bends[..input].iter().filter(|bends| **bends).count();
+        let lane =
+            |input: usize| right + CHANNEL + LANE * i64::try_from(before(input)).unwrap_or(0);
+        self.bends[object] = (0..rows.len()).map(lane).collect();
+        let x = lane(rows.len()) + CHANNEL;
         let name = |name: &str| if name.is_empty() { 0 } else { width(name) };
         let inputs = shown.inputs.iter().map(|input| name(&input.name)).max();
         let outputs = shown.outputs.iter().map(|output| name(&output.name)).max();
@@ -262,9 +264,10 @@ impl<'n> Layout<'n> {
             }
         }
         let right = self.place_targets(object);
+        let last = last.map_or(top, |last| last + ROW / 2);
         Reached {
             right,
-            bottom: free.max(place.bottom()),
+            bottom: free.max(last).max(place.bottom()),
         }
     }
 
@@ -306,20 +309,6 @@ impl<'n> Layout<'n> {
         let outputs = &self.network.objects[object].outputs;
         let value = outputs.get(output).and_then(|output| output.value.as_ref());
         value.map_or(0, |value| width(value) + CHARACTER)
-    }
-
-    /// Where the wires into a block bend: none crosses another.
-    fn lanes(&self, rows: &[i64], row_of: &dyn Fn(usize) -> i64, from: i64) -> Vec<i64> {
-        let rising = |input: usize| rows[input] > row_of(input);
-        let falling = |input: usize| rows[input] < row_of(input);
-        let all = 0..rows.len();
-        let mut order: Vec<usize> = all.clone().filter(|input| rising(*input)).collect();
-        order.extend(all.clone().rev().filter(|input| falling(*input)));
-        let lane = |input: usize| {
-            let place = order.iter().position(|other| *other == input);
-            from + LANE * i64::try_from(place.unwrap_or(0)).unwrap_or(0)
-        };
-        all.map(lane).collect()
     }
 
     /// Places the targets of an object to its right; the right edge of all.

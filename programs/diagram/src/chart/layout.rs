@@ -406,27 +406,6 @@ impl<'c> Layout<'c> {
         Some((open, step))
     }
 
-    /// Whether other branches of the divergence lead to a step too.
-    fn is_awaited(&mut self, step: usize) -> bool {
-        let Some(around) = self.around.last_mut() else {
-            return false;
-        };
-        let mut seen = HashSet::new();
-        let mut waiting = around.later.clone();
-        let mut is_awaited = around.awaited.contains(&step);
-        while let Some(next) = waiting.pop() {
-            is_awaited |= next == step;
-            if !self.placed.contains(&next) && seen.insert(next) {
-                let behind = self.leaving[next].iter();
-                waiting.extend(behind.flat_map(|at| &self.chart.transitions[*at].to));
-            }
-        }
-        if is_awaited {
-            around.awaited.insert(step);
-        }
-        is_awaited
-    }
-
     fn jump(&mut self, open: Open, step: usize, band: &mut Band, y: i64) {
         let width = width(&self.chart.steps[step].name) + 2 * CHARACTER;
         let place = Place {

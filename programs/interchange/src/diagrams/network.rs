@@ -76,15 +76,28 @@ impl Maker<'_> {
             ..Network::default()
         };
         self.join(statement, &mut network);
+        let first = network.objects.len();
+        let mut source = Some(statement.span.start);
         let instance = match &statement.kind {
-            StatementKind::If(branches, otherwise) if otherwise.is_empty() => {
-                match branches.as_slice() {
-                    [(condition, body)] => self.guarded(condition, body, &mut network)?,
-                    _ => return Err("IF with ELSIF".to_owned()),
-                }
+            StatementKind::If(_, otherwise) if !otherwise.is_empty() => {
+                return Err("IF with ELSE".to_owned());
             }
+            StatementKind::If(branches, _) => match branches.as_slice() {
+                [(condition, body)] => {
+                    if stores(body).is_some() {
+                        source = None;
+                    } else if let [only] = body.as_slice() {
+                        source = Some(only.span.start);
+                    }
+                    self.guarded(condition, body, &mut network)?
+                }
+                _ => return Err("IF with ELSIF".to_owned()),
+            },
             other => self.simple(other, None, &mut network)?,
         };
+        for object in &mut network.objects[first..] {
+            object.source = source;
+        }
         if let Some((object, instance)) = instance {
             self.open.retain(|open| open.instance != instance);
             self.open.push(Open {
@@ -148,17 +161,14 @@ impl Maker<'_> {
             return Err("IF with several statements".to_owned());
         };
         network.comments.extend(only.comments.iter().cloned());
-        if let StatementKind::Assign(path, value) = &only.kind
-            && let ExpressionKind::Literal(Literal::Boolean(sets)) = value.kind
-            && !path.steps.iter().any(|step| matches!(step, Step::Index(_)))
-        {
+        if let Some((path, sets)) = stores(body) {
             // Set and reset, in the one form that all tools execute alike.
             let own = make::read(path.clone());
             let (operator, condition) = match sets {
                 true => (Operator::Or, condition.clone()),
                 false => (Operator::And, make::not(condition.clone())),
             };
-            let value = make::chain(vec![own, condition], operator, &value.span);
+            let value = make::chain(vec![own, condition], operator, &only.span);
             let assign = StatementKind::Assign(path.clone(), value);
             return self.simple(&assign, None, network);
         }
@@ -195,7 +205,7 @@ impl Maker<'_> {
                 Ok(None)
             }
             StatementKind::Call(path, arguments) => self.call(path, arguments, enable, network),
-            StatementKind::If(..) => Err("IF within IF or with ELSE".to_owned()),
+            StatementKind::If(..) => Err("IF within IF".to_owned()),
             StatementKind::Case(..) => Err("CASE".to_owned()),
             StatementKind::For(_) | StatementKind::While(..) | StatementKind::Repeat(..) => {
                 Err("a loop or a jump".to_owned())
@@ -305,6 +315,19 @@ impl Maker<'_> {
         }
         Ok(pins)
     }
+}
+
+/// The variable that a body sets or resets, and nothing more.
+fn stores(body: &[Statement]) -> Option<(&Path, bool)> {
+    let [only] = body else { return None };
+    let StatementKind::Assign(path, value) = &only.kind else {
+        return None;
+    };
+    let ExpressionKind::Literal(Literal::Boolean(sets)) = value.kind else {
+        return None;
+    };
+    let has_index = path.steps.iter().any(|step| matches!(step, Step::Index(_)));
+    (!has_index).then_some((path, sets))
 }
 
 /// The variables of some classes.

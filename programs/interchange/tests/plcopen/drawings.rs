@@ -53,7 +53,11 @@ END_PROGRAM
 #[test]
 fn statements_are_function_blocks() {
     let found = document("level", "level.st", LEVEL, Bodies::Blocks);
-    assert!(found.text.contains("<FBD>") && !found.text.contains("<ST>"), "{}", found.text);
+    assert!(
+        found.text.contains("<FBD>") && !found.text.contains("<ST>"),
+        "{}",
+        found.text
+    );
     assert_eq!(found.losses, []);
     // A block is connected to what reads its output, and stays so.
     let again = written("again.xml", &found.text, Bodies::AsRead).expect("a document");
@@ -62,7 +66,12 @@ fn statements_are_function_blocks() {
         assert!(text.contains(r#"formalParameter="R" negated="true""#));
         assert!(text.contains("scale to percent"));
     }
-    assert!(written("level.st", LEVEL, Bodies::AsRead).expect("a document").text.contains("<ST>"));
+    assert!(
+        written("level.st", LEVEL, Bodies::AsRead)
+            .expect("a document")
+            .text
+            .contains("<ST>")
+    );
 }
 
 #[test]
@@ -138,16 +147,31 @@ fn random_chart(dice: &mut Dice) -> String {
             let timed = dice.pick(&["L", "D", "SD", "DS", "SL"]);
             let plain = dice.pick(&["N", "R", "S", "P", "P0", "P1"]);
             let _ = match dice.below(3) {
-                0 => write!(text, "{action}({timed}, T#{}ms); ", 10 * (1 + dice.below(5))),
+                0 => write!(
+                    text,
+                    "{action}({timed}, T#{}ms); ",
+                    10 * (1 + dice.below(5))
+                ),
                 _ => write!(text, "{action}({plain}); "),
             };
         }
         text += "END_STEP\n";
     }
-    let condition = ["a", "NOT b", "a AND b", "n > 0", "S0.T > T#30ms", "S1.X OR a"];
+    let condition = [
+        "a",
+        "NOT b",
+        "a AND b",
+        "n > 0",
+        "S0.T > T#30ms",
+        "S1.X OR a",
+    ];
     for _ in 0..2 + dice.below(10) {
         let mut some = || {
-            let several = if dice.below(4) == 0 { 1 + dice.below(3) } else { 1 };
+            let several = if dice.below(4) == 0 {
+                1 + dice.below(3)
+            } else {
+                1
+            };
             let mut all: Vec<usize> = (0..several).map(|_| dice.below(count)).collect();
             all.sort_unstable();
             all.dedup();
@@ -163,7 +187,10 @@ fn random_chart(dice: &mut Dice) -> String {
             _ => String::new(),
         };
         let condition = dice.pick(&condition);
-        let _ = writeln!(text, "  TRANSITION {priority}FROM {from} TO {to} := {condition}; END_TRANSITION");
+        let _ = writeln!(
+            text,
+            "  TRANSITION {priority}FROM {from} TO {to} := {condition}; END_TRANSITION"
+        );
     }
     text += "  ACTION Add: m := m + 1; END_ACTION\n  ACTION Double: m := m * 2 + n; END_ACTION\nEND_PROGRAM\n";
     text
@@ -182,7 +209,14 @@ fn pictures_show_every_name() {
     let (svg, found) = draw_typed("level.st", LEVEL, Wanted::default(), Bodies::Blocks);
     let svg = svg.expect("a picture");
     assert!(found.is_empty(), "{found:#?}");
-    for word in ["PROGRAM level", ">TON<", ">latch<", ">27648.0<", ">valve<", "scale to percent"] {
+    for word in [
+        "PROGRAM level",
+        ">TON<",
+        ">latch<",
+        ">27648.0<",
+        ">valve<",
+        "scale to percent",
+    ] {
         assert!(svg.contains(word), "{word}");
     }
     let (svg, _) = draw_typed("batch.st", BATCH, Wanted::default(), Bodies::AsRead);
@@ -192,7 +226,10 @@ fn pictures_show_every_name() {
     }
     // Text is its own picture.
     let (svg, _) = draw_typed("level.st", LEVEL, Wanted::default(), Bodies::AsRead);
-    assert!(svg.expect("a picture").contains("error := setpoint - scaled;"));
+    assert!(
+        svg.expect("a picture")
+            .contains("error := setpoint - scaled;")
+    );
     let (text, _) = listing("level.st", LEVEL, Wanted::default());
     assert!(text.expect("a text").contains("END_PROGRAM"));
 }

@@ -1,11 +1,32 @@
 //! Where the branches of a divergence end.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::{BEYOND, Band, COLUMN, End, GAP, Goal, Layout, Open, Part, joined};
 use crate::Place;
 
 impl Layout<'_> {
+    /// Whether other branches of the divergence lead to a step too.
+    pub(super) fn is_awaited(&mut self, step: usize) -> bool {
+        let Some(around) = self.around.last_mut() else {
+            return false;
+        };
+        let mut seen = HashSet::new();
+        let mut waiting = around.later.clone();
+        let mut is_awaited = around.awaited.contains(&step);
+        while let Some(next) = waiting.pop() {
+            is_awaited |= next == step;
+            if !self.placed.contains(&next) && seen.insert(next) {
+                let behind = self.leaving[next].iter();
+                waiting.extend(behind.flat_map(|at| &self.chart.transitions[*at].to));
+            }
+        }
+        if is_awaited {
+            around.awaited.insert(step);
+        }
+        is_awaited
+    }
+
     /// Ends branches: in steps of their own, in jumps, in convergences. What is left waits for branches elsewhere.
     pub(super) fn merge(&mut self, mut bands: Vec<Band>) -> Band {
         loop {
