@@ -8,7 +8,8 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use understudy_interchange::plcopen::Fidelity;
 use understudy_interchange::{
-    Compared, Format, Reading, Wanted, WriteError, Written, read, typed_text, unknown_form, write,
+    Bodies, Compared, Format, Reading, Wanted, WriteError, Written, read, typed_text, unknown_form,
+    write,
 };
 use understudy_text::duration::parse_positive;
 use understudy_text::{Lines, MAXIMUM_SHOWN, Report, shortened};
@@ -56,6 +57,8 @@ enum Form {
     Ladder,
     /// PLCopen TC6 XML 2.01 (also reads 2.0)
     Plcopen,
+    /// PLCopen XML with statements as function block diagrams where these can hold them
+    PlcopenFbd,
     /// IEC 61131-3 Structured Text
     St,
     /// Digraph XML of the paper
@@ -68,7 +71,7 @@ impl Form {
     fn format(self) -> Format {
         match self {
             Self::Ladder => Format::Ladder,
-            Self::Plcopen => Format::PlcOpen,
+            Self::Plcopen | Self::PlcopenFbd => Format::PlcOpen,
             Self::St => Format::StructuredText,
             Self::Digraph => Format::Digraph,
             Self::Ldmicro => Format::LdMicro,
@@ -113,8 +116,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
             Some(form.and_then(written))
         }
         // What is no ladder may be a program with numbers.
-        (None, Ok(form @ (Form::St | Form::Plcopen))) => {
-            match typed_text(&report.name, &report.text, wanted, form.format()) {
+        (None, Ok(form @ (Form::St | Form::Plcopen | Form::PlcopenFbd))) => {
+            let bodies = match form {
+                Form::PlcopenFbd => Bodies::Blocks,
+                _ => Bodies::AsRead,
+            };
+            match typed_text(&report.name, &report.text, wanted, form.format(), bodies) {
                 Ok((None, _)) => None,
                 Ok((Some(written), diagnostics)) => {
                     report.diagnostics = diagnostics;

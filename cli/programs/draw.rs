@@ -1,29 +1,36 @@
-//! `understudy draw`: diagrams of ladder programs.
+//! `understudy draw`: pictures of programs.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
-use understudy_interchange::digraph;
+use understudy_interchange::{Bodies, Source, Wanted, digraph, draw_typed, listing};
 use understudy_ladder::{draw_svg, draw_text};
+use understudy_text::Report;
 
-use crate::answer::Answer;
+use crate::answer::{Answer, Status};
 use crate::files;
 
-/// Draw a ladder diagram as text or SVG
+/// Draw a program: a ladder, function blocks or a sequential function chart
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   understudy draw examples/press-cell/robot.ladder
   understudy draw robot.ladder --as svg --output robot.svg
-  understudy draw robot.ladder --as digraph --output robot.svg")]
+  understudy draw level.xml --as svg --output level.svg
+  understudy draw level.st --as fbd --output level.svg
+
+A program with numbers is drawn in its own language: function blocks as networks, a sequence as a chart. Structured Text and instruction lists are listed; `--as fbd` draws statements as function blocks. As text, a program with numbers is Structured Text.")]
 pub(crate) struct Arguments {
-    /// Ladder program
-    #[arg(value_name = "FILE.ladder")]
-    ladder: PathBuf,
+    /// Program
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
     /// Output format
     #[arg(long = "as", value_enum, default_value = "text")]
     form: Form,
+    /// Program to draw, if the file contains several
+    #[arg(long, value_name = "NAME")]
+    program: Option<String>,
     /// Output file; default: standard output
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -31,26 +38,71 @@ pub(crate) struct Arguments {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Form {
-    /// Box-drawing characters
+    /// Box-drawing characters; Structured Text for a program with numbers
     Text,
     /// SVG picture
     Svg,
+    /// SVG picture with statements as function blocks
+    Fbd,
     /// SVG picture of the digraphs: elements are edges, connections are vertices
     Digraph,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
-    let (program, report) = files::ladder(&arguments.ladder)?;
-    let text = match arguments.form {
-        Form::Text => draw_text(&program),
-        Form::Svg => draw_svg(&program),
-        Form::Digraph => digraph::draw_svg(&program),
+    let path = arguments.file.as_path();
+    let wanted = Wanted {
+        program: arguments.program.as_deref(),
+        period: None,
+    };
+    let (source, report) = files::program(path, wanted)?;
+    let (text, report, is_ladder) = match (source, arguments.form) {
+        (Source::Ladder(program), Form::Text) => (draw_text(&program), report, true),
+        (Source::Ladder(program), Form::Svg) => (draw_svg(&program), report, true),
+        (Source::Ladder(program), Form::Digraph) => (digraph::draw_svg(&program), report, true),
+        (_, form) => {
+            let (text, report) = typed(path, report, wanted, form)?;
+            (text, report, false)
+        }
     };
     let output = arguments.output.as_deref();
     let answer = files::deliver(output, &text, json!({ "text": text }))?;
     let answer = match output {
-        Some(_) => answer.and_next(&[&"verify", &arguments.ladder]),
-        None => answer,
+        Some(_) if is_ladder => answer.and_next(&[&"verify", &path]),
+        _ => answer,
     };
     Ok(answer.with_reports(vec![report]))
+}
+
+/// A program with numbers, or one that is drawn in another language than that of ladders.
+fn typed(
+    path: &Path,
+    mut report: Report,
+    wanted: Wanted<'_>,
+    form: Form,
+) -> Result<(String, Report), Answer> {
+    let name = &report.name;
+    let bodies = match form {
+        Form::Fbd => Bodies::Blocks,
+        _ => Bodies::AsRead,
+    };
+    let (text, found) = match form {
+        Form::Digraph => {
+            let message =
+                "a digraph is made of a ladder, and the program has numbers: use --as svg";
+            let answer = Answer::failed(Status::BadInput, "U0438", message);
+            return Err(answer.with_reports(vec![report]));
+        }
+        Form::Text => listing(name, &report.text, wanted),
+        Form::Svg | Form::Fbd => draw_typed(name, &report.text, wanted, bodies),
+    };
+    let Some(text) = text else {
+        let message = format!(
+            "{} has no statements to be drawn as function blocks: use --as svg",
+            path.display()
+        );
+        let answer = Answer::failed(Status::BadInput, "U0438", message);
+        return Err(answer.with_reports(vec![report]));
+    };
+    report.diagnostics = found;
+    Ok((text, report))
 }

@@ -76,6 +76,28 @@ fn a_ladder_is_drawn() {
     );
 }
 
+/// Structured Text is its own picture, and function blocks where these are asked for, in a picture as in a document of another tool.
+#[test]
+fn a_program_with_numbers_is_drawn_in_its_language() {
+    let level = "examples/heated-tank/level.st";
+    let listed = understudy(&["draw", level]);
+    assert!(listed.output.contains("END_PROGRAM"), "{}", listed.shown());
+    let drawn = understudy(&["draw", level, "--as", "fbd"]);
+    for word in ["<svg", ">regulator<", ">LREAL_TO_REAL<"] {
+        assert!(drawn.output.contains(word), "{}", drawn.shown());
+    }
+    let digraph = understudy(&["draw", level, "--as", "digraph", "--json"]);
+    assert_eq!(digraph.status, 2, "{}", digraph.shown());
+    assert_eq!(digraph.json()["failures"][0]["code"], "U0438");
+    let document = understudy(&["convert", level, "--to", "plcopen-fbd"]);
+    assert!(document.output.contains("<FBD>"), "{}", document.shown());
+    let text = understudy(&["convert", level, "--to", "plcopen"]);
+    assert!(!text.output.contains("<FBD>"), "{}", text.shown());
+    let loops = understudy(&["draw", "examples/heated-tank/temperature.st", "--as", "fbd"]);
+    assert_eq!(loops.status, 0);
+    assert!(loops.errors.contains("U1018"), "{}", loops.shown());
+}
+
 #[test]
 fn programs_of_other_tools_are_ladders() {
     for file in ["press.st", "light.ld", "vents.xml"] {

@@ -14,6 +14,7 @@
 mod alarm;
 mod describe;
 mod diff;
+mod drawing;
 mod error;
 mod event;
 mod event_list;

@@ -16,6 +16,7 @@ mod turns;
 use std::sync::{Arc, OnceLock};
 
 use understudy_cluster::Cluster;
+use understudy_interchange::DrawnUnit;
 use understudy_journal::{Cycles, Happening, Members, Record};
 use understudy_ladder::Observer;
 use understudy_typed::Interpreter;
@@ -83,6 +84,8 @@ pub struct Model {
     timings: Timings,
     observers: Vec<OnceLock<Option<Observer>>>,
     interpreters: Vec<OnceLock<Option<Interpreter>>>,
+    /// The units of each program with numbers, as they are drawn.
+    pub(crate) drawings: Vec<OnceLock<Vec<DrawnUnit>>>,
     /// The newest cycle of which the states of the stations are in the series.
     closed: Option<i64>,
     at_ns: u64,
@@ -120,6 +123,7 @@ impl Model {
             timings: Timings::new(schedule, bounds.timings),
             observers: vec![OnceLock::new(); programs],
             interpreters: vec![OnceLock::new(); programs],
+            drawings: vec![OnceLock::new(); programs],
             closed: None,
             at_ns: 0,
             records: 0,

@@ -1,4 +1,4 @@
-// A program as a ladder with the power flow of the shown cycle, or as text with the values after its scan; for an understudy its parity words, with the outputs of their masks.
+// A program as a ladder with the power flow of the shown cycle; one with numbers as text, or as function blocks or a chart, with the values of its scan; for an understudy its parity words, with the outputs of their masks.
 
 import { changed } from "/address.js";
 import { act, ask } from "/ask.js";
@@ -11,6 +11,7 @@ let run = null;
 let program = 0;
 let find = "";
 let names = "symbols";
+let view = "text";
 // Pages of rungs; a rung that was asked for is shown once.
 let page = 0;
 let pages = 1;
@@ -39,6 +40,8 @@ export function prepare(facts) {
       el("label", {}, "Find ", el("input", { id: "ladder-find", type: "search", input: (event) => look(event.target.value.trim()) })),
       el("label", {}, "Names ", el("select", { id: "ladder-names", change: (event) => { names = event.target.value; chosen(); } },
         el("option", { value: "symbols" }, "symbols"), el("option", { value: "addresses" }, "addresses"))),
+      el("label", { id: "ladder-view-label" }, "View ", el("select", { id: "ladder-view", change: (event) => { view = event.target.value; chosen(); } },
+        el("option", { value: "text" }, "text"), el("option", { value: "drawing" }, "function blocks, chart"))),
       el("label", {}, "Palette ", el("select", { id: "ladder-palette", change: (event) => palette(event.target.value) },
         el("option", { value: "understudy" }, "Understudy"), el("option", { value: "codesys" }, "CODESYS"), el("option", { value: "tia" }, "TIA"))),
     ),
@@ -66,7 +69,7 @@ function palette(name) {
 
 // What is chosen, as an address has it.
 export function selection() {
-  return { program, find, names: names === "symbols" ? "" : names, page: page > 0 ? page + 1 : "" };
+  return { program, find, names: names === "symbols" ? "" : names, view: view === "text" ? "" : view, page: page > 0 ? page + 1 : "" };
 }
 
 // Takes a choice from an address: `program` is the number of a program, or the name of an understudy.
@@ -80,6 +83,8 @@ export function select(wanted) {
   id("ladder-find").value = find;
   names = wanted.names === "addresses" ? "addresses" : "symbols";
   id("ladder-names").value = names;
+  view = wanted.view === "drawing" ? "drawing" : "text";
+  id("ladder-view").value = view;
   page = Math.max(0, (Number(wanted.page) || 1) - 1);
   rung = null;
   choices += 1;
@@ -166,13 +171,14 @@ async function refresh(now) {
 async function picture() {
   const before = choices;
   const place = rung === null ? `page=${page}` : `rung=${rung}`;
-  const question = `/api/ladder/${program}?names=${names}&find=${encodeURIComponent(find)}&${place}&${cycleParameter()}`;
+  const question = `/api/ladder/${program}?names=${names}&view=${view}&find=${encodeURIComponent(find)}&${place}&${cycleParameter()}`;
   const answer = await act(() => ask(question));
   if (!answer || choices !== before) {
     return;
   }
   setText(id("ladder-stamp"), answer.words);
-  id("ladder-legend").hidden = Boolean(answer.lines);
+  id("ladder-legend").hidden = !answer.rungs;
+  id("ladder-view-label").hidden = Boolean(answer.rungs);
   const forced = forcesOf();
   showForced(forced);
   showPages(answer.rungs);
@@ -238,7 +244,9 @@ function mark(forced) {
     if (!force) {
       continue;
     }
-    const left = Number(label.getAttribute("x")) + Number(label.getAttribute("textLength")) + 1;
+    // Behind the name in a ladder, in front of it in a drawing.
+    const length = Number(label.getAttribute("textLength"));
+    const left = Number(label.getAttribute("x")) + (length > 0 ? length + 1 : -16);
     const top = Number(label.getAttribute("y")) - 13;
     label.classList.add("forced");
     label.after(svg("g", { class: "forced-mark" },
@@ -284,13 +292,17 @@ function askWhy(name) {
   openWhy(program, index >= 0 ? index : name);
 }
 
-// A click on the name of an output asks why.
+// A click on the name of an output asks why; in a drawing, on that of any variable.
 function pick(event) {
   const label = event.target.closest?.("text.name");
   if (!label || typeof program !== "number") {
     return;
   }
   const name = nameOn(label);
+  if (!id("ladder-view-label").hidden) {
+    askWhy(name);
+    return;
+  }
   const { outputs } = run.programs[program];
   const index = outputs.findIndex((output) => output.name === name || output.address === name);
   if (index >= 0) {

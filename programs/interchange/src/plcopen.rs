@@ -12,7 +12,7 @@ mod plan;
 mod power;
 mod standard;
 mod structure;
-mod typed;
+pub(crate) mod typed;
 mod units;
 mod write;
 pub(crate) mod xml;
@@ -26,8 +26,8 @@ use understudy_structured_text::syntax::UnitKind;
 use understudy_text::{Diagnostic, Severity, has_errors};
 
 pub use fidelity::{Count, Fidelity, Note};
-pub use typed::read_typed;
-pub use write::{write, write_typed};
+pub use typed::{drawn_units, read_typed};
+pub use write::{TypedDocument, write, write_typed};
 pub use xml::{MAXIMUM_BYTES, MAXIMUM_DEPTH, MAXIMUM_NODES};
 
 use crate::text::whole;

@@ -2,6 +2,7 @@
 //!
 //! Invariant: the text is the program. It is read back, and both are executed over scans with pseudo-random inputs: every output is the same.
 
+use std::collections::HashSet;
 use std::time::Duration;
 
 use understudy_executable::{Executable, Interface, digest};
@@ -31,13 +32,11 @@ pub fn typed_text(
     text: &str,
     wanted: Wanted<'_>,
     to: Format,
+    bodies: Bodies,
 ) -> Result<(Option<Written>, Vec<Diagnostic>), WriteError> {
     let format = Format::of(name, text);
-    let (mut file, found) = match (twincat::read(text), format) {
-        (Some(parsed), _) => parsed,
-        (None, Some(Format::StructuredText)) => parse(text),
-        (None, Some(Format::PlcOpen)) => plcopen::read_typed(text),
-        (None, _) => return Ok((None, Vec::new())),
+    let Some((mut file, found)) = parsed(name, text) else {
+        return Ok((None, Vec::new()));
     };
     let read = whole(text, (file.clone(), found), wanted.program, wanted.period);
     let diagnostics = read.diagnostics.clone();
@@ -49,13 +48,23 @@ pub fn typed_text(
     }
     let file = with_library(file);
     let as_text = print::file(&file);
+    let mut losses = Vec::new();
     let printed = match to {
         Format::StructuredText => as_text.clone(),
         Format::PlcOpen => {
             let main = file.instances.first().map(|instance| &instance.of);
             let main = main.or_else(|| Some(&file.units.last()?.name));
             let title = main.map_or("project", Name::as_str);
-            plcopen::write_typed(&file, title).map_err(WriteError::NotHeld)?
+            let drawn = match format {
+                Some(Format::PlcOpen) => plcopen::drawn_units(text),
+                _ => HashSet::new(),
+            };
+            let as_blocks =
+                |unit: &Unit| bodies == Bodies::Blocks || drawn.contains(&unit.name.key());
+            let document = plcopen::write_typed(&file, title, &as_blocks);
+            let document = document.map_err(WriteError::NotHeld)?;
+            losses.extend(in_text(&document.as_text));
+            document.text
         }
         _ => return Err(WriteError::ReadOnly),
     };
@@ -69,16 +78,57 @@ pub fn typed_text(
         scans: compare(&read, &again)?,
         ..Compared::default()
     };
-    let lost = match format {
-        Some(Format::StructuredText) => lost_comments(text, &as_text),
-        _ => None,
-    };
+    if format == Some(Format::StructuredText) {
+        losses.extend(lost_comments(text, &as_text));
+    }
     let written = Written {
-        losses: lost.into_iter().collect(),
+        losses,
         text: printed,
         compared,
     };
     Ok((Some(written), diagnostics))
+}
+
+/// The syntax of the file `name`, and what was found in it; nothing for a form that has no programs with numbers.
+pub(crate) fn parsed(name: &str, text: &str) -> Option<(File, Vec<Diagnostic>)> {
+    if let Some(parsed) = twincat::read(text) {
+        return Some(parsed);
+    }
+    match Format::of(name, text) {
+        Some(Format::StructuredText) => Some(parse(text)),
+        Some(Format::PlcOpen) => Some(plcopen::read_typed(text)),
+        _ => None,
+    }
+}
+
+/// What statements are written as, where the form has several languages.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Bodies {
+    /// What was read: drawn networks as function blocks, all else as text.
+    #[default]
+    AsRead,
+    /// Function blocks, as far as networks hold the statements.
+    Blocks,
+}
+
+/// The finding on bodies that are not networks.
+fn in_text(reasons: &[String]) -> Option<Diagnostic> {
+    if reasons.is_empty() {
+        return None;
+    }
+    let mut listed = reasons
+        .iter()
+        .take(8)
+        .cloned()
+        .collect::<Vec<_>>()
+        .join(", ");
+    if let Some(more @ 1..) = reasons.len().checked_sub(8) {
+        listed = format!("{listed} and {more} more");
+    }
+    let message = format!(
+        "PLCopen XML has these bodies as Structured Text, not as function blocks: {listed}"
+    );
+    Some(Diagnostic::warning("U1018", message, 0..0))
 }
 
 /// Runs the program by a task, where the file does not say what runs, or another program is wanted.
@@ -153,11 +203,14 @@ fn names_with_dots(unit: &Unit, made: &mut Vec<String>) {
         .declarations
         .iter()
         .map(|declaration| &declaration.name);
-    let actions = match &unit.body {
-        Body::Chart(chart) => chart.actions.as_slice(),
-        _ => &[],
+    let chart = match &unit.body {
+        Body::Chart(chart) => Some(chart),
+        _ => None,
     };
-    let actions = actions.iter().map(|action| &action.name);
+    let actions = chart.iter().flat_map(|chart| &chart.actions);
+    let actions = actions.map(|action| &action.name);
+    let steps = chart.iter().flat_map(|chart| &chart.steps);
+    let actions = actions.chain(steps.map(|step| &step.name));
     let methods = unit.methods.iter().map(|method| &method.name);
     let names = declared
         .chain(actions)

@@ -11,5 +11,5 @@ pub mod syntax;
 
 pub use jumps::in_parts;
 pub use library::{control as control_blocks, file as library};
-pub use lower::{Lowered, Options, lower};
+pub use lower::{Lowered, Options, input_names, lower};
 pub use parser::parse;

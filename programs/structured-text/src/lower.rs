@@ -29,6 +29,8 @@ mod statements;
 mod times;
 mod types;
 
+pub use standard::input_names;
+
 use std::collections::HashMap;
 use std::ops::Range;
 use std::rc::Rc;

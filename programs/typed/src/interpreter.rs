@@ -11,7 +11,7 @@ use crate::interpreter::memory::{Address, Memory};
 use crate::scan::Frame;
 use crate::types::Elementary;
 
-pub use self::trace::{Done, Effect, Read, Trace};
+pub use self::trace::{Done, Effect, Made, Read, Trace};
 
 /// The reference engine. It gives a program its meaning; [`crate::Machine`] is proved equal to it and is the one to use.
 #[derive(Debug, Clone)]

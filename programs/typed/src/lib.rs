@@ -30,7 +30,7 @@ pub use self::form::{
     Root, Routine, RoutineId, RoutineKind, Statement, StatementKind, Task, Variable,
 };
 pub use self::image::{Point, Points};
-pub use self::interpreter::{Done, Effect, Interpreter, Read, Trace};
+pub use self::interpreter::{Done, Effect, Interpreter, Made, Read, Trace};
 pub use self::machine::{Machine, Scratch};
 pub use self::naming::Part;
 pub use self::operation::{

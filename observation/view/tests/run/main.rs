@@ -7,6 +7,7 @@
 
 mod diffs;
 mod directory;
+mod drawings;
 mod fold;
 mod hostile;
 mod margin;

@@ -9,7 +9,7 @@ use axum::extract::{Path, Query, State};
 use serde::{Deserialize, Serialize};
 use understudy_cluster::Controller;
 use understudy_ladder::{Element, Program, Rung, draw_svg_rungs, visit};
-use understudy_view::ShownLine;
+use understudy_view::{ShownLine, ViewError};
 use understudy_wire::ProgramId;
 
 use super::Answered;
@@ -28,6 +28,9 @@ pub(super) struct Wanted {
     cycle: Option<i64>,
     #[serde(default)]
     names: Names,
+    /// Of a program with numbers.
+    #[serde(default)]
+    view: View,
     #[serde(default)]
     find: String,
     /// Of the rungs that were found, from 0; the last one where there are fewer.
@@ -45,12 +48,21 @@ enum Names {
     Addresses,
 }
 
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum View {
+    #[default]
+    Text,
+    /// Function blocks and charts.
+    Drawing,
+}
+
 #[derive(Debug, Serialize)]
 pub(super) struct Picture {
     cycle: i64,
     /// Cycle and lineage of the picture, and the share of the program that it shows.
     words: String,
-    /// Empty for a program with numbers.
+    /// Empty for the text of a program with numbers.
     svg: String,
     /// Nothing for a program with numbers.
     rungs: Option<Rungs>,
@@ -120,7 +132,10 @@ fn controller_of(known: &Known, program: ProgramId) -> Answered<&Controller> {
 fn draw(known: &Known, program: ProgramId, cycle: i64, wanted: &Wanted) -> Answered<Picture> {
     let controller = controller_of(known, program)?;
     let Some(ladder) = controller.ladder() else {
-        return Ok(text(known, program, cycle, wanted.find.trim()));
+        return Ok(match wanted.view {
+            View::Text => text(known, program, cycle, wanted.find.trim()),
+            View::Drawing => drawing(known, program, cycle),
+        });
     };
     let evaluation = known.run.evaluation(program, cycle);
     let found: Vec<usize> = found(ladder, wanted.find.trim()).collect();
@@ -156,15 +171,8 @@ fn draw(known: &Known, program: ProgramId, cycle: i64, wanted: &Wanted) -> Answe
 
 /// A program with numbers as its text, with the values after the scan of a cycle; of a search the lines that have the words.
 fn text(known: &Known, program: ProgramId, cycle: i64, find: &str) -> Picture {
-    let name = shown::program_name(&known.run, program);
-    let mut words = format!("{name}, cycle {cycle}");
     let (mut lines, error) = known.run.text_at(program, cycle).unwrap_or_default();
-    let step = known.run.history(program).and_then(|steps| steps.at(cycle));
-    match (error, step.and_then(|step| step.sampled.as_ref())) {
-        (Some(error), _) => words += &format!(": without values: {}", error.words()),
-        (None, Some(sampled)) => words += &format!(": as executed, lineage {}", sampled.before),
-        (None, None) => {}
-    }
+    let mut words = stamp(known, program, cycle, error);
     let find = find.to_lowercase();
     let count = lines.len();
     lines.retain(|line| line.text.to_lowercase().contains(&find));
@@ -178,6 +186,30 @@ fn text(known: &Known, program: ProgramId, cycle: i64, find: &str) -> Picture {
         rungs: None,
         lines: Some(lines),
     }
+}
+
+/// A program with numbers as function blocks or as a chart, with the values of a scan.
+fn drawing(known: &Known, program: ProgramId, cycle: i64) -> Picture {
+    let (svg, error) = known.run.drawing_at(program, cycle).unwrap_or_default();
+    Picture {
+        cycle,
+        words: stamp(known, program, cycle, error),
+        svg: without_style(&svg),
+        rungs: None,
+        lines: None,
+    }
+}
+
+/// Of which scan the values of a program with numbers are.
+fn stamp(known: &Known, program: ProgramId, cycle: i64, error: Option<ViewError>) -> String {
+    let name = shown::program_name(&known.run, program);
+    let step = known.run.history(program).and_then(|steps| steps.at(cycle));
+    let of = match (error, step.and_then(|step| step.sampled.as_ref())) {
+        (Some(error), _) => format!(": without values: {}", error.words()),
+        (None, Some(sampled)) => format!(": as executed, lineage {}", sampled.before),
+        (None, None) => String::new(),
+    };
+    format!("{name}, cycle {cycle}{of}")
 }
 
 /// The page has the styles of its own theme and palette.
@@ -321,6 +353,7 @@ mod tests {
             let of = |page, rung| Wanted {
                 cycle: None,
                 names: Names::Symbols,
+                view: View::Text,
                 find: String::new(),
                 page,
                 rung,

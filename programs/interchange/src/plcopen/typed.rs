@@ -5,10 +5,10 @@ mod account;
 mod chart;
 mod configuration;
 mod interface;
-mod make;
+pub(crate) mod make;
 mod network;
 mod surroundings;
-mod values;
+pub(crate) mod values;
 
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
@@ -23,6 +23,7 @@ use super::document::{self, Body as Drawn, Language, Part, Pou, PouKind};
 use super::xml::{self, attribute, child, elements, start_tag};
 use super::{NAMESPACES, within};
 use network::Network;
+pub(in crate::plcopen) use network::is_call;
 
 /// The namespace of the first edition, whose elements are the same as far as they are read.
 const FIRST_EDITION: &str = "http://www.plcopen.org/xml/tc6.xsd";
@@ -78,6 +79,19 @@ pub(super) fn read_typed_of(
     diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
     diagnostics.dedup();
     (typed.file, diagnostics)
+}
+
+/// The units of a document whose bodies are ladders or function blocks, in capitals.
+pub fn drawn_units(text: &str) -> HashSet<String> {
+    let Ok(document) = xml::parse(text) else {
+        return HashSet::new();
+    };
+    let (project, _) = document::read_bodies(document.root_element());
+    let drawn = project.pous.iter().filter(|pou| match &pou.body {
+        Some(Drawn::Graph(graph)) => graph.language != Language::Sequence,
+        _ => false,
+    });
+    drawn.map(|pou| pou.name.to_uppercase()).collect()
 }
 
 impl Typed {

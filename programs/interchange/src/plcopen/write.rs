@@ -5,6 +5,8 @@
 //! that nothing asks for after everything else; so a rung whose coils change what it reads gets a bit that keeps its power,
 //! and a block at the end of a rung gets a coil.
 
+mod blocks;
+mod chart;
 mod sheet;
 mod tree;
 mod typed;
@@ -18,7 +20,7 @@ use understudy_ladder::{
 
 use self::sheet::Sheet;
 use self::tree::Tree;
-pub use self::typed::write_typed;
+pub use self::typed::{TypedDocument, write_typed};
 
 /// The file of a program that runs every `period`.
 ///

@@ -2,6 +2,7 @@
 
 mod ablation;
 mod bad_input;
+mod drawings;
 mod instruction_lists;
 mod jumps;
 mod meaning;

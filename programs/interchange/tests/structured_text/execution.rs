@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use understudy_interchange::{Format, Wanted, WriteError, plcopen, read, typed_text};
+use understudy_interchange::{Bodies, Format, Wanted, WriteError, plcopen, read, typed_text};
 use understudy_ladder::Program as Ladder;
 use understudy_logic::Running;
 use understudy_structured_text::syntax::File;
@@ -148,29 +148,37 @@ fn programs_with_numbers_are_written_as_they_are() {
         };
         let name = path.display().to_string();
         let form = Format::StructuredText;
-        let result = typed_text(&name, &text, Wanted::default(), form);
+        let wanted = Wanted::default;
+        let result = typed_text(&name, &text, wanted(), form, Bodies::AsRead);
         let (found, diagnostics) = result.unwrap_or_else(|error| panic!("{name}: {error}"));
         let Some(found) = found else {
             continue;
         };
         written += 1;
         // What is written can be read, and written again.
-        let again = typed_text("again.st", &found.text, Wanted::default(), form);
+        let again = typed_text("again.st", &found.text, wanted(), form, Bodies::AsRead);
         let (again, found) = again.unwrap_or_else(|error| panic!("{name}: {error}"));
         assert!(again.is_some(), "{name}: {found:?}, {diagnostics:?}");
-        match typed_text(&name, &text, Wanted::default(), Format::PlcOpen) {
-            Ok((found, _)) => {
-                let found = found.expect("it was written as text");
-                drawn += 1;
-                let again =
-                    typed_text("again.xml", &found.text, Wanted::default(), Format::PlcOpen);
-                let (again, found) = again.unwrap_or_else(|error| panic!("{name}: {error}"));
-                assert!(again.is_some(), "{name}: {found:?}");
+        for bodies in [Bodies::AsRead, Bodies::Blocks] {
+            match typed_text(&name, &text, wanted(), Format::PlcOpen, bodies) {
+                Ok((found, _)) => {
+                    let found = found.expect("it was written as text");
+                    drawn += 1;
+                    let again = typed_text(
+                        "again.xml",
+                        &found.text,
+                        wanted(),
+                        Format::PlcOpen,
+                        Bodies::AsRead,
+                    );
+                    let (again, found) = again.unwrap_or_else(|error| panic!("{name}: {error}"));
+                    assert!(again.is_some(), "{name}: {found:?}");
+                }
+                Err(WriteError::NotHeld(_)) => {}
+                Err(error) => panic!("{name} {bodies:?}: {error}"),
             }
-            Err(WriteError::NotHeld(_)) => {}
-            Err(error) => panic!("{name}: {error}"),
         }
     }
     assert!(written >= 10, "{written} programs");
-    assert!(drawn * 10 >= written * 9, "{drawn} documents of {written}");
+    assert!(drawn * 10 >= written * 18, "{drawn} documents of {written}");
 }

@@ -10,6 +10,8 @@ mod texts;
 mod times;
 mod typed;
 
+pub use inputs::input_names;
+
 use understudy_typed::{Comparison, Elementary, Expression, Operation, RealFunction, Type};
 
 use crate::syntax::{self, Argument, Operator, Span};

@@ -92,11 +92,13 @@ impl Run<'_> {
                 for operand in operands {
                     values.push(self.value(context, line, operand)?);
                 }
-                self.apply(*operation, &values).map_err(|cause| Fault {
+                let value = self.apply(*operation, &values).map_err(|cause| Fault {
                     cause,
                     routine: Some(context.routine),
                     line,
-                })
+                })?;
+                self.made(*operation, &expression.of, &value);
+                Ok(value)
             }
             ExpressionKind::Choose(parts) => {
                 let [condition, first, second] = &**parts;

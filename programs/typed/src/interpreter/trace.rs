@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use crate::fault::Fault;
 use crate::form::{RoutineId, Statement};
-use crate::interpreter::memory::Address;
+use crate::interpreter::memory::{Address, Value};
 use crate::interpreter::{Context, Flow, Interpreter, Run};
+use crate::operation::Operation;
 use crate::types::{Elementary, Type};
 
 /// Statements that are recorded of one scan.
@@ -22,6 +23,24 @@ pub struct Read {
     pub value: u64,
     /// The statement of this scan that assigned it before, as a place in [`Trace::done`].
     pub by: Option<usize>,
+}
+
+/// What an operation of a statement came to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Made {
+    /// The operation.
+    pub operation: Operation,
+    /// The type of the result.
+    pub of: Elementary,
+    /// The result, as it is stored.
+    pub value: u64,
+}
+
+/// Where the reads and results of a statement begin.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Mark {
+    reads: usize,
+    results: usize,
 }
 
 /// What a statement did.
@@ -49,6 +68,8 @@ pub struct Done {
     pub effect: Effect,
     /// What it read, in order.
     pub reads: Vec<Read>,
+    /// What its operations came to, in order.
+    pub results: Vec<Made>,
     /// The choice that led to it, as a place in [`Trace::done`].
     pub under: Option<usize>,
 }
@@ -82,14 +103,16 @@ impl Trace {
 pub(super) struct Recorder {
     trace: Trace,
     reads: Vec<Read>,
+    results: Vec<Made>,
     /// The newest assignment of each address.
     writers: BTreeMap<u64, usize>,
     under: Option<usize>,
 }
 
 impl Recorder {
-    fn push(&mut self, context: Context, line: u32, effect: Effect, reads: usize) -> Option<usize> {
-        let reads = self.reads.split_off(reads.min(self.reads.len()));
+    fn push(&mut self, context: Context, line: u32, effect: Effect, mark: Mark) -> Option<usize> {
+        let reads = self.reads.split_off(mark.reads.min(self.reads.len()));
+        let results = self.results.split_off(mark.results.min(self.results.len()));
         if self.trace.done.len() == MOST {
             self.trace.is_cut = true;
             return None;
@@ -99,6 +122,7 @@ impl Recorder {
             line,
             effect,
             reads,
+            results,
             under: self.under,
         });
         Some(self.trace.done.len() - 1)
@@ -135,10 +159,26 @@ impl Interpreter {
 
 impl Run<'_> {
     /// The place behind the reads so far, where those of a statement begin.
-    pub(super) fn mark(&self) -> usize {
-        self.trace
-            .as_ref()
-            .map_or(0, |recorder| recorder.reads.len())
+    pub(super) fn mark(&self) -> Mark {
+        let recorder = self.trace.as_ref();
+        recorder.map_or(Mark::default(), |recorder| Mark {
+            reads: recorder.reads.len(),
+            results: recorder.results.len(),
+        })
+    }
+
+    /// An operation has come to a value.
+    pub(super) fn made(&mut self, operation: Operation, of: &Type, value: &Value) {
+        if let (Some(recorder), Some(of), Value::Number(value)) =
+            (&mut self.trace, of.elementary(), value)
+        {
+            let value = *value;
+            recorder.results.push(Made {
+                operation,
+                of,
+                value,
+            });
+        }
     }
 
     /// A value is read.
@@ -162,7 +202,7 @@ impl Run<'_> {
         line: u32,
         Address(address): Address,
         of: &Type,
-        reads: usize,
+        reads: Mark,
     ) {
         let Some(recorder) = &mut self.trace else {
             return;
@@ -188,7 +228,7 @@ impl Run<'_> {
         &mut self,
         context: Context,
         line: u32,
-        reads: usize,
+        reads: Mark,
         chosen: &[Statement],
     ) -> Result<Flow, Fault> {
         let mut before = None;

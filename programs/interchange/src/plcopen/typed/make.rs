@@ -7,12 +7,12 @@ use understudy_structured_text::syntax::{
 };
 
 /// A name of the document.
-pub(super) fn name(written: &Written) -> Name {
+pub(crate) fn name(written: &Written) -> Name {
     Name::new(written.as_str(), written.span())
 }
 
 /// `name` or `name.part`.
-pub(super) fn path(name: &str, part: Option<&str>, span: &Span) -> Path {
+pub(crate) fn path(name: &str, part: Option<&str>, span: &Span) -> Path {
     let steps = part.map(|part| Step::Field(Name::new(part, span.clone())));
     Path {
         root: Name::new(name, span.clone()),
@@ -21,32 +21,32 @@ pub(super) fn path(name: &str, part: Option<&str>, span: &Span) -> Path {
     }
 }
 
-pub(super) fn read(path: Path) -> Expression {
+pub(crate) fn read(path: Path) -> Expression {
     Expression {
         span: path.span.clone(),
         kind: ExpressionKind::Variable(path),
     }
 }
 
-pub(super) fn variable(name: &str, span: &Span) -> Expression {
+pub(crate) fn variable(name: &str, span: &Span) -> Expression {
     read(path(name, None, span))
 }
 
-pub(super) fn boolean(value: bool, span: &Span) -> Expression {
+pub(crate) fn boolean(value: bool, span: &Span) -> Expression {
     Expression {
         kind: ExpressionKind::Literal(Literal::Boolean(value)),
         span: span.clone(),
     }
 }
 
-pub(super) fn integer(value: i128, span: &Span) -> Expression {
+pub(crate) fn integer(value: i128, span: &Span) -> Expression {
     Expression {
         kind: ExpressionKind::Literal(Literal::Integer { value, of: None }),
         span: span.clone(),
     }
 }
 
-pub(super) fn not(value: Expression) -> Expression {
+pub(crate) fn not(value: Expression) -> Expression {
     Expression {
         span: value.span.clone(),
         kind: ExpressionKind::Not(Box::new(value)),
@@ -54,7 +54,7 @@ pub(super) fn not(value: Expression) -> Expression {
 }
 
 /// Two or more values with one operator between them; one is itself.
-pub(super) fn chain(values: Vec<Expression>, operator: Operator, span: &Span) -> Expression {
+pub(crate) fn chain(values: Vec<Expression>, operator: Operator, span: &Span) -> Expression {
     let mut values = values.into_iter();
     let Some(first) = values.next() else {
         return boolean(operator == Operator::And, span);
@@ -69,7 +69,7 @@ pub(super) fn chain(values: Vec<Expression>, operator: Operator, span: &Span) ->
     }
 }
 
-pub(super) fn call(name: Name, arguments: Vec<Argument>, span: &Span) -> Expression {
+pub(crate) fn call(name: Name, arguments: Vec<Argument>, span: &Span) -> Expression {
     let path = Path {
         span: name.span(),
         root: name,
@@ -81,7 +81,7 @@ pub(super) fn call(name: Name, arguments: Vec<Argument>, span: &Span) -> Express
     }
 }
 
-pub(super) fn statement(kind: StatementKind, span: &Span) -> Statement {
+pub(crate) fn statement(kind: StatementKind, span: &Span) -> Statement {
     Statement {
         kind,
         span: span.clone(),
@@ -89,22 +89,22 @@ pub(super) fn statement(kind: StatementKind, span: &Span) -> Statement {
     }
 }
 
-pub(super) fn assign(to: Path, value: Expression, span: &Span) -> Statement {
+pub(crate) fn assign(to: Path, value: Expression, span: &Span) -> Statement {
     statement(StatementKind::Assign(to, value), span)
 }
 
-pub(super) fn when(condition: Expression, body: Vec<Statement>, span: &Span) -> Statement {
+pub(crate) fn when(condition: Expression, body: Vec<Statement>, span: &Span) -> Statement {
     statement(StatementKind::If(vec![(condition, body)], Vec::new()), span)
 }
 
-pub(super) fn named(of: &str, span: &Span) -> TypeName {
+pub(crate) fn named(of: &str, span: &Span) -> TypeName {
     TypeName {
         kind: TypeKind::Named(Name::new(of, span.clone())),
         span: span.clone(),
     }
 }
 
-pub(super) fn declare(name: &str, class: Class, of: TypeName, span: &Span) -> Declaration {
+pub(crate) fn declare(name: &str, class: Class, of: TypeName, span: &Span) -> Declaration {
     Declaration {
         name: Name::new(name, span.clone()),
         class,

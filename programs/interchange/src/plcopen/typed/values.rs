@@ -17,29 +17,29 @@ const NUMBERS: [&str; 10] = [
 ];
 
 /// What is known where a value stands.
-pub(super) struct Values<'a> {
-    pub(super) file: &'a File,
+pub(crate) struct Values<'a> {
+    pub(crate) file: &'a File,
     /// The variables of the unit, and those that were made for it.
-    pub(super) declarations: &'a [Declaration],
-    pub(super) made: &'a [Declaration],
+    pub(crate) declarations: &'a [Declaration],
+    pub(crate) made: &'a [Declaration],
 }
 
 /// A unit of the file or of the library.
-pub(super) fn unit<'a>(file: &'a File, name: &str) -> Option<&'a Unit> {
+pub(crate) fn unit<'a>(file: &'a File, name: &str) -> Option<&'a Unit> {
     let mut units = file.units.iter().chain(&library().units);
     units.find(|unit| unit.name.is(name))
 }
 
 impl<'a> Values<'a> {
     /// The type of a value; a number without one takes the widest that it may need.
-    pub(super) fn of(&self, value: &Expression) -> TypeName {
+    pub(crate) fn of(&self, value: &Expression) -> TypeName {
         self.strong(value)
             .or_else(|| weak(value, &value.span))
             .unwrap_or_else(|| named("BOOL", &value.span))
     }
 
     /// The type of a value, where something in it has one.
-    pub(super) fn strong(&self, value: &Expression) -> Option<TypeName> {
+    pub(crate) fn strong(&self, value: &Expression) -> Option<TypeName> {
         let span = &value.span;
         match &value.kind {
             ExpressionKind::Literal(literal) => match literal {

@@ -9,6 +9,7 @@ use understudy_ladder::{
 
 use self::object::{Object, Source, WIRE, What};
 use self::place::Place;
+pub(super) use self::place::position;
 use super::tree::Tree;
 
 const LEFT: i64 = 40;

@@ -1,4 +1,4 @@
-//! A file with numbers as PLCopen XML 2.01: types, units with bodies in Structured Text or instruction lists, configuration.
+//! A file with numbers as PLCopen XML 2.01: types, units with bodies in all languages but ladders, configuration.
 
 use understudy_structured_text::print;
 use understudy_structured_text::syntax::{
@@ -6,7 +6,8 @@ use understudy_structured_text::syntax::{
 };
 
 use super::tree::Tree;
-use super::{document, standard_time};
+use super::{blocks, chart, document, standard_time};
+use crate::diagrams::networks;
 
 /// Elements that the format has for types; of two names the one of the format.
 const ELEMENTARY: [(&str, &str); 23] = [
@@ -35,11 +36,25 @@ const ELEMENTARY: [(&str, &str); 23] = [
     ("WSTRING", "wstring"),
 ];
 
-/// The file as a document.
+/// A document, and which bodies are in another language than was wanted, with the reason.
+#[derive(Debug, Clone, Default)]
+pub struct TypedDocument {
+    /// The document.
+    pub text: String,
+    /// A body and the reason, in words.
+    pub as_text: Vec<String>,
+}
+
+/// The file as a document. Statements of the units that `as_blocks` chooses are function blocks.
 ///
 /// # Errors
 /// What the format cannot hold, or is not written yet, in words.
-pub fn write_typed(file: &File, name: &str) -> Result<String, String> {
+pub fn write_typed(
+    file: &File,
+    name: &str,
+    as_blocks: &dyn Fn(&Unit) -> bool,
+) -> Result<TypedDocument, String> {
+    let mut as_text = Vec::new();
     let mut tree = document(name);
     tree.open("types", &[]);
     tree.open("dataTypes", &[]);
@@ -49,13 +64,14 @@ pub fn write_typed(file: &File, name: &str) -> Result<String, String> {
     tree.close("dataTypes");
     tree.open("pous", &[]);
     for unit in &file.units {
-        pou(&mut tree, unit)?;
+        pou(&mut tree, file, unit, as_blocks(unit), &mut as_text)?;
     }
     tree.close("pous");
     tree.close("types");
     instances(&mut tree, file)?;
     tree.close("project");
-    Ok(tree.finish())
+    let text = tree.finish();
+    Ok(TypedDocument { text, as_text })
 }
 
 fn data_type(tree: &mut Tree, definition: &TypeDefinition) -> Result<(), String> {
@@ -68,21 +84,27 @@ fn data_type(tree: &mut Tree, definition: &TypeDefinition) -> Result<(), String>
     Ok(())
 }
 
-fn pou(tree: &mut Tree, unit: &Unit) -> Result<(), String> {
+fn pou(
+    tree: &mut Tree,
+    file: &File,
+    unit: &Unit,
+    as_blocks: bool,
+    as_text: &mut Vec<String>,
+) -> Result<(), String> {
     let kind = match unit.kind {
         UnitKind::Program => "program",
         UnitKind::FunctionBlock => "functionBlock",
         UnitKind::Function => "function",
         UnitKind::Method => return Err(not_held(unit, "a method")),
     };
-    if !unit.methods.is_empty() || unit.extends.is_some() || !unit.implements.is_empty() {
+    let is_chart = matches!(unit.body, Body::Chart(_));
+    // The methods of a chart are its conditions and actions.
+    if !(unit.methods.is_empty() || is_chart)
+        || unit.extends.is_some()
+        || !unit.implements.is_empty()
+    {
         return Err(not_held(unit, "methods, EXTENDS or IMPLEMENTS"));
     }
-    let (language, text) = match &unit.body {
-        Body::Statements(statements) => ("ST", print::statements(statements)),
-        Body::Instructions(instructions) => ("IL", print::instructions(instructions)),
-        Body::Chart(_) => return Err(not_held(unit, "a sequential function chart")),
-    };
     tree.open("pou", &[("name", unit.name.as_str()), ("pouType", kind)]);
     tree.open("interface", &[]);
     if let Some(result) = &unit.result {
@@ -98,8 +120,30 @@ fn pou(tree: &mut Tree, unit: &Unit) -> Result<(), String> {
         variables(tree, block).map_err(|what| not_held(unit, &what))?;
     }
     tree.close("interface");
+    if let Body::Chart(of) = &unit.body {
+        chart::parts(tree, file, unit, of).map_err(|what| not_held(unit, &what))?;
+    }
     tree.open("body", &[]);
-    tree.formatted(language, text.trim_end());
+    match &unit.body {
+        Body::Chart(of) => chart::body(tree, unit, of).map_err(|what| not_held(unit, &what))?,
+        Body::Instructions(list) => tree.formatted("IL", print::instructions(list).trim_end()),
+        Body::Statements(statements) => {
+            let networks = as_blocks.then(|| networks(file, unit, statements));
+            match networks {
+                Some(Ok(networks)) => {
+                    tree.open("FBD", &[]);
+                    blocks::write(tree, file, &networks);
+                    tree.close("FBD");
+                }
+                other => {
+                    if let Some(Err(reason)) = other {
+                        as_text.push(format!("`{}` has {reason}", unit.name));
+                    }
+                    tree.formatted("ST", print::statements(statements).trim_end());
+                }
+            }
+        }
+    }
     tree.close("body");
     if !unit.comments.is_empty() {
         tree.formatted("documentation", &unit.comments.join("\n"));

@@ -82,6 +82,17 @@ impl Lowering<'_> {
     }
 }
 
+/// The names of the inputs of a standard function that is given `count` of them by their places.
+pub fn input_names(function: &str, count: usize) -> Vec<String> {
+    let (names, _, extensible) = inputs(&function.to_ascii_uppercase());
+    let name = |at: usize| match names.get(at) {
+        Some(name) => (*name).to_owned(),
+        None if extensible && names.first() == Some(&"K") => format!("IN{}", at - 1),
+        None => format!("IN{}", at + 1),
+    };
+    (0..count).map(name).collect()
+}
+
 /// The names of a function's inputs, how many it needs, and whether it takes more.
 fn inputs(key: &str) -> (&'static [&'static str], usize, bool) {
     if let Some(typed) = super::typed::of(key) {

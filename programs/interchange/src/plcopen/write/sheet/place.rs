@@ -12,7 +12,7 @@ pub(super) struct Place {
     pub(super) height: i64,
 }
 
-pub(super) fn position(tree: &mut Tree, element: &str, x: i64, y: i64) {
+pub(in crate::plcopen::write) fn position(tree: &mut Tree, element: &str, x: i64, y: i64) {
     tree.empty(element, &[("x", &x.to_string()), ("y", &y.to_string())]);
 }
 

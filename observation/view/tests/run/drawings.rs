@@ -1,0 +1,176 @@
+//! Programs with numbers as function blocks and charts, with the values of their scans.
+
+use std::sync::Arc;
+
+use understudy_cluster::{Cluster, Overrides, read_with};
+use understudy_view::{Bounds, Model};
+use understudy_wire::ProgramId;
+
+use crate::support::{records, scenario};
+
+const CLUSTER: &str = "\
+[cluster]
+name = \"press\"
+period = \"10ms\"
+
+[[controller]]
+name = \"blocks\"
+ladder = \"blocks.st\"
+
+[[controller]]
+name = \"chart\"
+ladder = \"chart.st\"
+
+[[plant]]
+controller = \"blocks\"
+ladder = \"belt.st\"
+
+[[plant]]
+controller = \"chart\"
+ladder = \"gate.st\"
+";
+
+const BLOCKS: &str = "\
+PROGRAM blocks
+  VAR_INPUT speed : INT; run : BOOL; END_VAR
+  VAR_OUTPUT y : INT; late : BOOL; n : INT; rest : REAL; END_VAR
+  VAR t : TON; wide : INT; END_VAR
+  y := speed * 3 + 1000 - n;
+  IF run THEN
+    n := n + 1;
+  END_IF;
+  t(IN := speed > 40, PT := T#50ms);
+  late := t.Q AND run;
+  wide := speed + 500 + (speed MOD 7 + 3);
+  rest := LIMIT(0.0, INT_TO_REAL(speed) * 0.5, 20.0);
+END_PROGRAM
+";
+
+/// Counts up to 79, and runs in every other group of ten scans.
+const BELT: &str = "\
+PROGRAM belt
+  VAR_INPUT y : INT; late : BOOL; n : INT; rest : REAL; END_VAR
+  VAR_OUTPUT speed : INT; run : BOOL; END_VAR
+  speed := (speed + 1) MOD 80;
+  run := speed MOD 20 < 10;
+END_PROGRAM
+";
+
+const CHART: &str = "\
+PROGRAM chart
+  VAR_INPUT go : BOOL; END_VAR
+  VAR_OUTPUT open : BOOL; level : REAL; END_VAR
+  INITIAL_STEP Shut: END_STEP
+  STEP Wide: open(N); Raise(P1); END_STEP
+  TRANSITION FROM Shut TO Wide := go; END_TRANSITION
+  TRANSITION FROM Wide TO Shut := NOT go; END_TRANSITION
+  ACTION Raise: level := level + 1.5; END_ACTION
+END_PROGRAM
+";
+
+const GATE: &str = "\
+PROGRAM gate
+  VAR_INPUT open : BOOL; level : REAL; END_VAR
+  VAR_OUTPUT go : BOOL; END_VAR
+  VAR n : INT; END_VAR
+  n := (n + 1) MOD 40;
+  go := n > 20;
+END_PROGRAM
+";
+
+fn cluster() -> Cluster {
+    let loaded = read_with(
+        "cluster.toml",
+        CLUSTER,
+        Overrides::default(),
+        &mut |name| match name {
+            "blocks.st" => Ok(BLOCKS.to_owned()),
+            "belt.st" => Ok(BELT.to_owned()),
+            "chart.st" => Ok(CHART.to_owned()),
+            "gate.st" => Ok(GATE.to_owned()),
+            _ => Err("no such file".to_owned()),
+        },
+    );
+    let reports = loaded.reports.iter().flat_map(|it| &it.diagnostics);
+    let found: Vec<String> = reports.map(|found| found.message.clone()).collect();
+    loaded.cluster.unwrap_or_else(|| panic!("{found:?}"))
+}
+
+fn model() -> Model {
+    let cluster = cluster();
+    let mut model = Model::new(Arc::new(cluster.clone()), Bounds::default());
+    let quiet = "title = \"quiet\"\ncycles = 200\n";
+    for record in records(&cluster, &scenario(&cluster, quiet), 1) {
+        model.note(&record);
+    }
+    model
+}
+
+/// The values above the outputs of a block, from top to bottom, found in the picture behind its type.
+fn values_behind<'s>(svg: &'s str, of: &str) -> Vec<&'s str> {
+    let (_, behind) = svg.split_once(&format!(">{of}</text>")).expect(of);
+    let own = behind.split("<rect").next().unwrap_or_default();
+    let texts = own.lines().filter(|line| {
+        ["title", "one", "zero"]
+            .iter()
+            .any(|class| line.contains(&format!("class=\"{class}\"")))
+    });
+    let text = |line: &'s str| {
+        line.split_once('>')
+            .and_then(|(_, text)| text.split_once('<'))
+    };
+    texts.filter_map(text).map(|(text, _)| text).collect()
+}
+
+/// In many cycles: what stands at the connections is what the scan computed, and what it left out is pale.
+#[test]
+fn connections_show_what_the_scan_computed() {
+    let model = model();
+    let (mut ran, mut waited) = (0, 0);
+    for cycle in 20..150 {
+        let (svg, error) = model
+            .drawing_at(ProgramId(0), cycle)
+            .expect("it has numbers");
+        assert!(error.is_none(), "{error:?}");
+        let values = &model.snapshot_at(cycle).expect("known").programs[0].values;
+        let number = |name: &str| values[name].as_i64().expect("a number");
+        let bit = |name: &str| values[name].as_bool().expect("a bit");
+        let (speed, run, y) = (number("speed"), bit("run"), number("y"));
+        assert_eq!(
+            values_behind(&svg, "MUL"),
+            [(speed * 3).to_string()],
+            "cycle {cycle}"
+        );
+        let n = number("n") - i64::from(run);
+        assert_eq!(y, speed * 3 + 1000 - n);
+        assert_eq!(values_behind(&svg, "SUB"), [y.to_string()]);
+        let greater = if speed > 40 { "TRUE" } else { "FALSE" };
+        assert_eq!(values_behind(&svg, "GT"), [greater]);
+        let late = if bit("late") { "TRUE" } else { "FALSE" };
+        assert_eq!(values_behind(&svg, "AND"), [late]);
+        assert_eq!(values_behind(&svg, "TON").len(), 2);
+        let idle = svg.contains("class=\"idle\"");
+        assert_eq!(idle, !run, "cycle {cycle}: {svg}");
+        *(if run { &mut ran } else { &mut waited }) += 1;
+    }
+    assert!(ran > 10 && waited > 10, "{ran} {waited}");
+}
+
+#[test]
+fn the_active_step_is_marked() {
+    let model = model();
+    let mut seen = [0, 0];
+    for cycle in 20..150 {
+        let (svg, _) = model
+            .drawing_at(ProgramId(1), cycle)
+            .expect("it has numbers");
+        let values = &model.snapshot_at(cycle).expect("known").programs[1].values;
+        let open = values["open"].as_bool().expect("a bit");
+        let (_, behind) = svg.split_once("class=\"active\"").expect("an active step");
+        let name = behind.split("</text>").next().unwrap_or_default();
+        let step = if open { "Wide" } else { "Shut" };
+        assert!(name.ends_with(step), "cycle {cycle}: {name}");
+        seen[usize::from(open)] += 1;
+    }
+    assert!(seen.iter().all(|count| *count > 10), "{seen:?}");
+}
