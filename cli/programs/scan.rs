@@ -7,7 +7,7 @@ use std::time::Duration;
 use clap::Args;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
-use understudy_executable::{Executable, Interface, Scratch, digest};
+use understudy_executable::{Executable, Interface, Scratch, declared, digest};
 use understudy_interchange::{Source, Wanted, no_program, read_source};
 use understudy_ladder::Program as Ladder;
 use understudy_text::{Diagnostic, Report, duration, has_errors};
@@ -30,18 +30,25 @@ Empty lines and lines that begin with # are skipped. Each scan is printed as `in
 With --digest, the inputs are pseudo-random and the same in every run. The digest of all outputs is equal on every processor and in every
 version of Understudy that executes the program alike.")]
 pub(crate) struct Arguments {
-    /// Program
-    #[arg(value_name = "PROGRAM")]
-    program_file: PathBuf,
+    #[command(flatten)]
+    subject: SubjectArguments,
     /// File with the inputs, one scan a line
     #[arg(long, value_name = "FILE", required_unless_present = "digest")]
     inputs: Option<PathBuf>,
     /// Print only a digest of the outputs of this number of scans with pseudo-random inputs
     #[arg(long, value_name = "SCANS", conflicts_with = "inputs")]
     digest: Option<u64>,
+}
+
+/// The program that is executed.
+#[derive(Debug, Args)]
+pub(crate) struct SubjectArguments {
+    /// Program
+    #[arg(value_name = "PROGRAM")]
+    program_file: PathBuf,
     /// Time from one scan to the next; by default that of the file, else 10ms
     #[arg(long, value_name = "TIME", value_parser = duration::parse_positive)]
-    period: Option<Duration>,
+    pub(crate) period: Option<Duration>,
     /// The program to execute in a text with several programs and no configuration
     #[arg(long, value_name = "NAME")]
     program: Option<String>,
@@ -97,7 +104,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
 }
 
 fn scan(arguments: &Arguments) -> std::result::Result<Answer, Answer> {
-    let (subject, report) = subject(arguments)?;
+    let (subject, report) = subject(&arguments.subject)?;
     let Some(inputs) = &arguments.inputs else {
         let answer = subject.digested(arguments.digest.unwrap_or_default());
         return Ok(answer.with_used(vec![report]));
@@ -114,15 +121,17 @@ fn scan(arguments: &Arguments) -> std::result::Result<Answer, Answer> {
 }
 
 /// A program that is executed.
-struct Subject {
-    name: String,
-    executable: Executable,
-    interface: Interface,
+pub(crate) struct Subject {
+    pub(crate) name: String,
+    pub(crate) executable: Executable,
+    pub(crate) interface: Interface,
     period: Duration,
     typed: Option<std::sync::Arc<Program>>,
 }
 
-fn subject(arguments: &Arguments) -> std::result::Result<(Subject, Report), Answer> {
+pub(crate) fn subject(
+    arguments: &SubjectArguments,
+) -> std::result::Result<(Subject, Report), Answer> {
     let text = files::text(&arguments.program_file)?;
     let name = arguments.program_file.display().to_string();
     let wanted = |period| Wanted {
@@ -173,14 +182,6 @@ fn lowered(
     program
         .lower(period)
         .map_err(|error| Answer::failed(Status::BadInput, "U0436", error.to_string()))
-}
-
-/// The points that a program declares: the reset and the fault of a program with numbers are not among them.
-fn declared(points: &Points) -> impl Iterator<Item = &Point> {
-    let implied = [Program::RESET, Program::FAULT];
-    points
-        .iter()
-        .filter(move |point| !implied.contains(&point.name.as_str()))
 }
 
 /// The stored values of each scan.
@@ -336,7 +337,7 @@ impl Subject {
 }
 
 /// The values of an image in the notation of the file.
-fn written(points: &Points, image: &[u64]) -> String {
+pub(crate) fn written(points: &Points, image: &[u64]) -> String {
     let values: Vec<String> = declared(points)
         .map(|point| point.of.write(point.get(image)))
         .collect();

@@ -41,6 +41,25 @@ pub fn elementary(of: Elementary, stored: u64) -> Value {
     }
 }
 
+/// A stored value as people read it: a BOOL as 0 or 1, a time with its unit.
+pub(crate) fn stored_text(of: Elementary, stored: u64) -> String {
+    if of.is_time() {
+        // A file has a duration in quotes.
+        return understudy_cluster::value_text(of, stored).replace('"', "");
+    }
+    value_text(&elementary(of, stored))
+}
+
+/// The values of all points of an image as people read them: `level = 2.5, run = 1`.
+pub(crate) fn named_text(points: &Points, image: &Image) -> String {
+    let points = points.iter();
+    let texts = points.map(|point| {
+        let text = stored_text(point.of, point.get(image.words()));
+        format!("{} = {text}", point.name)
+    });
+    texts.collect::<Vec<String>>().join(", ")
+}
+
 /// A value as people read it: a BOOL as 0 or 1.
 pub(crate) fn value_text(value: &Value) -> String {
     match value {
