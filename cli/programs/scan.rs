@@ -198,12 +198,13 @@ fn lines(text: &str, inputs: &Points) -> std::result::Result<Vec<Vec<u64>>, Vec<
             continue;
         }
         if scans.len() >= MAXIMUM_SCANS || diagnostics.len() >= MAXIMUM_REPORTED {
+            diagnostics.truncate(MAXIMUM_REPORTED);
             diagnostics.push(Diagnostic::too_many(start));
             break;
         }
         match values(line, start, &points) {
             Ok(values) => scans.push(values),
-            Err(diagnostic) => diagnostics.push(*diagnostic),
+            Err(found) => diagnostics.extend(found),
         }
     }
     if has_errors(&diagnostics) {
@@ -216,13 +217,13 @@ fn values(
     line: &str,
     start: usize,
     points: &[&Point],
-) -> std::result::Result<Vec<u64>, Box<Diagnostic>> {
+) -> std::result::Result<Vec<u64>, Vec<Diagnostic>> {
     // The lines of another tool may have the outputs behind an arrow.
     let inputs = line.split("->").next().unwrap_or_default();
     let words: Vec<&str> = inputs.split_whitespace().collect();
     if words.len() != points.len() {
         let message = format!(
-            "a scan has {} inputs, and this line {}",
+            "a scan has {} inputs, and this line has {}",
             points.len(),
             words.len()
         );
@@ -234,17 +235,25 @@ fn values(
         let help = format!("in this order: {}", named.join(", "));
         let span = start..start + line.len();
         let diagnostic = Diagnostic::error("U0439", message, span);
-        return Err(Box::new(diagnostic.with_help(help)));
+        return Err(vec![diagnostic.with_help(help)]);
     }
-    let read = words.iter().zip(points).map(|(word, point)| {
-        point.of.read(word).ok_or_else(|| {
+    let mut read = Vec::with_capacity(words.len());
+    let mut wrong = Vec::new();
+    for (word, point) in words.into_iter().zip(points) {
+        let Some(stored) = point.of.read(word) else {
             let at = start + (word.as_ptr() as usize - line.as_ptr() as usize);
-            let message = format!("`{word}` is no {} for `{}`", point.of, point.name);
+            let message = format!("invalid {} `{word}` for `{}`", point.of, point.name);
             let diagnostic = Diagnostic::error("U0439", message, at..at + word.len());
-            Box::new(diagnostic.with_help(expected(point.of)))
-        })
-    });
-    read.collect()
+            wrong.push(diagnostic.with_help(expected(point.of)));
+            continue;
+        };
+        read.push(stored);
+    }
+    if wrong.is_empty() {
+        Ok(read)
+    } else {
+        Err(wrong)
+    }
 }
 
 fn expected(of: Elementary) -> String {
@@ -252,8 +261,20 @@ fn expected(of: Elementary) -> String {
         Elementary::Bool => "write 0 or 1".to_owned(),
         Elementary::Real => "write 8 hexadecimal digits, or a number with a point".to_owned(),
         Elementary::Lreal => "write 16 hexadecimal digits, or a number with a point".to_owned(),
-        _ if of.is_time() => "write nanoseconds".to_owned(),
-        _ => "write a decimal number in the range of the type".to_owned(),
+        _ if of.is_time() => "write nanoseconds, such as 1500000000 for 1.5 s".to_owned(),
+        _ => {
+            let half = if of.is_signed() {
+                of.mask() >> 1
+            } else {
+                of.mask()
+            };
+            let least = if of.is_signed() {
+                -i128::from(half) - 1
+            } else {
+                0
+            };
+            format!("write a decimal number from {least} to {half}")
+        }
     }
 }
 

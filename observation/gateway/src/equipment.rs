@@ -83,7 +83,9 @@ impl Equipment {
     fn scan(&mut self) -> bool {
         for (at, point) in addressed(&self.interface.inputs) {
             let words = &self.holding[at..at + registers_of(point.of)];
-            let stored = words.iter().fold(0, |stored, word| stored << 16 | u64::from(*word));
+            let stored = words
+                .iter()
+                .fold(0, |stored, word| stored << 16 | u64::from(*word));
             point.set(&mut self.inputs, stored);
         }
         let before = self.outputs.clone();
@@ -247,10 +249,7 @@ pub fn serve_equipment(
     })
 }
 
-async fn scan_in(
-    period: Option<Duration>,
-    equipment: &Mutex<Served>,
-) -> std::convert::Infallible {
+async fn scan_in(period: Option<Duration>, equipment: &Mutex<Served>) -> std::convert::Infallible {
     let Some(period) = period else {
         return pending().await;
     };
@@ -318,7 +317,9 @@ mod tests {
     #[test]
     fn points_have_consecutive_registers_of_their_types() {
         let equipment = equipment();
-        let places = equipment.places().map(|(point, place)| format!("{} {place}", point.name));
+        let places = equipment
+            .places()
+            .map(|(point, place)| format!("{} {place}", point.name));
         let places: Vec<String> = places.collect();
         let expected = "step holding:0 udint, open holding:2.0, level holding:3 real, offset holding:5 int, mask holding:6 uint, \
             rest holding:7 lint, mass holding:11 lreal, scans input:0 uint, o input:1.0, l input:2 real, s input:4 int, m input:5 uint, \
@@ -358,13 +359,28 @@ mod tests {
         let mut served = served(equipment(), changed);
         let address = Err(ExceptionCode::IllegalDataAddress);
         for (request, expected) in [
-            (Request::WriteMultipleRegisters(14, vec![1, 2].into()), address.clone()),
+            (
+                Request::WriteMultipleRegisters(14, vec![1, 2].into()),
+                address.clone(),
+            ),
             (Request::WriteSingleRegister(u16::MAX, 1), address.clone()),
-            (Request::WriteMultipleRegisters(0, vec![].into()), Err(ExceptionCode::IllegalDataValue)),
+            (
+                Request::WriteMultipleRegisters(0, vec![].into()),
+                Err(ExceptionCode::IllegalDataValue),
+            ),
             (Request::ReadInputRegisters(13, 2), address),
-            (Request::ReadInputRegisters(0, 0), Err(ExceptionCode::IllegalDataValue)),
-            (Request::ReadCoils(0, 1), Err(ExceptionCode::IllegalFunction)),
-            (Request::WriteSingleCoil(0, true), Err(ExceptionCode::IllegalFunction)),
+            (
+                Request::ReadInputRegisters(0, 0),
+                Err(ExceptionCode::IllegalDataValue),
+            ),
+            (
+                Request::ReadCoils(0, 1),
+                Err(ExceptionCode::IllegalFunction),
+            ),
+            (
+                Request::WriteSingleCoil(0, true),
+                Err(ExceptionCode::IllegalFunction),
+            ),
         ] {
             assert_eq!(served.answer(&request), expected, "{request:?}");
         }

@@ -149,7 +149,10 @@ pub(crate) fn program_fault_text(
     match typed.zip(fault) {
         Some((typed, fault)) => {
             let assigned = fault_lines::assigned_text(typed, fault);
-            format!("program fault in {name}: {}{assigned}", fault.describe(typed))
+            format!(
+                "program fault in {name}: {}{assigned}",
+                fault.describe(typed)
+            )
         }
         None => format!("program fault in {name}"),
     }

@@ -185,7 +185,13 @@ fn differing_values(found: &mut Difference, points: &Points, images: [Option<&Im
     let text = |image: &Image| {
         let values = differing.iter();
         let texts: Vec<String> = values
-            .map(|point| format!("{} = {}", point.name, stored_text(point.of, point.get(image.words()))))
+            .map(|point| {
+                format!(
+                    "{} = {}",
+                    point.name,
+                    stored_text(point.of, point.get(image.words()))
+                )
+            })
             .collect();
         texts.join(", ")
     };

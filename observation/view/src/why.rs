@@ -301,7 +301,9 @@ impl Model {
         let sum = reconstruct(word, program, driven.outputs.width(), published).ok()?;
         let others = word.mask.iter().filter(|other| *other != program);
         let outputs_of = |program: ProgramId, image: &Image| {
-            let outputs = &self.cluster.controllers()[program.index()].interface.outputs;
+            let outputs = &self.cluster.controllers()[program.index()]
+                .interface
+                .outputs;
             (image.width() >= outputs.width()).then_some(outputs)
         };
         let values = |program: ProgramId, image: &Image| {
@@ -310,7 +312,10 @@ impl Model {
         };
         let values_text = |program: ProgramId, image: &Image| {
             let typed = self.cluster.controllers()[program.index()].code.typed();
-            Some(named_text(outputs_of(program, image).filter(|_| typed.is_some())?, image))
+            Some(named_text(
+                outputs_of(program, image).filter(|_| typed.is_some())?,
+                image,
+            ))
         };
         let others = others.filter_map(|other| {
             let outputs = published(other)?;

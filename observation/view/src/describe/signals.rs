@@ -8,7 +8,7 @@ use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_typed::Elementary;
 use understudy_wire::{Image, Member, PointValue, SignalPlace, Write, WriteId};
 
-use crate::value::stored_text;
+use crate::value::{is_declared, stored_text};
 
 /// Writes that are remembered: their outcomes come within some cycles.
 const MOST: usize = 256;
@@ -106,7 +106,8 @@ fn image_text<'a>(image: &Image, signals: impl Iterator<Item = &'a NamedSignal>)
     if !has_numbers || !signals.iter().all(end) {
         return image.to_string();
     }
-    let texts = signals.iter().map(|signal| {
+    let declared = signals.iter().filter(|signal| is_declared(&signal.name));
+    let texts = declared.map(|signal| {
         let bit = usize::from(signal.place.first_bit());
         // No point crosses a word.
         let stored = image.words()[bit / 64] >> (bit % 64) & signal.of.mask();

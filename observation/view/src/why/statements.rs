@@ -95,7 +95,10 @@ impl<'m> Explainer<'m> {
         let text = format!("program fault: {}", fault.describe(self.program));
         let mut reason = Reason {
             value,
-            of: self.program.part(name).and_then(|part| part.of.elementary()),
+            of: self
+                .program
+                .part(name)
+                .and_then(|part| part.of.elementary()),
             ..self.leaf(name, None, at, text)
         };
         if let Some(routine) = fault.routine {
@@ -223,7 +226,10 @@ impl<'m> Explainer<'m> {
         let routine = self.program.routine(choice.routine);
         match self.text.declares(&routine.name) {
             true => format!("; read by the condition in line {}", choice.line),
-            false => format!("; read by a condition of the library block {}", routine.name),
+            false => format!(
+                "; read by a condition of the library block {}",
+                routine.name
+            ),
         }
     }
 
@@ -241,6 +247,11 @@ impl<'m> Explainer<'m> {
             return self.leaf(&part.name, stored, place, "explained above");
         }
         match (read.by, part) {
+            // Only the first statements of a scan are recorded.
+            (Some(write), part) if trace.is_cut && !assigned(trace.done[write].effect, read) => {
+                let name = part.map_or("temporary".to_owned(), |part| part.name);
+                self.leaf(&name, stored, place, "assigned by a later turn of a loop")
+            }
             (Some(write), Some(part)) => self.written(&part.name, trace, write, place, depth),
             (Some(write), None) => {
                 let line = self.text.line(trace.done[write].line);
@@ -333,6 +344,14 @@ impl<'m> Explainer<'m> {
                 .because;
         }
         reason
+    }
+}
+
+/// Whether a statement assigned what was read.
+fn assigned(effect: Effect, read: &Read) -> bool {
+    match effect {
+        Effect::Assigned { value, .. } => value.is_none_or(|(_, stored)| stored == read.value),
+        Effect::Chose => false,
     }
 }
 
