@@ -126,7 +126,7 @@ pub(crate) struct Subject {
     pub(crate) executable: Executable,
     pub(crate) interface: Interface,
     period: Duration,
-    typed: Option<std::sync::Arc<Program>>,
+    pub(crate) typed: Option<std::sync::Arc<Program>>,
 }
 
 pub(crate) fn subject(

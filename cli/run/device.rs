@@ -7,6 +7,7 @@ use std::net::SocketAddr;
 use clap::Args;
 use serde_json::json;
 use understudy_gateway::{Changed, Equipment, GatewayError, serve_equipment};
+use understudy_typed::Fault;
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
@@ -41,6 +42,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     let Subject {
         executable,
         interface,
+        typed,
         ..
     } = subject;
     let equipment = Equipment::new(executable, interface.clone()).map_err(failed)?;
@@ -48,12 +50,19 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         return Ok(registers(&equipment).with_used(vec![report]));
     }
     let prints = !console.is_json();
-    let changed: Changed = Box::new(move |inputs, outputs| {
-        if prints {
-            let inputs = written(&interface.inputs, inputs);
-            let outputs = written(&interface.outputs, outputs);
-            // The reader may have closed the pipe.
-            let _ = writeln!(std::io::stdout(), "{inputs} -> {outputs}");
+    let changed: Changed = Box::new(move |equipment| {
+        if !prints {
+            return;
+        }
+        let inputs = written(&interface.inputs, equipment.inputs());
+        let outputs = written(&interface.outputs, equipment.outputs());
+        // The reader may have closed the pipe.
+        let _ = writeln!(std::io::stdout(), "{inputs} -> {outputs}");
+        let fault = typed
+            .as_ref()
+            .and_then(|program| Some(Fault::read(equipment.state())?.describe(program)));
+        if let Some(fault) = fault {
+            let _ = writeln!(std::io::stderr(), "the program has stopped: {fault}");
         }
     });
     let ready = |address| console.note(&format!("listening on {address}"));

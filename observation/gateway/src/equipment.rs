@@ -79,6 +79,21 @@ impl Equipment {
         points.map(|(point, table, at)| (point, place(point.of, table, at as u16)))
     }
 
+    /// u of the last scan.
+    pub fn inputs(&self) -> &[u64] {
+        &self.inputs
+    }
+
+    /// y of the last scan.
+    pub fn outputs(&self) -> &[u64] {
+        &self.outputs
+    }
+
+    /// x after it.
+    pub fn state(&self) -> &[u64] {
+        &self.state
+    }
+
     /// One scan; whether an output changed.
     fn scan(&mut self) -> bool {
         for (at, point) in addressed(&self.interface.inputs) {
@@ -193,8 +208,8 @@ fn place(of: Elementary, table: RegisterTable, address: u16) -> Place {
     })
 }
 
-/// Takes u and y of a scan in which an output changed.
-pub type Changed = Box<dyn FnMut(&[u64], &[u64]) + Send>;
+/// Takes the equipment after a scan in which an output changed.
+pub type Changed = Box<dyn FnMut(&Equipment) + Send>;
 
 struct Served {
     equipment: Equipment,
@@ -206,7 +221,7 @@ struct Served {
 impl Served {
     fn scan(&mut self) {
         if self.equipment.scan() {
-            (self.changed)(&self.equipment.inputs, &self.equipment.outputs);
+            (self.changed)(&self.equipment);
         }
     }
 
@@ -330,12 +345,14 @@ mod tests {
     #[test]
     fn each_write_is_followed_by_one_scan_and_reads_by_none() {
         let (sender, changes) = mpsc::channel();
-        let changed: Changed = Box::new(move |_, outputs| {
-            sender.send(outputs.to_vec()).expect("the test listens");
+        let changed: Changed = Box::new(move |equipment| {
+            sender
+                .send(equipment.outputs().to_vec())
+                .expect("the test listens");
         });
         let mut served = served(equipment(), changed);
         let words = [
-            0x0001_u16, 0x0002, 1, 0x4148, 0, 0xFFFD, 0xBEEF, 0, 0, 0x0007, 0xA120, 0x7FF0, 0, 0, 1,
+            0x0001_u16, 0x0002, 1, 0x4148, 0, 0xFFFD, 0xBEEF, 0, 0, 0x0007, 0xA120, 0x3FF0, 0, 0, 1,
         ];
         let write = Request::WriteMultipleRegisters(0, words.as_slice().into());
         let written = Ok(Response::WriteMultipleRegisters(0, 15));
@@ -355,7 +372,7 @@ mod tests {
     #[test]
     fn requests_beyond_the_registers_change_nothing() {
         let (sender, changes) = mpsc::channel();
-        let changed: Changed = Box::new(move |_, _| sender.send(()).expect("the test listens"));
+        let changed: Changed = Box::new(move |_| sender.send(()).expect("the test listens"));
         let mut served = served(equipment(), changed);
         let address = Err(ExceptionCode::IllegalDataAddress);
         for (request, expected) in [
