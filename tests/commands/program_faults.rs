@@ -60,6 +60,8 @@ fn run(name: &str, input: &str, bad: &str, good: &str) -> PathBuf {
         "scenario.toml",
         "--seed",
         "1",
+        "--out",
+        "runs",
     ];
     let answer = understudy_in(&folder, &arguments);
     assert_eq!(answer.status, 0, "{}", answer.shown());
@@ -71,13 +73,10 @@ fn check(name: &str, [input, bad, good]: [&str; 3], line: u32, told: &str, cause
     let folder = run(name, input, bad, good);
     let journal = understudy_in(&folder, &["journal"]).output;
     assert!(journal.contains(told), "{journal}");
-    let alarms = understudy_in(&folder, &["top", "--once", "--json"]).json();
-    let events = alarms["result"]["events"].to_string();
-    assert!(events.contains(told), "{events}");
-    assert_eq!(
-        alarms["result"]["programs"][0]["source"], "direct",
-        "{events}"
-    );
+    let top = understudy_in(&folder, &["top", "--once", "--json"]).json();
+    let alarms = top["result"]["alarms"].to_string();
+    assert!(alarms.contains(told), "{alarms}");
+    assert_eq!(top["result"]["programs"][0]["source"], "direct", "{top:#}");
 
     let why = understudy_in(&folder, &["why", "mixer.valve", "--at", "40"]).output;
     let lines: Vec<&str> = why.lines().collect();
