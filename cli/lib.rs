@@ -32,7 +32,7 @@ pub use console::Console;
 pub use files::{ladder, write as write_file};
 pub use member::{Arguments as MemberArguments, run_plant, run_remote_io, run_station};
 pub use overrides::OverrideArguments;
-pub use run::demo::PressCell;
+pub use run::cluster_run::ClusterRun;
 pub use run::lab::{Judged, NetworkArguments, RunArguments};
 pub use tools::proxy::{Arguments as ProxyArguments, run as run_proxy};
 

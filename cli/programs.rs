@@ -5,7 +5,7 @@ pub(crate) mod convert;
 mod draw;
 mod init;
 mod parity;
-mod scan;
+pub(crate) mod scan;
 pub(crate) mod verify;
 
 use crate::commands::{Group, command};

@@ -7,7 +7,7 @@ use std::time::Duration;
 use clap::Args;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
-use understudy_executable::{Executable, Interface, Scratch, digest};
+use understudy_executable::{Executable, Interface, Scratch, declared, digest};
 use understudy_interchange::{Source, Wanted, no_program, read_source};
 use understudy_ladder::Program as Ladder;
 use understudy_text::{Diagnostic, Report, duration, has_errors};
@@ -30,18 +30,25 @@ Empty lines and lines that begin with # are skipped. Each scan is printed as `in
 With --digest, the inputs are pseudo-random and the same in every run. The digest of all outputs is equal on every processor and in every
 version of Understudy that executes the program alike.")]
 pub(crate) struct Arguments {
-    /// Program
-    #[arg(value_name = "PROGRAM")]
-    program_file: PathBuf,
+    #[command(flatten)]
+    subject: SubjectArguments,
     /// File with the inputs, one scan a line
     #[arg(long, value_name = "FILE", required_unless_present = "digest")]
     inputs: Option<PathBuf>,
     /// Print only a digest of the outputs of this number of scans with pseudo-random inputs
     #[arg(long, value_name = "SCANS", conflicts_with = "inputs")]
     digest: Option<u64>,
+}
+
+/// The program that is executed.
+#[derive(Debug, Args)]
+pub(crate) struct SubjectArguments {
+    /// Program
+    #[arg(value_name = "PROGRAM")]
+    program_file: PathBuf,
     /// Time from one scan to the next; by default that of the file, else 10ms
     #[arg(long, value_name = "TIME", value_parser = duration::parse_positive)]
-    period: Option<Duration>,
+    pub(crate) period: Option<Duration>,
     /// The program to execute in a text with several programs and no configuration
     #[arg(long, value_name = "NAME")]
     program: Option<String>,
@@ -97,7 +104,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
 }
 
 fn scan(arguments: &Arguments) -> std::result::Result<Answer, Answer> {
-    let (subject, report) = subject(arguments)?;
+    let (subject, report) = subject(&arguments.subject)?;
     let Some(inputs) = &arguments.inputs else {
         let answer = subject.digested(arguments.digest.unwrap_or_default());
         return Ok(answer.with_used(vec![report]));
@@ -114,15 +121,17 @@ fn scan(arguments: &Arguments) -> std::result::Result<Answer, Answer> {
 }
 
 /// A program that is executed.
-struct Subject {
-    name: String,
-    executable: Executable,
-    interface: Interface,
+pub(crate) struct Subject {
+    pub(crate) name: String,
+    pub(crate) executable: Executable,
+    pub(crate) interface: Interface,
     period: Duration,
-    typed: Option<std::sync::Arc<Program>>,
+    pub(crate) typed: Option<std::sync::Arc<Program>>,
 }
 
-fn subject(arguments: &Arguments) -> std::result::Result<(Subject, Report), Answer> {
+pub(crate) fn subject(
+    arguments: &SubjectArguments,
+) -> std::result::Result<(Subject, Report), Answer> {
     let text = files::text(&arguments.program_file)?;
     let name = arguments.program_file.display().to_string();
     let wanted = |period| Wanted {
@@ -175,14 +184,6 @@ fn lowered(
         .map_err(|error| Answer::failed(Status::BadInput, "U0436", error.to_string()))
 }
 
-/// The points that a program declares: the reset and the fault of a program with numbers are not among them.
-fn declared(points: &Points) -> impl Iterator<Item = &Point> {
-    let implied = [Program::RESET, Program::FAULT];
-    points
-        .iter()
-        .filter(move |point| !implied.contains(&point.name.as_str()))
-}
-
 /// The stored values of each scan.
 fn lines(text: &str, inputs: &Points) -> std::result::Result<Vec<Vec<u64>>, Vec<Diagnostic>> {
     let points: Vec<&Point> = declared(inputs).collect();
@@ -197,12 +198,13 @@ fn lines(text: &str, inputs: &Points) -> std::result::Result<Vec<Vec<u64>>, Vec<
             continue;
         }
         if scans.len() >= MAXIMUM_SCANS || diagnostics.len() >= MAXIMUM_REPORTED {
+            diagnostics.truncate(MAXIMUM_REPORTED);
             diagnostics.push(Diagnostic::too_many(start));
             break;
         }
         match values(line, start, &points) {
             Ok(values) => scans.push(values),
-            Err(diagnostic) => diagnostics.push(*diagnostic),
+            Err(found) => diagnostics.extend(found),
         }
     }
     if has_errors(&diagnostics) {
@@ -215,13 +217,13 @@ fn values(
     line: &str,
     start: usize,
     points: &[&Point],
-) -> std::result::Result<Vec<u64>, Box<Diagnostic>> {
+) -> std::result::Result<Vec<u64>, Vec<Diagnostic>> {
     // The lines of another tool may have the outputs behind an arrow.
     let inputs = line.split("->").next().unwrap_or_default();
     let words: Vec<&str> = inputs.split_whitespace().collect();
     if words.len() != points.len() {
         let message = format!(
-            "a scan has {} inputs, and this line {}",
+            "a scan has {} inputs, and this line has {}",
             points.len(),
             words.len()
         );
@@ -233,17 +235,25 @@ fn values(
         let help = format!("in this order: {}", named.join(", "));
         let span = start..start + line.len();
         let diagnostic = Diagnostic::error("U0439", message, span);
-        return Err(Box::new(diagnostic.with_help(help)));
+        return Err(vec![diagnostic.with_help(help)]);
     }
-    let read = words.iter().zip(points).map(|(word, point)| {
-        point.of.read(word).ok_or_else(|| {
+    let mut read = Vec::with_capacity(words.len());
+    let mut wrong = Vec::new();
+    for (word, point) in words.into_iter().zip(points) {
+        let Some(stored) = point.of.read(word) else {
             let at = start + (word.as_ptr() as usize - line.as_ptr() as usize);
-            let message = format!("`{word}` is no {} for `{}`", point.of, point.name);
+            let message = format!("invalid {} `{word}` for `{}`", point.of, point.name);
             let diagnostic = Diagnostic::error("U0439", message, at..at + word.len());
-            Box::new(diagnostic.with_help(expected(point.of)))
-        })
-    });
-    read.collect()
+            wrong.push(diagnostic.with_help(expected(point.of)));
+            continue;
+        };
+        read.push(stored);
+    }
+    if wrong.is_empty() {
+        Ok(read)
+    } else {
+        Err(wrong)
+    }
 }
 
 fn expected(of: Elementary) -> String {
@@ -251,8 +261,20 @@ fn expected(of: Elementary) -> String {
         Elementary::Bool => "write 0 or 1".to_owned(),
         Elementary::Real => "write 8 hexadecimal digits, or a number with a point".to_owned(),
         Elementary::Lreal => "write 16 hexadecimal digits, or a number with a point".to_owned(),
-        _ if of.is_time() => "write nanoseconds".to_owned(),
-        _ => "write a decimal number in the range of the type".to_owned(),
+        _ if of.is_time() => "write nanoseconds, such as 1500000000 for 1.5 s".to_owned(),
+        _ => {
+            let half = if of.is_signed() {
+                of.mask() >> 1
+            } else {
+                of.mask()
+            };
+            let least = if of.is_signed() {
+                -i128::from(half) - 1
+            } else {
+                0
+            };
+            format!("write a decimal number from {least} to {half}")
+        }
     }
 }
 
@@ -336,7 +358,7 @@ impl Subject {
 }
 
 /// The values of an image in the notation of the file.
-fn written(points: &Points, image: &[u64]) -> String {
+pub(crate) fn written(points: &Points, image: &[u64]) -> String {
     let values: Vec<String> = declared(points)
         .map(|point| point.of.write(point.get(image)))
         .collect();

@@ -1,19 +1,18 @@
 //! `understudy demo`: the experiment of section V.B on processes.
 
 use std::num::NonZeroU64;
-use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::Args;
-use understudy_cluster::{Cluster, press_cell};
-use understudy_journal::{Members, RunDirectory};
-use understudy_scenarios::{Scenario, Summary, TABLE_TWO, read};
+use understudy_cluster::Cluster;
+use understudy_journal::Members;
+use understudy_scenarios::{TABLE_TWO, read};
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
-use crate::files;
 use crate::inspect::watch::{BesideArguments, Page};
-use crate::run::lab::{Judged, RunArguments, in_laboratory, judged};
+use crate::run::cluster_run::ClusterRun;
+use crate::run::lab::RunArguments;
 use crate::run::wakefulness;
 
 /// Maximum duration of a demonstration, from its origin.
@@ -66,7 +65,7 @@ fn demonstrate(
     arguments: &Arguments,
     console: &mut Console,
 ) -> Result<Answer, Answer> {
-    let cell = PressCell::write(run)?;
+    let cell = ClusterRun::press_cell(run)?;
     let members = Members::of(&cell.cluster);
     let found = read("table-two.toml", TABLE_TWO, Some(&members));
     let Some(scenario) = found.scenario else {
@@ -90,78 +89,4 @@ fn divisor(cluster: &Cluster) -> NonZeroU64 {
         .ok()
         .and_then(NonZeroU64::new)
         .unwrap_or(NonZeroU64::MIN)
-}
-
-/// The press cell of section V, written to the directory of its run.
-pub struct PressCell {
-    /// The cluster with its overrides.
-    pub cluster: Cluster,
-    directory: RunDirectory,
-    file: PathBuf,
-}
-
-impl PressCell {
-    /// Writes the files of the cluster.
-    ///
-    /// # Errors
-    /// U0602 if they cannot be written.
-    pub fn write(arguments: &RunArguments) -> Result<Self, Answer> {
-        let directory = files::run_directory(&arguments.out)?;
-        let folder = directory.file("cluster");
-        files::write_template(&folder, press_cell())?;
-        let file = folder.join("cluster.toml");
-        let (cluster, _) = files::cluster(&file, arguments.overrides.overrides())?;
-        Ok(Self {
-            cluster,
-            directory,
-            file,
-        })
-    }
-
-    /// Directory of the run.
-    pub fn path(&self) -> &Path {
-        self.directory.path()
-    }
-
-    /// Runs a scenario in the laboratory, and writes the results.
-    ///
-    /// # Errors
-    /// If the processes cannot be started.
-    pub fn judged(
-        &self,
-        scenario: &Scenario,
-        arguments: &RunArguments,
-        console: &mut Console,
-    ) -> Result<(Summary, Judged), Answer> {
-        let file = self.file.clone();
-        judged(
-            &self.cluster,
-            scenario,
-            file,
-            arguments,
-            &self.directory,
-            None,
-            console,
-        )
-    }
-
-    fn run(
-        &self,
-        scenario: &Scenario,
-        arguments: &RunArguments,
-        page: Option<&Page>,
-        console: &mut Console,
-    ) -> Result<Answer, Answer> {
-        let scenario = scenario.clone().shortened(arguments.cycles);
-        let file = self.file.clone();
-        in_laboratory(
-            &self.cluster,
-            &scenario,
-            file,
-            arguments,
-            &self.directory,
-            page,
-            console,
-        )
-    }
 }

@@ -24,8 +24,8 @@ pub struct Settings {
     pub agreement: Arc<Agreement>,
     /// All programs of the cluster, in order; a controller runs its own, an understudy all of them.
     pub programs: Arc<[Program]>,
-    /// The generated parity controller, which an understudy evaluates in [`understudy_cycle::Mode::Paper`]. It publishes no parity
-    /// word in that mode where this is absent.
+    /// The generated parity controller, which an understudy evaluates in [`understudy_cycle::Mode::Paper`]. Absent in the other mode, and where a
+    /// program has numbers, for which there is no circuit: then the parity word is the sum of the outputs of its replicas (9).
     pub generated: Option<Arc<Executable>>,
     /// Epoch that it founds when it receives no other member: later than any earlier one of the cluster, such as the
     /// wall clock at its start.

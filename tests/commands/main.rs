@@ -20,6 +20,7 @@ mod named_files;
 mod next;
 mod others;
 mod petri;
+mod program_faults;
 mod reconfigure;
 mod reliability;
 mod scan;

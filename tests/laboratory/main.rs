@@ -18,6 +18,7 @@ mod set_inputs;
 #[allow(dead_code, reason = "each test uses its part")]
 #[path = "../shared/mod.rs"]
 mod shared;
+mod tennessee_eastman;
 mod writes;
 
 use std::collections::BTreeSet;

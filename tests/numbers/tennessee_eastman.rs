@@ -20,8 +20,11 @@ fn text(name: &str) -> Result<String, String> {
     std::fs::read_to_string(folder().join(name)).map_err(|error| error.to_string())
 }
 
-fn cluster() -> Cluster {
+fn cluster(mode: &str) -> Cluster {
     let file = text("cluster.toml").expect("a cluster file");
+    let period = "period = \"100ms\"";
+    assert!(file.contains(period), "{file}");
+    let file = file.replace(period, &format!("{period}\nmode = \"{mode}\""));
     let loaded = read_cluster("cluster.toml", &file, &mut |name| text(name));
     let found = loaded.cluster;
     found.unwrap_or_else(|| panic!("{:?}", loaded.reports))
@@ -87,7 +90,7 @@ fn run(cluster: &Cluster, failures: Vec<Fault>) -> (BTreeMap<(ProgramId, Moment)
 
 #[test]
 fn the_actuators_move_alike_with_and_without_failures() {
-    let cluster = cluster();
+    let cluster = cluster("full");
     let (expected, reconstructed) = run(&cluster, Vec::new());
     assert_eq!(reconstructed, 0);
     assert!(expected.len() >= CONTROLLERS * 1200, "{}", expected.len());
@@ -103,4 +106,8 @@ fn the_actuators_move_alike_with_and_without_failures() {
             assert_eq!(found.get(place), Some(outputs), "{place:?}, seed {seed}");
         }
     }
+    // One parity word over all programs, with numbers too.
+    let (found, reconstructed) = run(&self::cluster("paper"), failures(1));
+    assert!(reconstructed > CONTROLLERS * 20, "{reconstructed}");
+    assert_eq!(found, expected);
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use understudy::{Answer, Console, PressCell, RunArguments, Status, write_file};
+use understudy::{Answer, ClusterRun, Console, RunArguments, Status, write_file};
 use understudy_baselines::{Comparison, ComparisonPlan, RealRun, compare, figure};
 use understudy_bus::LinkKind;
 
@@ -97,7 +97,7 @@ fn real(
         wrong: 0,
         failure: None,
     };
-    let ran = PressCell::write(run).and_then(|cell| {
+    let ran = ClusterRun::press_cell(run).and_then(|cell| {
         let schedule = &cell.cluster.agreement().schedule;
         let scenario =
             Trouble::Kill.scenario(Target::Stations, schedule, arguments.kills, arguments.seed);

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use clap::Args;
 use serde::Serialize;
-use understudy::{Answer, Console, PressCell, RunArguments, Status};
+use understudy::{Answer, ClusterRun, Console, RunArguments, Status};
 use understudy_cycle::Schedule;
 use understudy_member::link_kind;
 use understudy_network::Share;
@@ -129,7 +129,7 @@ fn trials(trials: u64, arguments: &RunArguments, console: &mut Console) -> Resul
             network: arguments.network.losing(loss).seeded(trial * 1000),
             ..arguments.clone()
         };
-        let cell = PressCell::write(&arguments)?;
+        let cell = ClusterRun::press_cell(&arguments)?;
         link = link_kind(&cell.cluster).to_string();
         let (station, scenario) = scenario(trial, &cell.cluster.agreement().schedule);
         console.note(&format!("{link}, {}", scenario.title));

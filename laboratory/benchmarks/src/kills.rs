@@ -1,19 +1,23 @@
-//! `understudy-bench kills`: every role of the press cell killed or suspended at random phases of the cycle, on processes.
+//! `understudy-bench kills`: every role of a cluster killed or suspended at random phases of the cycle, on processes.
 
 use std::fmt::Write as _;
+use std::path::PathBuf;
 
 use clap::Args;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
-use understudy::{Answer, Console, PressCell, RunArguments, Status};
+use understudy::{Answer, ClusterRun, Console, RunArguments, Status};
 use understudy_cycle::Schedule;
 use understudy_scenarios::{Action, Expectation, Fault, Scenario, Summary};
 use understudy_wire::{Member, ProgramId, StationId};
 
-/// Kill or suspend every role of the press cell at random phases
+/// Kill or suspend every role of a cluster at random phases
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
+    /// Cluster file; the press cell where absent
+    #[arg(value_name = "CLUSTER.toml")]
+    cluster: Option<PathBuf>,
     /// Kills of each role: controllers, understudies, remote I/Os
     #[arg(long, alias = "kills", default_value_t = 100)]
     count: u64,
@@ -168,7 +172,7 @@ impl Row {
         trouble: Trouble,
         target: Target,
         count: u64,
-        cell: &PressCell,
+        cell: &ClusterRun,
         summary: &Summary,
     ) -> Self {
         let total = summary.total();
@@ -209,7 +213,10 @@ fn row(
     arguments: &Arguments,
     console: &mut Console,
 ) -> Result<Row, Answer> {
-    let cell = PressCell::write(&arguments.run)?;
+    let cell = match &arguments.cluster {
+        Some(file) => ClusterRun::of_file(file.clone(), &arguments.run)?,
+        None => ClusterRun::press_cell(&arguments.run)?,
+    };
     let schedule = &cell.cluster.agreement().schedule;
     let scenario = trouble
         .scenario(target, schedule, arguments.count, arguments.seed)

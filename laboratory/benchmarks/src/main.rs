@@ -30,6 +30,7 @@ use understudy::{
 Example:
   understudy-bench exchange --cycles 2000
   understudy-bench kills --count 100
+  understudy-bench kills examples/heated-tank/cluster.toml --period 10ms
   understudy-bench failover --figure failover.svg
   understudy-bench scan examples/press-cell/robot.ladder
   understudy-bench join --trials 50 --loss 10%

@@ -3,7 +3,6 @@
 use std::time::Duration;
 
 use smallvec::SmallVec;
-use understudy_cycle::Mode;
 use understudy_wire::{
     Holding, Moment, ProgramId, ProgramSet, Segment, StationId, StationSet, Time, Turn, Word,
 };
@@ -190,10 +189,9 @@ impl Station {
             let replica = self.replicas.iter().find(|replica| replica.id() == program);
             replica.map(Replica::outputs)
         };
-        let word_of = |mask| match agreement.mode {
-            Mode::Full => understudy_parity::sum(mask, outputs_of),
-            Mode::Paper => {
-                let generated = self.settings.generated.as_ref()?;
+        let word_of = |mask| match &self.settings.generated {
+            None => understudy_parity::sum(mask, outputs_of),
+            Some(generated) => {
                 let steps = self.replicas.iter().map(Replica::last_step);
                 let sum = generated::outputs(generated, &mut self.scratch, steps)?;
                 Some(Word { mask, sum })

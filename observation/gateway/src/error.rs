@@ -10,7 +10,7 @@ use understudy_view::Trouble;
 #[derive(Debug, thiserror::Error)]
 pub enum GatewayError {
     /// It cannot listen.
-    #[error("U0590: the gateway cannot listen on {address}: {source}")]
+    #[error("U0590: cannot listen on {address}: {source}")]
     Listen {
         /// The address.
         address: SocketAddr,

@@ -7,12 +7,15 @@
 //! ```
 //!
 //! The gateways read the journal only, without any member. Writes go to the process that writes the run.
+//!
+//! The Modbus server also serves a program without a run, as equipment for tests: [`serve_equipment`].
 
 #![allow(
     clippy::disallowed_methods,
     reason = "it looks at a journal again and again, by the clock"
 )]
 
+mod equipment;
 mod error;
 mod feed;
 mod followed;
@@ -26,6 +29,7 @@ mod questions;
 mod register_map;
 mod writing;
 
+pub use equipment::{Changed, Equipment, serve_equipment};
 pub use error::GatewayError;
 pub use feed::Feed;
 pub use followed::{BOUNDS, Followed, Observation};

@@ -41,7 +41,7 @@ const _: () = assert!(PATIENCE.as_secs() > DECIDED_WITHIN.as_secs());
 const MOST_BITS: u16 = 2000;
 
 /// Likewise.
-const MOST_REGISTERS: u16 = 125;
+pub(crate) const MOST_REGISTERS: u16 = 125;
 
 /// Serves the process image of `run` until SIGINT or SIGTERM; `ready` gets the address. Clients write operator inputs through `gate`, with
 /// the role of an operator.
@@ -56,7 +56,11 @@ pub fn serve_modbus(
 ) -> Result<(), GatewayError> {
     let map = RegisterMap::new(run.cluster())?;
     let served = Arc::new(Served { run, map, gate });
-    serve_until_asked(address, ready, |listener| serve(listener, served))
+    let client = move |caller| Client {
+        served: Arc::clone(&served),
+        caller,
+    };
+    serve_until_asked(address, ready, |listener| serve(listener, client))
 }
 
 /// What all clients share.
@@ -66,7 +70,24 @@ struct Served {
     gate: Option<WriteGate>,
 }
 
-async fn serve(listener: TcpListener, served: Arc<Served>) -> std::io::Result<()> {
+/// Future of an answer.
+pub(crate) type Answering = Pin<Box<dyn Future<Output = Result<Response, ExceptionCode>> + Send>>;
+
+/// Serves each client with the service that `client` makes for its address.
+pub(crate) async fn serve<S>(
+    listener: TcpListener,
+    client: impl Fn(IpAddr) -> S,
+) -> std::io::Result<()>
+where
+    S: Service<
+            Request = Request<'static>,
+            Response = Response,
+            Exception = ExceptionCode,
+            Future = Answering,
+        > + Send
+        + Sync
+        + 'static,
+{
     let inner = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await?;
     let address = inner.local_addr()?;
     let connections = Connections::new(MOST_CLIENTS, 3);
@@ -74,9 +95,8 @@ async fn serve(listener: TcpListener, served: Arc<Served>) -> std::io::Result<()
     let listener = Listener::new(listener, connections, PATIENCE);
     let relayed = relay_known(listener, address, callers.clone());
     let connected = move |stream: TcpStream, seen: SocketAddr| {
-        let served = Arc::clone(&served);
-        let caller = callers.of(seen).unwrap_or(seen).ip();
-        async move { Ok(Some((Client { served, caller }, stream))) }
+        let client = client(callers.of(seen).unwrap_or(seen).ip());
+        async move { Ok(Some((client, stream))) }
     };
     // The library ends with the first connection that the system refuses, so it only gets admitted connections.
     let server = Server::new(inner);
@@ -96,7 +116,7 @@ impl Service for Client {
     type Request = Request<'static>;
     type Response = Response;
     type Exception = ExceptionCode;
-    type Future = Pin<Box<dyn Future<Output = Result<Response, ExceptionCode>> + Send>>;
+    type Future = Answering;
 
     fn call(&self, request: Self::Request) -> Self::Future {
         let (served, caller) = (Arc::clone(&self.served), self.caller);
@@ -229,7 +249,8 @@ fn answer(image: &ProcessImage, request: &Request<'_>) -> Result<Response, Excep
     }
 }
 
-fn part<T: Copy>(
+/// Consecutive values of a table.
+pub(crate) fn part<T: Copy>(
     table: &[T],
     address: u16,
     count: u16,

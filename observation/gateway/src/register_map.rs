@@ -237,12 +237,17 @@ impl RegisterMap {
                     let name = format!("{}.{}", program.name, point.name);
                     let target = written.remove(&name);
                     let meaning = target.as_ref().map_or(meaning, |target| &target.meaning);
+                    let unit = if point.of.is_time() {
+                        " in nanoseconds"
+                    } else {
+                        ""
+                    };
                     places.push(Place {
                         area: Area::Register,
                         address: address as u16,
                         width: width as u16,
                         name,
-                        meaning: format!("{}: {meaning}", point.of).into(),
+                        meaning: format!("{}{unit}: {meaning}", point.of).into(),
                         writable: target.is_some(),
                     });
                     if let Some(target) = target {

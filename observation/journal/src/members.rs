@@ -116,6 +116,12 @@ impl Members {
         signals.filter(|signal| matches!(signal.place, SignalPlace::Input(_)))
     }
 
+    /// Outputs of a program in the order of its process image.
+    pub fn outputs(&self, program: ProgramId) -> impl Iterator<Item = &NamedSignal> {
+        let signals = self.signals.get(program.index()).into_iter().flatten();
+        signals.filter(|signal| matches!(signal.place, SignalPlace::Output(_)))
+    }
+
     /// Stations in rank order.
     pub fn stations(&self) -> impl Iterator<Item = (StationId, &str)> {
         self.iter().filter_map(|(member, name)| match member {

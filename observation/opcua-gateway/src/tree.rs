@@ -328,6 +328,7 @@ impl Tree {
             "Since" Int64 "first cycle of those in a row with this source" => of(|program| program.since.map(Variant::from));
             "WordOf" String "station whose parity word the outputs were reconstructed from, or empty" => of(|program| Some(text(program.word_of.as_deref().unwrap_or_default())));
             "Missing" String "why there was no provable output in a missed cycle, or empty" => of(|program| Some(text(program.missing.unwrap_or_default())));
+            "Fault" String "program fault that has stopped it, with the line of its text and the values, or empty" => of(|program| Some(text(program.fault.as_deref().unwrap_or_default())));
             "AwaitsRelease" Boolean "whether the operator has to release the outputs" => of(|program| Some(program.awaits_release.into()));
             "Forced" Strings "forced signals, with owner and reason" => of(|program| Some(texts(&program.forced)));
             "Protected" Boolean "whether the failure of one station would be masked" => of(|program| Some(program.protection.as_ref()?.protected.into()));

@@ -32,6 +32,7 @@ macro_rules! descriptions {
     };
 }
 
+mod fault_lines;
 mod members;
 mod processes;
 mod signals;
@@ -146,7 +147,13 @@ pub(crate) fn program_fault_text(
     let name = controller.map_or("an unknown program", |controller| controller.name.as_str());
     let typed = controller.and_then(|controller| controller.code.typed());
     match typed.zip(fault) {
-        Some((typed, fault)) => format!("program fault in {name}: {}", fault.describe(typed)),
+        Some((typed, fault)) => {
+            let assigned = fault_lines::assigned_text(typed, fault);
+            format!(
+                "program fault in {name}: {}{assigned}",
+                fault.describe(typed)
+            )
+        }
         None => format!("program fault in {name}"),
     }
 }

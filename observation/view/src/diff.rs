@@ -8,7 +8,7 @@ use understudy_wire::{Image, ProgramId};
 
 use crate::model::Model;
 use crate::timeline::Timeline;
-use crate::value::{value_in, value_text};
+use crate::value::stored_text;
 
 /// What differs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
@@ -185,7 +185,13 @@ fn differing_values(found: &mut Difference, points: &Points, images: [Option<&Im
     let text = |image: &Image| {
         let values = differing.iter();
         let texts: Vec<String> = values
-            .map(|point| format!("{} = {}", point.name, value_text(&value_in(point, image))))
+            .map(|point| {
+                format!(
+                    "{} = {}",
+                    point.name,
+                    stored_text(point.of, point.get(image.words()))
+                )
+            })
             .collect();
         texts.join(", ")
     };

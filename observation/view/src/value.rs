@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 use understudy_cluster::Controller;
-use understudy_typed::{Elementary, Point, Points};
+use understudy_typed::{Elementary, Point, Points, Program};
 use understudy_wire::{Force, Image, SignalPlace};
 
 /// The bits of a point as they are stored; nothing where the text ends before them.
@@ -39,6 +39,30 @@ pub fn elementary(of: Elementary, stored: u64) -> Value {
         Elementary::Bool => Value::Bool(stored != 0),
         of => number(of, stored),
     }
+}
+
+/// A stored value as people read it: a BOOL as 0 or 1, a time with its unit.
+pub(crate) fn stored_text(of: Elementary, stored: u64) -> String {
+    if of.is_time() {
+        // A file has a duration in quotes.
+        return understudy_cluster::value_text(of, stored).replace('"', "");
+    }
+    value_text(&elementary(of, stored))
+}
+
+/// The values of the declared points of an image as people read them: `level = 2.5, run = 1`.
+pub(crate) fn named_text(points: &Points, image: &Image) -> String {
+    let points = points.iter().filter(|point| is_declared(&point.name));
+    let texts = points.map(|point| {
+        let text = stored_text(point.of, point.get(image.words()));
+        format!("{} = {text}", point.name)
+    });
+    texts.collect::<Vec<String>>().join(", ")
+}
+
+/// Whether a program declares the point of this name: its reset and its fault are told by events of their own.
+pub(crate) fn is_declared(name: &str) -> bool {
+    ![Program::RESET, Program::FAULT].contains(&name)
 }
 
 /// A value as people read it: a BOOL as 0 or 1.

@@ -17,13 +17,14 @@ use understudy_ladder::Program;
 use understudy_parity::reconstruct;
 use understudy_remote_io::Missing;
 use understudy_text::spelling::suggestion;
+use understudy_typed::Elementary;
 use understudy_wire::{Image, Member, ProgramId, Source, StationId};
 
 use crate::describe::missing_text;
 use crate::error::ViewError;
-use crate::history::{Driven, History, Step};
+use crate::history::{Driven, History, Sampled, Step};
 use crate::model::Model;
-use crate::value::{named, value_in};
+use crate::value::{named, named_text, value_in};
 use explain::Explainer;
 
 /// Why an output or a variable of a program has its value.
@@ -48,9 +49,12 @@ pub struct Why {
     pub scanned: Option<Value>,
     /// The inputs that were sampled in this cycle, by name.
     pub inputs: BTreeMap<String, Value>,
-    /// Whether it is a program with numbers.
+    /// The same as people read them, of a program with numbers.
     #[serde(skip)]
-    pub has_numbers: bool,
+    pub inputs_text: Option<String>,
+    /// Type of the signal, of a program with numbers.
+    #[serde(skip)]
+    pub of: Option<Elementary>,
     /// How it was reconstructed.
     pub reconstructed: Option<Reconstructed>,
     /// Configured fail-safe value, where the output is on a ramp to it.
@@ -75,6 +79,9 @@ pub struct Reconstructed {
     pub sum: String,
     /// The sum as outputs of the program, by name.
     pub values: BTreeMap<String, Value>,
+    /// The same as people read them, where the program has numbers.
+    #[serde(skip)]
+    pub values_text: Option<String>,
     /// L(t+1) of the program: a station at this lineage has the same inputs since the same start.
     pub lineage: String,
     /// Whether the sum equals the outputs that the samples yield.
@@ -92,6 +99,9 @@ pub struct Addend {
     pub outputs: String,
     /// The same by name.
     pub values: BTreeMap<String, Value>,
+    /// The same as people read them, where the program has numbers.
+    #[serde(skip)]
+    pub values_text: Option<String>,
 }
 
 /// A signal in a cycle, and the reason for its value.
@@ -101,6 +111,9 @@ pub struct Reason {
     pub signal: String,
     /// Its value at that place of the scan.
     pub value: Value,
+    /// Its type, of a program with numbers.
+    #[serde(skip)]
+    pub of: Option<Elementary>,
     /// From the origin of the run.
     pub cycle: i64,
     /// The rung that determined it, counted from 1.
@@ -188,7 +201,12 @@ impl Model {
             .or(because.as_ref().map(|reason| reason.value.clone()))
             .unwrap_or_default();
         let sampled = step.sampled.as_ref().into_iter();
-        let inputs = sampled.flat_map(|it| named(&controller.interface.inputs, &it.inputs));
+        let inputs = sampled
+            .clone()
+            .flat_map(|it| named(&controller.interface.inputs, &it.inputs));
+        let typed = controller.code.typed();
+        let is_typed = |_: &&Sampled| typed.is_some();
+        let mut sampled = sampled.filter(is_typed);
         Ok(Why {
             signal: name.to_owned(),
             program: controller.name.clone(),
@@ -198,7 +216,10 @@ impl Model {
             missing: missing.map(missing_text),
             scanned: scanned.filter(|scanned| *scanned != value),
             inputs: inputs.collect(),
-            has_numbers: controller.code.typed().is_some(),
+            inputs_text: sampled
+                .next()
+                .map(|it| named_text(&controller.interface.inputs, &it.inputs)),
+            of: typed.and_then(|typed| typed.part(name)?.of.elementary()),
             ramp_to: configured.filter(|_| on_ramp),
             value,
             reconstructed: step
@@ -279,13 +300,22 @@ impl Model {
         };
         let sum = reconstruct(word, program, driven.outputs.width(), published).ok()?;
         let others = word.mask.iter().filter(|other| *other != program);
+        let outputs_of = |program: ProgramId, image: &Image| {
+            let outputs = &self.cluster.controllers()[program.index()]
+                .interface
+                .outputs;
+            (image.width() >= outputs.width()).then_some(outputs)
+        };
         let values = |program: ProgramId, image: &Image| {
-            let interface = &self.cluster.controllers()[program.index()].interface;
-            let is_whole = image.width() >= interface.outputs.width();
-            let image = is_whole.then_some(image).into_iter();
-            image
-                .flat_map(|image| named(&interface.outputs, image))
-                .collect()
+            let outputs = outputs_of(program, image).into_iter();
+            outputs.flat_map(|outputs| named(outputs, image)).collect()
+        };
+        let values_text = |program: ProgramId, image: &Image| {
+            let typed = self.cluster.controllers()[program.index()].code.typed();
+            Some(named_text(
+                outputs_of(program, image).filter(|_| typed.is_some())?,
+                image,
+            ))
         };
         let others = others.filter_map(|other| {
             let outputs = published(other)?;
@@ -293,6 +323,7 @@ impl Model {
                 published_by: self.program_name(other).to_owned(),
                 outputs: outputs.to_string(),
                 values: values(other, outputs),
+                values_text: values_text(other, outputs),
             })
         });
         let not_received = (0..self.cluster.agreement().schedule.stations() as u8)
@@ -312,6 +343,7 @@ impl Model {
             lineage: sampled.map_or_else(String::new, |sampled| sampled.after.to_string()),
             proved: sampled.is_some_and(|sampled| sampled.outputs == sum),
             values: values(program, &sum),
+            values_text: values_text(program, &sum),
             sum: sum.to_string(),
             not_received: not_received.collect(),
         })

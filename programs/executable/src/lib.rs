@@ -4,7 +4,7 @@ mod digest;
 
 use understudy_logic::{Circuit, Scan};
 
-use understudy_typed::{Elementary, Machine, Points, Program};
+use understudy_typed::{Elementary, Machine, Point, Points, Program};
 
 pub use self::digest::{Digest, digest};
 
@@ -117,4 +117,12 @@ impl From<&Program> for Interface {
             outputs: program.outputs.clone(),
         }
     }
+}
+
+/// The points that a program declares: the reset and the fault of a program with numbers are not among them.
+pub fn declared(points: &Points) -> impl Iterator<Item = &Point> {
+    let implied = [Program::RESET, Program::FAULT];
+    points
+        .iter()
+        .filter(move |point| !implied.contains(&point.name.as_str()))
 }

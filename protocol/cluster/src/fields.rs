@@ -14,7 +14,7 @@ pub(crate) use understudy_text::tables::Placed;
 use understudy_text::tables::{Codes, Constant, Value, unknown_key};
 
 use crate::format::{Key, Kind, OPERATOR_INPUT, POINT, SIGNAL_INPUT, Section};
-use crate::place::{ByteOrder, Place, Registers, register};
+use crate::place::{ByteOrder, Place, PlaceError, Registers, register};
 
 /// The longest name of a member, in characters.
 pub const MAXIMUM_NAME_LENGTH: usize = 48;
@@ -209,7 +209,7 @@ impl<'a, 't> Fields<'a, 't> {
         match value.parse() {
             Ok(address) => {
                 if let Some(why) = why_unreachable(address) {
-                    let message = format!("{address} is no address of one device: {why}");
+                    let message = format!("{address} is not the address of one device: {why}");
                     let help = "the address and the port at which the others reach it";
                     diagnostics.push(Diagnostic::error("U0210", message, span).with_help(help));
                     return None;
@@ -220,7 +220,7 @@ impl<'a, 't> Fields<'a, 't> {
                 })
             }
             Err(_) => {
-                let message = format!("{value:?} is no address");
+                let message = format!("invalid address {value:?}");
                 let expected = self.section.key(name).kind.expected();
                 diagnostics.push(
                     Diagnostic::error("U0210", message, span)
@@ -487,10 +487,11 @@ fn place(value: Value<'_, '_>, diagnostics: &mut Vec<Diagnostic>) -> Option<Plac
         let text = value.text_as("a place in quotes, or its table", diagnostics)?;
         let place = text.value.parse::<Place>();
         if let Err(error) = &place {
-            diagnostics.push(
-                Diagnostic::error("U0222", error.to_string(), text.span)
-                    .with_help(format!("write {}", Place::EXAMPLES)),
-            );
+            let diagnostic = Diagnostic::error("U0222", error.to_string(), text.span);
+            diagnostics.push(match error {
+                PlaceError::Type(_) | PlaceError::Order(_) => diagnostic,
+                _ => diagnostic.with_help(format!("write {}", Place::EXAMPLES)),
+            });
         }
         return place.ok();
     };

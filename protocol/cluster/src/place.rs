@@ -141,6 +141,12 @@ pub enum PlaceError {
     /// It has another form.
     #[error("{0:?} is not a place of a Modbus device")]
     Form(String),
+    /// A number of a type that no registers have.
+    #[error("{0:?} is not a type of registers: expected {words}", words = Registers::TYPE_WORDS.join(", "))]
+    Type(String),
+    /// Bytes in an order that no registers have.
+    #[error("{0:?} is not an order of bytes: expected {words}", words = ByteOrder::WORDS.join(", "))]
+    Order(String),
     /// A register without its bit or its type.
     #[error("{0:?} names neither a bit nor a type")]
     NoType(String),
@@ -198,15 +204,17 @@ impl FromStr for Place {
             };
         };
         let (table, address) = register(first).ok_or_else(form)?;
-        let find = |words: &[&str], wanted: &str| words.iter().position(|word| *word == wanted);
-        let of = find(&Registers::TYPE_WORDS, of).ok_or_else(form)?;
-        let order = match order {
-            Some(order) => find(&ByteOrder::WORDS, order).ok_or_else(form)?,
-            None => 0,
-        };
         if more.is_some() {
             return Err(form());
         }
+        let find = |words: &[&str], wanted: &str| words.iter().position(|word| *word == wanted);
+        let of = find(&Registers::TYPE_WORDS, of).ok_or_else(|| PlaceError::Type(of.to_owned()))?;
+        let order = match order {
+            Some(order) => {
+                find(&ByteOrder::WORDS, order).ok_or_else(|| PlaceError::Order(order.to_owned()))?
+            }
+            None => 0,
+        };
         let registers = Registers {
             table,
             address,

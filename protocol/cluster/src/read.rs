@@ -206,11 +206,6 @@ fn build(
     let controllers: Option<Vec<Controller>> = members.into_iter().map(controller).collect();
     let (controllers, name) = (controllers?, cluster.name.as_ref()?.value.clone());
     let circuits: Option<Vec<&Circuit>> = controllers.iter().map(Controller::circuit).collect();
-    if circuits.is_none() && mode == Mode::Paper {
-        let message = "the paper's mode evaluates a generated circuit, and a program has numbers";
-        let error = Diagnostic::error("U0213", message, cluster.span.clone());
-        diagnostics.push(error.with_help("leave `mode` out, or write `mode = \"full\"`"));
-    }
     let parity = circuits.map(|circuits| understudy_parity::generate(&circuits));
     let parity = match parity.transpose() {
         Ok(parity) => parity,

@@ -30,7 +30,11 @@ pub fn value_text(of: Elementary, stored: u64) -> String {
         Elementary::Bool => (stored != 0).to_string(),
         Elementary::Real => format!("{:?}", f32::from_bits(stored as u32)),
         Elementary::Lreal => format!("{:?}", f64::from_bits(stored)),
-        _ if of.is_time() => format!("\"{}\"", duration::text(Duration::from_nanos(stored))),
+        _ if of.is_time() => {
+            let sign = if (stored as i64) < 0 { "-" } else { "" };
+            let time = Duration::from_nanos((stored as i64).unsigned_abs());
+            format!("\"{sign}{}\"", duration::text(time))
+        }
         _ => of.signed(stored).to_string(),
     }
 }

@@ -154,8 +154,8 @@ pub enum WriteRefusal {
     /// The program does not run: its state is not known yet, is lost, or its sensors are unknown.
     #[error("the program does not run")]
     NotRunning,
-    /// All samples with the pulse became void before any station's outputs of them were applied.
-    #[error("no station received the pulse while it lasted")]
+    /// The value ended, or another one replaced it, before outputs of a sample with it were applied.
+    #[error("no output that was computed with the value was applied while it lasted")]
     Void,
 }
 

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_cluster::stored_value;
+use understudy_cluster::{stored_value, value_text};
 use understudy_journal::NamedSignal;
-use understudy_remote_io::ValueMismatch;
+use understudy_remote_io::{OperatorInput, OperatorInputKind, ValueMismatch};
 use understudy_simulator::{Action, Fault};
 use understudy_text::Diagnostic;
 use understudy_text::spelling::suggestion;
@@ -263,7 +263,7 @@ impl Reader<'_> {
                         let input = place.bit;
                         return Some(Action::Write { input, value });
                     }
-                    Err(ValueMismatch::Limits) => "the value is outside the limits".to_owned(),
+                    Err(ValueMismatch::Limits) => outside(&named.input),
                     Err(ValueMismatch::Type) => "the value has another type".to_owned(),
                 }
             }
@@ -402,5 +402,18 @@ impl Reader<'_> {
             }
             last.insert(name, (action, span.clone()));
         }
+    }
+}
+
+/// What is wrong with a value outside the limits of an operator input.
+fn outside(input: &OperatorInput) -> String {
+    let text = |stored| value_text(input.place.of, stored);
+    match input.kind {
+        OperatorInputKind::Setpoint { low, high } => format!(
+            "the value is outside the limits: write one from {} to {}",
+            text(low),
+            text(high)
+        ),
+        _ => "the value is outside the limits".to_owned(),
     }
 }

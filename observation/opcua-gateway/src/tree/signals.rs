@@ -30,7 +30,7 @@ impl Tree {
             let writable = source.and_then(|source| written(place, point, source));
             let meaning = writable
                 .as_ref()
-                .map_or("as last sampled", |(meaning, _)| *meaning);
+                .map_or_else(|| sampled(point), |(meaning, _)| *meaning);
             self.add(&name, kind_of(point.of), meaning, move |seen| {
                 let program = seen.program(place);
                 let image = program.and_then(|program| program.inputs.as_deref());
@@ -45,7 +45,11 @@ impl Tree {
         self.enter(&["Programs", &controller.name, "Outputs"]);
         for point in &controller.interface.outputs {
             let (name, own) = (point.name.clone(), point.clone());
-            self.add(&name, kind_of(point.of), "as driven", move |seen| {
+            let meaning = match point.of.is_time() {
+                true => "as driven, in nanoseconds",
+                false => "as driven",
+            };
+            self.add(&name, kind_of(point.of), meaning, move |seen| {
                 let program = seen.program(place);
                 let image = program.and_then(|program| program.outputs.as_deref());
                 let trust = program.map(|program| trust::output(program, &own.name));
@@ -76,6 +80,14 @@ impl Tree {
     }
 }
 
+/// Meaning of the variable of an input.
+fn sampled(point: &Point) -> &'static str {
+    match point.of.is_time() {
+        true => "as last sampled, in nanoseconds",
+        false => "as last sampled",
+    }
+}
+
 /// An operator input, with the meaning of its variable.
 fn written(
     place: usize,
@@ -94,7 +106,10 @@ fn written(
         OperatorInputKind::Pulse(_) => ("pulse: writing TRUE presses it", None),
         OperatorInputKind::Group { .. } => ("signal of another group, as last sampled", None),
         OperatorInputKind::Setpoint { low, high } => (
-            "setpoint that operators write, as last sampled",
+            match point.of.is_time() {
+                true => "setpoint that operators write, as last sampled, in nanoseconds",
+                false => "setpoint that operators write, as last sampled",
+            },
             Some((number(low), number(high))),
         ),
     };

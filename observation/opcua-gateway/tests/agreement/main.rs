@@ -385,6 +385,10 @@ fn check_opcua(cluster: &Cluster, top: &Snapshot, observation: &Observation, con
             text(program.word_of.as_deref().unwrap_or_default()),
         );
         check(&path("Missing"), text(program.missing.unwrap_or_default()));
+        check(
+            &path("Fault"),
+            text(program.fault.as_deref().unwrap_or_default()),
+        );
         check(&path("AwaitsRelease"), Some(program.awaits_release.into()));
         let protected = program.protection.as_ref().map(|of| of.protected.into());
         check(&path("Protected"), protected);

@@ -38,9 +38,12 @@ descriptions! { station: StationEvent, members: Members;
 }
 
 descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
-    Sampled { inputs, .. } => "sampled" Info format!("samples {inputs}");
-    Applied { outputs, source, word_of, missing, .. } => "applied" Info
-        format!("drives {outputs}, {}", source_text(*source, *word_of, *missing, members));
+    Sampled { inputs, .. } => "sampled" Info format!("samples {}", members.inputs(inputs));
+    Applied { outputs, source, word_of, missing, .. } => "applied" Info format!(
+        "drives {}, {}",
+        members.outputs(outputs),
+        source_text(*source, *word_of, *missing, members)
+    );
     StartedCold { awaits_release: false, .. } => "started-cold" Notice
         "starts its program from the initial state";
     StartedCold { awaits_release: true, .. } => "started-cold" Notice
@@ -106,7 +109,7 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
         format!("refuses the value {value} of {} for {input}: {refusal}", write.owner)
     };
     WriteVoid { id, .. } => "write-void" Warning
-        format!("{} has no effect: no station received it while it lasted", members.write(*id));
+        format!("{} is not in effect: no output that was computed with it was applied", members.write(*id));
     SignalValidity { input, valid: true, .. } => "signal-validity" Notice format!(
         "the signal {} is valid at {}", members.source(*input), members.place(SignalPlace::Input(*input))
     );

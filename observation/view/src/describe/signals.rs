@@ -3,11 +3,12 @@
 use std::collections::VecDeque;
 use std::ops::Deref;
 
-use understudy_cluster::value_text;
 use understudy_journal::{Happening, Members, NamedSignal, Record};
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_typed::Elementary;
-use understudy_wire::{Member, PointValue, SignalPlace, Write, WriteId};
+use understudy_wire::{Image, Member, PointValue, SignalPlace, Write, WriteId};
+
+use crate::value::{is_declared, stored_text};
 
 /// Writes that are remembered: their outcomes come within some cycles.
 const MOST: usize = 256;
@@ -71,12 +72,49 @@ impl Names<'_> {
         }
     }
 
+    /// The image of all inputs of the reporting remote I/O.
+    pub(super) fn inputs(&self, image: &Image) -> String {
+        match self.by {
+            Some(Member::RemoteIo(program)) => image_text(image, self.members.inputs(program)),
+            _ => image.to_string(),
+        }
+    }
+
+    /// The image of all its outputs.
+    pub(super) fn outputs(&self, image: &Image) -> String {
+        match self.by {
+            Some(Member::RemoteIo(program)) => image_text(image, self.members.outputs(program)),
+            _ => image.to_string(),
+        }
+    }
+
     /// The output of another program at an input: `press.done`.
     pub(super) fn source(&self, input: u16) -> &str {
         let signal = signal(self.by, SignalPlace::Input(input), self.members);
         let from = signal.and_then(|signal| signal.from.as_deref());
         from.unwrap_or("of another program")
     }
+}
+
+/// The values by name where one of them is a number, else the bits.
+fn image_text<'a>(image: &Image, signals: impl Iterator<Item = &'a NamedSignal>) -> String {
+    let signals: Vec<&NamedSignal> = signals.collect();
+    let end = |signal: &&NamedSignal| {
+        u32::from(signal.place.first_bit()) + signal.of.bits() <= image.width() as u32
+    };
+    let has_numbers = signals.iter().any(|signal| signal.of != Elementary::Bool);
+    if !has_numbers || !signals.iter().all(end) {
+        return image.to_string();
+    }
+    let declared = signals.iter().filter(|signal| is_declared(&signal.name));
+    let texts = declared.map(|signal| {
+        let bit = usize::from(signal.place.first_bit());
+        // No point crosses a word.
+        let stored = image.words()[bit / 64] >> (bit % 64) & signal.of.mask();
+        let text = number_text(signal.of, stored, signal.unit.as_deref());
+        format!("{} = {text}", signal.name)
+    });
+    texts.collect::<Vec<String>>().join(", ")
 }
 
 fn signal(by: Option<Member>, place: SignalPlace, members: &Members) -> Option<&NamedSignal> {
@@ -118,8 +156,7 @@ fn signal_value(
 }
 
 fn number_text(of: Elementary, stored: u64, unit: Option<&str>) -> String {
-    // A file has a duration in quotes.
-    let text = value_text(of, stored).replace('"', "");
+    let text = stored_text(of, stored);
     match unit {
         Some(unit) => format!("{text} {unit}"),
         None => text,

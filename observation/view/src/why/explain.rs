@@ -85,6 +85,7 @@ impl<'m> Explainer<'m> {
         Reason {
             signal: signal.to_owned(),
             value: value.into(),
+            of: None,
             cycle: self.cycle(place),
             rung: None,
             title: None,
@@ -245,6 +246,7 @@ impl<'m> Explainer<'m> {
         Reason {
             signal: name.to_owned(),
             value: value.into(),
+            of: None,
             cycle: self.cycle(place),
             rung: Some(decision.rung + 1),
             title: rung.title.clone().filter(|title| !title.is_empty()),

@@ -1,12 +1,14 @@
 //! Why a variable of a program with numbers has its value: the statement that assigned it last, and the values that it read.
 //!
-//! Bounded by [`DEEPEST`] and [`MOST`]; the last reason states it.
+//! Bounded by [`DEEPEST`] and [`MOST`]; the last reason states it. What was explained once is not explained again.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
 use serde_json::Value;
-use understudy_typed::{Effect, Elementary, Fault, Part, Program, Read, RoutineId, Trace};
+use understudy_typed::{
+    Cause, Done, Effect, Elementary, Fault, Part, Program, Read, RoutineId, Trace,
+};
 
 use super::Reason;
 use crate::error::ViewError;
@@ -21,8 +23,14 @@ const DEEPEST: usize = 12;
 /// Reasons in all.
 const MOST: usize = 200;
 
+/// Values that the statement of a program fault read.
+const MOST_FAILED: usize = 20;
+
 /// Cycles that are gone back through to find when a value changed.
 const FARTHEST: usize = 4096;
+
+/// Text of a reason whose causes are not shown.
+const OMITTED: &str = "; further causes omitted";
 
 /// Explains variables of one program.
 pub(super) struct Explainer<'m> {
@@ -32,7 +40,12 @@ pub(super) struct Explainer<'m> {
     text: SourceText<'m>,
     traces: HashMap<usize, Option<Rc<Trace>>>,
     count: usize,
+    /// Address, step and statement of what was explained.
+    explained: HashSet<(u64, usize, Option<usize>)>,
 }
+
+/// Type and value, as it is stored, of a variable without parts.
+type Stored = Option<(Elementary, u64)>;
 
 impl<'m> Explainer<'m> {
     pub(super) fn new(
@@ -48,6 +61,7 @@ impl<'m> Explainer<'m> {
             text: SourceText::new(text),
             traces: HashMap::new(),
             count: 0,
+            explained: HashSet::new(),
         }
     }
 
@@ -56,13 +70,12 @@ impl<'m> Explainer<'m> {
         let trace = Rc::new(self.model.trace_at(self.history, place)?);
         self.traces.insert(place, Some(Rc::clone(&trace)));
         let stored = part.stored(&trace.memory);
-        let value = stored.map_or(Value::Null, |(of, stored)| elementary(of, stored));
         if let Some(input) = self.input(part.address, place) {
             return Ok(input);
         }
         match trace.last_write(part.address) {
             Some(write) => Ok(self.written(&part.name, &trace, write, place, 0)),
-            None => Ok(self.kept(part, value, place, 0)),
+            None => Ok(self.kept(part, stored, place, 0)),
         }
     }
 
@@ -79,21 +92,33 @@ impl<'m> Explainer<'m> {
         };
         let fault = steps[at].sampled.as_ref()?.fault?;
         let trace = self.trace(at)?;
-        let mut reason = self.leaf(
-            name,
+        let text = format!("program fault: {}", fault.describe(self.program));
+        let mut reason = Reason {
             value,
-            at,
-            format!("program fault: {}", self.told(&fault)),
-        );
+            of: self
+                .program
+                .part(name)
+                .and_then(|part| part.of.elementary()),
+            ..self.leaf(name, None, at, text)
+        };
         if let Some(routine) = fault.routine {
             self.locate(&mut reason, routine, fault.line);
         }
-        reason.because = self.reads(&trace.failed, &trace, at, 0, None);
+        reason.because = match self.not_finite(&fault, &trace) {
+            Some((output, write)) => vec![self.written(&output, &trace, write, at, 0)],
+            None => self.reads(&last_reads(&trace.failed), &trace, at, 0, None),
+        };
         Some(reason)
     }
 
-    fn told(&self, fault: &Fault) -> String {
-        fault.describe(self.program)
+    /// The output that is not a finite number, and the statement that assigned it.
+    fn not_finite(&self, fault: &Fault, trace: &Trace) -> Option<(String, usize)> {
+        let Cause::OutputNotFinite { output, .. } = fault.cause else {
+            return None;
+        };
+        let point = self.program.outputs.iter().nth(output as usize)?;
+        let write = trace.last_write(64 * u64::from(point.slot))?;
+        Some((point.name.clone(), write))
     }
 
     fn trace(&mut self, place: usize) -> Option<Rc<Trace>> {
@@ -109,10 +134,11 @@ impl<'m> Explainer<'m> {
         self.history.steps()[place].cycle
     }
 
-    fn leaf(&self, signal: &str, value: Value, place: usize, text: impl Into<String>) -> Reason {
+    fn leaf(&self, signal: &str, stored: Stored, place: usize, text: impl Into<String>) -> Reason {
         Reason {
             signal: signal.to_owned(),
-            value,
+            value: stored.map_or(Value::Null, |(of, stored)| elementary(of, stored)),
+            of: stored.map(|(of, _)| of),
             cycle: self.cycle(place),
             rung: None,
             title: None,
@@ -144,24 +170,20 @@ impl<'m> Explainer<'m> {
         depth: usize,
     ) -> Reason {
         let done = &trace.done[write];
-        let value = match done.effect {
-            Effect::Assigned {
-                value: Some((of, stored)),
-                ..
-            } => elementary(of, stored),
-            _ => Value::Null,
+        let stored = match done.effect {
+            Effect::Assigned { value, .. } => value,
+            Effect::Chose => None,
         };
-        let mut reason = self.leaf(name, value, place, "assigned");
+        let mut reason = self.leaf(name, stored, place, "assigned");
         self.locate(&mut reason, done.routine, done.line);
-        self.count += 1;
         if depth >= DEEPEST || self.count > MOST {
-            reason.text += "; further causes omitted";
+            reason.text += OMITTED;
             return reason;
         }
         reason.because = self.reads(&done.reads, trace, place, depth, None);
         let mut under = done.under;
         while let Some(choice) = under.map(|choice| &trace.done[choice]) {
-            let read = self.reads(&choice.reads, trace, place, depth, Some(choice.line));
+            let read = self.reads(&choice.reads, trace, place, depth, Some(choice));
             reason.because.extend(read);
             under = choice.under;
         }
@@ -174,7 +196,7 @@ impl<'m> Explainer<'m> {
         trace: &Rc<Trace>,
         place: usize,
         depth: usize,
-        condition: Option<u32>,
+        condition: Option<&Done>,
     ) -> Vec<Reason> {
         let mut told = Vec::new();
         let mut reasons = Vec::new();
@@ -183,25 +205,53 @@ impl<'m> Explainer<'m> {
                 continue;
             }
             told.push((read.address, read.value));
+            self.count += 1;
             let mut reason = self.read(read, trace, place, depth + 1);
-            if let Some(line) = condition {
-                reason.text += &format!("; read by the condition in line {line}");
+            if let Some(choice) = condition {
+                reason.text += &self.condition_text(choice);
+            }
+            let is_full = self.count >= MOST;
+            if is_full && !reason.text.ends_with(OMITTED) {
+                reason.text += OMITTED;
             }
             reasons.push(reason);
+            if is_full {
+                break;
+            }
         }
         reasons
     }
 
+    fn condition_text(&self, choice: &Done) -> String {
+        let routine = self.program.routine(choice.routine);
+        match self.text.declares(&routine.name) {
+            true => format!("; read by the condition in line {}", choice.line),
+            false => format!(
+                "; read by a condition of the library block {}",
+                routine.name
+            ),
+        }
+    }
+
     /// A value that a statement read.
     fn read(&mut self, read: &Read, trace: &Rc<Trace>, place: usize, depth: usize) -> Reason {
-        let value = elementary(read.of, read.value);
+        let stored = Some((read.of, read.value));
         if let Some(input) = self.input(read.address, place) {
             return input;
         }
         let slots = u64::from(self.program.state);
         let part = (read.address / 64 < slots).then(|| self.program.part_at(read.address));
         let part = part.flatten();
+        let is_new = self.explained.insert((read.address, place, read.by));
+        if let Some(part) = part.as_ref().filter(|_| !is_new) {
+            return self.leaf(&part.name, stored, place, "explained above");
+        }
         match (read.by, part) {
+            // Only the first statements of a scan are recorded.
+            (Some(write), part) if trace.is_cut && !assigned(trace.done[write].effect, read) => {
+                let name = part.map_or("temporary".to_owned(), |part| part.name);
+                self.leaf(&name, stored, place, "assigned by a later turn of a loop")
+            }
             (Some(write), Some(part)) => self.written(&part.name, trace, write, place, depth),
             (Some(write), None) => {
                 let line = self.text.line(trace.done[write].line);
@@ -209,8 +259,8 @@ impl<'m> Explainer<'m> {
                 let name = target.map_or("temporary", |(target, _)| target.trim());
                 self.written(name, trace, write, place, depth)
             }
-            (None, Some(part)) => self.kept(&part, value, place, depth),
-            (None, None) => self.leaf("temporary", value, place, "its initial value in this call"),
+            (None, Some(part)) => self.kept(&part, stored, place, depth),
+            (None, None) => self.leaf("temporary", stored, place, "its initial value in this call"),
         }
     }
 
@@ -241,11 +291,11 @@ impl<'m> Explainer<'m> {
             (false, true) => format!("input, since cycle {}", self.cycle(since)),
             (_, false) => format!("input, since cycle {} or longer", self.cycle(since)),
         };
-        Some(self.leaf(&point.name, elementary(point.of, value), place, text))
+        Some(self.leaf(&point.name, Some((point.of, value)), place, text))
     }
 
     /// A value of the state before the scan at `place`, which an earlier scan assigned.
-    fn kept(&mut self, part: &Part, value: Value, place: usize, depth: usize) -> Reason {
+    fn kept(&mut self, part: &Part, value: Stored, place: usize, depth: usize) -> Reason {
         let stored = |place: usize| {
             let sampled = self.history.steps()[place].sampled.as_ref()?;
             part.stored(sampled.state.words())
@@ -271,7 +321,6 @@ impl<'m> Explainer<'m> {
             return self.leaf(&part.name, value, place, text);
         };
         let when = self.cycle(writer);
-        self.count += 1;
         let is_bool = part.of.elementary() == Some(Elementary::Bool);
         // A number that changes in every scan leads back through all of them.
         let is_followed = (is_bool || since != place) && depth < DEEPEST && self.count <= MOST;
@@ -296,4 +345,27 @@ impl<'m> Explainer<'m> {
         }
         reason
     }
+}
+
+/// Whether a statement assigned what was read.
+fn assigned(effect: Effect, read: &Read) -> bool {
+    match effect {
+        Effect::Assigned { value, .. } => value.is_none_or(|(_, stored)| stored == read.value),
+        Effect::Chose => false,
+    }
+}
+
+/// The last reads of each address: before it fails, a loop has read in each of its turns.
+fn last_reads(reads: &[Read]) -> Vec<Read> {
+    let mut last: Vec<Read> = Vec::new();
+    for read in reads.iter().rev() {
+        if last.len() == MOST_FAILED {
+            break;
+        }
+        if last.iter().all(|known| known.address != read.address) {
+            last.push(*read);
+        }
+    }
+    last.reverse();
+    last
 }

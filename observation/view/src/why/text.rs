@@ -1,18 +1,18 @@
 //! A chain of reasons as a tree in text.
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use serde_json::Value;
+use understudy_typed::Elementary;
 
 use super::{Reason, Why};
-use crate::value::value_text;
+use crate::value::{stored_text, value_text};
 
 impl Why {
     /// For a terminal; lines end in a newline.
     pub fn to_text(&self) -> String {
         let mut text = String::new();
-        let value = value_text(&self.value);
+        let value = shown(&self.value, self.of);
         let _ = writeln!(
             text,
             "{}.{} is {value} in cycle {}",
@@ -25,11 +25,11 @@ impl Why {
             let _ = writeln!(text, "  {} drives it, {source}{why}", self.remote_io);
         }
         if let Some(scanned) = &self.scanned {
-            let scanned = value_text(scanned);
+            let scanned = shown(scanned, self.of);
             let _ = writeln!(text, "  the scan of this cycle yields {scanned}");
         }
-        if self.has_numbers && !self.inputs.is_empty() {
-            let _ = writeln!(text, "  inputs: {}", list(&self.inputs));
+        if let Some(inputs) = self.inputs_text.as_ref().filter(|it| !it.is_empty()) {
+            let _ = writeln!(text, "  inputs: {inputs}");
         }
         if let Some(restored) = &self.reconstructed {
             let not_received = if restored.not_received.is_empty() {
@@ -46,8 +46,8 @@ impl Why {
             );
             for other in &restored.others {
                 let _ = writeln!(text, "  + {} of {}", other.outputs, other.published_by);
-                if self.has_numbers {
-                    let _ = writeln!(text, "    {}", list(&other.values));
+                if let Some(values) = &other.values_text {
+                    let _ = writeln!(text, "    {values}");
                 }
             }
             let proof = if restored.proved {
@@ -60,12 +60,12 @@ impl Why {
                 "  = {}, {proof}; lineage {}",
                 restored.sum, restored.lineage
             );
-            if self.has_numbers {
-                let _ = writeln!(text, "    {}", list(&restored.values));
+            if let Some(values) = &restored.values_text {
+                let _ = writeln!(text, "    {values}");
             }
         }
         if let Some(configured) = &self.ramp_to {
-            let configured = value_text(configured);
+            let configured = shown(configured, self.of);
             let _ = writeln!(
                 text,
                 "  it is on its ramp to the fail-safe value {configured}"
@@ -84,13 +84,12 @@ impl Why {
 /// The source of values that no program computed.
 const FAIL_SAFE: &str = "fail-safe";
 
-/// `level = 2.5, run = 1`.
-fn list(values: &BTreeMap<String, Value>) -> String {
-    let values = values.iter();
-    let texts: Vec<String> = values
-        .map(|(name, value)| format!("{name} = {}", value_text(value)))
-        .collect();
-    texts.join(", ")
+/// A value as people read it: a time with its unit.
+fn shown(value: &Value, of: Option<Elementary>) -> String {
+    match (of, value.as_i64()) {
+        (Some(of), Some(stored)) if of.is_time() => stored_text(of, stored as u64),
+        _ => value_text(value),
+    }
 }
 
 fn children(text: &mut String, reason: &Reason, indent: &str) {
@@ -108,7 +107,7 @@ fn children(text: &mut String, reason: &Reason, indent: &str) {
 }
 
 fn line(text: &mut String, reason: &Reason, parent: i64, indent: &str) {
-    let value = value_text(&reason.value);
+    let value = shown(&reason.value, reason.of);
     let when = if reason.cycle == parent {
         String::new()
     } else {

@@ -178,8 +178,10 @@ impl<'a, 't> Value<'a, 't> {
         let place = words.iter().position(|word| *word == text);
         if place.is_none() {
             let message = format!("`{}` cannot be {text:?}", self.name);
+            let expected = format!("expected {}", quoted.join(" or "));
             diagnostics.push(
                 Diagnostic::error(self.codes.unknown_word, message, self.span())
+                    .with_label(expected)
                     .with_help(suggestion(text, words.iter().copied())),
             );
         }
