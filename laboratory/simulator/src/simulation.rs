@@ -30,6 +30,7 @@ use crate::referee::{Referee, Violation};
 use crate::signals::SignalReferee;
 use crate::slot::Slot;
 use crate::tally::Tally;
+use crate::wakeups::Wakeups;
 
 /// Something for the journal.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -70,6 +71,7 @@ pub struct Simulation {
     now: Time,
     stations: Vec<Slot<Station>>,
     remote_ios: Vec<Slot<RemoteIo>>,
+    wakeups: Wakeups,
     plants: Plants,
     referees: Vec<Referee>,
     signals: SignalReferee,
@@ -111,7 +113,13 @@ impl Simulation {
             settings.epoch = Epoch(1 + rank as u64);
             Slot::new(Station::new(now, settings))
         });
+        let stations: Vec<_> = stations.collect();
         let remote_ios = parts.remote_ios.iter();
+        let remote_ios: Vec<_> = remote_ios
+            .map(|settings| Slot::new(RemoteIo::new(now, settings.clone())))
+            .collect();
+        let due = stations.iter().map(Slot::due);
+        let due = due.chain(remote_ios.iter().map(Slot::due)).collect();
         let mut simulation = Self {
             links: Links::new(
                 (parts.stations.len(), parts.remote_ios.len()),
@@ -120,10 +128,9 @@ impl Simulation {
                 seed,
             ),
             now,
-            stations: stations.collect(),
-            remote_ios: remote_ios
-                .map(|settings| Slot::new(RemoteIo::new(now, settings.clone())))
-                .collect(),
+            wakeups: Wakeups::new(stations.len(), due),
+            stations,
+            remote_ios,
             plants: Plants::new(&parts),
             referees,
             signals: SignalReferee::new(parts.remote_ios.len()),
@@ -245,7 +252,7 @@ impl Simulation {
     }
 
     fn next_at(&self) -> Time {
-        let next = self.next_wakeup().0.min(self.pace.overdue_at());
+        let next = self.wakeups.next().0.min(self.pace.overdue_at());
         let others = [self.links.next_at(), self.next_fault_at()];
         let next = others.into_iter().flatten().fold(next, Time::min);
         self.now.max(next)
@@ -335,7 +342,7 @@ impl Simulation {
 
     fn advance(&mut self, observe: &mut Observe<'_>) {
         let arrival = self.links.next_at();
-        let (wakeup, sleeper) = self.next_wakeup();
+        let (wakeup, sleeper) = self.wakeups.next();
         let fault = self.next_fault_at();
         let overdue = self.pace.overdue_at();
         let others = [arrival, fault].into_iter().flatten();
@@ -354,21 +361,6 @@ impl Simulation {
         } else {
             self.pace.count_overdue();
         }
-    }
-
-    fn next_wakeup(&self) -> (Time, Member) {
-        let mut next = (Time(u64::MAX), Member::Station(StationId(0)));
-        for (rank, slot) in self.stations.iter().enumerate() {
-            if slot.due() < next.0 {
-                next = (slot.due(), Member::Station(StationId(rank as u8)));
-            }
-        }
-        for (program, slot) in self.remote_ios.iter().enumerate() {
-            if slot.due() < next.0 {
-                next = (slot.due(), Member::RemoteIo(ProgramId(program as u8)));
-            }
-        }
-        next
     }
 
     fn next_fault_at(&self) -> Option<Time> {
@@ -426,7 +418,9 @@ impl Simulation {
                 Output::Drive(_) | Output::Answer(_) => {}
             }
         }
-        self.stations[station.index()].settle();
+        let slot = &mut self.stations[station.index()];
+        slot.settle();
+        self.wakeups.set(member, slot.due());
     }
 
     fn poll_station(&mut self, station: StationId) -> Option<Output<understudy_node::Event>> {
@@ -459,7 +453,9 @@ impl Simulation {
                 Output::Answer(_) => {}
             }
         }
-        self.remote_ios[program.index()].settle();
+        let slot = &mut self.remote_ios[program.index()];
+        slot.settle();
+        self.wakeups.set(member, slot.due());
     }
 
     fn poll_remote_io(
