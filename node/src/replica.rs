@@ -435,12 +435,17 @@ impl Replica {
         let Some(held) = self.held.as_mut() else {
             return;
         };
-        let mut before = if self.past.len() < self.history {
-            held.state.clone()
-        } else {
-            self.past.pop_front().unwrap_or_else(|| held.state.clone())
+        let oldest = match self.past.len() < self.history {
+            true => None,
+            false => self.past.pop_front(),
         };
-        before.clone_from(&held.state);
+        let before = match oldest {
+            Some(mut reused) => {
+                reused.clone_from(&held.state);
+                reused
+            }
+            None => held.state.clone(),
+        };
         self.past.push_back(before);
         held.state.digest = Digest::of(&held.state.bits);
         self.step.state.clone_from(&held.state.bits);

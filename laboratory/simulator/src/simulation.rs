@@ -133,7 +133,7 @@ impl Simulation {
             remote_ios,
             plants: Plants::new(&parts),
             referees,
-            signals: SignalReferee::new(parts.remote_ios.len()),
+            signals: SignalReferee::new(&parts.remote_ios),
             tallies: vec![Tally::default(); parts.remote_ios.len()],
             ready: ProgramSet::EMPTY,
             arrived: vec![[StationSet::EMPTY; 3]; parts.remote_ios.len()],
@@ -341,20 +341,22 @@ impl Simulation {
     // ── one event ───────────────────────────────────────────────────────────────────────────────────────────────────
 
     fn advance(&mut self, observe: &mut Observe<'_>) {
-        let arrival = self.links.next_at();
+        let never = Time(u64::MAX);
+        let arrival = self.links.next_at().unwrap_or(never);
         let (wakeup, sleeper) = self.wakeups.next();
-        let fault = self.next_fault_at();
-        let overdue = self.pace.overdue_at();
-        let others = [arrival, fault].into_iter().flatten();
-        let next = others.fold(wakeup.min(overdue), Time::min);
+        let fault = self.next_fault_at().unwrap_or(never);
+        let next = arrival
+            .min(wakeup)
+            .min(fault)
+            .min(self.pace.overdue_at());
         self.now = self.now.max(next);
-        if arrival == Some(next) {
+        if arrival == next {
             if let Some(delivery) = self.links.pop() {
                 self.deliver(&delivery, observe);
             }
         } else if wakeup == next {
             self.give(sleeper, Input::Wakeup, observe);
-        } else if fault == Some(next) {
+        } else if fault == next {
             if let Some(fault) = self.faults.pop() {
                 self.apply(&fault, observe);
             }
@@ -394,12 +396,16 @@ impl Simulation {
     fn give(&mut self, member: Member, input: Input<'_>, observe: &mut Observe<'_>) {
         match member {
             Member::Station(station) => {
-                if self.stations[station.index()].give(self.now, input) {
+                let slot = &mut self.stations[station.index()];
+                if slot.give(self.now, input) {
+                    self.wakeups.set(member, slot.due());
                     self.drain_station(station, observe);
                 }
             }
             Member::RemoteIo(program) => {
-                if self.remote_ios[program.index()].give(self.now, input) {
+                let slot = &mut self.remote_ios[program.index()];
+                if slot.give(self.now, input) {
+                    self.wakeups.set(member, slot.due());
                     self.drain_remote_io(program, observe);
                 }
             }
@@ -418,9 +424,6 @@ impl Simulation {
                 Output::Drive(_) | Output::Answer(_) => {}
             }
         }
-        let slot = &mut self.stations[station.index()];
-        slot.settle();
-        self.wakeups.set(member, slot.due());
     }
 
     fn poll_station(&mut self, station: StationId) -> Option<Output<understudy_node::Event>> {
@@ -453,9 +456,6 @@ impl Simulation {
                 Output::Answer(_) => {}
             }
         }
-        let slot = &mut self.remote_ios[program.index()];
-        slot.settle();
-        self.wakeups.set(member, slot.due());
     }
 
     fn poll_remote_io(
@@ -467,10 +467,10 @@ impl Simulation {
 
     fn show_field(&mut self, program: ProgramId) {
         if let Some(field) = self.plants.field(program) {
-            self.remote_ios[program.index()].give(
-                self.now,
-                Input::RemoteIo(RemoteIoInput::Field(&field.sensors)),
-            );
+            let slot = &mut self.remote_ios[program.index()];
+            let sensors = RemoteIoInput::Field(&field.sensors);
+            slot.give(self.now, Input::RemoteIo(sensors));
+            self.wakeups.set(Member::RemoteIo(program), slot.due());
         }
     }
 
