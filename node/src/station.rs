@@ -276,9 +276,7 @@ impl Station {
         let never = Time(u64::MAX);
         let copies = self.member.copies_at().unwrap_or(never);
         let publishes = self.publishes_at().unwrap_or(never);
-        let first = copies
-            .min(publishes)
-            .min(self.asks_at().unwrap_or(never));
+        let first = copies.min(publishes).min(self.asks_at().unwrap_or(never));
         // No station starts the next cycle before the current one is over.
         let end = self.member.clock.anchor() + self.settings.agreement.schedule.period();
         if self.role != Role::Listening && first <= end {

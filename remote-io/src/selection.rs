@@ -108,7 +108,8 @@ impl<'a> Received<'a> {
             let turn = self
                 .turn_of(station)
                 .filter(|_| !excluded.contains(station));
-            let Some((turn, holding)) = turn.and_then(|turn| Some((turn, Holding::of(&turn.holdings, me)?)))
+            let Some((turn, holding)) =
+                turn.and_then(|turn| Some((turn, Holding::of(&turn.holdings, me)?)))
             else {
                 continue;
             };

@@ -345,10 +345,7 @@ impl Simulation {
         let arrival = self.links.next_at().unwrap_or(never);
         let (wakeup, sleeper) = self.wakeups.next();
         let fault = self.next_fault_at().unwrap_or(never);
-        let next = arrival
-            .min(wakeup)
-            .min(fault)
-            .min(self.pace.overdue_at());
+        let next = arrival.min(wakeup).min(fault).min(self.pace.overdue_at());
         self.now = self.now.max(next);
         if arrival == next {
             if let Some(delivery) = self.links.pop() {

@@ -53,7 +53,9 @@ impl Wakeups {
 
     fn find_first(&mut self) {
         let places = self.due.iter().enumerate();
-        self.first = places.min_by_key(|(_, at)| **at).map_or(0, |(place, _)| place);
+        self.first = places
+            .min_by_key(|(_, at)| **at)
+            .map_or(0, |(place, _)| place);
     }
 }
 
@@ -78,7 +80,10 @@ mod tests {
                 due[place] = at;
                 wakeups.set(member[place], at);
                 let earliest = *due.iter().min().expect("three members");
-                let first = due.iter().position(|at| *at == earliest).expect("one of them");
+                let first = due
+                    .iter()
+                    .position(|at| *at == earliest)
+                    .expect("one of them");
                 assert_eq!(wakeups.next(), (earliest, member[first]));
             }
         }

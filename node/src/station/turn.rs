@@ -90,12 +90,12 @@ impl Station {
 
     /// Publishes when this station has the token and knows its outputs, and at the last call the outputs that it knows.
     pub(super) fn publish_if_due(&mut self, now: Time) {
-        let Some(moment) = self.member.clock.moment() else {
-            return;
-        };
         if self.cycle.token == Token::Passed || !self.publishes() {
             return;
         }
+        let Some(moment) = self.member.clock.moment() else {
+            return;
+        };
         let due = self.publishes_by(moment);
         let early =
             self.has_token() && self.knows_all_outputs(moment) && self.has_what_others_lack();

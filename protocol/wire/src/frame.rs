@@ -154,8 +154,14 @@ pub struct Holding {
 impl Holding {
     /// The holding of a program, among those of one turn or join, which are in the order of programs.
     pub fn of(holdings: &[Self], program: ProgramId) -> Option<&Self> {
-        let place = holdings.binary_search_by_key(&program, |holding| holding.program);
-        place.ok().map(|place| &holdings[place])
+        // An understudy that holds all states has each at the index of its program.
+        let at_index = holdings.get(program.index());
+        at_index
+            .filter(|holding| holding.program == program)
+            .or_else(|| {
+                let place = holdings.binary_search_by_key(&program, |holding| holding.program);
+                place.ok().map(|place| &holdings[place])
+            })
     }
 }
 
