@@ -188,14 +188,20 @@ impl Replica {
             return;
         };
         if inputs.width() == program.executable.input_count() {
-            // Outputs of the first sample may have been proved in this station's earlier life.
-            let witnessed = match &self.remembered {
-                Remembered::Received(received, known) => known.witnessed || *received < moment,
-                Remembered::Nothing | Remembered::Relayed(_) => false,
-            };
+            if let Remembered::Received(received, known) = &mut self.remembered {
+                known.witnessed |= *received < moment;
+                known.applied = sample.applied;
+                known.excluded = sample.excluded;
+                known.accounted_for = sample.gone;
+                known.writes.clone_from(&sample.writes);
+                known.inputs.clone_from(inputs);
+                *received = moment;
+                return;
+            }
             let recalled = Recalled {
                 program: self.id,
-                witnessed,
+                // Outputs of the first sample may have been proved in this station's earlier life.
+                witnessed: false,
                 applied: sample.applied,
                 excluded: sample.excluded,
                 accounted_for: sample.gone,
@@ -429,12 +435,17 @@ impl Replica {
         let Some(held) = self.held.as_mut() else {
             return;
         };
-        let mut before = if self.past.len() < self.history {
-            held.state.clone()
-        } else {
-            self.past.pop_front().unwrap_or_else(|| held.state.clone())
+        let oldest = match self.past.len() < self.history {
+            true => None,
+            false => self.past.pop_front(),
         };
-        before.clone_from(&held.state);
+        let before = match oldest {
+            Some(mut reused) => {
+                reused.clone_from(&held.state);
+                reused
+            }
+            None => held.state.clone(),
+        };
         self.past.push_back(before);
         held.state.digest = Digest::of(&held.state.bits);
         self.step.state.clone_from(&held.state.bits);

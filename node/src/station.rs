@@ -39,6 +39,7 @@ use crate::settings::Settings;
 pub struct Station {
     settings: Settings,
     member: Participant<Event>,
+    /// In the order of programs.
     replicas: SmallVec<[Replica; 2]>,
     scratch: Scratch,
     cycle: CycleNotes,
@@ -148,7 +149,7 @@ impl Station {
 
     /// Flips one bit of x(i), modulo its width, as a memory fault does; no effect without x(i).
     pub fn flip_state(&mut self, program: ProgramId, bit: usize) {
-        if let Some(replica) = self.replicas.iter_mut().find(|it| it.id() == program) {
+        if let Some(replica) = replica_mut(&mut self.replicas, program) {
             replica.flip_state(bit);
         }
     }
@@ -160,10 +161,12 @@ impl Station {
 
     /// State of a program that it holds, with its lineage; it may be older than the newest sample.
     pub fn state_of(&self, program: ProgramId) -> Option<(Lineage, &Image)> {
-        self.replicas
-            .iter()
-            .find(|replica| replica.id() == program)?
-            .state()
+        self.replica(program)?.state()
+    }
+
+    fn replica(&self, program: ProgramId) -> Option<&Replica> {
+        let place = place_of(&self.replicas, program)?;
+        Some(&self.replicas[place])
     }
 
     fn own(&self) -> StationId {
@@ -219,11 +222,7 @@ impl Station {
         self.keep_sample(frame);
         let excluded = sample.excluded.contains(self.own());
         let moment = frame.header.moment;
-        let Some(replica) = self
-            .replicas
-            .iter_mut()
-            .find(|replica| replica.id() == program)
-        else {
+        let Some(replica) = replica_mut(&mut self.replicas, program) else {
             return;
         };
         replica.remember(&self.settings.programs[program.index()], moment, sample);
@@ -267,15 +266,17 @@ impl Station {
 
     fn take_recalled(&mut self, recalled: &[Recalled]) {
         for one in recalled {
-            if let Some(replica) = self.replicas.iter_mut().find(|it| it.id() == one.program) {
+            if let Some(replica) = replica_mut(&mut self.replicas, one.program) {
                 replica.take_recalled(&self.settings.programs[one.program.index()], one);
             }
         }
     }
 
     fn next_wakeup(&self) -> Time {
-        let others = [self.member.copies_at(), self.publishes_at(), self.asks_at()];
-        let first = others.into_iter().flatten().fold(Time(u64::MAX), Time::min);
+        let never = Time(u64::MAX);
+        let copies = self.member.copies_at().unwrap_or(never);
+        let publishes = self.publishes_at().unwrap_or(never);
+        let first = copies.min(publishes).min(self.asks_at().unwrap_or(never));
         // No station starts the next cycle before the current one is over.
         let end = self.member.clock.anchor() + self.settings.agreement.schedule.period();
         if self.role != Role::Listening && first <= end {
@@ -295,6 +296,16 @@ impl Station {
             self.start_cycle(now, planned);
         }
     }
+}
+
+fn replica_mut(replicas: &mut [Replica], program: ProgramId) -> Option<&mut Replica> {
+    let place = place_of(replicas, program)?;
+    Some(&mut replicas[place])
+}
+
+fn place_of(replicas: &[Replica], program: ProgramId) -> Option<usize> {
+    let place = replicas.binary_search_by_key(&program, Replica::id);
+    place.ok()
 }
 
 /// Two stations of equal settings that are drained and hash alike behave alike.

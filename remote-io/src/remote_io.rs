@@ -263,7 +263,7 @@ impl RemoteIo {
 
     fn note(&mut self, station: StationId, holdings: &[Holding], recalled: &[Recalled]) {
         let program = self.settings.program;
-        let own = holdings.iter().find(|holding| holding.program == program);
+        let own = Holding::of(holdings, program);
         let recalled = recalled.iter().find(|recalled| {
             recalled.program == program && recalled.inputs.width() == self.settings.inputs
         });

@@ -108,7 +108,8 @@ impl<'a> Received<'a> {
             let turn = self
                 .turn_of(station)
                 .filter(|_| !excluded.contains(station));
-            let Some((turn, holding)) = turn.and_then(|turn| Some((turn, holding_of(turn, me)?)))
+            let Some((turn, holding)) =
+                turn.and_then(|turn| Some((turn, Holding::of(&turn.holdings, me)?)))
             else {
                 continue;
             };
@@ -137,7 +138,7 @@ impl<'a> Received<'a> {
     /// lineage and the state digest that the understudy has for it.
     fn addend(&self, program: ProgramId, turn: &Turn) -> Option<&'a Image> {
         let (outputs, theirs) = self.own_word(program)?;
-        let ours = holding_of(turn, program)?;
+        let ours = Holding::of(&turn.holdings, program)?;
         let equal = ours.lineage == theirs.lineage && ours.digest == theirs.digest;
         equal.then_some(&outputs.sum)
     }
@@ -161,19 +162,26 @@ impl<'a> Received<'a> {
     /// Equal lineages and unequal digests: a state was corrupted in one of the stations.
     pub(crate) fn digest_differences(&self) -> Vec<(ProgramId, StationSet)> {
         let mut differences = Vec::new();
-        for program in (0..self.controllers as u8).map(ProgramId) {
-            let mut first = None;
-            for station in (0..self.turns.len() as u8).map(StationId) {
-                let turn = self.turn_of(station);
-                let Some(holding) = turn.and_then(|turn| holding_of(turn, program)) else {
+        let mut first = vec![None; self.controllers];
+        for station in (0..self.turns.len() as u8).map(StationId) {
+            let mut compared = ProgramSet::EMPTY;
+            let holdings = self.turn_of(station).into_iter();
+            for holding in holdings.flat_map(|turn| &turn.holdings) {
+                let program = holding.program;
+                let Some(first) = first.get_mut(program.index()) else {
                     continue;
                 };
+                if compared.contains(program) {
+                    continue;
+                }
+                compared.insert(program);
                 let (other, theirs) = *first.get_or_insert((station, holding));
                 if theirs.lineage == holding.lineage && theirs.digest != holding.digest {
                     differences.push((program, [other, station].into_iter().collect()));
                 }
             }
         }
+        differences.sort_by_key(|(program, _)| *program);
         differences
     }
 
@@ -203,14 +211,8 @@ impl<'a> Received<'a> {
         let turn = self.turn_of(StationId(program.0))?;
         let own = ProgramSet::only(program);
         let word = turn.words.iter().find(|word| word.mask == own)?;
-        Some((word, holding_of(turn, program)?))
+        Some((word, Holding::of(&turn.holdings, program)?))
     }
-}
-
-fn holding_of(turn: &Turn, program: ProgramId) -> Option<&Holding> {
-    turn.holdings
-        .iter()
-        .find(|holding| holding.program == program)
 }
 
 #[cfg(test)]

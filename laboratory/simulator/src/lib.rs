@@ -17,6 +17,7 @@ mod simulation;
 mod slot;
 mod stranger;
 mod tally;
+mod wakeups;
 
 pub use fault::{Action, Fault};
 pub use links::Metered;

@@ -8,6 +8,8 @@ use understudy_wire::{Moment, Time};
 #[derive(Debug, Clone, Hash)]
 pub(crate) struct Pace {
     period: Duration,
+    /// After which a cycle without a cycle master is counted.
+    patience: Duration,
     newest: Moment,
     /// When the newest cycle started.
     started: Time,
@@ -19,6 +21,7 @@ impl Pace {
     pub(crate) fn new(period: Duration) -> Self {
         Self {
             period,
+            patience: period * 2,
             newest: Moment::default(),
             started: Time::default(),
             count: None,
@@ -58,7 +61,7 @@ impl Pace {
 
     /// When a cycle without a cycle master has to be counted.
     pub(crate) fn overdue_at(&self) -> Time {
-        self.started + self.period * 2
+        self.started + self.patience
     }
 
     /// Counts one.

@@ -382,7 +382,7 @@ impl Referee {
     }
 
     fn judge(&mut self, moment: Moment, driven: &Image, source: Source) -> Result<(), Violation> {
-        if source != Source::FailSafe {
+        if source != Source::FailSafe && !self.ramps.is_empty() {
             self.descent.begins_at(driven);
         }
         match source {
@@ -392,12 +392,12 @@ impl Referee {
             }
             Source::Direct | Source::Reconstructed if self.is_unjudged(moment) => {
                 self.held = 0;
-                self.last_true = Some(driven.clone());
+                copy_to(&mut self.last_true, driven);
                 Ok(())
             }
             Source::Direct | Source::Reconstructed => {
                 self.held = 0;
-                self.last_true = Some(driven.clone());
+                copy_to(&mut self.last_true, driven);
                 let truth = self.truth.as_ref().filter(|(of, _)| *of == moment);
                 let truth = truth.map(|(_, outputs)| outputs);
                 if truth == Some(driven) {
@@ -438,6 +438,14 @@ impl Referee {
                 })
             }
         }
+    }
+}
+
+/// Copies an image into the place of another one.
+fn copy_to(place: &mut Option<Image>, image: &Image) {
+    match place {
+        Some(place) => place.clone_from(image),
+        None => *place = Some(image.clone()),
     }
 }
 

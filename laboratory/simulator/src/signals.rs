@@ -6,28 +6,34 @@
 use std::collections::VecDeque;
 
 use understudy_remote_io::Settings;
-use understudy_wire::{Image, Moment, ProgramId};
+use understudy_wire::{Image, Moment, ProgramId, ProgramSet};
 
 use crate::referee::Violation;
 
 /// Cycles whose outputs are remembered for each program.
 const REMEMBERED: usize = 64;
 
-/// The true outputs of every program in its last cycles.
+/// The true outputs of every program that another one reads, in its last cycles.
 #[derive(Debug, Clone)]
 pub(crate) struct SignalReferee {
+    read: ProgramSet,
     truths: Vec<VecDeque<(Moment, Image)>>,
 }
 
 impl SignalReferee {
-    pub(crate) fn new(programs: usize) -> Self {
+    pub(crate) fn new(readers: &[Settings]) -> Self {
+        let signals = readers.iter().flat_map(|reader| &reader.signals);
         Self {
-            truths: vec![VecDeque::new(); programs],
+            read: signals.map(|signal| signal.from).collect(),
+            truths: vec![VecDeque::new(); readers.len()],
         }
     }
 
     /// Remembers h(x(t), u(t)) of a program; nothing is known where the referee of the program knows nothing.
     pub(crate) fn note(&mut self, program: ProgramId, truth: Option<(Moment, &Image)>) {
+        if !self.read.contains(program) {
+            return;
+        }
         let truths = &mut self.truths[program.index()];
         match truth {
             None => truths.clear(),

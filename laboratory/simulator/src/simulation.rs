@@ -30,6 +30,7 @@ use crate::referee::{Referee, Violation};
 use crate::signals::SignalReferee;
 use crate::slot::Slot;
 use crate::tally::Tally;
+use crate::wakeups::Wakeups;
 
 /// Something for the journal.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -70,6 +71,7 @@ pub struct Simulation {
     now: Time,
     stations: Vec<Slot<Station>>,
     remote_ios: Vec<Slot<RemoteIo>>,
+    wakeups: Wakeups,
     plants: Plants,
     referees: Vec<Referee>,
     signals: SignalReferee,
@@ -111,7 +113,13 @@ impl Simulation {
             settings.epoch = Epoch(1 + rank as u64);
             Slot::new(Station::new(now, settings))
         });
+        let stations: Vec<_> = stations.collect();
         let remote_ios = parts.remote_ios.iter();
+        let remote_ios: Vec<_> = remote_ios
+            .map(|settings| Slot::new(RemoteIo::new(now, settings.clone())))
+            .collect();
+        let due = stations.iter().map(Slot::due);
+        let due = due.chain(remote_ios.iter().map(Slot::due)).collect();
         let mut simulation = Self {
             links: Links::new(
                 (parts.stations.len(), parts.remote_ios.len()),
@@ -120,13 +128,12 @@ impl Simulation {
                 seed,
             ),
             now,
-            stations: stations.collect(),
-            remote_ios: remote_ios
-                .map(|settings| Slot::new(RemoteIo::new(now, settings.clone())))
-                .collect(),
+            wakeups: Wakeups::new(stations.len(), due),
+            stations,
+            remote_ios,
             plants: Plants::new(&parts),
             referees,
-            signals: SignalReferee::new(parts.remote_ios.len()),
+            signals: SignalReferee::new(&parts.remote_ios),
             tallies: vec![Tally::default(); parts.remote_ios.len()],
             ready: ProgramSet::EMPTY,
             arrived: vec![[StationSet::EMPTY; 3]; parts.remote_ios.len()],
@@ -245,7 +252,7 @@ impl Simulation {
     }
 
     fn next_at(&self) -> Time {
-        let next = self.next_wakeup().0.min(self.pace.overdue_at());
+        let next = self.wakeups.next().0.min(self.pace.overdue_at());
         let others = [self.links.next_at(), self.next_fault_at()];
         let next = others.into_iter().flatten().fold(next, Time::min);
         self.now.max(next)
@@ -334,41 +341,25 @@ impl Simulation {
     // ── one event ───────────────────────────────────────────────────────────────────────────────────────────────────
 
     fn advance(&mut self, observe: &mut Observe<'_>) {
-        let arrival = self.links.next_at();
-        let (wakeup, sleeper) = self.next_wakeup();
-        let fault = self.next_fault_at();
-        let overdue = self.pace.overdue_at();
-        let others = [arrival, fault].into_iter().flatten();
-        let next = others.fold(wakeup.min(overdue), Time::min);
+        let never = Time(u64::MAX);
+        let arrival = self.links.next_at().unwrap_or(never);
+        let (wakeup, sleeper) = self.wakeups.next();
+        let fault = self.next_fault_at().unwrap_or(never);
+        let next = arrival.min(wakeup).min(fault).min(self.pace.overdue_at());
         self.now = self.now.max(next);
-        if arrival == Some(next) {
+        if arrival == next {
             if let Some(delivery) = self.links.pop() {
                 self.deliver(&delivery, observe);
             }
         } else if wakeup == next {
             self.give(sleeper, Input::Wakeup, observe);
-        } else if fault == Some(next) {
+        } else if fault == next {
             if let Some(fault) = self.faults.pop() {
                 self.apply(&fault, observe);
             }
         } else {
             self.pace.count_overdue();
         }
-    }
-
-    fn next_wakeup(&self) -> (Time, Member) {
-        let mut next = (Time(u64::MAX), Member::Station(StationId(0)));
-        for (rank, slot) in self.stations.iter().enumerate() {
-            if slot.due() < next.0 {
-                next = (slot.due(), Member::Station(StationId(rank as u8)));
-            }
-        }
-        for (program, slot) in self.remote_ios.iter().enumerate() {
-            if slot.due() < next.0 {
-                next = (slot.due(), Member::RemoteIo(ProgramId(program as u8)));
-            }
-        }
-        next
     }
 
     fn next_fault_at(&self) -> Option<Time> {
@@ -402,12 +393,16 @@ impl Simulation {
     fn give(&mut self, member: Member, input: Input<'_>, observe: &mut Observe<'_>) {
         match member {
             Member::Station(station) => {
-                if self.stations[station.index()].give(self.now, input) {
+                let slot = &mut self.stations[station.index()];
+                if slot.give(self.now, input) {
+                    self.wakeups.set(member, slot.due());
                     self.drain_station(station, observe);
                 }
             }
             Member::RemoteIo(program) => {
-                if self.remote_ios[program.index()].give(self.now, input) {
+                let slot = &mut self.remote_ios[program.index()];
+                if slot.give(self.now, input) {
+                    self.wakeups.set(member, slot.due());
                     self.drain_remote_io(program, observe);
                 }
             }
@@ -426,7 +421,6 @@ impl Simulation {
                 Output::Drive(_) | Output::Answer(_) => {}
             }
         }
-        self.stations[station.index()].settle();
     }
 
     fn poll_station(&mut self, station: StationId) -> Option<Output<understudy_node::Event>> {
@@ -459,7 +453,6 @@ impl Simulation {
                 Output::Answer(_) => {}
             }
         }
-        self.remote_ios[program.index()].settle();
     }
 
     fn poll_remote_io(
@@ -471,10 +464,10 @@ impl Simulation {
 
     fn show_field(&mut self, program: ProgramId) {
         if let Some(field) = self.plants.field(program) {
-            self.remote_ios[program.index()].give(
-                self.now,
-                Input::RemoteIo(RemoteIoInput::Field(&field.sensors)),
-            );
+            let slot = &mut self.remote_ios[program.index()];
+            let sensors = RemoteIoInput::Field(&field.sensors);
+            slot.give(self.now, Input::RemoteIo(sensors));
+            self.wakeups.set(Member::RemoteIo(program), slot.due());
         }
     }
 

@@ -32,7 +32,7 @@ impl<M: Machine> Slot<M> {
         }
     }
 
-    /// When it is woken, as it wanted when it was last settled; never while it is stopped or crashed.
+    /// When it is woken, as it wants since its last input; never while it is stopped or crashed.
     pub(crate) fn due(&self) -> Time {
         self.due
     }
@@ -51,6 +51,7 @@ impl<M: Machine> Slot<M> {
             return false;
         };
         machine.handle_input(now, input);
+        self.due = machine.wakeup() + self.slow;
         true
     }
 
@@ -63,8 +64,7 @@ impl<M: Machine> Slot<M> {
         self.machine.as_mut()
     }
 
-    /// Notes the time that it wants next, once its outputs are drained.
-    pub(crate) fn settle(&mut self) {
+    fn settle(&mut self) {
         self.due = match &self.machine {
             Some(machine) if !self.stopped => machine.wakeup() + self.slow,
             _ => NEVER,

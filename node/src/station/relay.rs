@@ -17,8 +17,7 @@ use understudy_wire::{
     encode,
 };
 
-use super::Station;
-use crate::replica::Replica;
+use super::{Station, replica_mut};
 
 impl Station {
     /// Keeps a sample of this cycle for stations that lack it.
@@ -61,8 +60,7 @@ impl Station {
         let now = self.member.moment();
         let silent_after = self.settings.agreement.flag_after;
         for holding in holdings {
-            let mut replicas = self.replicas.iter_mut();
-            if let Some(replica) = replicas.find(|replica| replica.id() == holding.program) {
+            if let Some(replica) = replica_mut(&mut self.replicas, holding.program) {
                 let theirs = recalled.iter().find(|it| it.program == holding.program);
                 replica.receive_holding(station, holding.stepped, theirs, (now, silent_after));
             }
@@ -71,7 +69,7 @@ impl Station {
 
     /// Programs that it runs and whose samples did not come from their remote I/Os in this cycle.
     pub(super) fn lacks(&self) -> ProgramSet {
-        let runs: ProgramSet = self.replicas.iter().map(Replica::id).collect();
+        let runs: ProgramSet = self.settings.runs().collect();
         runs.without(self.cycle.direct)
     }
 

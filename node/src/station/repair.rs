@@ -5,7 +5,7 @@
 
 use understudy_wire::{Body, Join, ProgramSet, StationId, Time, Transfer};
 
-use super::{Rest, Role, Station};
+use super::{Rest, Role, Station, replica_mut};
 use crate::event::Event;
 use crate::replica::{Replica, SEGMENTS_A_CYCLE};
 
@@ -23,8 +23,7 @@ impl Station {
             if self.cycle.others_have.contains(program) && self.own().0 != program.0 {
                 continue;
             }
-            let mut replicas = self.replicas.iter_mut();
-            let Some(replica) = replicas.find(|replica| replica.id() == program) else {
+            let Some(replica) = replica_mut(&mut self.replicas, program) else {
                 continue;
             };
             let partial = join
@@ -43,11 +42,7 @@ impl Station {
         if transfer.to != self.own() {
             return;
         }
-        let Some(replica) = self
-            .replicas
-            .iter_mut()
-            .find(|replica| replica.id() == transfer.program)
-        else {
+        let Some(replica) = replica_mut(&mut self.replicas, transfer.program) else {
             return;
         };
         let program = &self.settings.programs[transfer.program.index()];

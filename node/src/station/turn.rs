@@ -7,7 +7,7 @@ use understudy_wire::{
     Holding, Moment, ProgramId, ProgramSet, Segment, StationId, StationSet, Time, Turn, Word,
 };
 
-use super::{ControllerTurn, Station, Token};
+use super::{ControllerTurn, Station, Token, place_of, replica_mut};
 use crate::event::Event;
 use crate::replica::{Replica, Standing};
 use crate::{generated, words};
@@ -27,10 +27,9 @@ impl Station {
         let own_program = ProgramId(station.0);
         let understudy = self.settings.agreement.schedule.is_understudy(station);
         for word in &turn.words {
-            let mut holdings = turn.holdings.iter();
             if !understudy
                 && word.mask == ProgramSet::only(own_program)
-                && let Some(own) = holdings.find(|holding| holding.program == own_program)
+                && let Some(own) = Holding::of(&turn.holdings, own_program)
             {
                 self.cycle.controller_turns.push(ControllerTurn {
                     program: own_program,
@@ -52,11 +51,7 @@ impl Station {
     pub(super) fn compare(&mut self, station: StationId, holdings: &[Holding]) {
         let moment = self.member.moment();
         for theirs in holdings {
-            let Some(replica) = self
-                .replicas
-                .iter_mut()
-                .find(|replica| replica.id() == theirs.program)
-            else {
+            let Some(replica) = replica_mut(&mut self.replicas, theirs.program) else {
                 continue;
             };
             let differs = replica
@@ -82,8 +77,7 @@ impl Station {
     /// Programs whose controllers have published the outputs that this station computes for them, in this cycle.
     fn confirmed(&self) -> ProgramSet {
         let equal = self.cycle.controller_turns.iter().filter(|turn| {
-            let replica = self.replicas.iter().find(|it| it.id() == turn.program);
-            replica.is_some_and(|replica| {
+            self.replica(turn.program).is_some_and(|replica| {
                 replica.outputs() == &turn.outputs
                     && replica.holding().is_some_and(|ours| {
                         ours.lineage == turn.lineage && ours.digest == turn.digest
@@ -95,12 +89,12 @@ impl Station {
 
     /// Publishes when this station has the token and knows its outputs, and at the last call the outputs that it knows.
     pub(super) fn publish_if_due(&mut self, now: Time) {
-        let Some(moment) = self.member.clock.moment() else {
-            return;
-        };
         if self.cycle.token == Token::Passed || !self.publishes() {
             return;
         }
+        let Some(moment) = self.member.clock.moment() else {
+            return;
+        };
         let due = self.publishes_by(moment);
         let early =
             self.has_token() && self.knows_all_outputs(moment) && self.has_what_others_lack();
@@ -185,9 +179,10 @@ impl Station {
         let all = ProgramSet::first(agreement.schedule.controllers());
         let known = known.map(Replica::id).collect();
         let masks = words::masks_of_understudy(agreement.mode, all, known, self.confirmed());
+        let replicas = &self.replicas;
         let outputs_of = |program| {
-            let replica = self.replicas.iter().find(|replica| replica.id() == program);
-            replica.map(Replica::outputs)
+            let place = place_of(replicas, program)?;
+            Some(replicas[place].outputs())
         };
         let word_of = |mask| match &self.settings.generated {
             None => understudy_parity::sum(mask, outputs_of),

@@ -265,11 +265,12 @@ fn kept_recalled(recalled: &[Recalled]) -> Result<(), FrameError> {
 
 fn kept_holdings(holdings: &[Holding]) -> Result<ProgramSet, FrameError> {
     let held: ProgramSet = holdings.iter().map(|holding| holding.program).collect();
-    if held.len() == holdings.len() {
+    let ascending = holdings.is_sorted_by(|one, next| one.program < next.program);
+    if held.len() == holdings.len() && ascending {
         Ok(held)
     } else {
         Err(FrameError::Promise(
-            "a program is held once, with an index below 64",
+            "a program is held once, in the order of programs, with an index below 64",
         ))
     }
 }

@@ -151,6 +151,20 @@ pub struct Holding {
     pub digest: Digest,
 }
 
+impl Holding {
+    /// The holding of a program, among those of one turn or join, which are in the order of programs.
+    pub fn of(holdings: &[Self], program: ProgramId) -> Option<&Self> {
+        // An understudy that holds all states has each at the index of its program.
+        let at_index = holdings.get(program.index());
+        at_index
+            .filter(|holding| holding.program == program)
+            .or_else(|| {
+                let place = holdings.binary_search_by_key(&program, |holding| holding.program);
+                place.ok().map(|place| &holdings[place])
+            })
+    }
+}
+
 /// A sum of outputs over GF(2): of all members of its mask, (9) where the mask is every program.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Word {

@@ -165,6 +165,7 @@ impl Image {
 
 /// All words at once: every frame and every report has images in it, and a derived copy goes word by word.
 impl Clone for Image {
+    #[inline]
     fn clone(&self) -> Self {
         Self {
             width: self.width,

@@ -243,6 +243,7 @@ fn a_frame_that_breaks_a_promise_never_leaves() {
     check_refused(station, Body::Turn(turn(0, &[0])));
     check_refused(station, Body::Turn(turn(0b10, &[0])));
     check_refused(station, Body::Turn(turn(0b1, &[0, 0])));
+    check_refused(station, Body::Turn(turn(0b1, &[1, 0])));
     let sample = Sample {
         history: smallvec![image(1, 0)],
         ..empty.clone()

@@ -59,7 +59,7 @@ impl Forcing {
     }
 
     /// u(i) with the forced values, as it is sampled.
-    pub(super) fn inputs(&self, field: &Image) -> Image {
+    pub(super) fn inputs(&self, field: Image) -> Image {
         self.with(field, |signal| match signal {
             SignalPlace::Input(place) => Some(place),
             SignalPlace::Output(_) => None,
@@ -68,14 +68,14 @@ impl Forcing {
 
     /// y(i) with the forced values, as it is driven.
     pub(super) fn outputs(&self, applied: &Image) -> Image {
-        self.with(applied, |signal| match signal {
+        self.with(applied.clone(), |signal| match signal {
             SignalPlace::Output(place) => Some(place),
             SignalPlace::Input(_) => None,
         })
     }
 
-    fn with(&self, image: &Image, place: impl Fn(SignalPlace) -> Option<u16>) -> Image {
-        let mut forced = image.clone();
+    fn with(&self, image: Image, place: impl Fn(SignalPlace) -> Option<u16>) -> Image {
+        let mut forced = image;
         for active in &self.active {
             if let Some(place) = place(active.signal) {
                 for (bit, value) in (usize::from(place)..).zip(active.value.bits()) {
@@ -156,7 +156,7 @@ mod tests {
         forcing.put(place, number, Time(1));
         let driven = forcing.outputs(&Image::from_bits([true; 64]));
         assert_eq!(driven.words(), [0x4148_0000_FFFF_FFFF]);
-        assert_eq!(forcing.inputs(&Image::zero(64)), Image::zero(64));
+        assert_eq!(forcing.inputs(Image::zero(64)), Image::zero(64));
         // A force of one of its bits ends it.
         let bit = force(SignalPlace::Output(63), true.into());
         assert_eq!(forcing.remove_overlapping(&bit), Some(place));

@@ -4,7 +4,7 @@
 
 use smallvec::SmallVec;
 use understudy_cycle::Mode;
-use understudy_wire::{Body, Lineage, Moment, StationId, StationSet, Turn};
+use understudy_wire::{Body, Holding, Lineage, Moment, StationId, StationSet, Turn};
 
 use super::RemoteIo;
 use crate::event::{Event, Lacking, LackingReason};
@@ -103,8 +103,7 @@ impl RemoteIo {
             });
         };
         let program = self.settings.program;
-        let mut holdings = turn.holdings.iter();
-        let Some(holding) = holdings.find(|holding| holding.program == program) else {
+        let Some(holding) = Holding::of(&turn.holdings, program) else {
             return Some(LackingReason::Joining);
         };
         let says = turn.words.iter().any(|word| word.mask.contains(program));

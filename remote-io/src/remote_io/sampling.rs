@@ -9,14 +9,14 @@ use crate::event::Event;
 
 impl RemoteIo {
     /// The inputs that the program reads from now on, from the sensors and the findings of the diagnosis.
-    fn see(&mut self, moment: Moment, sensors: &Image) {
-        let mut shown = sensors.clone();
+    fn see(&mut self, moment: Moment, sensors: Image) {
+        let mut shown = sensors;
         let mut unsteady = None;
         if let Some(diagnosis) = &self.settings.diagnosis {
             let applied = self.applied.as_ref();
             let outputs = applied.map_or(&self.settings.fail_safe, |applied| &applied.outputs);
             let observation = Observation {
-                sensors,
+                sensors: &shown,
                 driven: &self.forcing.outputs(outputs),
                 is_true: applied.is_some_and(|applied| {
                     matches!(applied.source, Source::Direct | Source::Reconstructed)
@@ -47,14 +47,14 @@ impl RemoteIo {
             return;
         };
         let moment = self.moment();
-        self.see(moment, &sensors);
+        self.see(moment, sensors);
         let mut inputs = self.field.clone();
         let operator_inputs = &self.settings.operator_inputs;
         self.writing.put(operator_inputs, &mut inputs);
         let validity = self
             .signals
             .put(&self.settings.signals, moment, &mut inputs);
-        let mut inputs = self.forcing.inputs(&inputs);
+        let mut inputs = self.forcing.inputs(inputs);
         if let Some(stop) = self.settings.stop
             && self.program == Execution::Restarting
         {

@@ -68,11 +68,15 @@ impl Simulation {
                 }
             }
             (Member::Station(station), _) => {
-                let waiting = disturb(&mut self.stations[station.index()], action);
+                let slot = &mut self.stations[station.index()];
+                let waiting = disturb(slot, action);
+                self.wakeups.set(member, slot.due());
                 self.catch_up(member, waiting, observe);
             }
             (Member::RemoteIo(program), _) => {
-                let waiting = disturb(&mut self.remote_ios[program.index()], action);
+                let slot = &mut self.remote_ios[program.index()];
+                let waiting = disturb(slot, action);
+                self.wakeups.set(member, slot.due());
                 self.catch_up(member, waiting, observe);
             }
         }
@@ -92,12 +96,16 @@ impl Simulation {
                     _ => Epoch(self.founded),
                 };
                 settings.agreement = agreed(&settings.agreement);
-                self.stations[station.index()].restart(Station::new(self.now, settings));
+                let slot = &mut self.stations[station.index()];
+                slot.restart(Station::new(self.now, settings));
+                self.wakeups.set(member, slot.due());
             }
             Member::RemoteIo(program) => {
                 let mut settings = self.parts.remote_ios[program.index()].clone();
                 settings.agreement = agreed(&settings.agreement);
-                self.remote_ios[program.index()].restart(RemoteIo::new(self.now, settings));
+                let slot = &mut self.remote_ios[program.index()];
+                slot.restart(RemoteIo::new(self.now, settings));
+                self.wakeups.set(member, slot.due());
                 self.show_field(program);
             }
             Member::Plant(program) => self.plants.restart(program),

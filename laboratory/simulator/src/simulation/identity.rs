@@ -13,6 +13,8 @@ impl Hash for Simulation {
             now: _,
             stations,
             remote_ios,
+            // It is what the slots say.
+            wakeups: _,
             plants,
             referees,
             // It only judges.

@@ -1,12 +1,10 @@
 //! What the referees are shown of a remote I/O, and what they say.
 
-use understudy_node::Station;
 use understudy_remote_io::Event;
 use understudy_wire::{Lineage, Member, ProgramId, Source, StationId, StationSet};
 
 use super::{Observe, Record, Simulation};
 use crate::referee::Violation;
-use crate::slot::Slot;
 
 impl Simulation {
     pub(super) fn judge(&mut self, program: ProgramId, event: &Event, observe: &mut Observe<'_>) {
@@ -80,18 +78,19 @@ impl Simulation {
             return StationSet::EMPTY;
         };
         let (own, referee) = (running.configuration(), &self.referees[program.index()]);
-        let holds = |rank: u8, slot: &Slot<Station>| {
-            let station = Member::Station(StationId(rank));
-            let connected =
-                self.links.reaches(station, remote_io) && self.links.reaches(remote_io, station);
-            let admitted = slot.running().filter(|it| it.configuration() == own);
+        let holds = |station: &StationId| {
+            let admitted = self.stations[station.index()].running();
+            let admitted = admitted.filter(|it| it.configuration() == own);
             let state = admitted.and_then(|it| it.state_of(program));
-            connected && state.is_some_and(|(lineage, _)| referee.would_be_lost(lineage))
+            let station = Member::Station(*station);
+            state.is_some_and(|(lineage, _)| referee.would_be_lost(lineage))
+                && self.links.reaches(station, remote_io)
+                && self.links.reaches(remote_io, station)
         };
-        let stations = (0..).zip(&self.stations);
-        stations
-            .filter(|(rank, slot)| holds(*rank, slot))
-            .map(|(rank, _)| StationId(rank))
-            .collect()
+        // The others do not run the program.
+        let understudies = self.remote_ios.len()..self.stations.len();
+        let understudies = understudies.map(|rank| StationId(rank as u8));
+        let candidates = [StationId(program.0)].into_iter().chain(understudies);
+        candidates.filter(holds).collect()
     }
 }
