@@ -73,7 +73,7 @@ impl Kind {
             Self::Map => "a signal map",
             Self::Ads => "a TCT automaton",
             Self::Ladder => "a ladder",
-            Self::Unknown => "a file of unknown formatatat",
+            Self::Unknown => "a file of unknown format",
         }
     }
 }
