@@ -11,7 +11,7 @@ use understudy_text::Report;
 use crate::answer::{Answer, Status};
 use crate::files;
 
-/// Draw a program: a ladder, function blocks or a sequential function chart
+/// Draw a program as a ladder, as function blocks or as a chart
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:

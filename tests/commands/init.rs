@@ -229,7 +229,7 @@ fn bad_programs_are_all_said_and_nothing_is_written() {
     check(&["pump.ladder", "again.ladder"], &["U0624"]);
     check(&["taken.ladder"], &["U0624"]);
     check(&["pump.ladder", "pump-io=again.ladder"], &["U0624"]);
-    let many: Vec<String> = (0..64)
+    let many: Vec<String> = (0..65)
         .map(|number| format!("p{number}=pump.ladder"))
         .collect();
     let many: Vec<&str> = many.iter().map(String::as_str).collect();

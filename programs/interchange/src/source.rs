@@ -88,6 +88,10 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
     }
     let mut found = source(read);
     found.period = period.or(found.period);
+    // Nothing was read of a document that is not PLCopen XML, so what it lacks is no finding.
+    if found.diagnostics.iter().any(|it| it.code == "U1001") {
+        found.diagnostics.retain(|it| it.code != "U1051");
+    }
     // Of two readings of a document that both have errors, the one with fewer is nearer to what was meant; a ladder has
     // no circles, no library and no document of the first edition.
     let errors = |found: &[Diagnostic]| {

@@ -169,7 +169,7 @@ fn wait_until(due_ns: u64, shared: &Shared) -> bool {
         if early.is_zero() {
             return true;
         }
-        std::thread::sleep(early.min(LOOK));
+        std::thread::park_timeout(early.min(LOOK));
     }
     false
 }
