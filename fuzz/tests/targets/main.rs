@@ -125,7 +125,7 @@ fn map() {
 #[test]
 fn chain() {
     attack("chain", &[], |bytes| {
-        let _ = understudy_reliability::read_chain("chain.toml", &text(bytes));
+        let _ = understudy_reliability::read_chain("chain.toml", text(bytes));
     });
 }
 
