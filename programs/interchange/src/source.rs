@@ -64,34 +64,35 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
         diagnostics,
         ..
     } = read(format, name, text, wanted.program);
+    let ladder = SourceFile {
+        source: program.map(Source::Ladder),
+        period,
+        diagnostics,
+    };
+    let is_ladder = ladder.source.is_some();
     let are_several = wanted.program.is_none() && text.matches("<pouInstance").nth(1).is_some();
-    if program.is_some() && !are_several || format != Format::PlcOpen {
-        return SourceFile {
-            source: program.map(Source::Ladder),
-            period,
-            diagnostics,
-        };
+    if is_ladder && !are_several || format != Format::PlcOpen {
+        return ladder;
     }
     // What no ladder can hold may be a program with numbers, or a library.
     let parsed = plcopen::read_typed(text);
+    if !is_ladder && parsed.1.iter().any(|found| found.code == "U1001") {
+        // Nothing was read, so there is nothing to lower.
+        return SourceFile {
+            diagnostics: parsed.1,
+            ..ladder
+        };
+    }
     let read = whole(text, parsed, wanted.program, wanted.period);
     let runs_several = read
         .typed
         .as_ref()
         .is_some_and(|typed| typed.tasks.len() > 1);
-    if program.is_some() && !runs_several {
-        return SourceFile {
-            source: program.map(Source::Ladder),
-            period,
-            diagnostics,
-        };
+    if is_ladder && !runs_several {
+        return ladder;
     }
     let mut found = source(read);
-    found.period = period.or(found.period);
-    // Nothing was read of a document that is not PLCopen XML, so what it lacks is no finding.
-    if found.diagnostics.iter().any(|it| it.code == "U1001") {
-        found.diagnostics.retain(|it| it.code != "U1051");
-    }
+    found.period = ladder.period.or(found.period);
     // Of two readings of a document that both have errors, the one with fewer is nearer to what was meant; a ladder has
     // no circles, no library and no document of the first edition.
     let errors = |found: &[Diagnostic]| {
@@ -99,12 +100,10 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
         errors.filter(|it| it.severity == Severity::Error).count()
     };
     let is_other = |found: &Diagnostic| ["U1001", "U1006", "U1013"].contains(&found.code);
-    let is_ladder = !diagnostics.iter().any(is_other);
-    if found.source.is_none() && is_ladder && errors(&diagnostics) <= errors(&found.diagnostics) {
-        return SourceFile {
-            diagnostics,
-            ..found
-        };
+    let may_be_ladder = !ladder.diagnostics.iter().any(is_other);
+    let has_fewer = errors(&ladder.diagnostics) <= errors(&found.diagnostics);
+    if found.source.is_none() && may_be_ladder && has_fewer {
+        found.diagnostics = ladder.diagnostics;
     }
     found
 }
