@@ -39,7 +39,7 @@ use crate::settings::Settings;
 pub struct Station {
     settings: Settings,
     member: Participant<Event>,
-    /// In the order of programs.
+    /// The replicas that this station computes, in the order of programs.
     replicas: SmallVec<[Replica; 2]>,
     scratch: Scratch,
     cycle: CycleNotes,

@@ -13,7 +13,7 @@ pub(crate) struct Wakeups {
 }
 
 impl Wakeups {
-    /// Of so many stations, and of the remote I/Os after them.
+    /// The wake-ups of `stations` stations, and of the remote I/Os after them.
     pub(crate) fn new(stations: usize, due: Vec<Time>) -> Self {
         let mut wakeups = Self {
             stations,

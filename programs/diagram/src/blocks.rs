@@ -21,9 +21,9 @@ pub struct Network {
 pub struct Object {
     /// What it is.
     pub kind: Kind,
-    /// From top to bottom.
+    /// The inputs, from top to bottom.
     pub inputs: Vec<Input>,
-    /// From top to bottom.
+    /// The outputs, from top to bottom.
     pub outputs: Vec<Output>,
     /// Whether the scan executed it; nothing where no scan is shown.
     pub executed: Option<bool>,

@@ -13,7 +13,7 @@ use crate::effort::Stopped;
 /// States of a search, and how they lead to those found before.
 pub(super) struct Ring {
     pub(super) states: Diagram,
-    /// One scan, or so many with unchanged inputs.
+    /// Number of scans: 1 with any inputs, or more with unchanged inputs.
     pub(super) scans: usize,
 }
 
@@ -100,8 +100,8 @@ impl Model<'_> {
         Ok(rings)
     }
 
-    /// Shows `found` the states of E[hold U end] each time that there are more, and the scans that lead to those before: any one, or so many with
-    /// unchanged inputs.
+    /// Shows `found` the states of E[hold U end] each time that there are more, and the scans that lead to those before: one with any
+    /// inputs, or several with unchanged inputs.
     fn search(
         &self,
         hold: &Diagram,

@@ -176,7 +176,7 @@ impl<'c> Model<'c> {
         &found.expect("a signal of the cone").1
     }
 
-    /// Counts a step, and ends where nobody waits any more.
+    /// Counts a step, and ends when the caller no longer waits.
     pub(super) fn goes_on(&self) -> Result<(), Stopped> {
         self.steps.set(self.steps.get() + 1);
         if (self.wanted)(Work::Diagrams(self.steps.get())) {
@@ -189,7 +189,7 @@ impl<'c> Model<'c> {
     /// Made on first use.
     pub(super) fn jumps(&self) -> Result<&[Jump], Stopped> {
         if self.jumps.get().is_none() {
-            // Nobody else can have made them meanwhile.
+            // The cell is empty, so this cannot fail.
             let _ = self.jumps.set(Jump::all(self)?);
         }
         Ok(self.jumps.get().map_or(&[], Vec::as_slice))

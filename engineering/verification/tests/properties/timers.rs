@@ -18,7 +18,7 @@ use crate::replay::replays;
 /// What contacts ask for.
 const OPERANDS: [&str; 6] = ["u0", "u1", "y0", "y1", "t0.Q", "t1.Q"];
 
-/// Two rungs, each with a timer of so many scans between random contacts; a scan is 1 ms.
+/// Two rungs, each with a timer of its preset number of scans between random contacts; a scan is 1 ms.
 fn circuit(rungs: &[(u8, u8, u8, u8)], presets: [u32; 2]) -> Circuit {
     let mut text = String::from("program random\ninput u0\ninput u1\noutput y0\noutput y1\n");
     for (place, (preset, &(kind, first, second, third))) in presets.iter().zip(rungs).enumerate() {

@@ -28,7 +28,7 @@ pub(super) struct Wanted {
     cycle: Option<i64>,
     #[serde(default)]
     names: Names,
-    /// Of a program with numbers.
+    /// How a program with numbers is shown: as text or as a drawing.
     #[serde(default)]
     view: View,
     #[serde(default)]

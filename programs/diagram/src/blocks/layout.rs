@@ -3,7 +3,7 @@
 use super::{Kind, Network};
 use crate::{CHARACTER, Place, Point, width};
 
-/// From one pin of a block to the next.
+/// Distance between two pins of a block.
 const ROW: i64 = 24;
 /// Height of a value or a target.
 const HEIGHT: i64 = 20;
@@ -40,18 +40,18 @@ pub struct Wire {
     pub from: (usize, usize),
     /// Object and input.
     pub to: (usize, usize),
-    /// From its begin to its end.
+    /// Corners of the line, from its begin to its end.
     pub points: Vec<Point>,
 }
 
 /// Where the parts of a network are.
 #[derive(Debug, Clone, Default)]
 pub struct BlockPlan {
-    /// By object.
+    /// The place of each object, in the order of the network's objects.
     pub objects: Vec<Placed>,
     /// All connections.
     pub wires: Vec<Wire>,
-    /// The place of the comments; of no height where there are none.
+    /// The place of the comments; its height is 0 without comments.
     pub comments: Place,
     /// The right edge.
     pub right: i64,

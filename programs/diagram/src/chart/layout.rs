@@ -68,7 +68,7 @@ pub struct Link {
     pub from: usize,
     /// Which of the lines out of that object.
     pub output: usize,
-    /// From its begin to its end.
+    /// Corners of the line, from its begin to its end.
     pub points: Vec<Point>,
 }
 

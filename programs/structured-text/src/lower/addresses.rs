@@ -27,7 +27,8 @@ pub(super) struct Extent {
 }
 
 impl Extent {
-    /// `%MW3` for a variable of so many bytes; none for what is not in the memory, or has no complete address.
+    /// The bytes of a variable of `bytes` bytes at an address such as `%MW3`; nothing for an address outside of the memory or
+    /// an incomplete one.
     fn of(name: &Name, address: &Name, bytes: Option<u64>) -> Option<Self> {
         let key = normal(address.as_str());
         let numbers = key.strip_prefix("%M")?.get(1..)?;

@@ -1,6 +1,6 @@
 //! A partition of the states of a supervisor into cells, made coarser pair by pair.
 //!
-//! A merge that is refused once is refused for ever: cells only grow, and a larger cell asks for more. So a cell that was tried with all
+//! A merge that is refused once is always refused: cells only grow, and a larger cell asks for more. So a cell that was tried with all
 //! others is *closed*: no later merge can change it. Most attempts end at a closed cell, in their first step.
 
 use super::demands::Demands;
