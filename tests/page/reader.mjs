@@ -167,9 +167,10 @@ async function events() {
   await until("them hidden", `document.querySelector("#event-table [data-kind=stalled]") === null`);
   await click('#view-events .chips [data-name="warning"]');
   await until("warnings", `${rows("event-table")}.length > 0 && ${rows("event-table")}.every((row) => row.dataset.level === "warning" && row.cells[0].textContent === "⚠ warning")`);
+  // The address follows a little later than the rows.
+  await until("its address", "location.hash.includes('levels=warning')");
   await call("Page.reload");
   await until("warnings again", `${rows("event-table")}.length > 0 && ${rows("event-table")}.every((row) => row.dataset.level === "warning")`);
-  await until("its address", "location.hash.includes('levels=warning')");
   const link = await hash();
   await elsewhere(link);
   await until("warnings elsewhere", `${rows("event-table")}.length > 0 && ${rows("event-table")}.every((row) => row.dataset.level === "warning")`);
