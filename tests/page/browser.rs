@@ -76,6 +76,12 @@ fn a_browser_starts_a_shuttle_and_sees_since_when() {
     drive("operate", cluster, "operate.mjs", |_| Vec::new());
 }
 
+#[test]
+fn a_browser_shows_text_and_function_blocks_with_values() {
+    let cluster = "examples/heated-tank/cluster.toml";
+    drive("numbers", cluster, "numbers.mjs", |_| Vec::new());
+}
+
 /// The press cell with 90 more rungs in the robot, which are a chain of memory bits, a timer of the arm's laps and a counter of them.
 fn large_cell(folder: &Path) -> String {
     let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/press-cell");

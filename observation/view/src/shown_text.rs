@@ -9,7 +9,7 @@ use understudy_wire::ProgramId;
 
 use crate::error::ViewError;
 use crate::model::Model;
-use crate::source_text::{Line, SourceText};
+use crate::source_text::{Line, SourceText, Use};
 use crate::value::elementary;
 
 /// A line of a program's text, in one scan.
@@ -67,20 +67,10 @@ impl Model {
         let uses = typed.variables.iter().map(|variable| {
             let (mut written, mut read) = (BTreeSet::new(), BTreeSet::new());
             for (number, line) in (1..).zip(source.lines()) {
-                for (name, behind) in line.names.iter().filter(|_| line.is_program) {
-                    let behind = behind.trim_start();
-                    // What follows a colon is a declaration.
-                    let is_declaration =
-                        behind.starts_with([':', ',']) && !behind.starts_with(":=");
-                    let is_own = name_of(line, name, |it| {
-                        let same = it.eq_ignore_ascii_case(&variable.name);
-                        let head = it.get(..variable.name.len());
-                        let begins = head.is_some_and(|it| it.eq_ignore_ascii_case(&variable.name));
-                        same || begins && it[variable.name.len()..].starts_with('.')
-                    });
-                    match (is_own, is_declaration, behind.starts_with(":=")) {
-                        (true, false, true) => drop(written.insert(number)),
-                        (true, false, false) => drop(read.insert(number)),
+                for (name, kind) in line.names.iter().filter(|_| line.is_program) {
+                    match (kind, is_of(line, name, &variable.name)) {
+                        (Use::Written, true) => drop(written.insert(number)),
+                        (Use::Read, true) => drop(read.insert(number)),
                         _ => {}
                     }
                 }
@@ -97,9 +87,17 @@ impl Model {
     }
 }
 
-/// Whether a name in a line is one that is looked for: as written, or behind the name of its program.
-fn name_of(line: &Line<'_>, name: &str, is: impl Fn(&str) -> bool) -> bool {
-    is(name) || line.unit.is_some_and(|unit| is(&format!("{unit}.{name}")))
+/// Whether a name in a line is a variable or a part of it. Where a text has several programs, a variable stands behind the name of its program.
+fn is_of(line: &Line<'_>, name: &str, variable: &str) -> bool {
+    let behind_unit = || {
+        let (unit, own) = variable.split_once('.')?;
+        let is_own = line.unit.is_some_and(|it| it.eq_ignore_ascii_case(unit));
+        is_own.then_some(own)
+    };
+    let own = behind_unit().unwrap_or(variable);
+    let head = name.get(..own.len());
+    head.is_some_and(|head| head.eq_ignore_ascii_case(own))
+        && (name.len() == own.len() || name[own.len()..].starts_with('.'))
 }
 
 fn lines(typed: &Program, source: &SourceText<'_>, trace: Option<&Trace>) -> Vec<ShownLine> {
@@ -141,7 +139,8 @@ fn lines(typed: &Program, source: &SourceText<'_>, trace: Option<&Trace>) -> Vec
     };
     let shown = (1..).zip(source.lines()).map(|(number, line)| {
         let mut values: Vec<(String, Value)> = Vec::new();
-        for (name, _) in &line.names {
+        let shown = |kind| !matches!(kind, Use::Unit | Use::Parameter);
+        for (name, _) in line.names.iter().filter(|(_, kind)| shown(*kind)) {
             let known = values.iter().any(|(known, _)| known == name);
             if let Some(value) = value(line, name).filter(|_| !known) {
                 values.push(((*name).to_owned(), value));
@@ -156,4 +155,20 @@ fn lines(typed: &Program, source: &SourceText<'_>, trace: Option<&Trace>) -> Vec
         }
     });
     shown.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_of_its_own_variable_alone() {
+        let source = SourceText::new("PROGRAM level\n  inlet := level;\nEND_PROGRAM\n");
+        let line = &source.lines()[1];
+        assert!(is_of(line, "Level", "level") && is_of(line, "level.part", "level"));
+        assert!(is_of(line, "inlet", "level.inlet"));
+        // The program has the name of its variable.
+        assert!(!is_of(line, "inlet", "level"));
+        assert!(!is_of(line, "levels", "level") && !is_of(line, "inlet", "other.inlet"));
+    }
 }

@@ -15,15 +15,45 @@ pub(crate) struct Line<'t> {
     pub(crate) unit: Option<&'t str>,
     /// Whether that unit is a program.
     pub(crate) is_program: bool,
-    /// Names outside comments and texts, such as `pid.integral`, each with what is behind it.
-    pub(crate) names: Vec<(&'t str, &'t str)>,
+    /// Names outside comments and texts, such as `pid.integral`, and what each does there.
+    pub(crate) names: Vec<(&'t str, Use)>,
+}
+
+/// What a name does where it stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Use {
+    /// It is declared, or names a type in a declaration.
+    Declared,
+    /// It names a unit.
+    Unit,
+    /// It names a parameter in a call: `PV` in `regulator(PV := level)`.
+    Parameter,
+    /// A value is assigned to it.
+    Written,
+    /// Everything else: it is read, or a word of the language.
+    Read,
 }
 
 /// Words that begin a unit whose name follows.
 const UNITS: [&str; 4] = ["PROGRAM", "FUNCTION_BLOCK", "FUNCTION", "METHOD"];
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Words that begin declarations, which END_VAR ends.
+const SECTIONS: [&str; 10] = [
+    "VAR",
+    "VAR_INPUT",
+    "VAR_OUTPUT",
+    "VAR_IN_OUT",
+    "VAR_TEMP",
+    "VAR_STAT",
+    "VAR_EXTERNAL",
+    "VAR_GLOBAL",
+    "VAR_CONFIG",
+    "VAR_ACCESS",
+];
+
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 enum Comment {
+    #[default]
     None,
     Round,
     Slash,
@@ -31,22 +61,27 @@ enum Comment {
 
 impl<'t> SourceText<'t> {
     pub(crate) fn new(text: &'t str) -> Self {
-        let mut comment = Comment::None;
+        let mut reader = Reader::default();
         let (mut unit, mut is_program) = (None, false);
         let mut lines = Vec::new();
         for text in text.lines() {
-            let names = names_in(text, &mut comment);
+            let mut names = reader.names_in(text);
             let mut ends = false;
-            for (place, (name, _)) in names.iter().enumerate() {
+            for place in 0..names.len() {
+                let name = names[place].0;
                 let is = |word: &str| name.eq_ignore_ascii_case(word);
                 if UNITS.into_iter().any(is) {
                     // Modifiers of a method, such as PUBLIC, and its name.
-                    let mut behind = names[place + 1..].iter().map(|(name, _)| *name);
-                    let is_modifier = |word: &&str| {
+                    let mut behind = names[place + 1..].iter_mut();
+                    let is_modifier = |word: &str| {
                         let modifiers = ["PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL", "FINAL"];
                         modifiers.iter().any(|it| word.eq_ignore_ascii_case(it))
                     };
-                    unit = behind.find(|word| !is_modifier(word));
+                    let own = behind.find(|(word, _)| !is_modifier(word));
+                    unit = own.map(|(word, kind)| {
+                        *kind = Use::Unit;
+                        *word
+                    });
                     is_program = is("PROGRAM");
                 }
                 ends |= name
@@ -87,44 +122,106 @@ impl<'t> SourceText<'t> {
     }
 }
 
-/// Names with their parts, and what is behind each, outside comments and texts.
-fn names_in<'t>(line: &'t str, comment: &mut Comment) -> Vec<(&'t str, &'t str)> {
-    let mut names = Vec::new();
-    let mut rest = line;
-    while let Some(first) = rest.chars().next() {
-        let end = match comment {
-            Comment::Round => Some("*)"),
-            Comment::Slash => Some("*/"),
-            Comment::None => None,
-        };
-        if let Some(end) = end {
-            let Some(place) = rest.find(end) else {
-                return names;
+/// What is known at the end of a line for the next one.
+#[derive(Debug, Default)]
+struct Reader {
+    comment: Comment,
+    /// Between VAR and END_VAR.
+    in_declaration: bool,
+    /// Parentheses that are open.
+    depth: usize,
+    /// Behind `=>`: the variable that takes an output.
+    is_taking: bool,
+}
+
+impl Reader {
+    /// Names with their parts, and what each does, outside comments and texts.
+    fn names_in<'t>(&mut self, line: &'t str) -> Vec<(&'t str, Use)> {
+        let mut names = Vec::new();
+        let mut rest = line;
+        while let Some(first) = rest.chars().next() {
+            let end = match self.comment {
+                Comment::Round => Some("*)"),
+                Comment::Slash => Some("*/"),
+                Comment::None => None,
             };
-            rest = &rest[place + end.len()..];
-            *comment = Comment::None;
-        } else if let Some(behind) = rest.strip_prefix("(*") {
-            (*comment, rest) = (Comment::Round, behind);
-        } else if let Some(behind) = rest.strip_prefix("/*") {
-            (*comment, rest) = (Comment::Slash, behind);
-        } else if rest.starts_with("//") {
-            return names;
-        } else if first == '\'' || first == '"' {
-            let inside = &rest[1..];
-            rest = inside.find(first).map_or("", |end| &inside[end + 1..]);
-        } else if first.is_ascii_alphanumeric() || first == '_' || first == '%' {
-            let is_part = |letter: char| letter.is_alphanumeric() || "_.#%".contains(letter);
-            let end = rest.find(|letter| !is_part(letter)).unwrap_or(rest.len());
-            let (name, behind) = rest.split_at(end);
-            if !first.is_ascii_digit() && !name.contains('#') {
-                names.push((name.trim_end_matches('.'), behind));
+            if let Some(end) = end {
+                let Some(place) = rest.find(end) else {
+                    return names;
+                };
+                rest = &rest[place + end.len()..];
+                self.comment = Comment::None;
+            } else if let Some(behind) = rest.strip_prefix("(*") {
+                (self.comment, rest) = (Comment::Round, behind);
+            } else if let Some(behind) = rest.strip_prefix("/*") {
+                (self.comment, rest) = (Comment::Slash, behind);
+            } else if rest.starts_with("//") {
+                return names;
+            } else if first == '\'' || first == '"' {
+                let inside = &rest[1..];
+                rest = inside.find(first).map_or("", |end| &inside[end + 1..]);
+            } else if first.is_ascii_alphanumeric() || first == '_' || first == '%' {
+                let is_part = |letter: char| letter.is_alphanumeric() || "_.#%".contains(letter);
+                let end = rest.find(|letter| !is_part(letter)).unwrap_or(rest.len());
+                let (name, behind) = rest.split_at(end);
+                if !first.is_ascii_digit() && !name.contains('#') {
+                    names.push((name.trim_end_matches('.'), self.use_of(name, behind)));
+                }
+                rest = behind;
+            } else {
+                match first {
+                    '(' => self.depth += 1,
+                    ')' => self.depth = self.depth.saturating_sub(1),
+                    ';' => self.depth = 0,
+                    _ => {}
+                }
+                self.is_taking = rest.starts_with("=>") || self.is_taking && !";,)".contains(first);
+                rest = &rest[first.len_utf8()..];
+                if first == '.' {
+                    // A part of what an index chose.
+                    rest = rest.trim_start_matches(|letter: char| {
+                        letter.is_alphanumeric() || letter == '_'
+                    });
+                }
             }
-            rest = behind;
-        } else {
-            rest = &rest[first.len_utf8()..];
+        }
+        names
+    }
+
+    fn use_of(&mut self, name: &str, behind: &str) -> Use {
+        if SECTIONS.contains(&&*name.to_ascii_uppercase()) {
+            self.in_declaration = true;
+        } else if name.eq_ignore_ascii_case("END_VAR") {
+            self.in_declaration = false;
+        }
+        let assigned = behind_parts(behind);
+        let (is_assigned, is_taken) = (assigned.starts_with(":="), assigned.starts_with("=>"));
+        match () {
+            () if self.in_declaration => Use::Declared,
+            () if self.depth > 0 && (is_assigned || is_taken) => Use::Parameter,
+            () if is_assigned || std::mem::take(&mut self.is_taking) => Use::Written,
+            () => Use::Read,
         }
     }
-    names
+}
+
+/// What stands behind the indices and parts that follow a name: ` := 1` behind `a` in `a[2].b := 1`.
+fn behind_parts(mut behind: &str) -> &str {
+    loop {
+        behind = behind.trim_start();
+        let Some(inside) = behind.strip_prefix('[') else {
+            break;
+        };
+        let mut depth = 1;
+        let end = inside.find(|letter| {
+            depth += i32::from(letter == '[') - i32::from(letter == ']');
+            depth == 0
+        });
+        behind = end.map_or("", |end| &inside[end + 1..]);
+        behind = behind
+            .trim_start_matches(|letter: char| letter.is_alphanumeric() || "_.^".contains(letter));
+    }
+    behind.trim_start_matches('^').trim_start()
 }
 
 #[cfg(test)]
@@ -147,5 +244,33 @@ mod tests {
         assert!(!source.declares("PID"));
         assert_eq!(source.line(5), Some("END_PROGRAM"));
         assert_eq!(source.line(0), None);
+    }
+
+    #[test]
+    fn a_name_is_declared_given_written_or_read() {
+        let text = "PROGRAM level\nVAR_INPUT\n  level AT %ID0, SP : REAL := top;\nEND_VAR\n\
+            pid(SP := SP + a[SP], XOUT => level,\n  PV := level);\n\
+            t[SP].x[b[1]] := level * (SP - 1);\np^ := a[1] = SP;\nEND_PROGRAM\n";
+        let source = SourceText::new(text);
+        let uses = |line: usize| source.lines()[line - 1].names.clone();
+        assert_eq!(uses(1)[1], ("level", Use::Unit));
+        assert!(uses(3).iter().all(|(_, kind)| *kind == Use::Declared));
+        let expected = [
+            ("pid", Use::Read),
+            ("SP", Use::Parameter),
+            ("SP", Use::Read),
+            ("a", Use::Read),
+            ("SP", Use::Read),
+            ("XOUT", Use::Parameter),
+            ("level", Use::Written),
+        ];
+        assert_eq!(uses(5), expected);
+        assert_eq!(uses(6), [("PV", Use::Parameter), ("level", Use::Read)]);
+        let written: Vec<_> = [uses(7), uses(8)].concat();
+        let written = written.iter().filter(|(_, kind)| *kind == Use::Written);
+        assert_eq!(
+            written.map(|(name, _)| *name).collect::<Vec<_>>(),
+            ["t", "p"]
+        );
     }
 }

@@ -168,6 +168,20 @@ fn random_chart(dice: &mut Dice) -> Chart {
 }
 
 #[test]
+fn a_value_of_the_scan_has_room_in_its_box() {
+    for value in ["FALSE", "13.051045320505231"] {
+        let mut network = Network::default();
+        let source = network.value("drain");
+        network.objects[source].outputs[0].value = Some(value.to_owned());
+        network.target("outlet", (source, 0), false);
+        let plan = blocks::lay_out(&network, 0);
+        let needed = 8 * i64::try_from(format!("drain {value}").len()).expect("short");
+        assert!(plan.objects[source].place.width >= needed, "{plan:?}");
+        assert!(plan.objects[1].place.x >= plan.objects[source].place.right());
+    }
+}
+
+#[test]
 fn every_step_and_transition_of_a_chart_has_one_place_that_nothing_overlaps() {
     for seed in 0..20_000 {
         let chart = random_chart(&mut Dice::new(seed));

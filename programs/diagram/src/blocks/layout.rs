@@ -148,11 +148,11 @@ impl<'n> Layout<'n> {
     fn tree(&mut self, object: usize, top: i64) -> Reached {
         match &self.network.objects[object].kind {
             Kind::Block { .. } => self.block(object, top),
-            Kind::Value(text) | Kind::Target(text) => {
+            Kind::Value(_) | Kind::Target(_) => {
                 let place = Place {
                     x: MARGIN,
                     y: top,
-                    width: width(text) + CHARACTER,
+                    width: self.text(object),
                     height: HEIGHT,
                 };
                 self.simple(object, place);

@@ -1,0 +1,54 @@
+// Looks at programs with numbers of the example heated-tank, as text and as function blocks, takes pictures, and fails where something is not as it has to be.
+//
+//   node tests/page/numbers.mjs http://127.0.0.1:7480/ PICTURES [AXE.min.js]
+
+import { accessible, change, click, evaluate, more, open, picture, problems, run, scheme, size, text, until } from "./chromium.mjs";
+
+const [axe] = more;
+
+const shown = `fetch("/api/state").then((answer) => answer.json()).then((state) => state.cycle)`;
+
+// The names and values that a drawing shows.
+const labels = `[...document.querySelectorAll("#ladder-picture svg text")].map((label) => label.textContent)`;
+
+async function textView() {
+  await open("ladder?program=0");
+  await until("its text", `document.querySelectorAll(".program-text tbody tr").length > 3`);
+  await until("a statement that was executed", `document.querySelector('.program-text tr[data-executed="true"]') !== null`);
+  await until("a real value", `/= -?\\d+\\.\\d/.test(${text(".program-text .values")} + document.querySelector(".program-text").textContent)`);
+  // The program has the name of its input, which no line assigns.
+  const uses = `fetch("/api/cross-reference/0").then((answer) => answer.json()).then(({ signals }) => signals.find(({ name }) => name === "level"))`;
+  const level = await evaluate(uses);
+  if (level.written.length !== 0 || level.read.length !== 3) {
+    problems.push(`the cross-reference of level is ${JSON.stringify(level)}`);
+  }
+  await picture("numbers-text");
+  await accessible("text", axe);
+}
+
+async function drawing() {
+  await change("#ladder-view", "drawing");
+  await until("a drawing", `document.querySelector("#ladder-picture svg") !== null && document.querySelector(".program-text") === null`);
+  await until("values in it", `${labels}.some((words) => /-?\\d+\\.\\d/.test(words))`);
+  await until("its address", `location.hash.includes("view=drawing")`);
+  await picture("numbers-drawing");
+  await accessible("drawing", axe);
+  const before = await evaluate(`${labels}.join()`);
+  await until("values that change", `${labels}.join() !== ${JSON.stringify(before)}`);
+  await evaluate(`document.querySelector("#ladder-picture svg text.name").dispatchEvent(new MouseEvent("click", { bubbles: true }))`);
+  await until("the reason", `document.querySelector("#why")?.textContent.length > 40 || location.hash.includes("why=")`);
+  await picture("numbers-why");
+}
+
+async function drive() {
+  await evaluate("localStorage.setItem('tour', 'seen'), document.querySelector('[data-tour=skip]')?.click()");
+  await scheme("light");
+  await size(1360, 1000, false);
+  await until("some cycles", `${shown}.then((cycle) => cycle > 60)`);
+  await textView();
+  await drawing();
+  await change("#ladder-view", "text");
+  await until("the text again", `document.querySelectorAll(".program-text tbody tr").length > 3`);
+}
+
+run(drive);
