@@ -452,3 +452,62 @@ fn an_unknown_program_is_answered_with_those_of_the_file() {
     check(Some("fil"), "did you mean `fill`?");
     check(None, "choose one with --program, of fill, drain");
 }
+
+/// The findings of one severity in a program of these variables and statements.
+fn findings(variables: &str, body: &str, severity: Severity) -> String {
+    let text = format!(
+        "PROGRAM main VAR_INPUT a : INT; END_VAR VAR_OUTPUT y : INT; END_VAR
+         VAR {variables} END_VAR {body} END_PROGRAM"
+    );
+    shown(&text, &read(&text, None).1, severity)
+}
+
+#[test]
+fn a_value_of_case_has_one_label() {
+    let warnings = |body: &str| findings("", body, Severity::Warning);
+    for (body, words) in [
+        ("CASE a OF 1: y := 1; 1: y := 2; END_CASE;", "the value 1"),
+        (
+            "CASE a OF 2..4, 7: y := 1; 3..9: y := 2; END_CASE;",
+            "a value of 3..9",
+        ),
+        (
+            "CASE a OF 5: y := 1; 1..9: y := 2; END_CASE;",
+            "a value of 1..9",
+        ),
+    ] {
+        let found = warnings(body);
+        assert!(found.contains("U1036") && found.contains(words), "{found}");
+    }
+    let found = warnings("CASE a OF 2..4, 7: y := 1; 1, 5..6, 8: y := 2; END_CASE;");
+    assert!(!found.contains("U1036"), "{found}");
+    once(
+        "x : INT;",
+        "",
+        "CASE a OF 7: x := 1; 5..9: x := 2; END_CASE;",
+        "1",
+    );
+}
+
+#[test]
+fn literals_and_initial_values_stay_in_their_ranges() {
+    for (variables, words) in [
+        ("x : REAL := 1.0E50;", "is not a REAL"),
+        ("x : REAL := REAL#1.0E50;", "is not a REAL"),
+        ("x : LREAL := 1.0E500;", "too large for LREAL"),
+        ("x : INT (0..10) := 20;", "outside the range 0..10"),
+        ("x : INT (-5..5) := -6;", "outside the range -5..5"),
+    ] {
+        let found = findings(variables, "y := a;", Severity::Error);
+        assert!(found.contains(words), "{variables} {found}");
+    }
+    for variables in [
+        "x : REAL := 3.4E38;",
+        "x : LREAL := 1.0E50;",
+        "x : INT (0..10) := 10;",
+        "x : INT (-5..5) := -5;",
+    ] {
+        let found = findings(variables, "y := a;", Severity::Error);
+        assert!(found.is_empty(), "{variables} {found}");
+    }
+}

@@ -1,5 +1,6 @@
 //! The content of a PLCopen file with its places, before its meaning is checked.
 
+mod macro_step;
 mod objects;
 mod read;
 mod rungs;

@@ -173,6 +173,74 @@ fn a_chart_goes_from_step_to_step() {
     assert_eq!(shown, expected.map(<[u64]>::to_vec));
 }
 
+/// The macro step, entered by transition 2, and transition 5 behind it; `inner` is its chart.
+fn with_macro_step(inner: &str) -> String {
+    let condition =
+        |text: &str| format!(r#"<condition><inline name="c"><ST>{text}</ST></inline></condition>"#);
+    let transition = |id: u32, source: u32, text: &str| {
+        let (source, condition) = (from(source), condition(text));
+        format!(
+            r#"<transition localId="{id}">{source}<connectionPointOut/>{condition}</transition>"#
+        )
+    };
+    let counted = |id: u32, step: u32| {
+        let step = from(step);
+        format!(
+            r#"<actionBlock localId="{id}">{step}<action qualifier="P1"><inline><ST>n := n + 1;</ST></inline></action></actionBlock>"#
+        )
+    };
+    let step = |id: u32, name: &str, inputs: &str| {
+        format!(
+            r#"<step localId="{id}" name="{name}">{inputs}<connectionPointOut formalParameter="sfc"/></step>"#
+        )
+    };
+    let inner = match inner {
+        "flat" => [
+            step(1, "First", ""),
+            counted(2, 1),
+            transition(3, 1, "go"),
+            step(4, "Last", &from(3)),
+            counted(5, 4),
+        ]
+        .concat(),
+        _ => {
+            let body = step(1, "First", "")
+                + &counted(2, 1)
+                + &transition(3, 1, "go")
+                + &step(4, "Last", &from(3))
+                + &counted(5, 4);
+            format!(
+                r#"<macroStep localId="9" name="Inner"><body><SFC>{body}</SFC></body></macroStep>"#
+            )
+        }
+    };
+    let idle = r#"<step localId="1" name="Idle" initialStep="true"><connectionPointOut formalParameter="sfc"/></step>"#;
+    let (entered, jump) = (from(2), from(5));
+    [
+        idle.to_owned(),
+        transition(2, 1, "go"),
+        format!(r#"<macroStep localId="3" name="Whole">{entered}<connectionPointOut/><body><SFC>{inner}</SFC></body></macroStep>"#),
+        transition(5, 3, "NOT go"),
+        format!(r#"<jumpStep localId="6" targetName="Idle">{jump}</jumpStep>"#),
+    ]
+    .concat()
+}
+
+#[test]
+fn a_macro_step_ends_with_the_last_step_of_its_chart() {
+    let variables = variable("go", "%IX0.0", "BOOL") + &variable("n", "%QW0", "INT");
+    for inner in ["flat", "nested"] {
+        let text = document(
+            &variables,
+            &format!("<SFC>{}</SFC>", with_macro_step(inner)),
+        );
+        // Idle; First; not left while `go` is off, and not the macro step either; Last; Idle; First.
+        let shown = run(&text, &[&[0], &[1], &[0], &[0], &[1], &[0], &[1]]);
+        let counts: Vec<u64> = shown.iter().map(|outputs| outputs[0]).collect();
+        assert_eq!(counts, [0, 1, 1, 1, 2, 2, 3], "{inner}");
+    }
+}
+
 #[test]
 fn what_is_not_understood_is_refused_by_its_name() {
     let variables = variable("a", "%IX0.0", "BOOL");
@@ -181,7 +249,15 @@ fn what_is_not_understood_is_refused_by_its_name() {
         (r#"<FBD><comment localId="1" magic="yes"/></FBD>"#, "magic"),
         (
             r#"<SFC><macroStep localId="1" name="m"/></SFC>"#,
-            "macro step",
+            "the macro step `m` has no body",
+        ),
+        (
+            r#"<SFC><macroStep localId="1" name="m"><body><ST>a := a;</ST></body></macroStep></SFC>"#,
+            "is not a sequential function chart",
+        ),
+        (
+            r#"<SFC><macroStep localId="1" name="m"><body><SFC><step localId="1" name="p"/><step localId="2" name="q"/></SFC></body></macroStep></SFC>"#,
+            "has 2 last steps",
         ),
     ] {
         let found = typed(&document(&variables, body), PERIOD).expect_err("a refusal");

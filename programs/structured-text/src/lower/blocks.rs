@@ -113,10 +113,7 @@ impl<'a> Lowering<'a> {
             return None;
         }
         let block = self.block(unit, &span)?;
-        Some(Resolved {
-            of: block.of.clone(),
-            image: block.image.clone(),
-        })
+        Some(Resolved::new(block.of.clone(), block.image.clone()))
     }
 
     /// The memory of a program or function block.

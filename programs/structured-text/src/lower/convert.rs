@@ -172,7 +172,7 @@ impl Lowering<'_> {
             _ => return self.mismatch("a number", to, span),
         };
         if elementary.is_real() {
-            return Some(value.in_real(elementary));
+            return self.real_number(value, elementary, span);
         }
         if elementary.is_time() {
             return self.mismatch("a number without a unit", to, span);
@@ -201,6 +201,24 @@ impl Lowering<'_> {
             return None;
         }
         Some(number(to.clone(), value as u64 & elementary.mask()))
+    }
+
+    /// A literal in a real type; one that is too large for it is an error.
+    pub(super) fn real_number(
+        &mut self,
+        value: Number,
+        of: Elementary,
+        span: &Span,
+    ) -> Option<Expression> {
+        if let (Elementary::Real, Number::Real(single, double)) = (of, value)
+            && single.is_infinite()
+            && double.is_finite()
+        {
+            let message = format!("{double:e} is not a REAL, which is -3.4e38 to 3.4e38");
+            self.error_with("U1032", message, span.clone(), "use LREAL");
+            return None;
+        }
+        Some(value.in_real(of))
     }
 
     fn coerce_typed(&mut self, value: Expression, to: &Type, span: &Span) -> Option<Expression> {

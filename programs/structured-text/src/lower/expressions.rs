@@ -89,14 +89,21 @@ impl Lowering<'_> {
                 }
             }
             Literal::Real { text, of } => {
-                let Some(value) = Number::written(text) else {
-                    let message = format!("`{text}` is not a number");
+                let value = Number::written(text);
+                let Some(value) = value.filter(|value| value.is_finite()) else {
+                    let message = match value {
+                        Some(_) => format!("`{text}` is too large for LREAL"),
+                        None => format!("`{text}` is not a number"),
+                    };
                     self.error("U1032", message, span.clone());
                     return Operand::Faulty;
                 };
-                match of {
-                    Some(of) if of.is_real() => value.in_real(*of),
-                    _ => return Operand::Number(value),
+                match of.filter(|of| of.is_real()) {
+                    Some(of) => match self.real_number(value, of, span) {
+                        Some(value) => value,
+                        None => return Operand::Faulty,
+                    },
+                    None => return Operand::Number(value),
                 }
             }
             Literal::Time { nanoseconds, of } => number(Type::Elementary(*of), *nanoseconds as u64),

@@ -18,7 +18,19 @@ impl Lowering<'_> {
     ) -> Option<Image> {
         let mut image = Builder::of(&resolved.image);
         self.initialize(initial, &resolved.of, 0, &mut image)?;
-        Some(image.done())
+        let image = image.done();
+        if let (Some((low, high)), Initializer::Value(value)) = (resolved.range, initial) {
+            let stored = image.first().map_or(0, |(_, value)| *value);
+            let initial = resolved.of.elementary().map_or(0, |of| of.signed(stored));
+            if initial < low || initial > high {
+                let message =
+                    format!("the initial value {initial} is outside the range {low}..{high}");
+                let help = "write a value of the range, or a wider range";
+                self.error_with("U1036", message, value.span.clone(), help);
+                return None;
+            }
+        }
+        Some(image)
     }
 
     fn initialize(

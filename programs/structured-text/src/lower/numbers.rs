@@ -30,6 +30,11 @@ impl Number {
         Some(Self::Real(text.parse().ok()?, text.parse().ok()?))
     }
 
+    /// Whether LREAL has a finite number for it.
+    pub(super) fn is_finite(self) -> bool {
+        self.real().1.is_finite()
+    }
+
     fn real(self) -> (f32, f64) {
         match self {
             Self::Integer(value) => (value as f32, value as f64),

@@ -1,5 +1,8 @@
 //! Statements.
 
+use std::collections::BTreeMap;
+
+use understudy_text::Diagnostic;
 use understudy_typed::{
     Branch, Case, Elementary, Expression, For, Operation, Statement, StatementKind, Type,
 };
@@ -12,6 +15,9 @@ use super::fold::{apply, convert, reinterpret};
 use super::names::number;
 use super::numbers::{Number, Operand};
 use super::places::{Target, insert, load};
+
+/// Labels of a CASE: the last value and the place by the first value.
+type Labels = BTreeMap<i64, (i64, Span)>;
 
 impl Lowering<'_> {
     pub(super) fn statements(
@@ -166,11 +172,16 @@ impl Lowering<'_> {
             self.error_with("U1043", message, selector.span.clone(), help);
         }
         let mut lowered = Vec::with_capacity(cases.len());
+        let mut known = Labels::default();
         for (labels, statements) in cases {
             let mut ranges = Vec::with_capacity(labels.len());
             for label in labels {
                 let range = of.as_ref().zip(elementary);
-                ranges.extend(range.and_then(|(of, elementary)| self.label(label, of, elementary)));
+                let range = range.and_then(|(of, elementary)| self.label(label, of, elementary));
+                if let Some(range) = range {
+                    self.told_before(&mut known, range, &label.first.span);
+                    ranges.push(range);
+                }
             }
             let body = self.block_of(statements);
             lowered.push(Case { ranges, body });
@@ -182,6 +193,26 @@ impl Lowering<'_> {
             value = reinterpret(value, as_integer(of));
         }
         Some(StatementKind::Case(value, lowered, otherwise))
+    }
+
+    /// Warns where a label of CASE has a value that one before it has.
+    fn told_before(&mut self, known: &mut Labels, (first, last): (i64, i64), span: &Span) {
+        let before = known.range(..=last).next_back();
+        let Some((_, (_, place))) = before.filter(|(_, (end, _))| *end >= first) else {
+            known.insert(first, (last, span.clone()));
+            return;
+        };
+        let value = match first == last {
+            true => format!("the value {first}"),
+            false => format!("a value of {first}..{last}"),
+        };
+        let message = format!("an earlier label of this CASE has {value}");
+        let found = Diagnostic::warning("U1036", message, span.clone())
+            .with_related(place.clone(), "the first one counts")
+            .with_help("give each value one label");
+        if !self.in_library() {
+            self.report(found);
+        }
     }
 
     fn label(&mut self, label: &Label, of: &Type, elementary: Elementary) -> Option<(i64, i64)> {

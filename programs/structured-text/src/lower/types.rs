@@ -22,11 +22,23 @@ pub(super) const DEFAULT_CAPACITY: u16 = 254;
 pub(super) struct Resolved {
     pub(super) of: Type,
     pub(super) image: Image,
+    /// The bounds of a subrange.
+    pub(super) range: Option<(i128, i128)>,
+}
+
+impl Resolved {
+    pub(super) fn new(of: Type, image: Image) -> Self {
+        Self {
+            of,
+            image,
+            range: None,
+        }
+    }
 }
 
 impl From<Type> for Resolved {
     fn from(of: Type) -> Self {
-        Self { of, image: zero() }
+        Self::new(of, zero())
     }
 }
 
@@ -214,8 +226,8 @@ impl<'a> Lowering<'a> {
         let mut image = Builder::default();
         image.set(0, elementary.bits(), low as u64);
         Some(Resolved {
-            of,
-            image: image.done(),
+            range: Some((low, high)),
+            ..Resolved::new(of, image.done())
         })
     }
 
@@ -274,10 +286,7 @@ impl<'a> Lowering<'a> {
                 image.put(at * stride, &array.element, &element.image);
             }
         }
-        Some(Resolved {
-            of,
-            image: image.done(),
-        })
+        Some(Resolved::new(of, image.done()))
     }
 
     fn structure_type(
@@ -332,10 +341,7 @@ impl<'a> Lowering<'a> {
                 unit: None,
             },
         );
-        Some(Resolved {
-            of: Type::Structure(id, slots as u32),
-            image,
-        })
+        Some(Resolved::new(Type::Structure(id, slots as u32), image))
     }
 
     pub(super) fn add_structure(
@@ -412,9 +418,9 @@ impl<'a> Lowering<'a> {
         let first = first.map_or(0, |(_, value)| *value);
         let mut image = Builder::default();
         image.set(0, elementary.bits(), first as u64);
-        Some(Resolved {
-            of: Type::Enumeration(id, elementary),
-            image: image.done(),
-        })
+        Some(Resolved::new(
+            Type::Enumeration(id, elementary),
+            image.done(),
+        ))
     }
 }

@@ -6,6 +6,7 @@ use roxmltree::Node;
 use understudy_ladder::Name;
 use understudy_text::Diagnostic;
 
+use super::macro_step::Ends;
 use super::read::Reader;
 use super::rungs::rung;
 use super::{
@@ -27,6 +28,7 @@ pub(super) fn graph(reader: &mut Reader, body: Node<'_, '_>, language: Language)
         objects: Vec::new(),
     };
     let mut rungs = 0;
+    let mut ends = Ends::default();
     for node in elements(body) {
         if graph.objects.len() >= MAXIMUM_OBJECTS {
             let message = format!("a body has more than {MAXIMUM_OBJECTS} objects");
@@ -37,10 +39,14 @@ pub(super) fn graph(reader: &mut Reader, body: Node<'_, '_>, language: Language)
             rungs += 1;
             rung(reader, node, rungs, &mut graph.objects);
         } else if let Some(object) = object(reader, node) {
-            graph.objects.push(object);
+            match node.tag_name().name() {
+                "macroStep" => ends.expand(reader, node, object, &mut graph.objects),
+                _ => graph.objects.push(object),
+            }
         }
     }
     unique(reader, &graph);
+    ends.connect(reader, &mut graph);
     graph
 }
 
@@ -155,7 +161,7 @@ fn object(reader: &mut Reader, node: Node<'_, '_>) -> Option<Object> {
                 .trim()
                 .to_owned(),
         ),
-        "step" => {
+        "step" | "macroStep" => {
             let initial = attribute(node, "initialStep")
                 .is_some_and(|value| matches!(value.as_str(), "true" | "1"));
             Kind::Step(reader.needed(node, "name")?, initial)
@@ -170,7 +176,6 @@ fn object(reader: &mut Reader, node: Node<'_, '_>) -> Option<Object> {
         "label" => Kind::Label(reader.needed(node, "label")?),
         "jump" => Kind::Jump(reader.needed(node, "label")?),
         "return" => Kind::Return,
-        "macroStep" => Kind::Other("a macro step"),
         "vendorElement" => Kind::Other("a vendor's element"),
         "error" => Kind::Other("an error mark"),
         _ => {

@@ -138,11 +138,11 @@ const KNOWN: [(&str, &str); 97] = [
     ),
     ("return", "localId executionOrderId|height width globalId"),
     ("rung", "localId|lineNumber"),
-    // Refused where objects are read.
     (
         "macroStep",
         "localId name|height width globalId executionOrderId",
     ),
+    // Refused where objects are read.
     (
         "vendorElement",
         "localId|height width globalId executionOrderId",
