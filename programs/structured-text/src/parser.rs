@@ -377,6 +377,10 @@ impl<'a> Parser<'a> {
 
     /// Reports the lexeme found in place of `what`; a lexeme that was reported already is not reported again.
     fn expected(&mut self, what: &str) {
+        self.expected_at(what, self.span());
+    }
+
+    fn expected_at(&mut self, what: &str, span: Span) {
         let found = match self.peek() {
             Lexeme::Faulty => return,
             Lexeme::End => "the end of the text".to_owned(),
@@ -385,11 +389,17 @@ impl<'a> Parser<'a> {
                 format!("`{}`", written.escape_debug())
             }
         };
-        self.error(
-            "U1034",
-            format!("expected {what}, found {found}"),
-            self.span(),
-        );
+        self.error("U1034", format!("expected {what}, found {found}"), span);
+    }
+
+    /// Reports a word or sign that is missing: at the end of the line before, where the text goes on with a new line, unless it `begins` one itself.
+    /// Whether it was missing there.
+    fn missing(&mut self, what: &str, begins: bool) -> bool {
+        let at_end = self.placed().starts_line && *self.peek() != Lexeme::Faulty && !begins;
+        let end = self.end();
+        let span = if at_end { end..end } else { self.span() };
+        self.expected_at(&format!("`{what}`"), span);
+        at_end
     }
 
     fn need_end(&mut self, what: &str) {
@@ -409,7 +419,7 @@ impl<'a> Parser<'a> {
     fn need_word(&mut self, word: &str) -> bool {
         let found = self.take_word(word);
         if !found {
-            self.expected(&format!("`{word}`"));
+            self.missing(word, word.starts_with("END_"));
         }
         found
     }
@@ -420,19 +430,9 @@ impl<'a> Parser<'a> {
         if self.take_sign(";") {
             return;
         }
-        if self.placed().starts_line && *self.peek() != Lexeme::Faulty {
-            let end = self.end();
-            let found = self.written().chars().take(60).collect::<String>();
-            let found = match self.at_end() {
-                true => "the end of the text".to_owned(),
-                false => format!("`{}`", found.escape_debug()),
-            };
-            let message = format!("expected `;`, found {found}");
-            self.error("U1034", message, end..end);
-            return;
+        if !self.missing(";", false) {
+            self.recover(ends);
         }
-        self.expected("`;`");
-        self.recover(ends);
     }
 
     /// An identifier.

@@ -38,7 +38,11 @@ impl Sampled {
         let mut seen = vec![None; questions.len()];
         let mut rows = Vec::with_capacity(SCANS);
         let mut mixed = 1_u64;
+        let mut open = questions.len();
         for number in 0..SCANS {
+            if open == 0 {
+                break;
+            }
             for [input] in &mut inputs {
                 *input ^= flips(&mut mixed);
             }
@@ -51,6 +55,7 @@ impl Sampled {
                         scan: number,
                         run: runs.trailing_zeros() as usize,
                     });
+                    open -= usize::from(seen.is_some());
                 }
             }
         }

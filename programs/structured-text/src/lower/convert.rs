@@ -293,7 +293,12 @@ impl Lowering<'_> {
                 } else {
                     &wanted
                 };
-                format!("write {found}_TO_{wanted}(…)")
+                match wanted {
+                    "BOOL" => {
+                        format!("compare it, such as `… > 0`, or write {found}_TO_BOOL(…)")
+                    }
+                    _ => format!("write {found}_TO_{wanted}(…)"),
+                }
             }
             Type::Elementary(of) if of.is_time() => "write a unit, such as T#500ms".to_owned(),
             Type::Elementary(of) if found.starts_with("STRING") => {

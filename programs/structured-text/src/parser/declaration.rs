@@ -1,5 +1,7 @@
 //! Blocks of variables.
 
+use understudy_text::Diagnostic;
+
 use super::Parser;
 use crate::lexer::Lexeme;
 use crate::syntax::{Class, Declaration, Name};
@@ -205,6 +207,12 @@ impl Parser<'_> {
             if matches!(self.peek(), Lexeme::Word(_)) || self.at_quoted_name() {
                 let help = "assign the parts of the other variable one by one";
                 self.refuse("variables in the place of others are", span, Some(help));
+            } else if self.at_sign(":") || self.at_sign(",") {
+                let message = "AT is a word of the language, not the name of a variable";
+                let help = "rename the variable";
+                let word = self.end() - "AT".len()..self.end();
+                let found = Diagnostic::error("U1034", message, word).with_help(help);
+                self.diagnostics.push(found);
             } else {
                 self.expected("an address such as %IX0.0");
             }
