@@ -96,7 +96,7 @@ fn nearest_file(path: &Path) -> Option<PathBuf> {
 /// # Errors
 /// If the file cannot be read, is no program or has errors.
 pub(crate) fn program(path: &Path, wanted: Wanted<'_>) -> Result<(Source, Report), Answer> {
-    let text = text_of(Kind::Ladder, path)?;
+    let text = text_of(Kind::Program, path)?;
     let name = path.display().to_string();
     // A Boolean program has stronger proofs than the same program with numbers.
     if wanted.program.is_none() {
@@ -127,7 +127,7 @@ pub(crate) fn program(path: &Path, wanted: Wanted<'_>) -> Result<(Source, Report
 /// # Errors
 /// If the file cannot be read, is not a ladder or has errors.
 pub fn ladder(path: &Path) -> Result<(Program, Report), Answer> {
-    let text = text_of(Kind::Ladder, path)?;
+    let text = text_of(Kind::Program, path)?;
     let name = path.display().to_string();
     let parsed = parse_program(&name, &text);
     let report = Report {

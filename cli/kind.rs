@@ -19,7 +19,7 @@ pub(crate) enum Kind {
     Net,
     Map,
     Ads,
-    Ladder,
+    Program,
     /// Neither the name nor the content determines the kind.
     Unknown,
 }
@@ -34,7 +34,7 @@ impl Kind {
         }
         if ending != "toml" {
             return match Format::of(&path.to_string_lossy(), text) {
-                Some(_) => Self::Ladder,
+                Some(_) => Self::Program,
                 None => Self::Unknown,
             };
         }
@@ -58,7 +58,7 @@ impl Kind {
             Self::Net => "net",
             Self::Map => "map",
             Self::Ads => "ADS",
-            Self::Ladder => "ladder",
+            Self::Program => "program",
             Self::Unknown => "unknown",
         }
     }
@@ -72,7 +72,7 @@ impl Kind {
             Self::Net => "a Petri net",
             Self::Map => "a signal map",
             Self::Ads => "a TCT automaton",
-            Self::Ladder => "a ladder",
+            Self::Program => "a program",
             Self::Unknown => "a file of unknown format",
         }
     }
@@ -93,10 +93,10 @@ pub(crate) fn expect(wanted: Kind, path: &Path, text: &str) -> Result<(), Answer
         (Kind::Cluster, Kind::Scenario) => {
             "give a scenario to `lab` and `simulate` by --scenario, after the cluster file"
         }
-        (Kind::Cluster, Kind::Ladder) => {
+        (Kind::Cluster, Kind::Program) => {
             "a cluster file names programs by `ladder = \"FILE\"`; `understudy init` writes a first one"
         }
-        (Kind::Ladder, Kind::Cluster) => "name one of its ladder programs",
+        (Kind::Program, Kind::Cluster) => "name one of its programs",
         (Kind::Cluster, _) => "`understudy init` writes a first one",
         _ => "`understudy check` reports the kind of a file and its errors",
     };
@@ -129,7 +129,7 @@ mod tests {
         check(Kind::Cluster, "empty.toml", "", true);
         check(Kind::Cluster, "a.scl", "", false);
         check(Kind::Cluster, "a.txt", "program a\n", false);
-        check(Kind::Ladder, "a.clp", "_FILES_CLASSICLADDER\n", true);
+        check(Kind::Program, "a.clp", "_FILES_CLASSICLADDER\n", true);
         check(Kind::Scenario, "a.toml", scenario, true);
         check(Kind::Scenario, "a.toml", cluster, false);
         check(Kind::Scenario, "empty.toml", "", true);

@@ -39,7 +39,7 @@ The programs of a cluster are checked with it. Names in a scenario are checked a
 cluster.toml in its folder. Ladder programs are also checked for rungs without effect, coils with conflicting values in one scan, and
 sequence steps that are passed in one scan; `understudy verify` shows example runs. Warnings do not change the exit status.")]
 pub(crate) struct Arguments {
-    /// Ladder programs (.ladder), TCT automata (.ADS), and clusters, scenarios, models, nets, signal maps and projects (.toml)
+    /// Programs (.ladder, .st, .xml and others), TCT automata (.ADS), and clusters, scenarios, models, nets, signal maps and projects (.toml)
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
     /// The program to check in a text with several programs and no configuration
@@ -150,7 +150,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
                 found.add_file(Kind::Map, path, text, diagnostics);
             }
             Kind::Model => found.add_model(path),
-            Kind::Ladder => {
+            Kind::Program => {
                 let name = path.display().to_string();
                 let wanted = Wanted {
                     period: Some(PERIOD),
@@ -172,7 +172,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
                     }
                     Some(Source::Ladder(_)) | None => {}
                 }
-                found.add_file(Kind::Ladder, path, text, diagnostics);
+                found.add_file(Kind::Program, path, text, diagnostics);
             }
             Kind::Unknown => {
                 let diagnostics = vec![unknown_form(&text)];
@@ -280,7 +280,7 @@ impl Found<'_> {
     /// Reports on a file and the ladders that it names.
     fn add_with_ladders(&mut self, kind: Kind, reports: Vec<Report>) {
         for (index, report) in reports.into_iter().enumerate() {
-            self.add(if index == 0 { kind } else { Kind::Ladder }, report);
+            self.add(if index == 0 { kind } else { Kind::Program }, report);
         }
     }
 

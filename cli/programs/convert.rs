@@ -82,7 +82,7 @@ impl Form {
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let source = match arguments.from {
         Some(_) => files::text(&arguments.from_file)?,
-        None => files::text_of(Kind::Ladder, &arguments.from_file)?,
+        None => files::text_of(Kind::Program, &arguments.from_file)?,
     };
     let name = arguments.from_file.display().to_string();
     let form = arguments.from.map(Form::format);

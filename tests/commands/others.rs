@@ -265,7 +265,7 @@ fn a_file_in_the_wrong_place_is_named_with_the_way_out() {
         "U0616",
         "understudy init",
     );
-    check(&["draw", cell], "U0616", "one of its ladder programs");
+    check(&["draw", cell], "U0616", "one of its programs");
     check(&["synth", cell], "U0616", "a model of plants");
     check(&["petri", "bounds", cell], "U0616", "a Petri net");
     check(&["reconfigure", cell], "U0616", "a reconfiguration project");

@@ -9,7 +9,7 @@ use crate::kind::Kind;
 pub(super) fn after_check(answer: Answer, given: &[(Kind, &Path)]) -> Answer {
     let all = |wanted| given.iter().filter(move |(kind, _)| *kind == wanted);
     let first = |wanted| all(wanted).map(|(_, path)| *path).next();
-    let ladders: Vec<&Path> = all(Kind::Ladder).map(|(_, path)| *path).collect();
+    let ladders: Vec<&Path> = all(Kind::Program).map(|(_, path)| *path).collect();
     match (first(Kind::Cluster), first(Kind::Scenario)) {
         (Some(cluster), Some(scenario)) => answer
             .and_next(&[&"simulate", &cluster, &"--scenario", &scenario])

@@ -107,7 +107,7 @@ impl Found {
         let path = &source.path;
         let read = files::bytes(path).and_then(|bytes| {
             let text = files::decoded(path, bytes.clone())?;
-            kind::expect(Kind::Ladder, path, &text)?;
+            kind::expect(Kind::Program, path, &text)?;
             Ok((bytes, text))
         });
         let (bytes, text) = match read {
