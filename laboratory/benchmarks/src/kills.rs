@@ -165,6 +165,8 @@ struct Row {
     by_stall: u64,
     /// Whether the run was complete and met what was expected.
     passed: bool,
+    /// What was expected and not found, with what was found.
+    not_met: Vec<String>,
 }
 
 impl Row {
@@ -176,6 +178,7 @@ impl Row {
         summary: &Summary,
     ) -> Self {
         let total = summary.total();
+        let not_met = summary.expectations.iter().filter(|it| !it.met);
         Self {
             link: summary.circumstances.link.clone(),
             directory: cell.path().display().to_string(),
@@ -188,6 +191,9 @@ impl Row {
             missed: total.missed,
             by_stall: total.held_by_stall + total.fail_safe_by_stall,
             passed: summary.passed,
+            not_met: not_met
+                .map(|it| format!("{}: {}", it.expected, it.found))
+                .collect(),
         }
     }
 }
@@ -248,6 +254,9 @@ fn answer(rows: &[Row]) -> Answer {
             row.by_stall,
             if row.passed { "" } else { "  FAILED" }
         );
+        for reason in &row.not_met {
+            let _ = writeln!(text, "    not met: {reason}");
+        }
     }
     text.push_str(
         "cycles over all remote I/Os; a remote I/O that is down does not drive its plant\n",
