@@ -26,6 +26,8 @@ struct Holder {
     recalled: Option<Recalled>,
     /// Cycles since it was received; `u32::MAX` for never.
     silent: u32,
+    /// Cycles since any frame of it came, one that was too late for its cycle too; `u32::MAX` for never.
+    unheard: u32,
 }
 
 impl Holders {
@@ -44,6 +46,7 @@ impl Holders {
                 holding: None,
                 recalled: None,
                 silent: u32::MAX,
+                unheard: u32::MAX,
             })
             .collect();
         Self {
@@ -75,11 +78,30 @@ impl Holders {
         }
     }
 
+    /// Takes a sign of life: any frame, and the state that it names if it was too late for its cycle.
+    pub(crate) fn hear(&mut self, station: StationId, holding: Option<&Holding>) {
+        let living_for = self.living_for;
+        let mut entries = self.entries.iter_mut();
+        if let Some(entry) = entries.find(|entry| entry.station == station) {
+            entry.unheard = 0;
+            if entry.silent > living_for && holding.is_some() {
+                entry.holding = holding.copied();
+            }
+        }
+    }
+
+    /// Whether a station that may hold a state gives signs of life, even if none is in time: a cold start would lose that state.
+    pub(crate) fn may_hold(&self) -> bool {
+        let mut entries = self.entries.iter();
+        entries.any(|entry| entry.unheard <= self.living_for && entry.holding.is_some())
+    }
+
     /// Ends a cycle.
     pub(crate) fn close_cycle(&mut self) {
         self.listened = self.listened.saturating_add(1);
         for entry in &mut self.entries {
             entry.silent = entry.silent.saturating_add(1);
+            entry.unheard = entry.unheard.saturating_add(1);
         }
     }
 

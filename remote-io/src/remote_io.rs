@@ -211,10 +211,17 @@ impl RemoteIo {
             _ => return,
         };
         match self.member.arrival(now, frame) {
-            Arrival::Stale => return,
+            Arrival::Stale => {
+                if self.member.admits(&frame.header) {
+                    self.holders
+                        .hear(station, own_holding(&frame.body, self.settings.program));
+                }
+                return;
+            }
             Arrival::Present => {}
             Arrival::Begins(anchor) => self.begin_cycle(now, frame.header.moment, anchor),
         }
+        self.holders.hear(station, None);
         match &frame.body {
             Body::Turn(turn) if self.member.attendance.receive_turn(station) => {
                 self.note(station, &turn.holdings, &turn.recalled);
@@ -322,6 +329,15 @@ impl RemoteIo {
         self.deadline = Deadline::Passed {
             idle: idle.saturating_add(1).saturating_add(passed),
         };
+    }
+}
+
+/// The state of a program that the sender of a frame says it holds.
+fn own_holding(body: &Body, program: ProgramId) -> Option<&Holding> {
+    match body {
+        Body::Turn(turn) => Holding::of(&turn.holdings, program),
+        Body::Join(join) => Holding::of(&join.holdings, program),
+        _ => None,
     }
 }
 

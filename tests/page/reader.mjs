@@ -85,6 +85,7 @@ async function watch() {
   await until("a timer that runs", `/^[1-9]\\d* ms$/.test(document.querySelector('[data-signal="0.state.lap.time"]')?.dataset.value)`);
   await picture("watch");
   await accessible("watch", axe);
+  await until("the address", `location.hash.includes("signals=0.state.laps,0.state.lap.time,0.state.holding,0.input.3,1.output.0")`);
   await call("Page.reload");
   await until("the same table", `${rows("watch-table")}.length === 5 && document.querySelector('[data-signal="0.state.holding"]').dataset.value !== undefined`);
   await click("#back");

@@ -164,3 +164,36 @@ proptest! {
         check(mode, understudies, &troubles, network, seed);
     }
 }
+
+/// On a network that delays frames by up to two cycles, every turn of the one station that holds the state comes too late, while an understudy
+/// without a state is received.
+#[test]
+fn a_state_whose_station_is_late_is_not_lost() {
+    let crash = |rank, ends, at_cycle, phase, cycles| Trouble {
+        member: Member::Station(StationId(rank)),
+        begins: Action::Crash,
+        ends: Some(ends),
+        at_cycle,
+        phase,
+        cycles,
+    };
+    let troubles = [
+        crash(2, Action::Restart, 42, 0.6932735763821679, 12),
+        crash(3, Action::RestartInEpoch { epoch: 0 }, 31, 0.0, 70),
+        Trouble {
+            member: Member::Station(StationId(0)),
+            begins: Action::Replay { age: 1 },
+            ends: None,
+            at_cycle: 52,
+            phase: 0.36283512961119024,
+            cycles: 0,
+        },
+    ];
+    let network = Network {
+        jitter: Duration::from_micros(22_099),
+        loss: 0.14757381049998938,
+        duplicate: 0.1218262537843947,
+        ..Network::default()
+    };
+    check(Mode::Full, 2, &troubles, network, 7891165348679592666);
+}

@@ -2,7 +2,8 @@
 //! history.
 //!
 //! ```text
-//!   no living station holds a state ───────────────────── cold start
+//!   no living station holds a state, and none that comes
+//!   too late in each cycle ────────────────────────────── cold start
 //!   a state at the floor, or one that covers it ────────── adopted
 //!   different states of one cycle after a restart ──────── the operator chooses (`release`)
 //!   only states before the floor, or none that provably
@@ -82,6 +83,8 @@ impl RemoteIo {
         match self.verdict() {
             // The operator has been asked: a state that is not received for a moment is no reason to start cold.
             Verdict::Cold if self.question == Some(Question::StateLost) => {}
+            // Nor is one whose station is received too late in each cycle.
+            Verdict::Cold if self.holders.may_hold() => {}
             Verdict::Cold => self.start(moment, None),
             Verdict::Adopt(from, holding) => self.start(moment, Some((from, holding))),
             Verdict::Disputed(stations) => {
