@@ -34,7 +34,7 @@ pub enum Action {
         /// The epoch.
         epoch: u64,
     },
-    /// It starts again with another configuration, as after a wrong download: it and the others refuse each other.
+    /// It starts again with a configuration of its own, as after a wrong download: it and all others refuse each other.
     RestartMisconfigured,
     /// It stands still, and frames wait for it (SIGSTOP).
     Stop,

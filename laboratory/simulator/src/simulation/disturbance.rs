@@ -84,7 +84,7 @@ impl Simulation {
 
     fn restart(&mut self, member: Member, action: Action) {
         let agreed = |agreement: &Arc<Agreement>| match action {
-            Action::RestartMisconfigured => Arc::new(misconfigured(agreement)),
+            Action::RestartMisconfigured => Arc::new(misconfigured(agreement, member)),
             _ => Arc::clone(agreement),
         };
         match member {
@@ -125,9 +125,15 @@ impl Simulation {
     }
 }
 
-fn misconfigured(agreement: &Agreement) -> Agreement {
+/// A configuration that no other member has. Two members of one wrong configuration would be a cluster of their own, whose outputs the right one
+/// cannot know of (`Holders::covers_all_applied` says what remains).
+fn misconfigured(agreement: &Agreement, member: Member) -> Agreement {
+    let number = match member {
+        Member::Station(station) => (u64::from(station.0) + 1) << 8,
+        Member::RemoteIo(program) | Member::Plant(program) => u64::from(program.0),
+    };
     Agreement {
-        configuration: ConfigurationHash(!agreement.configuration.0),
+        configuration: ConfigurationHash(!agreement.configuration.0 ^ number),
         ..agreement.clone()
     }
 }
