@@ -20,7 +20,7 @@ Example:
   understudy draw level.xml --as svg --output level.svg
   understudy draw level.st --as fbd --output level.svg
 
-A program with numbers is drawn in its own language: function blocks as networks, a sequence as a chart. Structured Text and instruction lists are listed; `--as fbd` draws statements as function blocks. As text, a program with numbers is Structured Text.")]
+A program with numbers is drawn in its own language: a ladder with its boxes, function blocks as networks, a sequence as a chart. Structured Text and instruction lists are listed; `--as fbd` draws statements as function blocks. As text, a program with numbers is Structured Text.")]
 pub(crate) struct Arguments {
     /// Program
     #[arg(value_name = "FILE")]

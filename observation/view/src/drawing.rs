@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use understudy_diagram::Picture;
-use understudy_diagram::blocks::{Kind, Network};
+use understudy_diagram::blocks::{Coil, Contacts, Kind, Network};
 use understudy_diagram::chart::Chart;
 use understudy_interchange::{Bodies, DrawnBody, drawn_units};
 use understudy_text::Lines;
@@ -51,7 +51,7 @@ impl Model {
                 .map(|trace| Scan::new(typed, trace, &unit.name));
             if let Some(scan) = scan {
                 match &mut unit.body {
-                    DrawnBody::Blocks(networks) => {
+                    DrawnBody::Networks(networks) => {
                         let mut networks = networks.iter_mut();
                         networks.by_ref().for_each(|it| scan.network(it, &lines));
                     }
@@ -125,7 +125,11 @@ impl<'t> Scan<'t> {
                 }
             ) && object.inputs.iter().all(|input| input.name == "EN");
             object.executed = (!is_silent).then_some(!done.is_empty());
-            match &object.kind {
+            match &mut object.kind {
+                Kind::Contacts(contacts) => contacts.each(&mut |name, value| {
+                    let read = self.read(name, done);
+                    *value = read.as_deref().and_then(power);
+                }),
                 Kind::Value(text) => {
                     let value = self.read(text, done);
                     object.outputs[0].value = value.filter(|_| is_name(text));
@@ -143,6 +147,22 @@ impl<'t> Scan<'t> {
             }
         }
         self.results(network, lines);
+        for at in 0..network.objects.len() {
+            let object = &network.objects[at];
+            let Kind::Contacts(contacts) = &object.kind else {
+                continue;
+            };
+            let inputs = object.inputs.iter().filter_map(|input| input.from);
+            let inputs = inputs.map(|(from, output)| {
+                let value = &network.objects[from].outputs[output].value;
+                value.as_deref().and_then(power)
+            });
+            let passes = contacts.passes(&inputs.collect::<Vec<_>>());
+            let value = passes.map(|passes| if passes { "TRUE" } else { "FALSE" });
+            if object.executed.is_some() {
+                network.objects[at].outputs[0].value = value.map(str::to_owned);
+            }
+        }
     }
 
     /// What a statement read of a variable; where it was not executed, the variable at the end of the scan.
@@ -166,7 +186,7 @@ impl<'t> Scan<'t> {
             let done = self.lines.get(&line).map_or(&[][..], Vec::as_slice);
             for input in object.inputs.iter().filter(|input| input.name != "EN") {
                 let assigned = match &object.kind {
-                    Kind::Target(name) => name.clone(),
+                    Kind::Target(name) | Kind::Coil(name, Coil::Plain) => name.clone(),
                     Kind::Block {
                         instance: Some(instance),
                         ..
@@ -212,10 +232,11 @@ fn fill(
     let Some((done, of, value)) = assigned else {
         return;
     };
-    if !matches!(
+    let is_made = matches!(
         network.objects[object].kind,
-        Kind::Block { instance: None, .. }
-    ) {
+        Kind::Block { instance: None, .. } | Kind::Contacts(_)
+    );
+    if !is_made {
         return;
     }
     for (at, made) in matched(network, object, &done.results).unwrap_or_default() {
@@ -237,6 +258,15 @@ fn is_name(text: &str) -> bool {
         .next()
         .is_some_and(|it| it.is_alphabetic() || it == '_' || it == '%');
     first && letters.all(|it| it.is_alphanumeric() || it == '_' || it == '.')
+}
+
+/// A value as power.
+fn power(value: &str) -> Option<bool> {
+    match value {
+        "TRUE" => Some(true),
+        "FALSE" => Some(false),
+        _ => None,
+    }
 }
 
 /// A value written out.
@@ -275,7 +305,8 @@ impl Matching<'_> {
         let object = &network.objects[at];
         let of = match &object.kind {
             Kind::Value(text) => return (is_name(text) || is_literal(text)).then_some(()),
-            Kind::Target(_) => return None,
+            Kind::Contacts(contacts) => return self.contacts(contacts, at),
+            Kind::Target(_) | Kind::Coil(..) => return None,
             Kind::Block {
                 instance: Some(_), ..
             } => return Some(()),
@@ -322,6 +353,26 @@ impl Matching<'_> {
             _ => return None,
         };
         self.found.push((at, last));
+        Some(())
+    }
+
+    /// Contacts in series and in parallel are AND and OR.
+    fn contacts(&mut self, contacts: &Contacts, at: usize) -> Option<()> {
+        let (all, word) = match contacts {
+            Contacts::Contact { .. } => return Some(()),
+            Contacts::Power(input) => {
+                let (from, _) = self.network.objects[at].inputs.get(*input)?.from?;
+                return self.object(from);
+            }
+            Contacts::Series(all) => (all, "AND"),
+            Contacts::Parallel(all) => (all, "OR"),
+        };
+        for (number, one) in all.iter().enumerate() {
+            self.contacts(one, at)?;
+            if number > 0 {
+                self.take(word)?;
+            }
+        }
         Some(())
     }
 

@@ -1,7 +1,11 @@
 //! Networks of function blocks.
 
+mod contacts;
 mod layout;
 
+pub(crate) use contacts::BARS;
+pub use contacts::{BRANCH, CONTACT_HEAD, CONTACT_ROW, Contacts};
+pub(crate) use layout::COIL;
 pub use layout::{BlockPlan, Placed, Wire, lay_out};
 
 /// What is connected, and perhaps one scan of it.
@@ -38,6 +42,10 @@ pub enum Kind {
     Value(String),
     /// A variable that is assigned. It has one input.
     Target(String),
+    /// A variable that a ladder assigns. It has one input.
+    Coil(String, Coil),
+    /// Contacts of a ladder. They have one output.
+    Contacts(Contacts),
     /// A function, or an instance of a function block.
     Block {
         /// Its type.
@@ -45,6 +53,29 @@ pub enum Kind {
         /// The name of the instance.
         instance: Option<String>,
     },
+}
+
+/// What a coil does with the power.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Coil {
+    /// Its variable is what the power is.
+    Plain,
+    /// Its variable is the opposite.
+    Negated,
+    /// The power makes its variable TRUE.
+    Set,
+    /// The power makes its variable FALSE.
+    Reset,
+}
+
+impl Kind {
+    /// The variable that is assigned.
+    pub fn target(&self) -> Option<&str> {
+        match self {
+            Self::Target(name) | Self::Coil(name, _) => Some(name),
+            _ => None,
+        }
+    }
 }
 
 /// An input of a part.
@@ -78,18 +109,21 @@ impl Network {
     }
 
     /// Adds a variable that is assigned; its place.
-    pub fn target(
-        &mut self,
-        text: impl Into<String>,
-        from: (usize, usize),
-        negated: bool,
-    ) -> usize {
+    pub fn target(&mut self, text: impl Into<String>, from: (usize, usize)) -> usize {
+        self.assigned(Kind::Target(text.into()), from)
+    }
+
+    /// Adds a coil; its place.
+    pub fn coil(&mut self, text: impl Into<String>, kind: Coil, from: (usize, usize)) -> usize {
+        self.assigned(Kind::Coil(text.into(), kind), from)
+    }
+
+    fn assigned(&mut self, kind: Kind, from: (usize, usize)) -> usize {
         let input = Input {
-            name: String::new(),
-            negated,
             from: Some(from),
+            ..Input::default()
         };
-        self.add(Kind::Target(text.into()), vec![input], Vec::new())
+        self.add(kind, vec![input], Vec::new())
     }
 
     /// Adds a part; its place.

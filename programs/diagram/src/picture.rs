@@ -4,7 +4,9 @@ use std::fmt::Write as _;
 
 use understudy_text::markup::escaped;
 
-use crate::blocks::{self, BlockPlan, Kind, Network};
+use crate::blocks::{
+    self, BARS, BRANCH, BlockPlan, CONTACT_HEAD, CONTACT_ROW, Coil, Contacts, Kind, Network,
+};
 use crate::chart::{self, Chart, Part};
 use crate::{CHARACTER, Place, Point, width};
 
@@ -92,12 +94,7 @@ impl Picture {
         for wire in &plan.wires {
             let (from, output) = wire.from;
             let value = network.objects[from].outputs[output].value.as_deref();
-            let class = match value {
-                Some("TRUE") => "live",
-                Some("FALSE") => "wire",
-                _ => "data",
-            };
-            self.line(class, &wire.points);
+            self.line(class_of_wire(power(value)), &wire.points);
         }
         for place in 0..network.objects.len() {
             self.object(network, &plan, place);
@@ -127,6 +124,23 @@ impl Picture {
                 }
                 self.bubbles(network, plan, at);
             }
+            Kind::Contacts(contacts) => {
+                let powers = object.inputs.iter().map(|input| {
+                    let (from, output) = input.from?;
+                    power(network.objects[from].outputs[output].value.as_deref())
+                });
+                let powers: Vec<Option<bool>> = powers.collect();
+                // The rail has power, which is shown where a scan is.
+                let is_scan = object.outputs.iter().any(|output| output.value.is_some());
+                let (x, y) = (place.x, place.y + CONTACT_HEAD);
+                if powers.is_empty() {
+                    let ends = [place.y, place.bottom()].map(|y| Point { x, y });
+                    self.line("bar", &ends);
+                }
+                let inputs = Inputs { x, powers };
+                self.contacts(contacts, Point { x, y }, is_scan.then_some(true), &inputs);
+            }
+            Kind::Coil(name, kind) => self.coil(name, *kind, place),
             Kind::Block { of, instance } => {
                 self.rectangle("box", place);
                 self.centred("title", place.middle(), place.y + LINE / 2 + 1, of);
@@ -150,6 +164,101 @@ impl Picture {
         if idle {
             self.body.push_str("</g>\n");
         }
+    }
+
+    /// Contacts behind a point, with the power there; the power behind them.
+    fn contacts(
+        &mut self,
+        contacts: &Contacts,
+        from: Point,
+        before: Option<bool>,
+        inputs: &Inputs,
+    ) -> Option<bool> {
+        let after = contacts.behind(before, &inputs.powers);
+        let to = from.x + contacts.width();
+        match contacts {
+            Contacts::Power(_) => self.wire(after, from.y, inputs.x, from.x),
+            Contacts::Contact {
+                name,
+                negated,
+                value,
+            } => {
+                let middle = (from.x + to) / 2;
+                let (left, right) = (middle - BARS / 2, middle + BARS / 2);
+                self.wire(before, from.y, from.x, left);
+                self.wire(after, from.y, right, to);
+                let is_closed = value.is_some_and(|value| value != *negated);
+                let class = if is_closed { "live" } else { "bar" };
+                let upright = |x| {
+                    [-9, 9].map(|down| Point {
+                        x,
+                        y: from.y + down,
+                    })
+                };
+                self.line(class, &upright(left));
+                self.line(class, &upright(right));
+                if *negated {
+                    let [begin, end] = [(left, 9), (right, -9)].map(|(x, down)| Point {
+                        x,
+                        y: from.y + down,
+                    });
+                    self.line(class, &[begin, end]);
+                }
+                self.centred("name", middle, from.y - LINE, name);
+            }
+            Contacts::Series(all) if all.is_empty() => self.wire(before, from.y, from.x, to),
+            Contacts::Series(all) => {
+                let mut at = (from.x, before);
+                for contacts in all {
+                    let power = self.contacts(contacts, Point { x: at.0, ..from }, at.1, inputs);
+                    at = (at.0 + contacts.width(), power);
+                }
+            }
+            Contacts::Parallel(all) => {
+                let is_fed = !contacts.inputs(0).is_empty();
+                let (mut row, mut last) = (from.y, from.y);
+                for branch in all {
+                    let x = from.x + BRANCH;
+                    if !is_fed {
+                        self.wire(before, row, from.x, x);
+                    }
+                    let power = self.contacts(branch, Point { x, y: row }, before, inputs);
+                    self.wire(power, row, x + branch.width(), to);
+                    last = row;
+                    row += branch.rows() * CONTACT_ROW;
+                }
+                let upright = |x| [from.y, last].map(|y| Point { x, y });
+                if !is_fed {
+                    self.line(class_of_wire(before), &upright(from.x));
+                }
+                self.line(class_of_wire(after), &upright(to));
+            }
+        }
+        after
+    }
+
+    fn wire(&mut self, power: Option<bool>, y: i64, from: i64, to: i64) {
+        self.line(class_of_wire(power), &[from, to].map(|x| Point { x, y }));
+    }
+
+    fn coil(&mut self, name: &str, kind: Coil, place: Place) {
+        let y = place.y + place.height / 2;
+        let (left, right) = (place.x, place.x + BARS + 10);
+        let (top, bottom) = (y - 9, y + 9);
+        let (out, back) = (left - 2, right + 2);
+        let (bow_left, bow_right) = (left + 6, right - 6);
+        let _ = writeln!(
+            self.body,
+            r#"<path class="bar" d="M{bow_left} {top}Q{out} {y} {bow_left} {bottom}M{bow_right} {top}Q{back} {y} {bow_right} {bottom}"/>"#
+        );
+        let sign = match kind {
+            Coil::Plain => "",
+            Coil::Negated => "/",
+            Coil::Set => "S",
+            Coil::Reset => "R",
+        };
+        self.centred("title", (left + right) / 2, y, sign);
+        self.text("name", place.x + blocks::COIL, y, name);
     }
 
     /// The circles of inputs that take the opposite.
@@ -312,6 +421,29 @@ impl Picture {
             escaped(title),
             self.body
         )
+    }
+}
+
+/// What comes into an object of contacts.
+struct Inputs {
+    /// Where the object begins.
+    x: i64,
+    powers: Vec<Option<bool>>,
+}
+
+fn power(value: Option<&str>) -> Option<bool> {
+    match value? {
+        "TRUE" => Some(true),
+        "FALSE" => Some(false),
+        _ => None,
+    }
+}
+
+fn class_of_wire(power: Option<bool>) -> &'static str {
+    match power {
+        Some(true) => "live",
+        Some(false) => "wire",
+        None => "data",
     }
 }
 

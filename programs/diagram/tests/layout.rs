@@ -1,6 +1,6 @@
 //! Places of random networks and charts: no parts overlap, no wire crosses a part, and nothing is left out.
 
-use understudy_diagram::blocks::{Input, Kind, Network, Output};
+use understudy_diagram::blocks::{Coil, Contacts, Input, Kind, Network, Output};
 use understudy_diagram::chart::{Chart, Part, Step, Transition};
 use understudy_diagram::{Place, Point, blocks, chart};
 use understudy_testing::random::Dice;
@@ -38,10 +38,51 @@ fn block(network: &mut Network, dice: &mut Dice, depth: usize) -> usize {
     let object = network.add(Kind::Block { of, instance }, inputs, outputs);
     for output in 1..count {
         if dice.below(2) == 0 {
-            network.target("target", (object, output), false);
+            network.target("target", (object, output));
         }
     }
     object
+}
+
+/// Contacts in series and in parallel; all branches begin at an input of `inputs`, or all at the rail.
+fn contacts(dice: &mut Dice, depth: usize, is_fed: bool, inputs: &mut usize) -> Contacts {
+    let several = |dice: &mut Dice, fed: [bool; 2], inputs: &mut usize| {
+        let count = 2 + dice.below(2);
+        let all = (0..count).map(|at| contacts(dice, depth - 1, fed[at.min(1)], inputs));
+        all.collect::<Vec<_>>()
+    };
+    match dice.below(if depth == 0 { 1 } else { 4 }) {
+        1 => Contacts::Parallel(several(dice, [is_fed, is_fed], inputs)),
+        2 => Contacts::Series(several(dice, [is_fed, false], inputs)),
+        _ if is_fed => {
+            *inputs += 1;
+            Contacts::Power(*inputs - 1)
+        }
+        3 => Contacts::Series(Vec::new()),
+        _ => Contacts::Contact {
+            name: "c".repeat(1 + dice.below(12)),
+            negated: dice.below(2) == 0,
+            value: None,
+        },
+    }
+}
+
+/// Contacts that lead to a coil, some behind blocks.
+fn rung(network: &mut Network, dice: &mut Dice) {
+    let mut count = 0;
+    let is_fed = dice.below(2) == 0;
+    // An input alone is no object.
+    let first = contacts(dice, 3, is_fed, &mut count);
+    let behind = contacts(dice, 1, false, &mut count);
+    let contacts = Contacts::Series(vec![first, behind]);
+    let inputs = (0..count).map(|_| Input {
+        from: Some((block(network, dice, 2), 0)),
+        ..Input::default()
+    });
+    let inputs = inputs.collect();
+    let outputs = vec![Output::default()];
+    let object = network.add(Kind::Contacts(contacts), inputs, outputs);
+    network.coil("coil", Coil::Set, (object, 0));
 }
 
 /// The horizontal and vertical parts of a wire, as areas without width.
@@ -77,8 +118,12 @@ fn parts_of_networks_do_not_overlap_and_wires_do_not_cross() {
     for seed in 0..600 {
         let mut dice = Dice::new(seed);
         let mut network = Network::default();
-        let root = block(&mut network, &mut dice, 4);
-        network.target("result", (root, 0), false);
+        if seed % 2 == 0 {
+            let root = block(&mut network, &mut dice, 4);
+            network.target("result", (root, 0));
+        } else {
+            rung(&mut network, &mut dice);
+        }
         let plan = blocks::lay_out(&network, 20);
         let places: Vec<Place> = network
             .objects
@@ -173,7 +218,7 @@ fn a_value_of_the_scan_has_room_in_its_box() {
         let mut network = Network::default();
         let source = network.value("drain");
         network.objects[source].outputs[0].value = Some(value.to_owned());
-        network.target("outlet", (source, 0), false);
+        network.target("outlet", (source, 0));
         let plan = blocks::lay_out(&network, 0);
         let needed = 8 * i64::try_from(format!("drain {value}").len()).expect("short");
         assert!(plan.objects[source].place.width >= needed, "{plan:?}");

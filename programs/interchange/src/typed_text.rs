@@ -2,7 +2,7 @@
 //!
 //! Invariant: the text is the program. It is read back, and both are executed over scans with pseudo-random inputs: every output is the same.
 
-use std::collections::HashSet;
+use std::collections::HashMap;
 use std::time::Duration;
 
 use understudy_executable::{Executable, Interface, digest};
@@ -11,6 +11,7 @@ use understudy_structured_text::{control_blocks, parse, print};
 use understudy_text::{Diagnostic, Severity, has_errors};
 use understudy_typed::Program;
 
+use crate::diagrams::Style;
 use crate::format::Format;
 use crate::plcopen;
 use crate::source::Wanted;
@@ -57,11 +58,10 @@ pub fn typed_text(
             let title = main.map_or("project", Name::as_str);
             let drawn = match format {
                 Some(Format::PlcOpen) => plcopen::drawn_units(text),
-                _ => HashSet::new(),
+                _ => HashMap::new(),
             };
-            let as_blocks =
-                |unit: &Unit| bodies == Bodies::Blocks || drawn.contains(&unit.name.key());
-            let document = plcopen::write_typed(&file, title, &as_blocks);
+            let style = |unit: &Unit| bodies.style(drawn.get(&unit.name.key()).copied());
+            let document = plcopen::write_typed(&file, title, &style);
             let document = document.map_err(WriteError::NotHeld)?;
             losses.extend(in_text(&document.as_text));
             document.text
@@ -104,11 +104,18 @@ pub(crate) fn parsed(name: &str, text: &str) -> Option<(File, Vec<Diagnostic>)> 
 /// What statements are written as, where the form has several languages.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Bodies {
-    /// What was read: drawn networks as function blocks, all else as text.
+    /// What was read: ladders, function blocks or text.
     #[default]
     AsRead,
-    /// Function blocks, as far as networks hold the statements.
+    /// Text as function blocks, as far as networks hold the statements; all else as it was read.
     Blocks,
+}
+
+impl Bodies {
+    /// What a body is drawn as that was drawn as `read`; nothing for text.
+    pub(crate) fn style(self, read: Option<Style>) -> Option<Style> {
+        read.or((self == Self::Blocks).then_some(Style::Blocks))
+    }
 }
 
 /// The finding on bodies that are not networks.
@@ -125,9 +132,8 @@ fn in_text(reasons: &[String]) -> Option<Diagnostic> {
     if let Some(more @ 1..) = reasons.len().checked_sub(8) {
         listed = format!("{listed} and {more} more");
     }
-    let message = format!(
-        "PLCopen XML has these bodies as Structured Text, not as function blocks: {listed}"
-    );
+    let message =
+        format!("PLCopen XML has these bodies as Structured Text, not as networks: {listed}");
     Some(Diagnostic::warning("U1018", message, 0..0))
 }
 

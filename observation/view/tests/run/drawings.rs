@@ -78,16 +78,40 @@ PROGRAM gate
 END_PROGRAM
 ";
 
-fn cluster() -> Cluster {
+/// A ladder: `speed > 40` and the contact `run` lead to the coil `late`, and the contact of NOT `run` to the coil `idle`.
+const RUNGS: &str = r#"<project xmlns="http://www.plcopen.org/xml/tc6_0201"><types><dataTypes/><pous><pou name="rungs" pouType="program">
+<interface><inputVars><variable name="speed"><type><INT/></type></variable><variable name="run"><type><BOOL/></type></variable></inputVars>
+<outputVars><variable name="y"><type><INT/></type></variable><variable name="late"><type><BOOL/></type></variable>
+<variable name="n"><type><INT/></type></variable><variable name="rest"><type><REAL/></type></variable>
+<variable name="idle"><type><BOOL/></type></variable></outputVars></interface><body><LD>
+<leftPowerRail localId="1"><position x="0" y="0"/><connectionPointOut formalParameter=""/></leftPowerRail>
+<inVariable localId="2"><position x="20" y="20"/><connectionPointOut/><expression>speed</expression></inVariable>
+<inVariable localId="3"><position x="20" y="40"/><connectionPointOut/><expression>40</expression></inVariable>
+<block localId="4" typeName="GT"><position x="60" y="0"/><inputVariables>
+<variable formalParameter="IN1"><connectionPointIn><connection refLocalId="2"/></connectionPointIn></variable>
+<variable formalParameter="IN2"><connectionPointIn><connection refLocalId="3"/></connectionPointIn></variable></inputVariables><inOutVariables/>
+<outputVariables><variable formalParameter="OUT"><connectionPointOut/></variable></outputVariables></block>
+<contact localId="5" negated="false"><position x="140" y="20"/><connectionPointIn><connection refLocalId="4" formalParameter="OUT"/></connectionPointIn>
+<connectionPointOut/><variable>run</variable></contact>
+<coil localId="6" negated="false"><position x="200" y="20"/><connectionPointIn><connection refLocalId="5"/></connectionPointIn>
+<connectionPointOut/><variable>late</variable></coil>
+<contact localId="7" negated="true"><position x="140" y="100"/><connectionPointIn><connection refLocalId="1"/></connectionPointIn>
+<connectionPointOut/><variable>run</variable></contact>
+<coil localId="8" negated="false"><position x="200" y="100"/><connectionPointIn><connection refLocalId="7"/></connectionPointIn>
+<connectionPointOut/><variable>idle</variable></coil>
+</LD></body></pou></pous></types><instances><configurations/></instances></project>"#;
+
+fn cluster(text: &str) -> Cluster {
     let loaded = read_with(
         "cluster.toml",
-        CLUSTER,
+        text,
         Overrides::default(),
         &mut |name| match name {
             "blocks.st" => Ok(BLOCKS.to_owned()),
             "belt.st" => Ok(BELT.to_owned()),
             "chart.st" => Ok(CHART.to_owned()),
             "gate.st" => Ok(GATE.to_owned()),
+            "rungs.xml" => Ok(RUNGS.to_owned()),
             _ => Err("no such file".to_owned()),
         },
     );
@@ -96,8 +120,8 @@ fn cluster() -> Cluster {
     loaded.cluster.unwrap_or_else(|| panic!("{found:?}"))
 }
 
-fn model() -> Model {
-    let cluster = cluster();
+fn model(text: &str) -> Model {
+    let cluster = cluster(text);
     let mut model = Model::new(Arc::new(cluster.clone()), Bounds::default());
     let quiet = "title = \"quiet\"\ncycles = 200\n";
     for record in records(&cluster, &scenario(&cluster, quiet), 1) {
@@ -125,7 +149,7 @@ fn values_behind<'s>(svg: &'s str, of: &str) -> Vec<&'s str> {
 /// In many cycles: what stands at the connections is what the scan computed, and what it left out is pale.
 #[test]
 fn connections_show_what_the_scan_computed() {
-    let model = model();
+    let model = model(CLUSTER);
     let (mut ran, mut waited) = (0, 0);
     for cycle in 20..150 {
         let (svg, error) = model
@@ -158,7 +182,7 @@ fn connections_show_what_the_scan_computed() {
 
 #[test]
 fn the_active_step_is_marked() {
-    let model = model();
+    let model = model(CLUSTER);
     let mut seen = [0, 0];
     for cycle in 20..150 {
         let (svg, _) = model
@@ -173,4 +197,42 @@ fn the_active_step_is_marked() {
         seen[usize::from(open)] += 1;
     }
     assert!(seen.iter().all(|count| *count > 10), "{seen:?}");
+}
+
+/// In many cycles: the power of a ladder goes where the scan computed it.
+#[test]
+fn contacts_and_wires_show_the_power() {
+    let text = CLUSTER
+        .replace("\"blocks.st\"", "\"rungs.xml\"")
+        .replace("\"blocks\"", "\"rungs\"");
+    let model = model(&text);
+    let mut seen = [0; 4];
+    for cycle in 20..150 {
+        let (svg, error) = model
+            .drawing_at(ProgramId(0), cycle)
+            .expect("it has numbers");
+        assert!(error.is_none(), "{error:?}");
+        let values = &model.snapshot_at(cycle).expect("known").programs[0].values;
+        let bit = |name: &str| values[name].as_bool().expect("a bit");
+        let greater = values["speed"].as_i64().expect("a number") > 40;
+        let paths = svg.lines().filter_map(|line| {
+            let (_, behind) = line.split_once("<path class=\"")?;
+            behind.split_once('"').map(|(class, _)| class)
+        });
+        let classes: Vec<&str> = paths.collect();
+        let wire = |live: bool| if live { "live" } else { "wire" };
+        let bar = |closed: bool| if closed { "live" } else { "bar" };
+        let (run, late) = (bit("run"), bit("late"));
+        assert_eq!(late, greater && run);
+        // Two numbers, the power of the block and that of the coil; what is within the contacts; the coil.
+        let first = ["data", "data", wire(greater), wire(late)];
+        let contact = [wire(greater), wire(greater), wire(late), bar(run), bar(run)];
+        // The coil; the rail; a contact that is closed while its variable is FALSE, with its stroke.
+        let second = [wire(!run), "bar", "live", wire(!run)];
+        let stroke = [bar(!run), bar(!run), bar(!run)];
+        let all = [&first[..], &contact, &["bar"], &second, &stroke, &["bar"]].concat();
+        assert_eq!(classes, all, "cycle {cycle}: {svg}");
+        seen[usize::from(greater) + 2 * usize::from(run)] += 1;
+    }
+    assert!(seen.iter().all(|count| *count > 5), "{seen:?}");
 }

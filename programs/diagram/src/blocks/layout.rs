@@ -1,6 +1,6 @@
 //! Places of the parts of a network: what feeds a block is to its left, in the order of its inputs, and each part has rows of its own.
 
-use super::{Kind, Network};
+use super::{CONTACT_HEAD, CONTACT_ROW, Contacts, Kind, Network, Object};
 use crate::{CHARACTER, Place, Point, width};
 
 /// Distance between two pins of a block.
@@ -17,6 +17,8 @@ const CHANNEL: i64 = 14;
 const LANE: i64 = 8;
 /// Above a block with an instance, for its name.
 const INSTANCE: i64 = 18;
+/// Width of a coil; its name is behind it.
+pub(crate) const COIL: i64 = 30;
 /// The left and upper edge of all.
 const MARGIN: i64 = 20;
 /// Height of a line of a comment.
@@ -76,7 +78,7 @@ pub fn lay_out(network: &Network, top: i64) -> BlockPlan {
     }
     for object in 0..network.objects.len() {
         // A root: nothing is connected to it, and what assigns a target places it.
-        let is_target = matches!(network.objects[object].kind, Kind::Target(_));
+        let is_target = network.objects[object].kind.target().is_some();
         if layout.consumer[object].is_none() && !is_target {
             bottom = layout.tree(object, bottom).bottom + GAP;
         }
@@ -90,6 +92,61 @@ pub fn lay_out(network: &Network, top: i64) -> BlockPlan {
         comments,
         objects: layout.objects,
         bottom,
+    }
+}
+
+/// The size of a block or of contacts, and where its pins are.
+struct Shape {
+    /// From the upper edge to the first input.
+    head: i64,
+    /// For what is above the upper edge.
+    above: i64,
+    /// How far below the upper edge the inputs are.
+    inputs: Vec<i64>,
+    /// How far below it the outputs are.
+    outputs: Vec<i64>,
+    width: i64,
+    height: i64,
+}
+
+impl Shape {
+    fn of(shown: &Object) -> Self {
+        match &shown.kind {
+            Kind::Contacts(contacts) => Self::contacts(contacts),
+            Kind::Block { of, instance } => Self::block(shown, of, instance.as_deref()),
+            Kind::Value(_) | Kind::Target(_) | Kind::Coil(..) => Self::block(shown, "", None),
+        }
+    }
+
+    fn contacts(contacts: &Contacts) -> Self {
+        let rows = contacts.inputs(0).into_iter();
+        let inputs: Vec<i64> = rows.map(|row| CONTACT_HEAD + row * CONTACT_ROW).collect();
+        Self {
+            head: inputs.first().copied().unwrap_or(CONTACT_HEAD),
+            above: 0,
+            inputs,
+            outputs: vec![CONTACT_HEAD],
+            width: contacts.width(),
+            height: contacts.rows() * CONTACT_ROW,
+        }
+    }
+
+    fn block(shown: &Object, of: &str, instance: Option<&str>) -> Self {
+        let name = |name: &str| if name.is_empty() { 0 } else { width(name) };
+        let inputs = shown.inputs.iter().map(|input| name(&input.name)).max();
+        let outputs = shown.outputs.iter().map(|output| name(&output.name)).max();
+        let pins = inputs.unwrap_or(0) + outputs.unwrap_or(0) + 4 * CHARACTER;
+        let heading = width(of).max(instance.map_or(0, width));
+        let count = shown.inputs.len().max(shown.outputs.len()).max(1);
+        let rows = |count: usize| (HEAD..).step_by(ROW as usize).take(count).collect();
+        Self {
+            head: HEAD,
+            above: instance.map_or(0, |_| INSTANCE),
+            inputs: rows(shown.inputs.len()),
+            outputs: rows(shown.outputs.len()),
+            width: pins.max(heading + 2 * CHARACTER),
+            height: HEAD + ROW * i64::try_from(count).unwrap_or(1) - ROW / 2 + 4,
+        }
     }
 }
 
@@ -118,9 +175,9 @@ impl<'n> Layout<'n> {
         let mut targets = vec![Vec::new(); count];
         for (place, object) in network.objects.iter().enumerate() {
             for (from, output) in object.inputs.iter().filter_map(|input| input.from) {
-                match object.kind {
-                    Kind::Target(_) => targets[from].push((place, output)),
-                    _ => consumer[from] = Some(place),
+                match object.kind.target() {
+                    Some(_) => targets[from].push((place, output)),
+                    None => consumer[from] = Some(place),
                 }
             }
         }
@@ -146,22 +203,20 @@ impl<'n> Layout<'n> {
 
     /// Places an object, what feeds it and its targets at or below `top`.
     fn tree(&mut self, object: usize, top: i64) -> Reached {
-        match &self.network.objects[object].kind {
-            Kind::Block { .. } => self.block(object, top),
-            Kind::Value(_) | Kind::Target(_) => {
-                let place = Place {
-                    x: MARGIN,
-                    y: top,
-                    width: self.text(object),
-                    height: HEIGHT,
-                };
-                self.simple(object, place);
-                let right = self.place_targets(object);
-                Reached {
-                    right,
-                    bottom: top + ROW,
-                }
-            }
+        if self.is_block(object) {
+            return self.block(object, top);
+        }
+        let place = Place {
+            x: MARGIN,
+            y: top,
+            width: self.text(object),
+            height: HEIGHT,
+        };
+        self.simple(object, place);
+        let right = self.place_targets(object);
+        Reached {
+            right,
+            bottom: top + ROW,
         }
     }
 
@@ -176,23 +231,25 @@ impl<'n> Layout<'n> {
     fn block(&mut self, object: usize, top: i64) -> Reached {
         let network = self.network;
         let shown = &network.objects[object];
-        let Kind::Block { of, instance } = &shown.kind else {
-            return Reached {
-                right: MARGIN,
-                bottom: top,
-            };
-        };
-        let head = HEAD + instance.as_ref().map_or(0, |_| INSTANCE);
+        let Shape {
+            head,
+            above,
+            inputs: pins,
+            outputs,
+            width,
+            height,
+        } = Shape::of(shown);
+        let offset = |input: usize| pins[input] - head;
         let sources: Vec<Option<(usize, usize)>> =
             shown.inputs.iter().map(|input| input.from).collect();
-        let mut first = top + head;
+        let mut first = top + above + head;
         let mut free = top;
         // The right edge of the blocks that feed it, and the width of the values, which are in a column behind these.
         let (mut blocks, mut values) = (None, 0);
         let mut rows: Vec<i64> = Vec::with_capacity(sources.len());
         let mut last: Option<i64> = None;
         for (input, source) in sources.iter().enumerate() {
-            let pin = first + ROW * i64::try_from(input).unwrap_or(0);
+            let pin = first + offset(input);
             // No source is above its pin, nor above the source before it: so no wire crosses another.
             let least = last.map_or(pin, |last| pin.max(last + ROW));
             let mut row = least;
@@ -224,31 +281,28 @@ impl<'n> Layout<'n> {
             Some(blocks) => blocks,
             None => MARGIN + values,
         };
-        let row_of = |input: usize| first + ROW * i64::try_from(input).unwrap_or(0);
+        let row_of = |input: usize| first + offset(input);
         let bends = rows.iter().enumerate();
         let bends: Vec<bool> = bends.map(|(input, row)| *row > row_of(input)).collect();
         let before = |input: usize| bends[..input].iter().filter(|bends| **bends).count();
         let lane =
             |input: usize| right + CHANNEL + LANE * i64::try_from(before(input)).unwrap_or(0);
         self.bends[object] = (0..rows.len()).map(lane).collect();
-        let x = lane(rows.len()) + CHANNEL;
-        let name = |name: &str| if name.is_empty() { 0 } else { width(name) };
-        let inputs = shown.inputs.iter().map(|input| name(&input.name)).max();
-        let outputs = shown.outputs.iter().map(|output| name(&output.name)).max();
-        let pins = inputs.unwrap_or(0) + outputs.unwrap_or(0) + 4 * CHARACTER;
-        let heading = width(of).max(instance.as_ref().map_or(0, |instance| width(instance)));
-        let count = shown.inputs.len().max(shown.outputs.len()).max(1);
+        // Contacts without an input begin at the rail.
+        let x = match (&shown.kind, rows.len()) {
+            (Kind::Contacts(_), 0) => MARGIN,
+            (_, count) => lane(count) + CHANNEL,
+        };
         let place = Place {
             x,
-            y: first - HEAD,
-            width: pins.max(heading + 2 * CHARACTER),
-            height: HEAD + ROW * i64::try_from(count).unwrap_or(1) - ROW / 2 + 4,
+            y: first - head,
+            width,
+            height,
         };
-        let offset = |pin: usize| HEAD + ROW * i64::try_from(pin).unwrap_or(0);
         let placed = &mut self.objects[object];
         placed.place = place;
-        placed.inputs = (0..shown.inputs.len()).map(offset).collect();
-        placed.outputs = (0..shown.outputs.len()).map(offset).collect();
+        placed.inputs = pins;
+        placed.outputs = outputs;
         for (source, row) in sources.iter().zip(&rows) {
             if let Some((source, _)) = source
                 && !self.is_block(*source)
@@ -283,8 +337,10 @@ impl<'n> Layout<'n> {
         }
     }
 
+    /// Whether it has a place of its own, behind what feeds it.
     fn is_block(&self, object: usize) -> bool {
-        matches!(self.network.objects[object].kind, Kind::Block { .. })
+        let kind = &self.network.objects[object].kind;
+        matches!(kind, Kind::Block { .. } | Kind::Contacts(_))
     }
 
     /// Width of a value with its value in the scan.
@@ -300,7 +356,8 @@ impl<'n> Layout<'n> {
                 width(text) + value + CHARACTER
             }
             Kind::Target(text) => width(text) + CHARACTER,
-            Kind::Block { .. } => self.objects[object].place.width,
+            Kind::Coil(text, _) => COIL + width(text) + CHARACTER,
+            Kind::Block { .. } | Kind::Contacts(_) => self.objects[object].place.width,
         }
     }
 

@@ -4,8 +4,11 @@
 //! The networks say what the statements say: read as a document, they are these statements again.
 
 mod expression;
+mod rung;
 
-use understudy_diagram::blocks::{Input, Kind, Network, Output};
+use std::cell::RefCell;
+
+use understudy_diagram::blocks::{Coil, Input, Kind, Network, Output};
 use understudy_structured_text::print;
 use understudy_structured_text::syntax::{
     Argument, Class, Declaration, Expression, ExpressionKind, File, Literal, Operator, Path,
@@ -21,6 +24,15 @@ const MAXIMUM_BLOCKS: usize = 24;
 /// An output of an object.
 type Source = (usize, usize);
 
+/// What statements are drawn as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Style {
+    /// Function blocks.
+    Blocks,
+    /// A ladder: BOOLs are contacts and coils, numbers are function blocks.
+    Ladder,
+}
+
 /// The networks of a body, in the order in which they are executed.
 ///
 /// # Errors
@@ -29,12 +41,15 @@ pub(crate) fn networks(
     file: &File,
     of: &Unit,
     statements: &[Statement],
+    style: Style,
 ) -> Result<Vec<Network>, String> {
     let mut maker = Maker {
         file,
         unit: of,
+        style,
         networks: Vec::new(),
         open: Vec::new(),
+        taken: RefCell::default(),
     };
     for statement in statements {
         maker.statement(statement)?;
@@ -62,8 +77,11 @@ struct Value {
 struct Maker<'a> {
     file: &'a File,
     unit: &'a Unit,
+    style: Style,
     networks: Vec<Network>,
     open: Vec<Open>,
+    /// Outputs that parts of this statement are connected to.
+    taken: RefCell<Vec<Source>>,
 }
 
 impl Maker<'_> {
@@ -76,6 +94,7 @@ impl Maker<'_> {
             ..Network::default()
         };
         self.join(statement, &mut network);
+        self.taken.borrow_mut().clear();
         let first = network.objects.len();
         let mut source = Some(statement.span.start);
         let instance = match &statement.kind {
@@ -162,6 +181,12 @@ impl Maker<'_> {
         };
         network.comments.extend(only.comments.iter().cloned());
         if let Some((path, sets)) = stores(body) {
+            if self.is_power(&make::read(path.clone())) {
+                let from = self.power(condition, network);
+                let kind = if sets { Coil::Set } else { Coil::Reset };
+                network.coil(print_path(path), kind, from);
+                return Ok(None);
+            }
             // Set and reset, in the one form that all tools execute alike.
             let own = make::read(path.clone());
             let (operator, condition) = match sets {
@@ -188,6 +213,10 @@ impl Maker<'_> {
                 if enable.is_some() && does_more(self.file, value) {
                     return Err("a function of the file under a condition".to_owned());
                 }
+                if enable.is_none() && self.is_power(&make::read(path.clone())) {
+                    self.coil(path, value, network);
+                    return Ok(None);
+                }
                 let value = self.source(value, network);
                 let from = match enable {
                     Some(enable) => enabled(value, enable, network),
@@ -201,7 +230,7 @@ impl Maker<'_> {
                     ),
                     None => value.from,
                 };
-                network.target(print_path(path), from, false);
+                network.target(print_path(path), from);
                 Ok(None)
             }
             StatementKind::Call(path, arguments) => self.call(path, arguments, enable, network),
@@ -225,12 +254,7 @@ impl Maker<'_> {
         enable: Option<Value>,
         network: &mut Network,
     ) -> Result<Option<(usize, String)>, String> {
-        let values = Values {
-            file: self.file,
-            declarations: &self.unit.declarations,
-            made: &[],
-        };
-        let of = values.strong(&make::read(path.clone())).map(|of| of.kind);
+        let of = self.type_of(&make::read(path.clone()));
         let called = match &of {
             Some(TypeKind::Named(of)) => unit(self.file, of.as_str()),
             _ => None,
@@ -281,11 +305,21 @@ impl Maker<'_> {
                 } else {
                     value.from
                 };
-                network.target(print_path(to), from, false);
+                network.target(print_path(to), from);
             }
         }
         // With EN, an output is what it was where the block is not executed.
         Ok(Some((object, name.to_uppercase())))
+    }
+
+    /// The type of a value, where something in it has one.
+    fn type_of(&self, value: &Expression) -> Option<TypeKind> {
+        let values = Values {
+            file: self.file,
+            declarations: &self.unit.declarations,
+            made: &[],
+        };
+        values.strong(value).map(|of| of.kind)
     }
 
     /// What is given, by the names of the inputs.

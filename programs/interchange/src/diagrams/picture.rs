@@ -7,7 +7,7 @@ use understudy_structured_text::print;
 use understudy_structured_text::syntax::{Body, File, Statement, Unit, UnitKind};
 use understudy_text::{Diagnostic, has_errors};
 
-use super::{chart, networks};
+use super::{Style, chart, networks};
 use crate::format::Format;
 use crate::plcopen;
 use crate::source::Wanted;
@@ -34,8 +34,8 @@ pub struct DrawnUnit {
 /// A body as it is drawn.
 #[derive(Debug, Clone)]
 pub enum DrawnBody {
-    /// Function blocks.
-    Blocks(Vec<Network>),
+    /// Function blocks, or a ladder.
+    Networks(Vec<Network>),
     /// A sequential function chart.
     Chart(Chart),
     /// Text, and why it is not drawn where it was to be, in words.
@@ -46,7 +46,7 @@ impl DrawnUnit {
     /// Paints the body.
     pub fn paint_body(&self, picture: &mut Picture) {
         match &self.body {
-            DrawnBody::Blocks(networks) => networks.iter().for_each(|it| picture.network(it)),
+            DrawnBody::Networks(networks) => networks.iter().for_each(|it| picture.network(it)),
             DrawnBody::Chart(chart) => picture.chart(chart),
             DrawnBody::Text(text, _) => picture.listing(text),
         }
@@ -64,7 +64,7 @@ impl DrawnUnit {
 }
 
 /// The units of the file `name` as they are drawn; nothing for a form that has no programs with numbers. Statements that were drawn, or are to be
-/// drawn as blocks, are networks as far as these hold them.
+/// drawn, are networks as far as these hold them.
 pub fn drawn_units(name: &str, text: &str, bodies: Bodies) -> Option<Vec<DrawnUnit>> {
     let (file, _) = parsed(name, text)?;
     Some(units(name, text, &file, bodies))
@@ -123,13 +123,13 @@ fn units(name: &str, text: &str, file: &File, bodies: Bodies) -> Vec<DrawnUnit> 
     };
     let units = file.units.iter();
     let units = units.map(|unit| {
-        let as_blocks = bodies == Bodies::Blocks || drawn.contains(&unit.name.key());
-        drawn_unit(file, unit, as_blocks)
+        let style = bodies.style(drawn.get(&unit.name.key()).copied());
+        drawn_unit(file, unit, style)
     });
     units.collect()
 }
 
-fn drawn_unit(file: &File, unit: &Unit, as_blocks: bool) -> DrawnUnit {
+fn drawn_unit(file: &File, unit: &Unit, style: Option<Style>) -> DrawnUnit {
     let word = match unit.kind {
         UnitKind::Program => "PROGRAM",
         UnitKind::FunctionBlock => "FUNCTION_BLOCK",
@@ -144,8 +144,7 @@ fn drawn_unit(file: &File, unit: &Unit, as_blocks: bool) -> DrawnUnit {
     notes += &print::declarations(&unit.declarations);
     let mut parts = Vec::new();
     let body = match &unit.body {
-        Body::Statements(list) if as_blocks => statements(file, unit, list),
-        Body::Statements(list) => DrawnBody::Text(print::statements(list), None),
+        Body::Statements(list) => statements(file, unit, list, style),
         Body::Instructions(list) => DrawnBody::Text(print::instructions(list), None),
         Body::Chart(of) => {
             let actions = of.actions.iter();
@@ -178,9 +177,10 @@ fn drawn_unit(file: &File, unit: &Unit, as_blocks: bool) -> DrawnUnit {
     }
 }
 
-fn statements(file: &File, unit: &Unit, list: &[Statement]) -> DrawnBody {
-    match networks(file, unit, list) {
-        Ok(networks) => DrawnBody::Blocks(networks),
-        Err(reason) => DrawnBody::Text(print::statements(list), Some(reason)),
+fn statements(file: &File, unit: &Unit, list: &[Statement], style: Option<Style>) -> DrawnBody {
+    match style.map(|style| networks(file, unit, list, style)) {
+        Some(Ok(networks)) => DrawnBody::Networks(networks),
+        Some(Err(reason)) => DrawnBody::Text(print::statements(list), Some(reason)),
+        None => DrawnBody::Text(print::statements(list), None),
     }
 }

@@ -19,6 +19,8 @@ use understudy_structured_text::parser::{parse_instructions_at, parse_statements
 use understudy_structured_text::syntax::{Body, File, Unit, UnitKind};
 use understudy_text::Diagnostic;
 
+use crate::diagrams::Style;
+
 use super::document::{self, Body as Drawn, Language, Part, Pou, PouKind};
 use super::xml::{self, attribute, child, elements, start_tag};
 use super::{NAMESPACES, within};
@@ -82,16 +84,23 @@ pub(super) fn read_typed_of(
 }
 
 /// The units of a document whose bodies are ladders or function blocks, in capitals.
-pub fn drawn_units(text: &str) -> HashSet<String> {
+pub fn drawn_units(text: &str) -> HashMap<String, Style> {
     let Ok(document) = xml::parse(text) else {
-        return HashSet::new();
+        return HashMap::new();
     };
     let (project, _) = document::read_bodies(document.root_element());
-    let drawn = project.pous.iter().filter(|pou| match &pou.body {
-        Some(Drawn::Graph(graph)) => graph.language != Language::Sequence,
-        _ => false,
+    let drawn = project.pous.iter().filter_map(|pou| {
+        let Some(Drawn::Graph(graph)) = &pou.body else {
+            return None;
+        };
+        let style = match graph.language {
+            Language::Ladder => Style::Ladder,
+            Language::FunctionBlocks => Style::Blocks,
+            Language::Sequence => return None,
+        };
+        Some((pou.name.to_uppercase(), style))
     });
-    drawn.map(|pou| pou.name.to_uppercase()).collect()
+    drawn.collect()
 }
 
 impl Typed {

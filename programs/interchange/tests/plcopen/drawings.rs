@@ -74,6 +74,29 @@ fn statements_are_function_blocks() {
     );
 }
 
+/// An output is connected once: what reads it again in one statement names it.
+#[test]
+fn an_output_is_connected_once() {
+    let text = "PROGRAM main
+  VAR_INPUT a AT %IX0.0 : BOOL; END_VAR
+  VAR_OUTPUT y AT %QL0 : TIME; END_VAR
+  VAR t : TON; END_VAR
+  t(IN := a, PT := T#50ms);
+  y := t.ET + (t.ET + t.PT) - t.ET;
+END_PROGRAM";
+    let found = document("once", "once.st", text, Bodies::Blocks);
+    assert_eq!(
+        found.text.matches(r#"formalParameter="ET">"#).count(),
+        2,
+        "{}",
+        found.text
+    );
+    assert_eq!(
+        found.text.matches("<expression>t.ET</expression>").count(),
+        2
+    );
+}
+
 #[test]
 fn what_no_network_holds_stays_text_and_is_named() {
     let text = "PROGRAM main
@@ -201,6 +224,87 @@ fn random_charts_are_executed_as_they_were() {
     for seed in 0..60 {
         let text = random_chart(&mut Dice::new(seed));
         document(&format!("chart-{seed}"), "chart.st", &text, Bodies::AsRead);
+    }
+}
+
+const LADDER: &str = include_str!("ladder-with-numbers.xml");
+
+/// Bodies in LD with boxes of numbers stay such bodies.
+#[test]
+fn a_ladder_with_boxes_is_a_ladder() {
+    let found = document("ladder", "ladder.xml", LADDER, Bodies::AsRead);
+    let count = |text: &str| found.text.matches(text).count();
+    assert_eq!((count("<LD>"), count("<FBD>"), count("<ST>")), (1, 0, 0));
+    assert_eq!((count("<leftPowerRail"), count("<rightPowerRail")), (1, 1));
+    let marks = [r#"storage="set""#, r#"storage="reset""#, r#"typeName="GT""#];
+    assert_eq!(marks.map(count), [1, 1, 1], "{}", found.text);
+    let negated = |what: &str| {
+        let tags = found.text.split(what).skip(1);
+        let tags = tags.filter_map(|text| text.split_once('>'));
+        tags.filter(|(tag, _)| tag.contains(r#"negated="true""#))
+            .count()
+    };
+    assert_eq!((negated("<contact "), negated("<coil ")), (2, 1));
+
+    let (svg, diagnostics) = draw_typed("ladder.xml", LADDER, Wanted::default(), Bodies::AsRead);
+    let svg = svg.expect("a picture");
+    assert!(diagnostics.is_empty(), "{diagnostics:#?}");
+    // Signs of coils, and names once for each contact.
+    assert!(svg.contains(">S</text>") && svg.contains(">R</text>") && svg.contains(">/</text>"));
+    assert_eq!(svg.matches(">auto</text>").count(), 3);
+}
+
+/// A Boolean value of contacts, comparisons and blocks.
+fn random_power(dice: &mut Dice, depth: usize) -> String {
+    let inner = |dice: &mut Dice| random_power(dice, depth - 1);
+    match dice.below(if depth == 0 { 4 } else { 9 }) {
+        0 => dice.pick(&["a", "b", "y", "z"]).to_owned(),
+        1 => format!("NOT {}", dice.pick(&["a", "b", "y"])),
+        2 => dice
+            .pick(&["n > 3", "m <= n", "t.Q", "t.ET > T#20ms"])
+            .to_owned(),
+        3 => dice.pick(&["TRUE", "FALSE", "a", "t.Q"]).to_owned(),
+        4 | 5 => format!("({} AND {})", inner(dice), inner(dice)),
+        6 => format!("({} OR {})", inner(dice), inner(dice)),
+        7 => format!("({} XOR {})", inner(dice), inner(dice)),
+        _ => format!(
+            "NOT ({} OR {} AND {})",
+            inner(dice),
+            inner(dice),
+            inner(dice)
+        ),
+    }
+}
+
+/// Random statements, read as a ladder: what is written is a ladder, valid, and executed as the statements.
+#[test]
+fn random_ladders_with_numbers_are_executed_as_they_were() {
+    for seed in 0..60 {
+        let dice = &mut Dice::new(seed);
+        let mut text = String::from(
+            "PROGRAM main\n  VAR_INPUT a AT %IX0.0 : BOOL; b AT %IX0.1 : BOOL; n AT %IW0 : INT; END_VAR\n  VAR_OUTPUT y AT %QX0.0 : BOOL; z AT %QX0.1 : BOOL; m AT %QW0 : INT; END_VAR\n  VAR t : TON; END_VAR\n",
+        );
+        for _ in 0..1 + dice.below(6) {
+            let power = random_power(dice, 3);
+            let target = dice.pick(&["y", "z"]);
+            let _ = match dice.below(6) {
+                0 => writeln!(text, "  t(IN := {power}, PT := T#30ms);"),
+                1 => writeln!(text, "  IF {power} THEN {target} := TRUE; END_IF;"),
+                2 => writeln!(text, "  IF {power} THEN {target} := FALSE; END_IF;"),
+                3 => writeln!(text, "  IF {power} THEN m := m + n; END_IF;"),
+                _ => writeln!(text, "  {target} := {power};"),
+            };
+        }
+        text += "END_PROGRAM\n";
+        let blocks = document(&format!("blocks-{seed}"), "main.st", &text, Bodies::Blocks);
+        let ladder = blocks.text.replace("FBD>", "LD>");
+        let found = document(
+            &format!("ladder-{seed}"),
+            "main.xml",
+            &ladder,
+            Bodies::AsRead,
+        );
+        assert!(found.text.contains("<LD>"), "{text}");
     }
 }
 

@@ -15,6 +15,14 @@ use crate::plcopen::typed::values::unit;
 impl Maker<'_> {
     /// What an expression comes from. What no function does is read as it is written.
     pub(super) fn source(&self, value: &Expression, network: &mut Network) -> Value {
+        if let Some(from) = self.rung(value, network) {
+            return plain(from);
+        }
+        self.parts(value, network)
+    }
+
+    /// The same, where the value itself is not contacts.
+    pub(super) fn parts(&self, value: &Expression, network: &mut Network) -> Value {
         match &value.kind {
             ExpressionKind::Not(inner) => {
                 let value = self.source(inner, network);
@@ -24,7 +32,10 @@ impl Maker<'_> {
                 }
             }
             ExpressionKind::Variable(path) => match self.connected(path, network) {
-                Some(from) => plain(from),
+                Some(from) => {
+                    self.taken.borrow_mut().push(from);
+                    plain(from)
+                }
                 None => written(value, network),
             },
             ExpressionKind::Chain(first, rest)
@@ -40,7 +51,7 @@ impl Maker<'_> {
     }
 
     /// The output of a block in this network that a variable is, where nothing is connected to it.
-    fn connected(&self, path: &Path, network: &Network) -> Option<Source> {
+    pub(super) fn connected(&self, path: &Path, network: &Network) -> Option<Source> {
         let (last, before) = path.steps.split_last()?;
         let Step::Field(pin) = last else { return None };
         let instance = Path {
@@ -59,7 +70,8 @@ impl Maker<'_> {
             .position(|output| pin.is(&output.name))?;
         let from = (open.object, place);
         let is_last = is_own && !feeds_a_block(network, open.object);
-        (is_last && is_free(network, from)).then_some(from)
+        let is_taken = self.taken.borrow().contains(&from);
+        (is_last && !is_taken && is_free(network, from)).then_some(from)
     }
 
     /// Operators of one rank; those of one kind that follow each other are one function where it takes many inputs.
@@ -156,14 +168,14 @@ impl Maker<'_> {
                     true => function("NOT", &[plain(from)], network),
                     false => from,
                 };
-                network.target(print_path(to), from, false);
+                network.target(print_path(to), from);
             }
         }
         Some(made((object, 0)))
     }
 }
 
-fn plain(from: Source) -> Value {
+pub(super) fn plain(from: Source) -> Value {
     Value {
         from,
         negated: false,

@@ -1,4 +1,4 @@
-//! A file with numbers as PLCopen XML 2.01: types, units with bodies in all languages but ladders, configuration.
+//! A file with numbers as PLCopen XML 2.01: types, units with bodies in all languages, configuration.
 
 use understudy_structured_text::print;
 use understudy_structured_text::syntax::{
@@ -7,7 +7,7 @@ use understudy_structured_text::syntax::{
 
 use super::tree::Tree;
 use super::{blocks, chart, document, standard_time};
-use crate::diagrams::networks;
+use crate::diagrams::{Style, networks};
 
 /// Elements that the format has for types; of two names the one of the format.
 const ELEMENTARY: [(&str, &str); 23] = [
@@ -45,14 +45,14 @@ pub struct TypedDocument {
     pub as_text: Vec<String>,
 }
 
-/// The file as a document. Statements of the units that `as_blocks` chooses are function blocks.
+/// The file as a document. Statements are drawn in the `style` of their unit, where it has one.
 ///
 /// # Errors
 /// What the format cannot hold, or is not written yet, in words.
 pub fn write_typed(
     file: &File,
     name: &str,
-    as_blocks: &dyn Fn(&Unit) -> bool,
+    style: &dyn Fn(&Unit) -> Option<Style>,
 ) -> Result<TypedDocument, String> {
     let mut as_text = Vec::new();
     let mut tree = document(name);
@@ -64,7 +64,7 @@ pub fn write_typed(
     tree.close("dataTypes");
     tree.open("pous", &[]);
     for unit in &file.units {
-        pou(&mut tree, file, unit, as_blocks(unit), &mut as_text)?;
+        pou(&mut tree, file, unit, style(unit), &mut as_text)?;
     }
     tree.close("pous");
     tree.close("types");
@@ -88,7 +88,7 @@ fn pou(
     tree: &mut Tree,
     file: &File,
     unit: &Unit,
-    as_blocks: bool,
+    style: Option<Style>,
     as_text: &mut Vec<String>,
 ) -> Result<(), String> {
     let kind = match unit.kind {
@@ -128,15 +128,11 @@ fn pou(
         Body::Chart(of) => chart::body(tree, unit, of).map_err(|what| not_held(unit, &what))?,
         Body::Instructions(list) => tree.formatted("IL", print::instructions(list).trim_end()),
         Body::Statements(statements) => {
-            let networks = as_blocks.then(|| networks(file, unit, statements));
-            match networks {
-                Some(Ok(networks)) => {
-                    tree.open("FBD", &[]);
-                    blocks::write(tree, file, &networks);
-                    tree.close("FBD");
-                }
+            let drawn = style.map(|style| (style, networks(file, unit, statements, style)));
+            match drawn {
+                Some((style, Ok(networks))) => blocks::write(tree, file, &networks, style),
                 other => {
-                    if let Some(Err(reason)) = other {
+                    if let Some((_, Err(reason))) = other {
                         as_text.push(format!("`{}` has {reason}", unit.name));
                     }
                     tree.formatted("ST", print::statements(statements).trim_end());
