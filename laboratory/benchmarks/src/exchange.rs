@@ -60,7 +60,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     };
     let carriers = [
         ("plain sockets", Carrier::Raw, None),
-        ("udp", Carrier::Link(LinkKind::Udp), Some(1.5)),
+        ("udp", Carrier::Link(LinkKind::Udp), Some(1.2)),
         ("zenoh", Carrier::Link(LinkKind::Zenoh), Some(4.0)),
     ];
     let mut list: Vec<Measured> = Vec::new();
