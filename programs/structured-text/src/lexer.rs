@@ -28,6 +28,8 @@ pub(crate) enum Lexeme<'a> {
     Address(&'a str),
     /// An operator or a punctuation mark.
     Sign(&'static str),
+    /// C code that can write variables, as written.
+    Code(&'a str),
     /// Not understood and already diagnosed.
     Faulty,
     /// The end of the text.
@@ -113,6 +115,13 @@ fn is_foreign_code(content: &str) -> bool {
         || content.trim_end().ends_with(';')
 }
 
+/// Why C code is refused.
+pub(crate) fn code_refused(span: Range<usize>) -> Diagnostic {
+    let message = "C code that can write variables is not supported";
+    let help = "write it in Structured Text, or do it outside of the program";
+    Diagnostic::error("U1040", message, span).with_help(help)
+}
+
 /// All lexemes of `text`, and what was wrong.
 pub(crate) fn lex(text: &str) -> Lexemes<'_> {
     let mut lexer = Lexer {
@@ -158,6 +167,15 @@ pub(crate) fn lex(text: &str) -> Lexemes<'_> {
                     comments: boxed(&mut above),
                 });
             }
+        } else if let Some(code) = lexer.code() {
+            let start = lexer.place - code.len();
+            placed.push(Placed {
+                lexeme: Lexeme::Code(code),
+                span: start..lexer.place,
+                within: start..lexer.place,
+                starts_line: std::mem::take(&mut line_broken),
+                comments: boxed(&mut above),
+            });
         } else if let Some(comment) = lexer.comment().or_else(|| lexer.region()) {
             match placed.last_mut().filter(|_| !line_broken) {
                 Some(last) if comment.is_some() => {
@@ -300,7 +318,8 @@ impl<'a> Lexer<'a> {
         self.place += opening.len() + length + closing_length;
         let content = &content[..length];
         if opening == "{{" || opening == "{" && is_foreign_code(content) {
-            self.foreign_code(content, start);
+            let message = "this C code is not executed; it writes no variable of the program";
+            self.warn(message.to_owned(), start);
             return Some(None);
         }
         if opening == "{" {
@@ -351,18 +370,22 @@ impl<'a> Lexer<'a> {
         Some(first)
     }
 
-    /// C code of Beremiz and matiec: what can write a variable is refused, since nothing executes it here.
-    fn foreign_code(&mut self, content: &str, start: usize) {
-        let writes = ["SET", "Set", "data__", "&"];
-        if writes.iter().any(|word| content.contains(word)) {
-            let message = "C code that can write variables is not supported";
-            let found = Diagnostic::error("U1040", message, start..self.place);
-            let help = "write it in Structured Text, or do it outside of the program";
-            self.diagnostics.push(found.with_help(help));
-            return;
+    /// Takes C code of Beremiz and matiec that can write a variable: nothing executes it here, so no program can have it.
+    fn code(&mut self) -> Option<&'a str> {
+        const WRITES: [&str; 4] = ["SET", "Set", "data__", "&"];
+        let rest = self.rest();
+        let pairs = [("{{", "}}"), ("{", "}")];
+        let (opening, closing) = pairs.into_iter().find(|pair| rest.starts_with(pair.0))?;
+        let content = &rest[opening.len()..];
+        let length = self.comment_length(content, opening, closing)?;
+        let content = &content[..length];
+        let is_code = opening == "{{" || is_foreign_code(content);
+        if !is_code || !WRITES.iter().any(|word| content.contains(word)) {
+            return None;
         }
-        let message = "this C code is not executed; it writes no variable of the program";
-        self.warn(message.to_owned(), start);
+        let start = self.place;
+        self.place += opening.len() + length + closing.len();
+        Some(self.since(start))
     }
 
     /// Reads past a pragma where that changes nothing.

@@ -29,7 +29,7 @@ pub use words::is_keyword;
 
 use understudy_text::{Diagnostic, MAXIMUM_FINDINGS};
 
-use crate::lexer::{Lexeme, Lexemes, Placed, lex};
+use crate::lexer::{Lexeme, Lexemes, Placed, code_refused, lex};
 use crate::syntax::{
     Body, Declaration, Expression, ExpressionKind, File, Instruction, Literal, Name, Span,
     Statement, TypeName,
@@ -383,6 +383,7 @@ impl<'a> Parser<'a> {
     fn expected_at(&mut self, what: &str, span: Span) {
         let found = match self.peek() {
             Lexeme::Faulty => return,
+            Lexeme::Code(_) => return self.diagnostics.push(code_refused(self.span())),
             Lexeme::End => "the end of the text".to_owned(),
             _ => {
                 let written: String = self.written().chars().take(60).collect();

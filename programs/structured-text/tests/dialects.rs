@@ -229,11 +229,37 @@ fn c_code_is_refused_unless_it_writes_nothing() {
         let text = format!("PROGRAM main VAR y : INT; END_VAR y := 1; {code} END_PROGRAM");
         refused(&text, &["U1040", "C code"]);
     }
+    // Blocks that no program has are not executed: OpenPLC writes those of Python into each file.
+    check(
+        "FUNCTION_BLOCK python_eval VAR_INPUT a : BOOL; END_VAR {extern void f(PYTHON_EVAL*);f(data__);} END_FUNCTION_BLOCK \
+         PROGRAM main VAR_OUTPUT y : INT; END_VAR y := 3; END_PROGRAM",
+        &[(&[], "3")],
+    );
+    refused(
+        "FUNCTION_BLOCK b VAR_INPUT a : BOOL; END_VAR {{ SetFbVar(A, 1); }} END_FUNCTION_BLOCK \
+         PROGRAM main VAR f : b; END_VAR f(); END_PROGRAM",
+        &["U1040", "C code"],
+    );
     // The time of the scan, as matiec's own blocks read it.
     check(
         "PROGRAM main VAR_OUTPUT y : TIME; END_VAR {__SET_VAR(data__->,y,,__CURRENT_TIME)} END_PROGRAM",
         &[(&[], "0"), (&[], "10000000")],
     );
+}
+
+/// A text is no point: the program has it, and says that nobody else does.
+#[test]
+fn inputs_and_outputs_that_are_no_points_are_kept_with_a_warning() {
+    let text = "PROGRAM main VAR_INPUT name : STRING := 'ab'; u : INT; END_VAR \
+                VAR_OUTPUT said : STRING; n : INT; END_VAR \
+                said := name; n := u + LEN(said); END_PROGRAM";
+    check(text, &[(&[5], "7")]);
+    warned(text, "`name` is STRING");
+    warned(text, "`said` is STRING");
+    let parts = "TYPE pair : STRUCT low : INT; high : INT; END_STRUCT; END_TYPE \
+                 PROGRAM main VAR_INPUT p : pair; END_VAR VAR_OUTPUT n : INT; END_VAR \
+                 n := p.low + 10 * p.high; END_PROGRAM";
+    check(parts, &[(&[1, 2], "21")]);
 }
 
 #[test]

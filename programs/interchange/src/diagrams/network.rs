@@ -242,6 +242,7 @@ impl Maker<'_> {
             StatementKind::Exit | StatementKind::Continue | StatementKind::Return => {
                 Err("a jump or RETURN".to_owned())
             }
+            StatementKind::Code(_) => Err("C code".to_owned()),
             StatementKind::Nothing => Ok(None),
         }
     }

@@ -301,6 +301,11 @@ fn names_that_differ_by_case_alone_are_named_both() {
 
 #[test]
 fn the_interval_of_a_task_is_a_time_within_the_bounds() {
+    let text = file("<ST><xhtml:p>y := a;</xhtml:p></ST>");
+    let old = text
+        .replace("T#20ms", "00:00:00.020")
+        .replace("name=\"i\" typeName", "name=\"i\" type");
+    assert_eq!(codes(&old), codes(&text), "as 1.0 writes it");
     for interval in ["T#-10ms", "T#0s", "T#2h", "soon", "10"] {
         let text = file("<ST><xhtml:p>y := a;</xhtml:p></ST>").replace("T#20ms", interval);
         let found = codes(&text);

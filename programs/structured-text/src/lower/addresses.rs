@@ -164,7 +164,7 @@ impl Lowering<'_> {
 
     /// The points of a variable: itself, or the parts of a structure and the elements of arrays of structures. Whether
     /// all of it has one.
-    fn points_of(
+    pub(super) fn points_of(
         &self,
         of: &Type,
         name: &str,

@@ -22,14 +22,24 @@ pub(super) struct Bound<'s> {
 }
 
 impl Lowering<'_> {
-    /// Finds the parameter of each argument.
+    /// Finds the parameter of each argument. Nothing is said of a call whose parameters are not all known, which is reported where they are
+    /// declared.
     pub(super) fn bind<'s>(
         &mut self,
         name: &str,
+        declarations: &[syntax::Declaration],
         parameters: &[Parameter],
         arguments: &'s [Argument],
         span: &Span,
     ) -> Option<Bound<'s>> {
+        let is_unknown = |found: &syntax::Declaration| {
+            let is_parameter = matches!(found.class, Class::Input | Class::Output | Class::InOut);
+            is_parameter && !parameters.iter().any(|known| found.name.is(&known.name))
+        };
+        if declarations.iter().any(is_unknown) && understudy_text::has_errors(&self.diagnostics) {
+            self.blamed += 1;
+            return None;
+        }
         let mut bound = Bound {
             given: Vec::new(),
             taken: Vec::new(),

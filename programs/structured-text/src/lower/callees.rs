@@ -82,6 +82,10 @@ impl Lowering<'_> {
         if let Some(unit) = unit {
             return self.unit_callee(unit, name);
         }
+        if self.base_is_unknown() {
+            self.blamed += 1;
+            return None;
+        }
         let units = self.units.iter();
         let known = units.filter(|entry| entry.unit.kind == UnitKind::Function);
         let known = known.map(|entry| entry.unit.name.as_str());

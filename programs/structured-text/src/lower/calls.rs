@@ -129,8 +129,14 @@ impl Lowering<'_> {
         body: &mut Vec<Statement>,
     ) -> Option<(Option<&'s syntax::Expression>, Option<&'s Path>)> {
         let block = self.block(unit, span)?;
-        let name = self.units[unit].unit.name.as_str();
-        let bound = self.bind(name, &block.parameters, arguments, span)?;
+        let called = self.units[unit].unit;
+        let bound = self.bind(
+            called.name.as_str(),
+            &called.declarations,
+            &block.parameters,
+            arguments,
+            span,
+        )?;
         let open = self.open_types(&block.parameters, &bound)?;
         let owner = Owner { unit, method: None };
         let is_own = matches!(instance.place.root, Root::Own(0)) && instance.place.offset == 0;
@@ -232,9 +238,15 @@ impl Lowering<'_> {
             class,
             open: Vec::new(),
         };
-        let name = self.unit_of(owner).name.as_str();
+        let called = self.unit_of(owner);
         let parameters = self.declared_parameters(&plain, span)?;
-        let bound = self.bind(name, &parameters, arguments, span)?;
+        let bound = self.bind(
+            called.name.as_str(),
+            &called.declarations,
+            &parameters,
+            arguments,
+            span,
+        )?;
         let open = self.open_types(&parameters, &bound)?;
         let routine = self.routine(Key { open, ..plain }, span)?;
         self.called(&routine, span);

@@ -34,6 +34,7 @@ impl<'a> Lowering<'a> {
         let name = instance.name.as_str();
         let bound = self.bind(
             name,
+            &[],
             &routine.parameters,
             instance.connections,
             &instance.name.span(),

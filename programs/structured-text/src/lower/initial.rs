@@ -176,6 +176,16 @@ impl Lowering<'_> {
     pub(super) fn no_such_part(&mut self, name: &Name, of: &Type) {
         let mut help = "check the type of the variable".to_owned();
         if let Type::Structure(id, _) = of {
+            let unit = self.structures[id.0 as usize].unit;
+            let unit = unit.map(|unit| self.units[unit].unit);
+            let mut declared = unit.into_iter().flat_map(|unit| &unit.declarations);
+            // It has no place, because its type is not known.
+            if declared.any(|found| found.name == *name)
+                && understudy_text::has_errors(&self.diagnostics)
+            {
+                self.blamed += 1;
+                return;
+            }
             let fields = &self.program.structures[id.0 as usize].fields;
             let shown = fields.iter().map(|field| field.name.as_str());
             help = understudy_text::spelling::suggestion(

@@ -211,8 +211,28 @@ impl<'a> Lowering<'a> {
         matches!(resolved.of, Type::Enumeration(..)).then_some(resolved.of)
     }
 
+    /// Whether names here can be those of a base that is not known, which is reported.
+    pub(super) fn base_is_unknown(&self) -> bool {
+        let mut unit = self.scope.class.or(self.scope.unit);
+        // As many steps as there are units, where blocks extend each other in a circle.
+        for _ in &self.units {
+            let Some(found) = unit.filter(|unit| self.units[*unit].unit.extends.is_some()) else {
+                return false;
+            };
+            unit = self.base_of(found);
+            if unit.is_none() {
+                return understudy_text::has_errors(&self.diagnostics);
+            }
+        }
+        false
+    }
+
     /// Reports a name that nothing has.
     pub(super) fn unknown_name(&mut self, name: &Name) {
+        if self.base_is_unknown() {
+            self.blamed += 1;
+            return;
+        }
         let help = {
             let own = self.scope.symbols.iter().flat_map(|symbols| symbols.iter());
             let own = own.filter_map(|(_, symbol)| match symbol {

@@ -354,19 +354,28 @@ impl<'a> Lowering<'a> {
     }
 
     fn point(&mut self, name: &str, variable: &Variable, slot: u32, is_input: bool) {
-        let Some(of) = variable.of.elementary() else {
+        let mut points = Vec::new();
+        if !self.points_of(&variable.of, name, slot, &mut points) {
             let found = self.describe(&variable.of);
-            let message =
-                format!("`{name}` is a point of {found}; a point is one number, bit or time");
-            let help = "declare each of its parts as an input or output, or use VAR";
-            self.error_with("U1083", message, variable.span.clone(), help);
+            let message = match is_input {
+                true => format!(
+                    "the input `{name}` is {found}: nothing writes it, and it keeps its initial value"
+                ),
+                false => {
+                    format!("the output `{name}` is {found}: only the program itself can read it")
+                }
+            };
+            let help = "a point is a number, a bit or a time; declare each part as a variable of its own, or use VAR";
+            self.warn("U1055", message, variable.span.clone(), help);
             return;
-        };
-        let points = match is_input {
+        }
+        let known = match is_input {
             true => &mut self.program.inputs,
             false => &mut self.program.outputs,
         };
-        points.push(name, of, slot);
+        for (name, of, slot) in points {
+            known.push(name, of, slot);
+        }
     }
 
     /// Lowers each unit of a file without a PROGRAM by itself.

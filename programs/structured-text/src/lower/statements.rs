@@ -7,6 +7,7 @@ use understudy_typed::{
     Branch, Case, Elementary, Expression, For, Operation, Statement, StatementKind, Type,
 };
 
+use crate::lexer::code_refused;
 use crate::syntax::{self, ExpressionKind, Label, Span};
 
 use super::Lowering;
@@ -90,6 +91,10 @@ impl Lowering<'_> {
             S::Exit => self.in_loop("EXIT", &statement.span, StatementKind::Exit),
             S::Continue => self.in_loop("CONTINUE", &statement.span, StatementKind::Continue),
             S::Return => Some(StatementKind::Return),
+            S::Code(_) => {
+                self.report(code_refused(statement.span.clone()));
+                None
+            }
             S::Nothing => None,
         }
     }

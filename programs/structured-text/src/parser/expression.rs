@@ -116,6 +116,11 @@ impl Parser<'_> {
                 self.skip();
                 ExpressionKind::Faulty
             }
+            Lexeme::Code(_) => {
+                self.expected("a value");
+                self.skip();
+                ExpressionKind::Faulty
+            }
             Lexeme::Address(_) => self.variable(start),
             Lexeme::Word(word) => match word.len() {
                 4 if word.eq_ignore_ascii_case("TRUE") => self.boolean(true),

@@ -137,6 +137,10 @@ impl Parser<'_> {
     }
 
     fn statement(&mut self) -> StatementKind {
+        if let Lexeme::Code(code) = *self.peek() {
+            self.skip();
+            return StatementKind::Code(code.to_owned());
+        }
         let Some(word) = self.word() else {
             return self.simple();
         };

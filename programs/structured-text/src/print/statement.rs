@@ -82,6 +82,7 @@ impl Printer {
             StatementKind::Exit => self.line("EXIT;"),
             StatementKind::Continue => self.line("CONTINUE;"),
             StatementKind::Return => self.line("RETURN;"),
+            StatementKind::Code(code) => self.line(code),
             StatementKind::Nothing => self.line(";"),
         }
     }

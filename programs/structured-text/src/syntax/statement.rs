@@ -42,6 +42,8 @@ pub enum StatementKind {
     Continue,
     /// `RETURN`
     Return,
+    /// C code that can write variables, as written; a program that executes it is refused.
+    Code(String),
     /// `;`, and what was not understood and is already diagnosed.
     Nothing,
 }

@@ -12,6 +12,7 @@ use super::{
     Body, Ignored, Instance, Language, Part, Pou, PouKind, Project, Section, Variable, VariableType,
 };
 use crate::plcopen::literal::time;
+use crate::plcopen::typed::time_of_day;
 use crate::plcopen::xml::{attribute, child, children, elements, start_tag, text, word};
 
 /// The elementary types whose elements stand for themselves.
@@ -334,7 +335,10 @@ impl Reader {
                     self.project.globals.extend(globals);
                 }
                 "pouInstance" => {
-                    let Some(type_name) = self.needed(node, "typeName") else {
+                    // As 1.0 has it.
+                    let type_name = attribute(node, "type").filter(|of| !of.is_empty());
+                    let Some(type_name) = type_name.or_else(|| self.needed(node, "typeName"))
+                    else {
                         continue;
                     };
                     let task = node
@@ -365,7 +369,9 @@ impl Reader {
 impl Reader {
     /// The time from one scan to the next.
     fn interval(&mut self, text: &Name) -> Option<Duration> {
-        let interval = time(text).filter(|interval| PERIODS.contains(interval));
+        let written = || time_of_day(text).and_then(|interval| u64::try_from(interval).ok());
+        let interval = time(text).or_else(|| written().map(Duration::from_nanos));
+        let interval = interval.filter(|interval| PERIODS.contains(interval));
         if interval.is_none() {
             let message = format!(
                 "the interval `{text}` of the task is not a time from {:?} to {:?}",

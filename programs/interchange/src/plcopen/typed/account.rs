@@ -68,7 +68,7 @@ const KNOWN: [(&str, &str); 97] = [
     ("configuration", "name|globalId"),
     ("resource", "name|globalId"),
     ("task", "name single interval priority|globalId"),
-    ("pouInstance", "name typeName|globalId"),
+    ("pouInstance", "name typeName type|globalId"),
     ("leftPowerRail", PLACED),
     ("rightPowerRail", PLACED),
     (

@@ -171,6 +171,7 @@ impl Follower {
             StatementKind::Exit
             | StatementKind::Continue
             | StatementKind::Return
+            | StatementKind::Code(_)
             | StatementKind::Nothing => Some(()),
         }
     }
