@@ -247,6 +247,13 @@ impl<'a> Lowering<'a> {
         }
     }
 
+    /// Whether an error was reported that what is found now can follow from; then it needs no message of its own.
+    fn follows_an_error(&mut self) -> bool {
+        let follows = understudy_text::has_errors(&self.diagnostics);
+        self.blamed += usize::from(follows);
+        follows
+    }
+
     fn error(&mut self, code: &'static str, message: impl Into<String>, span: Range<usize>) {
         self.report(Diagnostic::error(code, message, span));
     }

@@ -247,7 +247,7 @@ fn c_code_is_refused_unless_it_writes_nothing() {
     );
 }
 
-/// A text is no point: the program has it, and says that nobody else does.
+/// A text is not a point: the program keeps it, with a warning.
 #[test]
 fn inputs_and_outputs_that_are_no_points_are_kept_with_a_warning() {
     let text = "PROGRAM main VAR_INPUT name : STRING := 'ab'; u : INT; END_VAR \

@@ -47,6 +47,20 @@ pub(crate) fn time(text: &str) -> Option<Duration> {
     (rest.len() < text.len()).then(|| duration(rest))?
 }
 
+/// `00:00:00.02`, as PLCopen XML 1.0 writes the interval of a task; more than 0.
+pub(crate) fn clock(text: &str) -> Option<Duration> {
+    let parts: Vec<&str> = text.split(':').collect();
+    let [hours, minutes, seconds] = parts[..] else {
+        return None;
+    };
+    let hours: u16 = hours.parse().ok()?;
+    let minutes: u16 = minutes.parse().ok()?;
+    let seconds: f64 = seconds.parse().ok()?;
+    let whole = f64::from(hours) * 3600.0 + f64::from(minutes) * 60.0;
+    let found = Duration::try_from_secs_f64(whole + seconds).ok()?;
+    (!found.is_zero()).then_some(found)
+}
+
 /// The value of a literal of time behind its `T#`: as every other duration, in any case, with `_` between its parts.
 pub(crate) fn duration(value: &str) -> Option<Duration> {
     let plain = value.replace('_', "").to_ascii_lowercase();

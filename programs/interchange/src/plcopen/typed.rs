@@ -10,8 +10,6 @@ mod network;
 mod surroundings;
 pub(crate) mod values;
 
-pub(super) use configuration::time_of_day;
-
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 

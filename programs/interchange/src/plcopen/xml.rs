@@ -126,6 +126,12 @@ pub(crate) fn attribute(node: Node<'_, '_>, name: &str) -> Option<Name> {
     Some(Name::at(attribute.value().trim(), attribute.range_value()))
 }
 
+/// The program that an instance is of: `typeName`, or `type` as 1.0 has it.
+pub(crate) fn program_type(instance: Node<'_, '_>) -> Option<Name> {
+    let mut written = ["typeName", "type"].into_iter();
+    written.find_map(|name| attribute(instance, name).filter(|of| !of.is_empty()))
+}
+
 /// The text of an element and of those in it.
 pub(crate) fn text(node: Node<'_, '_>) -> Passage {
     Passage::of(node)

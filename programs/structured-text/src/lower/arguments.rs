@@ -36,8 +36,7 @@ impl Lowering<'_> {
             let is_parameter = matches!(found.class, Class::Input | Class::Output | Class::InOut);
             is_parameter && !parameters.iter().any(|known| found.name.is(&known.name))
         };
-        if declarations.iter().any(is_unknown) && understudy_text::has_errors(&self.diagnostics) {
-            self.blamed += 1;
+        if declarations.iter().any(is_unknown) && self.follows_an_error() {
             return None;
         }
         let mut bound = Bound {

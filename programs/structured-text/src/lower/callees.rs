@@ -82,8 +82,7 @@ impl Lowering<'_> {
         if let Some(unit) = unit {
             return self.unit_callee(unit, name);
         }
-        if self.base_is_unknown() {
-            self.blamed += 1;
+        if self.base_is_unknown() && self.follows_an_error() {
             return None;
         }
         let units = self.units.iter();

@@ -180,10 +180,7 @@ impl Lowering<'_> {
             let unit = unit.map(|unit| self.units[unit].unit);
             let mut declared = unit.into_iter().flat_map(|unit| &unit.declarations);
             // It has no place, because its type is not known.
-            if declared.any(|found| found.name == *name)
-                && understudy_text::has_errors(&self.diagnostics)
-            {
-                self.blamed += 1;
+            if declared.any(|found| found.name == *name) && self.follows_an_error() {
                 return;
             }
             let fields = &self.program.structures[id.0 as usize].fields;

@@ -211,7 +211,7 @@ impl<'a> Lowering<'a> {
         matches!(resolved.of, Type::Enumeration(..)).then_some(resolved.of)
     }
 
-    /// Whether names here can be those of a base that is not known, which is reported.
+    /// Whether names here can be those of a base that is not known.
     pub(super) fn base_is_unknown(&self) -> bool {
         let mut unit = self.scope.class.or(self.scope.unit);
         // As many steps as there are units, where blocks extend each other in a circle.
@@ -221,7 +221,7 @@ impl<'a> Lowering<'a> {
             };
             unit = self.base_of(found);
             if unit.is_none() {
-                return understudy_text::has_errors(&self.diagnostics);
+                return true;
             }
         }
         false
@@ -229,8 +229,7 @@ impl<'a> Lowering<'a> {
 
     /// Reports a name that nothing has.
     pub(super) fn unknown_name(&mut self, name: &Name) {
-        if self.base_is_unknown() {
-            self.blamed += 1;
+        if self.base_is_unknown() && self.follows_an_error() {
             return;
         }
         let help = {

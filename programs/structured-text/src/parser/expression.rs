@@ -112,11 +112,7 @@ impl Parser<'_> {
                 literal
             }
             Lexeme::Qualified(_) => self.qualified(),
-            Lexeme::Faulty => {
-                self.skip();
-                ExpressionKind::Faulty
-            }
-            Lexeme::Code(_) => {
+            Lexeme::Faulty | Lexeme::Code(_) => {
                 self.expected("a value");
                 self.skip();
                 ExpressionKind::Faulty

@@ -11,9 +11,10 @@ use super::objects::graph;
 use super::{
     Body, Ignored, Instance, Language, Part, Pou, PouKind, Project, Section, Variable, VariableType,
 };
-use crate::plcopen::literal::time;
-use crate::plcopen::typed::time_of_day;
-use crate::plcopen::xml::{attribute, child, children, elements, start_tag, text, word};
+use crate::plcopen::literal::{clock, time};
+use crate::plcopen::xml::{
+    attribute, child, children, elements, program_type, start_tag, text, word,
+};
 
 /// The elementary types whose elements stand for themselves.
 const ELEMENTARY: [&str; 18] = [
@@ -335,8 +336,7 @@ impl Reader {
                     self.project.globals.extend(globals);
                 }
                 "pouInstance" => {
-                    // As 1.0 has it.
-                    let type_name = attribute(node, "type").filter(|of| !of.is_empty());
+                    let type_name = program_type(node);
                     let Some(type_name) = type_name.or_else(|| self.needed(node, "typeName"))
                     else {
                         continue;
@@ -369,8 +369,7 @@ impl Reader {
 impl Reader {
     /// The time from one scan to the next.
     fn interval(&mut self, text: &Name) -> Option<Duration> {
-        let written = || time_of_day(text).and_then(|interval| u64::try_from(interval).ok());
-        let interval = time(text).or_else(|| written().map(Duration::from_nanos));
+        let interval = time(text).or_else(|| clock(text));
         let interval = interval.filter(|interval| PERIODS.contains(interval));
         if interval.is_none() {
             let message = format!(

@@ -6,7 +6,8 @@ use understudy_structured_text::syntax::{Class, ExpressionKind, Literal, Program
 
 use super::Typed;
 use super::make::name;
-use crate::plcopen::xml::{attribute, children, elements, start_tag};
+use crate::plcopen::literal::clock;
+use crate::plcopen::xml::{attribute, children, elements, program_type, start_tag};
 
 impl Typed {
     pub(super) fn instances(&mut self, node: Node<'_, '_>) {
@@ -74,8 +75,7 @@ impl Typed {
     /// The instances of programs in a task or a resource.
     fn runs(&mut self, node: Node<'_, '_>) {
         for instance in children(node, "pouInstance") {
-            // As 1.0 has it.
-            let of = attribute(instance, "type").filter(|of| !of.is_empty());
+            let of = program_type(instance);
             let Some(of) = of.or_else(|| self.needed(instance, "typeName")) else {
                 continue;
             };
@@ -95,42 +95,29 @@ impl Typed {
     }
 }
 
-/// Nanoseconds of `00:00:00.02`, as 1.0 writes an interval.
-pub(in crate::plcopen) fn time_of_day(text: &str) -> Option<i64> {
-    let parts: Vec<&str> = text.split(':').collect();
-    let [hours, minutes, seconds] = parts[..] else {
-        return None;
-    };
-    let hours: u16 = hours.parse().ok()?;
-    let minutes: u16 = minutes.parse().ok()?;
-    let seconds: f64 = seconds.parse().ok()?;
-    seconds_of(f64::from(hours) * 3600.0 + f64::from(minutes) * 60.0 + seconds)
-}
-
 /// `T#20ms`, or as 2.01 has it, `PT0.02S`, or as 1.0 has it, `00:00:00.02`; also plain seconds.
 fn nanoseconds(text: &str) -> Option<i64> {
-    if let Some(found) = time_of_day(text) {
-        return Some(found);
+    if let Some(found) = clock(text) {
+        return i64::try_from(found.as_nanos()).ok();
     }
     if let Some(seconds) = text
         .strip_prefix("PT")
         .and_then(|rest| rest.strip_suffix('S'))
     {
-        return seconds_of(seconds.parse().ok()?);
+        return seconds_of(seconds);
     }
     let (value, found) = parse_expression_at(text, &|span| span);
     match value.kind {
         ExpressionKind::Literal(Literal::Time { nanoseconds, .. }) if found.is_empty() => {
             Some(nanoseconds)
         }
-        ExpressionKind::Literal(Literal::Real { .. } | Literal::Integer { .. }) => {
-            seconds_of(text.parse().ok()?)
-        }
+        ExpressionKind::Literal(Literal::Real { .. } | Literal::Integer { .. }) => seconds_of(text),
         _ => None,
     }
 }
 
-fn seconds_of(seconds: f64) -> Option<i64> {
+fn seconds_of(text: &str) -> Option<i64> {
+    let seconds: f64 = text.parse().ok()?;
     let nanoseconds = (seconds * 1e9).round();
     (nanoseconds > 0.0 && nanoseconds < 1e18).then_some(nanoseconds as i64)
 }
