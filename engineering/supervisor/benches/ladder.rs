@@ -42,6 +42,30 @@ fn generation(bencher: Bencher, states: u32) {
     });
 }
 
+/// A generated ladder of 10,000 and 45,000 states of the supervisor, of which each command waits for a request.
+#[divan::bench(sample_count = 1, args = [10_000, 45_000])]
+fn proof_of_a_large_one(bencher: Bencher, states: u32) {
+    let automaton = large(states);
+    let modules = Modules::supervisor(&automaton);
+    let map = InputOutputMap::direct("large", &modules.alphabet());
+    let Conversion {
+        program,
+        correspondence,
+        ..
+    } = convert(&modules, &map, Mode::Requested).expect("the map fits");
+    let settings = ProofSettings {
+        mode: Mode::Requested,
+        ..ProofSettings::default()
+    };
+    bencher.bench_local(|| {
+        let verdict = prove(&program, &modules, &map, &correspondence, settings);
+        match verdict.expect("a verdict") {
+            Verdict::Proved(proof) => eprintln!("{proof:?}"),
+            Verdict::Refuted(found) => panic!("{found}"),
+        }
+    });
+}
+
 fn agv(name: &str) -> Automaton {
     automaton("agv", name)
 }

@@ -24,4 +24,4 @@ pub use normal_form::{Monomial, NormalForm, TooManyMonomials};
 pub use packed::{bit, pack, unpack};
 pub use polynomial::Polynomial;
 pub use running::Running;
-pub use scan::{Scan, Scratch};
+pub use scan::{SPARSE, Scan, Scratch, Sparse, SparseRun};

@@ -4,13 +4,17 @@
 //! element). For lanes, the word k is element k of 64 independent runs, bit l being the run l.
 //! Both read the whole old state before any of the new one is written, as (1)-(2) demand.
 
+mod sparse;
+
 use std::array;
 
 use crate::circuit::Circuit;
 use crate::expression::{Expression, Operation, Variable};
 
+pub use sparse::{SPARSE, Sparse, SparseRun};
+
 /// A place in the scratch memory and whether its value is wanted negated: 2 · place + negated.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Operand(u32);
 
 impl Operand {

@@ -4,7 +4,9 @@ mod common;
 
 use common::{circuit, configuration, recipe};
 use proptest::prelude::*;
-use understudy_logic::{Circuit, CircuitBuilder, Expression, Scan, Scratch, Variable, bit, pack};
+use understudy_logic::{
+    Circuit, CircuitBuilder, Expression, Scan, Scratch, Sparse, SparseRun, Variable, bit, pack,
+};
 
 /// One step of `circuit` from packed `state` under packed `inputs`, by [`understudy_logic::Graph::evaluate`].
 fn expected(circuit: &Circuit, state: &[u64], inputs: &[u64]) -> (Vec<bool>, Vec<bool>) {
@@ -99,6 +101,42 @@ proptest! {
     fn random_circuits(recipe in recipe(), samples in prop::collection::vec(any::<u64>(), 1..5)) {
         let samples: Vec<Vec<u64>> = samples.into_iter().map(|word| vec![word]).collect();
         check(&circuit("random", &recipe), &samples);
+    }
+}
+
+/// Runs in which few registers are on do in a sparse pass what they do alone.
+fn check_sparse(circuit: &Circuit, count: usize, mask: u64, samples: &[u64]) {
+    let mut sparse = Sparse::new(Scan::new(circuit));
+    let sample = |number: usize| samples[number % samples.len()].rotate_left(number as u32);
+    let registers = circuit.registers().len() as u32;
+    let runs = (0..count).map(|number| {
+        let is_on = |place: &u32| mask & sample(number + 1) >> (place % 64) & 1 == 1;
+        SparseRun {
+            on: (0..registers).filter(is_on).collect(),
+            signals: vec![sample(number); circuit.inputs().len().div_ceil(64)],
+        }
+    });
+    let before: Vec<SparseRun> = runs.collect();
+    let mut after = before.clone();
+    sparse.step(&mut after);
+    for (before, after) in before.iter().zip(&after) {
+        let state = pack((0..registers).map(|place| before.on.contains(&place)));
+        let (next, values) = expected(circuit, &state, &before.signals);
+        let on = (0..registers).filter(|&place| next[place as usize]);
+        assert_eq!(after.on, on.collect::<Vec<_>>());
+        assert_eq!(after.signals, pack(values.iter().copied()));
+    }
+}
+
+proptest! {
+    #![proptest_config(configuration(200))]
+
+    #[test]
+    fn sparse_runs(recipe in recipe(), mask in any::<u64>(), samples in prop::collection::vec(any::<u64>(), 1..20)) {
+        let circuit = circuit("random", &recipe);
+        for (count, mask) in [(1, mask), (64, 0), (65, mask & mask >> 7), (200, u64::MAX)] {
+            check_sparse(&circuit, count, mask, &samples);
+        }
     }
 }
 

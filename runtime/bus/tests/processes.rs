@@ -228,45 +228,50 @@ fn started(
     (part, running)
 }
 
+/// Takes reports until every one of `missing` has come, each a listener with a speaker.
+fn wait_for_pairs(
+    reports: &Receiver<Reports>,
+    when: &str,
+    mut missing: BTreeSet<(Member, Member)>,
+    mut is_enough: impl FnMut(Member, u64) -> bool,
+) {
+    let start = Instant::now();
+    while !missing.is_empty() {
+        let left = DEADLINE.saturating_sub(start.elapsed());
+        match reports.recv_timeout(left) {
+            Ok((listener, Noted::Member(Chat::StillHears { speaker, hundreds }))) => {
+                if is_enough(speaker, hundreds) {
+                    missing.remove(&(listener, speaker));
+                }
+            }
+            Ok(_) => {}
+            Err(_) => panic!("{when}, not received (listener, speaker): {missing:?}"),
+        }
+    }
+}
+
 /// One is stopped for some seconds, and goes on.
 fn stopped(link: LinkKind) {
     let (sender, reports) = channel();
     let (_part, running) = started(link, &sender);
     for own in [station(0), station(1), remote_io(0)] {
+        let (its, others): (BTreeSet<_>, BTreeSet<_>) = pairs()
+            .into_iter()
+            .partition(|(listener, speaker)| *listener == own || *speaker == own);
         let mut newest = 0;
-        let mut missing = pairs();
-        wait_until(&reports, "somebody before the stop", |(listener, event)| {
-            if let Noted::Member(Chat::StillHears { speaker, hundreds }) = event {
-                missing.remove(&(*listener, *speaker));
-                newest = newest.max(*hundreds);
-            }
-            missing.is_empty()
+        wait_for_pairs(&reports, "before the stop", pairs(), |_, hundreds| {
+            newest = newest.max(hundreds);
+            true
         });
         running[&own].signal(Signal::SIGSTOP);
         // A hundred frames take a second.
-        let mut missing: BTreeSet<(Member, Member)> = pairs();
-        missing.retain(|(listener, speaker)| *listener != own && *speaker != own);
-        wait_until(&reports, "somebody during the stop", |(listener, event)| {
-            if let Noted::Member(Chat::StillHears { speaker, hundreds }) = event
-                && *hundreds >= newest + 2
-            {
-                missing.remove(&(*listener, *speaker));
-            }
-            missing.is_empty()
-        });
+        let during = |_, hundreds| hundreds >= newest + 2;
+        wait_for_pairs(&reports, "during the stop", others, during);
         running[&own].signal(Signal::SIGCONT);
         let continued = Instant::now();
-        let mut missing: BTreeSet<(Member, Member)> = pairs();
-        missing.retain(|(listener, speaker)| *listener == own || *speaker == own);
-        wait_until(&reports, "somebody after the stop", |(listener, event)| {
-            if let Noted::Member(Chat::StillHears { speaker, hundreds }) = event {
-                // The one who was stopped is behind the others by as many frames as it did not say.
-                if *speaker == own || *hundreds > newest + 2 {
-                    missing.remove(&(*listener, *speaker));
-                }
-            }
-            missing.is_empty()
-        });
+        // The one who was stopped is behind the others by as many frames as it did not say.
+        let after = |speaker, hundreds| speaker == own || hundreds > newest + 2;
+        wait_for_pairs(&reports, "after the stop", its, after);
         println!(
             "  {own:?} hears and is heard again {:?} after its stop",
             continued.elapsed()

@@ -7,7 +7,7 @@ use std::time::Duration;
 use hashbrown::HashTable;
 use rustc_hash::FxBuildHasher;
 use understudy_ladder::{Name, Program};
-use understudy_logic::{Circuit, Lanes, Run, Scan, WIDE, pack};
+use understudy_logic::{Circuit, SPARSE, Scan, Sparse, SparseRun, pack};
 
 use super::environment::Environment;
 use super::reference::{Allowed, Happening, Joint, Reference};
@@ -70,7 +70,7 @@ pub fn prove(
     );
     let view = View::new(&circuit, program, map, correspondence)?;
     let mut exploration = Exploration {
-        lanes: Lanes::new(Scan::new(&circuit)),
+        sparse: Sparse::new(Scan::new(&circuit)),
         circuit: &circuit,
         reference,
         environment,
@@ -99,7 +99,7 @@ struct Node {
 type Question = (Joint, Box<[u8]>, Vec<Label>, Vec<Label>, bool);
 
 struct Exploration<'a> {
-    lanes: Lanes,
+    sparse: Sparse,
     circuit: &'a Circuit,
     reference: Reference<'a>,
     environment: Environment,
@@ -116,15 +116,17 @@ struct Exploration<'a> {
 
 impl Exploration<'_> {
     fn run(&mut self) -> Result<Verdict, ProofError> {
-        let registers = self.lanes.scan().initial().to_vec();
-        let seen = self.see(&registers, &[]);
+        let on: Box<[u32]> = ones(self.sparse.scan().initial())
+            .map(|place| place as u32)
+            .collect();
+        let seen = self.see(&on, &[]);
         let state = seen
             .states
             .iter()
             .map(|states| states.first().copied())
             .collect();
         self.keep(Node {
-            on: on(&registers),
+            on,
             kept: vec![false; self.circuit.inputs().len()].into(),
             state,
             positions: vec![0; self.reference.switch_count()].into(),
@@ -134,12 +136,12 @@ impl Exploration<'_> {
         while next < self.nodes.len() {
             let first = next;
             let mut waiting = Vec::new();
-            while next < self.nodes.len() && waiting.len() < WIDE {
+            while next < self.nodes.len() && waiting.len() < SPARSE {
                 let images = self.following(next);
                 waiting.extend(images.into_iter().map(|image| (next, image)));
                 next += 1;
             }
-            for waiting in waiting.chunks(WIDE) {
+            for waiting in waiting.chunks(SPARSE) {
                 if let Some(counterexample) = self.expand(waiting) {
                     return Ok(Verdict::Refuted(Box::new(counterexample)));
                 }
@@ -173,22 +175,15 @@ impl Exploration<'_> {
         self.environment.following(&node.kept, is_on)
     }
 
-    /// Scans from nodes with images, at most [`WIDE`] at once.
+    /// Scans from nodes with images, at most [`SPARSE`] at once.
     fn expand(&mut self, waiting: &[(usize, Vec<bool>)]) -> Option<Counterexample> {
-        let words = self.lanes.scan().initial().len();
-        let runs = waiting.iter().map(|(index, image)| {
-            let mut state = vec![0; words];
-            for &place in &self.nodes[*index].on {
-                state[place as usize / 64] |= 1 << (place % 64);
-            }
-            Run {
-                state,
-                signals: pack(image.iter().copied()),
-            }
+        let runs = waiting.iter().map(|(index, image)| SparseRun {
+            on: self.nodes[*index].on.to_vec(),
+            signals: pack(image.iter().copied()),
         });
-        let mut runs: Vec<Run> = runs.collect();
-        self.lanes.step(&mut runs);
-        for ((index, image), run) in waiting.iter().zip(&runs) {
+        let mut runs: Vec<SparseRun> = runs.collect();
+        self.sparse.step(&mut runs);
+        for ((index, image), run) in waiting.iter().zip(runs) {
             self.scans += 1;
             let found = self.judge(*index, image, run);
             if found.is_some() {
@@ -212,7 +207,7 @@ impl Exploration<'_> {
     }
 
     /// Compares one scan with what is allowed, and keeps where it leads.
-    fn judge(&mut self, index: usize, image: &[bool], run: &Run) -> Option<Counterexample> {
+    fn judge(&mut self, index: usize, image: &[bool], run: SparseRun) -> Option<Counterexample> {
         let node = &self.nodes[index];
         let happening = self.environment.happening(&node.kept, image);
         if let Some(state) = &node.state {
@@ -223,7 +218,7 @@ impl Exploration<'_> {
                         automaton: automaton.name().to_owned(),
                         event: automaton.alphabet().name(event),
                     };
-                    let seen = self.see(&run.state, &run.signals);
+                    let seen = self.see(&run.on, &run.signals);
                     return Some(self.refute(index, image, &seen, deviation, &[]));
                 }
             }
@@ -244,7 +239,7 @@ impl Exploration<'_> {
                 .scan(&node.state, &node.positions, &happening);
             self.cache.insert(question.clone(), allowed);
         }
-        let seen = self.see(&run.state, &run.signals);
+        let seen = self.see(&run.on, &run.signals);
         let found = self.cache[&question]
             .iter()
             .find(|allowed| seen.is(allowed));
@@ -255,7 +250,7 @@ impl Exploration<'_> {
         };
         self.used.extend(found.word.iter().copied());
         self.keep(Node {
-            on: on(&run.state),
+            on: run.on.into(),
             kept: self.environment.kept(image).into(),
             state: found.state.clone(),
             positions: found.positions.clone(),
@@ -264,7 +259,7 @@ impl Exploration<'_> {
         None
     }
 
-    fn see(&self, registers: &[u64], outputs: &[u64]) -> Seen {
+    fn see(&self, registers: &[u32], outputs: &[u64]) -> Seen {
         let mut seen = Seen {
             states: vec![Vec::new(); self.reference.automata().len()],
             positions: vec![Vec::new(); self.reference.switch_count()],
@@ -273,22 +268,16 @@ impl Exploration<'_> {
         for &(automaton, state) in &self.view.constant {
             seen.states[automaton].push(state);
         }
-        for (image, bits) in [
-            (registers, &self.view.registers),
-            (outputs, &self.view.outputs),
-        ] {
-            for (place, &word) in image.iter().enumerate() {
-                let mut word = word;
-                while word != 0 {
-                    let number = place * 64 + word.trailing_zeros() as usize;
-                    word &= word - 1;
-                    match bits[number] {
-                        Bit::Other => {}
-                        Bit::State { automaton, state } => seen.states[automaton].push(state),
-                        Bit::Switch { switch, position } => seen.positions[switch].push(position),
-                        Bit::Pulse(pulse) => seen.pulses.push(pulse),
-                    }
-                }
+        let registers = registers
+            .iter()
+            .map(|&place| self.view.registers[place as usize]);
+        let outputs = ones(outputs).map(|place| self.view.outputs[place]);
+        for bit in registers.chain(outputs) {
+            match bit {
+                Bit::Other => {}
+                Bit::State { automaton, state } => seen.states[automaton].push(state),
+                Bit::Switch { switch, position } => seen.positions[switch].push(position),
+                Bit::Pulse(pulse) => seen.pulses.push(pulse),
             }
         }
         seen
@@ -429,15 +418,10 @@ impl Exploration<'_> {
     }
 }
 
-/// The places of the bits that are 1.
-fn on(image: &[u64]) -> Box<[u32]> {
-    let mut on = Vec::new();
-    for (place, &word) in (0..).zip(image) {
-        let mut word = word;
-        while word != 0 {
-            on.push(64 * place + word.trailing_zeros());
-            word &= word - 1;
-        }
-    }
-    on.into()
+/// The places of the bits that are 1, ascending.
+fn ones(image: &[u64]) -> impl Iterator<Item = usize> {
+    image.iter().enumerate().flat_map(|(place, &word)| {
+        let ones = (0..64).filter(move |bit| word >> bit & 1 == 1);
+        ones.map(move |bit| 64 * place + bit)
+    })
 }

@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use understudy_ladder::{Name, Program};
+use understudy_ladder::{Name, Program, Signal};
 use understudy_logic::Circuit;
 
 use super::reference::Allowed;
@@ -44,6 +44,10 @@ impl View {
         let output_of: HashMap<&str, usize> = outputs.zip(0..).collect();
         let coils = program.rungs.iter().flat_map(|rung| &rung.coils);
         let written: HashSet<&str> = coils.map(|coil| coil.target.as_str()).collect();
+        let memory = program.memory.iter();
+        let memory: HashMap<&str, &Signal> = memory
+            .map(|signal| (signal.name.as_str(), signal))
+            .collect();
         let mut view = Self {
             registers: vec![Bit::Other; circuit.registers().len()],
             outputs: vec![Bit::Other; circuit.outputs().len()],
@@ -53,8 +57,7 @@ impl View {
         for (automaton, bits) in correspondence.states.iter().enumerate() {
             for (number, name) in (0..).zip(bits) {
                 let state = State::new(number);
-                let declared = program.memory.iter().find(|signal| signal.name == *name);
-                match (register_of.get(name.as_str()), declared) {
+                match (register_of.get(name.as_str()), memory.get(name.as_str())) {
                     (Some(&place), _) => view.registers[place] = Bit::State { automaton, state },
                     (None, Some(signal)) if !written.contains(name.as_str()) => {
                         if signal.initial == Some(true) {
