@@ -60,7 +60,7 @@ fn proof_of_a_large_one(bencher: Bencher, states: u32) {
     bencher.bench_local(|| {
         let verdict = prove(&program, &modules, &map, &correspondence, settings);
         match verdict.expect("a verdict") {
-            Verdict::Proved(proof) => eprintln!("{proof:?}"),
+            Verdict::Proved(proof) => proof,
             Verdict::Refuted(found) => panic!("{found}"),
         }
     });

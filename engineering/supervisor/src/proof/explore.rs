@@ -59,6 +59,7 @@ pub fn prove(
     let partition = Partition::new(map, modules).map_err(ProofError::Partition)?;
     let (freed, timers) = free_timers(program);
     let circuit = freed.lower(Duration::from_millis(1))?;
+    drop(freed);
     let reference = Reference::new(modules, map, &partition, settings.mode);
     let environment = Environment::new(
         circuit.inputs(),
