@@ -9,9 +9,12 @@ use divan::counter::ItemsCount;
 use divan::{AllocProfiler, Bencher, black_box};
 use families::{line, philosophers, workshop};
 use models::Model;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
 use understudy_supervisor::operations::{compare_effects, condat, minstate, supreduce, sync};
 use understudy_supervisor::{
-    Automaton, Bounds, SymbolicBounds, synthesise, synthesise_symbolically,
+    Automaton, Bounds, Label, State, SymbolicBounds, Transition, synthesise,
+    synthesise_symbolically,
 };
 
 /// So that memory is measured beside time.
@@ -115,6 +118,40 @@ fn supreduce_of_a_workshop(bencher: Bencher<'_, '_>, (machines, kinds, capacity)
     let made = synthesise(&plants, &references(&specifications), Bounds::default());
     let supervisor = made.expect("it fits").supervisor;
     let plant = sync(&plants, Bounds::default()).expect("it fits");
+    bencher.bench_local(|| supreduce(&plant, &supervisor, Bounds::default()));
+}
+
+/// A plant without any structure, in which each state has `events / 3` random events with random targets, and a supervisor that disables
+/// one of ten that are controllable. Every pair of states is tried; the figure to reach is 30 s.
+#[divan::bench(args = [(20_000, 60), (50_000, 30)], sample_count = 1, sample_size = 1)]
+fn supreduce_of_random_plants(bencher: Bencher<'_, '_>, (states, events): (u32, u32)) {
+    let mut random = Pcg64Mcg::seed_from_u64(1);
+    let mut transitions = Vec::new();
+    for source in (0..states).map(State::new) {
+        for label in (0..events).map(Label::new) {
+            if random.random_ratio(1, 3) {
+                let target = State::new(random.random_range(0..states));
+                let is_allowed = !label.is_controllable() || random.random_ratio(9, 10);
+                let transition = Transition {
+                    source,
+                    label,
+                    target,
+                };
+                transitions.push((transition, is_allowed));
+            }
+        }
+    }
+    let automaton = |name: &str, transitions: Vec<Transition>| {
+        let marked = vec![true; states as usize];
+        Automaton::new(name, [], marked, transitions).expect("deterministic")
+    };
+    let all = transitions.iter().map(|(transition, _)| *transition);
+    let plant = automaton("plant", all.collect());
+    let allowed = transitions.iter().filter(|(_, is_allowed)| *is_allowed);
+    let supervisor = automaton(
+        "supervisor",
+        allowed.map(|(transition, _)| *transition).collect(),
+    );
     bencher.bench_local(|| supreduce(&plant, &supervisor, Bounds::default()));
 }
 

@@ -320,10 +320,15 @@ impl<M: Machine> Host<'_, M> {
     }
 
     fn report_reopenings(&mut self, now: Time) {
-        while let Some(Reopening { silence, failure }) = self.link.reopening() {
+        while let Some(reopening) = self.link.reopening() {
+            let Reopening {
+                silence,
+                peer,
+                failure,
+            } = reopening;
             let silence_ms = u64::try_from(silence.as_millis()).unwrap_or(u64::MAX);
             let event = match failure {
-                None => HostEvent::LinkReopened { silence_ms },
+                None => HostEvent::LinkReopened { silence_ms, peer },
                 Some(reason) => HostEvent::LinkFailed { silence_ms, reason },
             };
             self.sink.record(now, Noted::Host(event));

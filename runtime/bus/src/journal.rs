@@ -147,14 +147,17 @@ pub enum HostEvent {
         /// Which bound, for the last one.
         reason: String,
     },
-    /// No configured peer was received for so long that the link was closed and opened anew.
+    /// No configured peer was received for so long, or one that is connected was not, that the link was closed and opened anew.
     LinkReopened {
         /// How long, in milliseconds.
         silence_ms: u64,
+        /// The one that is connected and was not received; none where no peer was.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        peer: Option<Member>,
     },
     /// The same, and the link could not be opened: no frame is sent or received. It is tried again.
     LinkFailed {
-        /// How long no peer was received, in milliseconds.
+        /// How long no peer was received, or one that is connected was not, in milliseconds.
         silence_ms: u64,
         /// Why it cannot be opened.
         reason: String,

@@ -7,7 +7,7 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
-use understudy_wire::Frame;
+use understudy_wire::{Frame, Member};
 
 use crate::endpoints::Endpoints;
 use crate::error::BusError;
@@ -34,17 +34,19 @@ pub trait Link: Send {
     /// What happened since the start.
     fn counters(&self) -> LinkCounters;
 
-    /// The next time that the link was opened anew because no peer was received; to be asked again until there is none.
+    /// The next time that the link was opened anew; to be asked again until there is none.
     fn reopening(&mut self) -> Option<Reopening> {
         None
     }
 }
 
-/// A link received none of its peers, and was closed and opened anew.
+/// A link received none of its peers, or not one that is connected, and was closed and opened anew.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reopening {
-    /// How long no peer was received.
+    /// How long no peer was received, or `peer` was not.
     pub silence: Duration,
+    /// The one that is connected and was not received; none where no peer was.
+    pub peer: Option<Member>,
     /// Why the link could not be opened; it is tried again.
     pub failure: Option<String>,
 }
@@ -56,7 +58,7 @@ pub struct LinkCounters {
     pub unsent: u64,
     /// Datagrams that found this member's own queue full.
     pub overrun: u64,
-    /// Times that the link was opened anew because no peer was received.
+    /// Times that the link was opened anew ([`Reopening`]).
     pub reopened: u64,
 }
 

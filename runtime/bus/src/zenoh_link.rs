@@ -2,18 +2,21 @@
 //!
 //! * **One session for each member.** It listens on the member's own address and connects to the peers before it
 //!   ([`Endpoints::called`]), so that no two connects cross. Zenoh itself connects again, with growing pauses, whenever a connection
-//!   fails or ends. A session has a new identity, so that a second life is never taken for the first.
+//!   fails or ends.
 //! * **TCP.** A session depends on declarations that are sent once, so it needs a transport that delivers them. Zenoh's listener
 //!   for UDP has two more defects (1.10.2, `accept_read_task`): one task hands all datagrams on through a queue of one
 //!   place for each sender, so it waits without end for a sender whose session has just ended, and then no peer is received any more.
 //! * Scouting and gossip are off. A member subscribes to the stations, and to the remote I/Os, by one expression each.
 //! * A member that publishes no frame for a [`PULSE`] publishes an empty message, however long its cycle is. A member that receives none
-//!   of its peers for [`silence::SILENT_PULSES`] opens its session anew, whatever the reason; the pause doubles each time.
+//!   of its peers for [`silence::SILENT_PULSES`], or is connected to one and does not receive it for [`silence::MUTE_PULSES`], opens its
+//!   session anew, whatever the reason; the pause doubles each time. The second was seen after one of several members that were stopped
+//!   for two seconds went on: two of its peers were connected to it and received nothing from then on.
 //! * Callbacks only enqueue, and nothing that the cycle's thread calls waits for a peer: what does not fit into a queue is dropped.
 
+mod settings;
 mod silence;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 use std::net::{SocketAddr, TcpListener};
 use std::os::fd::BorrowedFd;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -34,24 +37,14 @@ use crate::endpoints::{Endpoints, Peer};
 use crate::error::{BusError, reason};
 use crate::link::{Link, LinkCounters, LinkKind, Reopening};
 use crate::rights::raise_link_thread;
-use silence::Silence;
+use settings::{identity, settings};
+use silence::{Silence, Silent};
 
 /// Datagrams that wait for the cycle's thread, at most; one of 72 stations and 64 remote I/Os hears fewer in a cycle.
 const QUEUE_FRAMES: usize = 1024;
 
 /// How often each member publishes something.
 const PULSE: Duration = Duration::from_millis(250);
-
-/// How long it may take to connect to a peer. Long compared with what a busy machine needs, because an attempt that is given up is an
-/// attempt that is begun again.
-const OPEN_TIMEOUT_MS: u32 = 2_000;
-
-/// A connection on which nothing is received for so long has ended. A process that ends takes its connections with it at once;
-/// this is for a machine or a cable that fails.
-const LEASE_MS: u32 = 2_000;
-
-/// A longer frame goes in parts. What waits for a peer takes eight batches of this size, at most.
-const BATCH_BYTES: u16 = 16 * 1024;
 
 /// How Zenoh's own threads are to be set up, as a variable of the environment of every process that opens a Zenoh link. Zenoh
 /// reads it once, when its first session opens, and takes nothing else; without it there are six threads where two do.
@@ -95,9 +88,11 @@ impl ZenohLink {
         TcpListener::bind(frames).map_err(|source| BusError::listen(frames, source))?;
         let (outbox, inbox) =
             doorbell(QUEUE_FRAMES).map_err(BusError::system("an eventfd for what arrives"))?;
+        let senders = endpoints.senders().map(|peer| peer.member);
+        let heard = senders.map(|member| (name(member), (member, AtomicBool::new(false))));
         let ears = Ears {
             outbox,
-            heard: Arc::new(AtomicBool::new(false)),
+            heard: Arc::new(heard.collect()),
         };
         let session = Session::open(endpoints, &ears).map_err(|error| BusError::Zenoh {
             address: frames,
@@ -110,13 +105,16 @@ impl ZenohLink {
         let (closing, closed) = channel();
         let (report, reopenings) = channel();
         let clock = Clock::start();
+        let own = endpoints.own().member;
+        let before = endpoints.others().iter().filter(|peer| peer.member < own);
+        let place = u32::try_from(before.count()).unwrap_or(u32::MAX);
         let mut keeper = Keeper {
             endpoints: endpoints.clone(),
             session: Some(session),
             publishers: Arc::clone(&publishers),
             published: Arc::clone(&published),
             ears,
-            silence: Silence::new(clock.now()),
+            silence: Silence::new(clock.now(), place),
             failed: false,
             reopened: Arc::clone(&reopened),
             report,
@@ -210,8 +208,26 @@ impl Drop for ZenohLink {
 #[derive(Clone)]
 struct Ears {
     outbox: Outbox<Vec<u8>>,
-    /// Whether a peer was received since it was last asked.
-    heard: Arc<AtomicBool>,
+    /// Of each peer by its [`name`], whether it was received since it was last asked.
+    heard: Arc<HashMap<String, (Member, AtomicBool)>>,
+}
+
+impl Ears {
+    fn hear(&self, key: &str) {
+        let name = key.rsplit_once('/').map_or(key, |(_, name)| name);
+        if let Some((_, heard)) = self.heard.get(name) {
+            heard.store(true, Ordering::Relaxed);
+        }
+    }
+
+    /// Whom it has heard since it was last asked.
+    fn take(&self) -> BTreeSet<Member> {
+        let heard = self.heard.values();
+        heard
+            .filter(|(_, heard)| heard.swap(false, Ordering::Relaxed))
+            .map(|(member, _)| *member)
+            .collect()
+    }
 }
 
 /// The one session of a member.
@@ -254,7 +270,7 @@ impl Session {
                 .allowed_origin(Locality::Remote)
                 .callback(move |sample| {
                     raise_link_thread();
-                    ears.heard.store(true, Ordering::Relaxed);
+                    ears.hear(sample.key_expr().as_str());
                     let payload = sample.payload();
                     if !payload.is_empty() {
                         ears.outbox.put(payload.to_bytes().into_owned());
@@ -268,6 +284,23 @@ impl Session {
             publishers: Arc::new(publishers),
             _exact: exact,
         })
+    }
+
+    /// Those of its senders to whom it is connected.
+    fn connected(&self, endpoints: &Endpoints) -> BTreeSet<Member> {
+        let identities: Vec<String> = self
+            .session
+            .info()
+            .peers_zid()
+            .wait()
+            .map(|id| id.to_string())
+            .collect();
+        let senders = endpoints.senders().map(|peer| peer.member);
+        let is_connected = |member: &Member| {
+            let own = identity(endpoints.cluster(), *member);
+            identities.iter().any(|id| id.starts_with(&own))
+        };
+        senders.filter(is_connected).collect()
     }
 
     /// Waits for its end, for [`CLOSE_TIMEOUT`] at most.
@@ -287,7 +320,7 @@ impl Session {
     }
 }
 
-/// Publishes signs of this member, and opens its session anew where no peer is received.
+/// Publishes signs of this member, and opens its session anew where no peer is received, or one that is connected is not.
 struct Keeper {
     endpoints: Endpoints,
     /// None where it could not be opened anew.
@@ -314,16 +347,25 @@ impl Keeper {
                 }
             }
         }
-        let heard = self.ears.heard.swap(false, Ordering::Relaxed);
-        let due = self.silence.look(now, heard);
+        let heard = self.ears.take();
+        let connected = match &self.session {
+            Some(session) => session.connected(&self.endpoints),
+            None => BTreeSet::new(),
+        };
+        let due = self.silence.look(now, &heard, &connected);
         // Of one that nobody sends to nothing can be told.
         let listens = self.endpoints.senders().next().is_some();
-        if listens && (due || self.session.is_none()) {
-            self.reopen(self.silence.lasts(now));
+        if !listens {
+            return;
+        }
+        if let Some(silent) = due {
+            self.reopen(silent);
+        } else if self.session.is_none() {
+            self.reopen(self.silence.of_all(now));
         }
     }
 
-    fn reopen(&mut self, silence: Duration) {
+    fn reopen(&mut self, silent: Silent) {
         if let Some(session) = self.session.take() {
             session.close();
         }
@@ -343,18 +385,27 @@ impl Keeper {
         self.failed = failure.is_some();
         if !again {
             // A link that is dropped asks no more.
-            let _ = self.report.send(Reopening { silence, failure });
+            let _ = self.report.send(Reopening {
+                silence: silent.lasts,
+                peer: silent.peer,
+                failure,
+            });
         }
     }
 }
 
 fn key(cluster: ClusterHash, topic: Topic, speaker: Member) -> String {
-    let (kind, number) = match speaker {
+    format!("{}/{}", prefix(cluster, topic), name(speaker))
+}
+
+/// The last part of a member's keys.
+fn name(member: Member) -> String {
+    let (kind, number) = match member {
         Member::Station(station) => ("station", station.0),
         Member::RemoteIo(program) => ("remote-io", program.0),
         Member::Plant(program) => ("plant", program.0),
     };
-    format!("{}/{kind}-{number}", prefix(cluster, topic))
+    format!("{kind}-{number}")
 }
 
 fn prefix(cluster: ClusterHash, topic: Topic) -> String {
@@ -391,63 +442,49 @@ fn subscriptions(endpoints: &Endpoints) -> BTreeSet<String> {
     all
 }
 
-fn settings(endpoints: &Endpoints) -> zenoh::Result<zenoh::Config> {
-    let locator = |address| -> zenoh::Result<String> {
-        Ok(format!("tcp/{}", LinkKind::Zenoh.frames_address(address)?))
-    };
-    let listen = [locator(endpoints.own().address)?];
-    let connect = endpoints.called().map(|peer| locator(peer.address));
-    let connect = connect.collect::<zenoh::Result<Vec<String>>>()?;
-    let peers = endpoints.others().iter();
-    let peers = peers
-        .filter(|peer| endpoints.talks_with(peer.member))
-        .count();
-    let mut config = zenoh::Config::default();
-    for (setting, value) in [
-        ("mode", "\"peer\"".to_owned()),
-        ("listen/endpoints", format!("{listen:?}")),
-        ("connect/endpoints", format!("{connect:?}")),
-        // For as long as the session is open, in the background.
-        ("connect/timeout_ms", "-1".into()),
-        ("connect/exit_on_failure", "false".into()),
-        (
-            "connect/retry",
-            "{ period_init_ms: 25, period_max_ms: 400, period_increase_factor: 2 }".into(),
-        ),
-        ("open/return_conditions/connect_scouted", "false".into()),
-        ("open/return_conditions/declares", "false".into()),
-        ("scouting/multicast/enabled", "false".into()),
-        ("scouting/gossip/enabled", "false".into()),
-        // The low-latency transport sends on the calling thread, and would wait there for a peer that is suspended.
-        ("transport/unicast/lowlatency", "false".into()),
-        // Not to be switched off: with one queue for all priorities Zenoh 1.10.2 marks that queue as full under one priority and as free
-        // under another one (`TransmissionPipelineProducer::push_network_message` and `TransmissionPipelineConsumer::refill`), so that
-        // it drops every frame to this peer from the first full queue on.
-        ("transport/unicast/qos/enabled", "true".into()),
-        // Each frame is a batch of its own, and a member sends some in a row.
-        ("transport/link/tx/queue/size/real_time", "8".into()),
-        ("transport/link/tx/batch_size", BATCH_BYTES.to_string()),
-        (
-            "transport/unicast/open_timeout",
-            OPEN_TIMEOUT_MS.to_string(),
-        ),
-        (
-            "transport/unicast/accept_timeout",
-            OPEN_TIMEOUT_MS.to_string(),
-        ),
-        // Every peer, the last life of each, and no more, so that strangers do not take all descriptors.
-        ("transport/unicast/max_sessions", (2 * peers).to_string()),
-        ("transport/unicast/accept_pending", (2 * peers).to_string()),
-        ("transport/link/tx/lease", LEASE_MS.to_string()),
-        ("transport/link/tx/keep_alive", "4".into()),
-        (
-            "transport/link/tx/queue/congestion_control/drop/wait_before_drop",
-            "0".into(),
-        ),
-    ] {
-        config
-            .insert_json5(setting, &value)
-            .map_err(|error| format!("{setting} = {value}: {error}"))?;
+#[cfg(test)]
+mod tests {
+    use std::time::Instant;
+
+    use understudy_wire::{ProgramId, StationId};
+
+    use super::*;
+    use crate::ports::free_addresses;
+
+    /// One of two peers is connected and publishes nothing: the session is opened anew because of that one.
+    #[test]
+    fn a_peer_that_is_connected_and_not_received_is_found() {
+        let members = [
+            Member::Station(StationId(0)),
+            Member::Station(StationId(1)),
+            Member::RemoteIo(ProgramId(0)),
+        ];
+        let addresses = free_addresses(members.len()).expect("there are ports");
+        let peers = members.iter().zip(addresses);
+        let peers = peers.map(|(&member, address)| Peer {
+            member,
+            name: name(member),
+            address,
+        });
+        let peers: Vec<Peer> = peers.collect();
+        let endpoints = |own| {
+            let roster = Roster::new(1, 2, Vec::new());
+            Endpoints::new(ClusterHash(1), own, peers.clone(), roster).expect("a member")
+        };
+        let [first, mute, speaker] = members;
+        let mut link = ZenohLink::open(&endpoints(first)).expect("a link");
+        let _speaker = ZenohLink::open(&endpoints(speaker)).expect("a link");
+        let settings = settings(&endpoints(mute)).expect("valid");
+        let _mute = zenoh::open(settings).wait().expect("a session");
+        let start = Instant::now();
+        let reopening = loop {
+            if let Some(reopening) = link.reopening() {
+                break reopening;
+            }
+            assert!(start.elapsed() < Duration::from_secs(60), "not found");
+            std::thread::yield_now();
+        };
+        assert_eq!(reopening.peer, Some(mute));
+        assert_eq!(reopening.silence, PULSE * silence::MUTE_PULSES);
     }
-    Ok(config)
 }

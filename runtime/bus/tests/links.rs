@@ -313,7 +313,10 @@ fn a_session_without_peers_is_opened_anew_over_zenoh() {
         let (member, event) = reports.recv_timeout(DEADLINE).expect("it is reported");
         if let Noted::Host(event) = event {
             match event {
-                HostEvent::LinkReopened { silence_ms } => {
+                HostEvent::LinkReopened {
+                    silence_ms,
+                    peer: None,
+                } => {
                     assert!(silence_ms >= 1000, "after {silence_ms} ms");
                     missing.remove(&member);
                 }

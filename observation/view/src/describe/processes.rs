@@ -32,10 +32,12 @@ descriptions! { host: HostEvent, members: Members;
     );
     UnsendableFrames { frames, reason } => "unsendable-frames" Warning
         format!("{frames} frames could not be sent: {reason}");
-    LinkReopened { silence_ms } => "link-reopened" Warning
+    LinkReopened { silence_ms, peer: None } => "link-reopened" Warning
         format!("received no member for {silence_ms} ms and reopened its link");
-    LinkFailed { silence_ms, reason } => "link-failed" Alarm
-        format!("received no member for {silence_ms} ms and cannot reopen its link: {reason}");
+    LinkReopened { silence_ms, peer: Some(peer) } => "link-reopened" Warning format!(
+        "was connected to {} but received nothing from it for {silence_ms} ms, and reopened its link", members.name(*peer)
+    );
+    LinkFailed { reason, .. } => "link-failed" Alarm format!("cannot reopen its link: {reason}");
     FieldLost { reason } => "field-lost" Alarm format!("its equipment cannot be read or written: {reason}");
     FieldRegained => "field-regained" Notice "its equipment is read and written again";
     FieldContested => "field-contested" Alarm "another master writes the outputs of its equipment";
