@@ -13,7 +13,7 @@ use crate::console::Console;
 pub(crate) const BUDGET: &str = "30s";
 
 /// Interval of the progress messages.
-const BETWEEN: Duration = Duration::from_secs(3);
+pub(super) const BETWEEN: Duration = Duration::from_secs(3);
 
 /// Reduced supervisor, with a warning if the time limit, SIGINT or SIGTERM stopped the reduction. Its effect on the plant was compared
 /// with that of `supervisor`.

@@ -1,6 +1,7 @@
 //! `understudy supervisor-to-ladder`: a proved ladder program of a supervisor.
 
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
@@ -9,14 +10,16 @@ use understudy_supervisor::ladder::{
     Conversion, InputOutputMap, Located, Mode, Modules, convert, read_map, table,
 };
 use understudy_supervisor::proof::{
-    Finding, FindingSeverity, ProofSettings, Verdict, findings, prove,
+    Finding, FindingSeverity, ProofSettings, Proving, Verdict, findings, prove_telling,
 };
 use understudy_supervisor::{Automaton, Label, Model, Signal};
 use understudy_text::{Diagnostic, Report};
 
 use crate::answer::{Answer, Status};
+use crate::console::Console;
 use crate::files;
 use crate::supervisors::automata::{self, Sources};
+use crate::supervisors::reduction::BETWEEN;
 
 /// Convert a supervisor to a proved ladder program
 #[derive(Debug, Args)]
@@ -70,7 +73,7 @@ impl From<ModeWord> for Mode {
     }
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let supervisor = source(&arguments.supervisor)?;
     let mut plants = Vec::new();
     let mut signals = supervisor.model.signals.clone();
@@ -104,12 +107,26 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         mode,
         ..ProofSettings::default()
     };
-    let verdict = prove(
+    let begin = Instant::now();
+    let mut told = begin;
+    let mut tell = |at: Proving| {
+        if told.elapsed() >= BETWEEN {
+            told = Instant::now();
+            console.note(&format!(
+                "{} s: proof of {} states so far, {} of them scanned with every input",
+                begin.elapsed().as_secs(),
+                at.reached,
+                at.scanned
+            ));
+        }
+    };
+    let verdict = prove_telling(
         &conversion.program,
         &modules,
         &map,
         &conversion.correspondence,
         settings,
+        &mut tell,
     )?;
     Ok(answer(arguments, &modules, &conversion, &found, verdict))
 }

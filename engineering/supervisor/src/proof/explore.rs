@@ -41,6 +41,15 @@ impl Default for ProofSettings {
     }
 }
 
+/// How far a proof is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Proving {
+    /// States of ladder and inputs that were reached.
+    pub reached: usize,
+    /// Those of them that were scanned with every input.
+    pub scanned: usize,
+}
+
 /// Holds `program` to the automata of `modules`, from its first scan through all that it can reach.
 ///
 /// In each scan up to [`ProofSettings::simultaneous`] inputs change; a rising, falling, high or low signal keeps its value as
@@ -55,6 +64,21 @@ pub fn prove(
     map: &InputOutputMap,
     correspondence: &Correspondence,
     settings: ProofSettings,
+) -> Result<Verdict, ProofError> {
+    prove_telling(program, modules, map, correspondence, settings, &mut |_| {})
+}
+
+/// As [`prove`], and tells many times a second how far it is.
+///
+/// # Errors
+/// As [`prove`].
+pub fn prove_telling(
+    program: &Program,
+    modules: &Modules,
+    map: &InputOutputMap,
+    correspondence: &Correspondence,
+    settings: ProofSettings,
+    tell: &mut dyn FnMut(Proving),
 ) -> Result<Verdict, ProofError> {
     let partition = Partition::new(map, modules).map_err(ProofError::Partition)?;
     let (freed, timers) = free_timers(program);
@@ -84,7 +108,7 @@ pub fn prove(
         used: HashSet::new(),
         scans: 0,
     };
-    exploration.run()
+    exploration.run(tell)
 }
 
 /// A reached state, and how.
@@ -116,7 +140,7 @@ struct Exploration<'a> {
 }
 
 impl Exploration<'_> {
-    fn run(&mut self) -> Result<Verdict, ProofError> {
+    fn run(&mut self, tell: &mut dyn FnMut(Proving)) -> Result<Verdict, ProofError> {
         let on: Box<[u32]> = ones(self.sparse.scan().initial())
             .map(|place| place as u32)
             .collect();
@@ -147,6 +171,10 @@ impl Exploration<'_> {
                     return Ok(Verdict::Refuted(Box::new(counterexample)));
                 }
             }
+            tell(Proving {
+                reached: self.nodes.len(),
+                scanned: next,
+            });
             for node in &self.nodes[first..next] {
                 self.joint.extend(node.state.clone());
             }
