@@ -7,7 +7,7 @@
 LINK is udp or zenoh. Every controller runs the press of examples/press-cell; no plant is simulated. A line has the time from the
 first process to the first cycle in which all members are synchronised, the cycles without a proved output (all, and those next
 to a stall of the host), wrong outputs, UDP datagrams sent in a cycle, and the processor time of a member in a cycle, its journal
-included. Datagrams are those of the whole machine, so nothing else may use UDP meanwhile.
+included (that of the kernel in parentheses: by ticks of the clock, so only roughly). Datagrams are those of the whole machine, so nothing else may use UDP meanwhile.
 """
 
 import json
@@ -64,12 +64,12 @@ def processes(runs):
 
 
 def processor_time(process):
-    """Processor time of a process in seconds, or nothing if it has ended."""
+    """Processor time of a process in seconds, its own and that of the kernel for it, or nothing if it has ended."""
     try:
         fields = Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()
     except OSError:
         return None
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    return tuple(int(ticks) / os.sysconf("SC_CLK_TCK") for ticks in fields[11:13])
 
 
 def measure(understudy, link, programs, period, cycles):
@@ -98,7 +98,8 @@ def measure(understudy, link, programs, period, cycles):
     times = []
     for kind in KINDS:
         own = [spent for it, spent in used.items() if members[it] == kind]
-        times.append(f"{sum(own) / max(len(own), 1) / cycles * 1e6:.0f} µs")
+        mean = [sum(part) / len(own) / cycles * 1e6 for part in zip(*own)]
+        times.append(f"{sum(mean):.0f} µs ({mean[1]:.0f})" if own else "-")
     return [
         str(cycles),
         f"{(origin - started) / 1e9:.1f} s",
@@ -113,7 +114,7 @@ def main():
     if len(sys.argv) < 4:
         sys.exit(__doc__)
     understudy, link, *wanted = sys.argv[1:]
-    row = "| {:5} | {:>8} | {:>7} | {:>6} | {:>7} | {:>15} | {:>5} | {:>9} | {:>10} | {:>10} | {:>10} |"
+    row = "| {:5} | {:>8} | {:>7} | {:>6} | {:>7} | {:>15} | {:>5} | {:>9} | {:>12} | {:>12} | {:>12} |"
     print(row.format("link", "programs", "period", "cycles", "start", "missed (stalls)", "wrong", "datagrams", *KINDS))
     print("|" + "---|" * 11)
     for run in wanted:
