@@ -6,11 +6,13 @@
 
 mod cells;
 mod demands;
+mod sieve;
 
 use crate::automaton::{Automaton, State};
 use crate::explicit::{Bounds, TooLarge};
 use cells::{Cells, End, Limits};
 use demands::Demands;
+use sieve::Sieve;
 
 /// Pairs of cells that an order after the first may look at in any case: less than a second. A large supervisor is mostly smallest in
 /// the first order, and a further order then takes at most the steps of that one.
@@ -88,7 +90,8 @@ pub fn supreduce_while(
                 left,
             })
         };
-        let end = cells.merge_greedily(order, limits, &mut go_on);
+        let mut sieve = Sieve::new(supervisor, &demands, order);
+        let end = cells.merge_greedily(&mut sieve, limits, &mut go_on);
         let reduced = cells.reduced(supervisor);
         let size = |automaton: &Automaton| (automaton.state_count(), automaton.transition_count());
         if number == 0 || size(&reduced) < size(&best.supervisor) {

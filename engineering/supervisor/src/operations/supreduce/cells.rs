@@ -4,13 +4,14 @@
 //! others is *closed*: no later merge can change it. Most attempts end at a closed cell, in their first step.
 
 use super::demands::Demands;
+use super::sieve::Sieve;
 use crate::automaton::{Automaton, Edge, State};
 use crate::explicit::{Bounds, TooLarge};
 
 const NONE: u32 = u32::MAX;
 
-/// Pairs of cells between two checks whether to continue: some milliseconds.
-const BETWEEN_CHECKS: u64 = 1 << 16;
+/// Pairs of cells between two checks whether to continue: about a millisecond.
+const BETWEEN_CHECKS: u64 = 1 << 12;
 
 /// What an order may take.
 #[derive(Debug, Clone, Copy)]
@@ -39,6 +40,8 @@ pub(super) struct Cells {
     events: usize,
     /// The root of a cell is its smallest state.
     parent: Vec<u32>,
+    /// The next state of the same cell, in a ring.
+    next: Vec<u32>,
     /// What a cell enables, then what it disables.
     demands: Vec<u64>,
     /// The events with a target, as bit sets.
@@ -62,6 +65,8 @@ pub(super) struct Cells {
 
 enum Change {
     Parent(u32, u32),
+    /// The rings of two cells became one, or the other way round.
+    Rings(u32, u32),
     Demand(usize, u64),
     Defined(usize, u64),
     Target(usize),
@@ -112,6 +117,7 @@ impl Cells {
             words: demands.words,
             events,
             parent: (0..states as u32).collect(),
+            next: (0..states as u32).collect(),
             demands: demands.sets.clone(),
             defined,
             targets,
@@ -152,16 +158,44 @@ impl Cells {
         self.is_root(state) && !self.closed[state.index()]
     }
 
-    /// Tries every pair of cells in an order. `go_on` is told how many states were tried with all others, and how many cells are left.
+    pub(super) fn is_closed(&self, root: u32) -> bool {
+        self.closed[root as usize]
+    }
+
+    /// The states of a cell.
+    pub(super) fn members(&self, root: u32) -> impl Iterator<Item = u32> {
+        let next = move |state: &u32| {
+            let next = self.next[*state as usize];
+            (next != root).then_some(next)
+        };
+        std::iter::successors(Some(root), next)
+    }
+
+    /// What a cell enables and what it disables.
+    pub(super) fn demands_of(&self, root: u32) -> (&[u64], &[u64]) {
+        self.demands[root as usize * self.words..][..self.words].split_at(self.words / 2)
+    }
+
+    /// The events of a cell that have a target, with the cell of the target.
+    pub(super) fn targets_of(&self, root: u32) -> impl Iterator<Item = (usize, u32)> {
+        let targets = &self.targets[root as usize * self.events..][..self.events];
+        let targets = targets.iter().enumerate();
+        targets
+            .filter(|(_, target)| **target != NONE)
+            .map(|(event, target)| (event, self.root(*target)))
+    }
+
+    /// Tries every pair of cells in the order of the sieve. `go_on` is told how many states were tried with all others, and how many cells
+    /// are left.
     pub(super) fn merge_greedily(
         &mut self,
-        order: &[State],
+        sieve: &mut Sieve,
         limits: Limits,
         go_on: &mut dyn FnMut(usize, usize) -> bool,
     ) -> End {
-        let mut others: Vec<State> = order.to_vec();
         let mut closed = 0;
-        for (place, &state) in order.iter().enumerate() {
+        for place in 0..self.parent.len() {
+            let state = sieve.state(place);
             if !self.is_open(state) {
                 continue;
             }
@@ -171,29 +205,40 @@ impl Cells {
             }
             closed += 1;
             self.current = state.number();
-            others.retain(|&other| self.is_open(other));
-            for &other in &others {
-                // A cell before this one that is still open has a root behind it.
-                if other == state || !self.is_open(other) {
-                    continue;
-                }
-                let root = self.find(state.number());
-                self.undo.clear();
+            sieve.sift(self, state.number());
+            for word in 0..sieve.words() {
                 if !self.spend(self.left, &mut |left| go_on(place, left)) {
                     return End::Stopped;
                 }
-                if !self.first_step_agrees(root, other.number()) {
-                    self.refused_with[other.index()] = self.current;
-                    continue;
-                }
-                match self.attempt(root, other.number(), &mut |left| go_on(place, left)) {
-                    Attempt::Merged => {}
-                    Attempt::Refused => self.refused_with[other.index()] = self.current,
-                    Attempt::Stopped => return End::Stopped,
+                for bit in bits(sieve.left(word)) {
+                    let other = sieve.state(64 * word + bit);
+                    // A cell before this one that is still open has a root behind it.
+                    if other == state {
+                        continue;
+                    }
+                    if !self.is_open(other) {
+                        sieve.forget(64 * word + bit);
+                        continue;
+                    }
+                    let root = self.find(state.number());
+                    self.undo.clear();
+                    if !self.spend(self.left, &mut |left| go_on(place, left)) {
+                        return End::Stopped;
+                    }
+                    if !self.first_step_agrees(root, other.number()) {
+                        self.refused_with[other.index()] = self.current;
+                        continue;
+                    }
+                    match self.attempt(root, other.number(), &mut |left| go_on(place, left)) {
+                        Attempt::Merged => {}
+                        Attempt::Refused => self.refused_with[other.index()] = self.current,
+                        Attempt::Stopped => return End::Stopped,
+                    }
                 }
             }
             let root = self.root(state.number());
             self.closed[root as usize] = true;
+            sieve.close(self, root);
         }
         End::Complete
     }
@@ -283,6 +328,8 @@ impl Cells {
         let (kept, joined) = (left.min(right), left.max(right));
         self.parent[joined as usize] = kept;
         self.undo.push(Change::Parent(joined, joined));
+        self.next.swap(kept as usize, joined as usize);
+        self.undo.push(Change::Rings(kept, joined));
         if self.refused_with[joined as usize] == self.current {
             let before = std::mem::replace(&mut self.refused_with[kept as usize], self.current);
             self.undo.push(Change::Refused(kept, before));
@@ -336,6 +383,7 @@ impl Cells {
         while let Some(change) = self.undo.pop() {
             match change {
                 Change::Parent(state, parent) => self.parent[state as usize] = parent,
+                Change::Rings(kept, joined) => self.next.swap(kept as usize, joined as usize),
                 Change::Demand(place, set) => self.demands[place] = set,
                 Change::Defined(place, set) => self.defined[place] = set,
                 Change::Target(place) => self.targets[place] = NONE,
@@ -380,7 +428,7 @@ impl Cells {
 }
 
 /// The places of the bits of a set, ascending.
-fn bits(mut set: u64) -> impl Iterator<Item = usize> {
+pub(super) fn bits(mut set: u64) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let place = set.trailing_zeros() as usize;
         (set != 0).then(|| {
