@@ -9,8 +9,10 @@
 //! * Scouting and gossip are off. A member subscribes to the stations, and to the remote I/Os, by one expression each.
 //! * A member that publishes no frame for a [`PULSE`] publishes an empty message, however long its cycle is. A member that receives none
 //!   of its peers for [`silence::SILENT_PULSES`], or is connected to one and does not receive it for [`silence::MUTE_PULSES`], opens its
-//!   session anew, whatever the reason; the pause doubles each time. The second was seen after one of several members that were stopped
-//!   for two seconds went on: two of its peers were connected to it and received nothing from then on.
+//!   session anew, whatever the reason; the pause doubles each time. A connection in one direction only is Zenoh's (1.10.2,
+//!   `open_transport_unicast_inner` and `init_new_transport_unicast`): where the time limit of an attempt passes after the transport began to
+//!   send and before it began to receive, it stays so, and its signs of life keep the other end from ending it. One of a hundred
+//!   suspensions of four seconds, a lease and a time limit, ended so for a peer.
 //! * Callbacks only enqueue, and nothing that the cycle's thread calls waits for a peer: what does not fit into a queue is dropped.
 
 mod settings;
