@@ -6,6 +6,9 @@ use std::path::Path;
 use crate::answer::Answer;
 use crate::kind::Kind;
 
+/// A command with more files is not shown.
+const READABLE: usize = 8;
+
 pub(super) fn after_check(answer: Answer, given: &[(Kind, &Path)]) -> Answer {
     let all = |wanted| given.iter().filter(move |(kind, _)| *kind == wanted);
     let first = |wanted| all(wanted).map(|(_, path)| *path).next();
@@ -26,9 +29,13 @@ pub(super) fn after_check(answer: Answer, given: &[(Kind, &Path)]) -> Answer {
             }
         }
         (None, None) if !ladders.is_empty() => {
+            let answer = answer.and_next(&[&"verify", &ladders[0]]);
+            if ladders.len() > READABLE {
+                return answer;
+            }
             let mut from: Vec<&dyn AsRef<OsStr>> = vec![&"init", &"cell", &"--from"];
             from.extend(ladders.iter().map(|path| path as &dyn AsRef<OsStr>));
-            answer.and_next(&[&"verify", &ladders[0]]).and_next(&from)
+            answer.and_next(&from)
         }
         (None, None) => {
             let command = |kind| match kind {
