@@ -329,7 +329,11 @@ impl<M: Machine> Host<'_, M> {
             let silence_ms = u64::try_from(silence.as_millis()).unwrap_or(u64::MAX);
             let event = match failure {
                 None => HostEvent::LinkReopened { silence_ms, peer },
-                Some(reason) => HostEvent::LinkFailed { silence_ms, reason },
+                Some(reason) => HostEvent::LinkFailed {
+                    silence_ms,
+                    peer,
+                    reason,
+                },
             };
             self.sink.record(now, Noted::Host(event));
         }

@@ -157,8 +157,11 @@ pub enum HostEvent {
     },
     /// The same, and the link could not be opened: no frame is sent or received. It is tried again.
     LinkFailed {
-        /// How long no peer was received, or one that is connected was not, in milliseconds.
+        /// How long, in milliseconds.
         silence_ms: u64,
+        /// The one that is connected and was not received; none where no peer was.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        peer: Option<Member>,
         /// Why it cannot be opened.
         reason: String,
     },

@@ -222,13 +222,12 @@ impl Ears {
         }
     }
 
-    /// Whom it has heard since it was last asked.
-    fn take(&self) -> BTreeSet<Member> {
-        let heard = self.heard.values();
-        heard
-            .filter(|(_, heard)| heard.swap(false, Ordering::Relaxed))
-            .map(|(member, _)| *member)
-            .collect()
+    /// Whether a peer was received since it was last asked, and those that were not.
+    fn take(&self) -> (bool, BTreeSet<Member>) {
+        let peers = self.heard.values();
+        let unheard = peers.filter(|(_, heard)| !heard.swap(false, Ordering::Relaxed));
+        let unheard: BTreeSet<Member> = unheard.map(|(member, _)| *member).collect();
+        (unheard.len() < self.heard.len(), unheard)
     }
 }
 
@@ -288,8 +287,8 @@ impl Session {
         })
     }
 
-    /// Those of its senders to whom it is connected.
-    fn connected(&self, endpoints: &Endpoints) -> BTreeSet<Member> {
+    /// Those of `peers` to which it is connected.
+    fn connected(&self, endpoints: &Endpoints, mut peers: BTreeSet<Member>) -> BTreeSet<Member> {
         let identities: Vec<String> = self
             .session
             .info()
@@ -297,12 +296,11 @@ impl Session {
             .wait()
             .map(|id| id.to_string())
             .collect();
-        let senders = endpoints.senders().map(|peer| peer.member);
-        let is_connected = |member: &Member| {
+        peers.retain(|member| {
             let own = identity(endpoints.cluster(), *member);
             identities.iter().any(|id| id.starts_with(&own))
-        };
-        senders.filter(is_connected).collect()
+        });
+        peers
     }
 
     /// Waits for its end, for [`CLOSE_TIMEOUT`] at most.
@@ -349,21 +347,19 @@ impl Keeper {
                 }
             }
         }
-        let heard = self.ears.take();
-        let connected = match &self.session {
-            Some(session) => session.connected(&self.endpoints),
-            None => BTreeSet::new(),
-        };
-        let due = self.silence.look(now, &heard, &connected);
-        // Of one that nobody sends to nothing can be told.
-        let listens = self.endpoints.senders().next().is_some();
-        if !listens {
+        // Without senders there is nothing to conclude from.
+        if self.ears.heard.is_empty() {
             return;
         }
-        if let Some(silent) = due {
+        let (heard, unheard) = self.ears.take();
+        let mute = match &self.session {
+            Some(session) if !unheard.is_empty() => session.connected(&self.endpoints, unheard),
+            _ => BTreeSet::new(),
+        };
+        let due = self.silence.look(now, heard, &mute);
+        let lost = || self.session.is_none().then(|| self.silence.of_all(now));
+        if let Some(silent) = due.or_else(lost) {
             self.reopen(silent);
-        } else if self.session.is_none() {
-            self.reopen(self.silence.of_all(now));
         }
     }
 

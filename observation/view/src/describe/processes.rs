@@ -32,12 +32,11 @@ descriptions! { host: HostEvent, members: Members;
     );
     UnsendableFrames { frames, reason } => "unsendable-frames" Warning
         format!("{frames} frames could not be sent: {reason}");
-    LinkReopened { silence_ms, peer: None } => "link-reopened" Warning
-        format!("received no member for {silence_ms} ms and reopened its link");
-    LinkReopened { silence_ms, peer: Some(peer) } => "link-reopened" Warning format!(
-        "was connected to {} but received nothing from it for {silence_ms} ms, and reopened its link", members.name(*peer)
+    LinkReopened { silence_ms, peer } => "link-reopened" Warning
+        format!("received {} for {silence_ms} ms and reopened its link", nothing_of(*peer, members));
+    LinkFailed { silence_ms, peer, reason } => "link-failed" Alarm format!(
+        "received {} for {silence_ms} ms and cannot reopen its link: {reason}", nothing_of(*peer, members)
     );
-    LinkFailed { reason, .. } => "link-failed" Alarm format!("cannot reopen its link: {reason}");
     FieldLost { reason } => "field-lost" Alarm format!("its equipment cannot be read or written: {reason}");
     FieldRegained => "field-regained" Notice "its equipment is read and written again";
     FieldContested => "field-contested" Alarm "another master writes the outputs of its equipment";
@@ -48,6 +47,17 @@ descriptions! { host: HostEvent, members: Members;
     JournalLost { records } => "journal-lost" Warning format!("{records} records are lost");
     UnknownCommand { line } => "unknown-command" Warning format!("received an unknown command: {line}");
     Stopped(_) => "stopped" Info "ended as requested";
+}
+
+/// What a link did not receive: no member, or one that it is connected to.
+fn nothing_of(peer: Option<Member>, members: &Members) -> String {
+    match peer {
+        None => "no member".to_owned(),
+        Some(peer) => format!(
+            "nothing from {}, to which it was connected,",
+            members.name(peer)
+        ),
+    }
 }
 
 fn date_of(unix_ns: u64) -> String {

@@ -12,7 +12,7 @@ const OPEN_TIMEOUT_MS: u32 = 2_000;
 
 /// A connection on which nothing is received for so long has ended. A process that ends takes its connections with it at once;
 /// this is for a machine or a cable that fails.
-pub(super) const LEASE_MS: u32 = 2_000;
+const LEASE_MS: u32 = 2_000;
 
 /// A longer frame goes in parts. What waits for a peer takes eight batches of this size, at most.
 const BATCH_BYTES: u16 = 16 * 1024;

@@ -32,7 +32,7 @@ pub(super) struct Silence {
     pulses: u32,
     /// Of each peer that is connected, pulses in which others were received and it was not.
     mute: BTreeMap<Member, u32>,
-    /// So many times the pulses have to pass.
+    /// Factor of the pulses that must pass.
     patience: u32,
     /// The place of this member among all.
     place: u32,
@@ -49,30 +49,30 @@ impl Silence {
         }
     }
 
-    /// At each pulse, with those who were received since the last one and those who are connected: the reason to open the session anew.
+    /// At each pulse: the reason to open the session anew. `heard` where a peer was received since the last one; `mute` are the peers that
+    /// are connected and were not.
     pub(super) fn look(
         &mut self,
         now: Time,
-        heard: &BTreeSet<Member>,
-        connected: &BTreeSet<Member>,
+        heard: bool,
+        mute: &BTreeSet<Member>,
     ) -> Option<Silent> {
-        self.mute
-            .retain(|peer, _| connected.contains(peer) && !heard.contains(peer));
-        let silent = if heard.is_empty() {
-            self.pulses += 1;
-            (self.pulses >= self.patience * SILENT_PULSES).then(|| self.of_all(now))
-        } else {
+        self.mute.retain(|peer, _| mute.contains(peer));
+        let silent = if heard {
             (self.since, self.pulses) = (now, 0);
-            for peer in connected.difference(heard) {
+            for peer in mute {
                 *self.mute.entry(*peer).or_default() += 1;
             }
             self.longest_mute()
+        } else {
+            self.pulses += 1;
+            (self.pulses >= self.patience * SILENT_PULSES).then(|| self.of_all(now))
         };
         if silent.is_some() {
             self.pulses = 0;
             self.mute.clear();
             self.patience = (self.patience * 2).min(MOST_PATIENCE);
-        } else if !heard.is_empty() && self.mute.is_empty() {
+        } else if heard && self.mute.is_empty() {
             self.patience = 1;
         }
         silent
@@ -106,26 +106,23 @@ mod tests {
         Member::Station(StationId(rank))
     }
 
-    /// The pulses of `1..=count` after which a session was opened anew.
+    /// Those of `pulses` after which a session was opened anew, each with the peer that was mute.
     fn opened(
         silence: &mut Silence,
         pulses: std::ops::RangeInclusive<u32>,
         heard: &[Member],
         connected: &[Member],
     ) -> Vec<(u32, Option<Member>)> {
-        let (heard, connected) = (set(heard), set(connected));
+        let mute = connected.iter().filter(|peer| !heard.contains(peer));
+        let mute: BTreeSet<Member> = mute.copied().collect();
         let mut opened = Vec::new();
         for pulse in pulses {
             let now = Time::default() + PULSE * pulse;
-            if let Some(silent) = silence.look(now, &heard, &connected) {
+            if let Some(silent) = silence.look(now, !heard.is_empty(), &mute) {
                 opened.push((pulse, silent.peer));
             }
         }
         opened
-    }
-
-    fn set(members: &[Member]) -> BTreeSet<Member> {
-        members.iter().copied().collect()
     }
 
     #[test]
