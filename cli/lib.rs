@@ -16,6 +16,7 @@ mod inspect;
 mod kind;
 mod member;
 mod overrides;
+mod patience;
 mod programs;
 mod reliability;
 mod run;

@@ -19,7 +19,7 @@ use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::deployment::catalogue;
 use crate::files;
-use crate::programs::verify::patience::Patience;
+use crate::patience::Patience;
 use crate::run::outcome::command_line;
 use programs::Programs;
 

@@ -2,7 +2,6 @@
 
 mod answer;
 mod numbers;
-pub(crate) mod patience;
 
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -25,8 +24,8 @@ use understudy_verification::{GoOn, draw_runs, prove_parity, smv};
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::files;
+use crate::patience::Patience;
 use answer::{Finding, ProgramAnswer};
-use patience::Patience;
 
 /// Prove properties of programs or show counterexamples
 #[derive(Debug, Args)]

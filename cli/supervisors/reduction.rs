@@ -1,6 +1,6 @@
 //! Reduces a supervisor with progress messages and a time limit.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use understudy_bus::Interruption;
 use understudy_supervisor::operations::{Reducing, compare_effects, supreduce_while};
@@ -8,12 +8,10 @@ use understudy_supervisor::{Automaton, Bounds};
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
+use crate::patience::Patience;
 
 /// Default time limit: the smallest supervisor so far is the result.
 pub(crate) const BUDGET: &str = "30s";
-
-/// Interval of the progress messages.
-pub(super) const BETWEEN: Duration = Duration::from_secs(3);
 
 /// Reduced supervisor, with a warning if the time limit, SIGINT or SIGTERM stopped the reduction. Its effect on the plant was compared
 /// with that of `supervisor`.
@@ -29,24 +27,15 @@ pub(crate) fn reduced(
 ) -> Result<(Automaton, Option<String>), Answer> {
     // Without the flag an interruption ends the command.
     let interruption = Interruption::expected().ok();
-    let begin = Instant::now();
-    let mut told = begin;
+    let patience = Patience::new(Some(budget), console);
     let mut interrupted = false;
     let mut go_on = |at: Reducing| {
-        if told.elapsed() >= BETWEEN {
-            told = Instant::now();
-            console.note(&format!(
-                "{} s: order {} of {}: {} of {} states tried, {} left; Ctrl-C accepts the result so far",
-                begin.elapsed().as_secs(),
-                at.order,
-                at.orders,
-                at.tried,
-                at.states,
-                at.left
-            ));
-        }
         interrupted = interruption.as_ref().is_some_and(Interruption::came);
-        !interrupted && begin.elapsed() < budget
+        let goes_on = patience.goes_on_with(format_args!(
+            "order {} of {}: {} of {} states tried, {} left; Ctrl-C accepts the result so far",
+            at.order, at.orders, at.tried, at.states, at.left
+        ));
+        !interrupted && goes_on
     };
     let made = supreduce_while(plant, supervisor, bounds, &mut go_on)?;
     if let Some(other) = compare_effects(plant, supervisor, &made.supervisor, bounds)? {
@@ -60,7 +49,7 @@ pub(crate) fn reduced(
         format!(
             "warning[U0847]: the reduction was {} after {} s at {} of {} states; the supervisor has the same effect, but may not be minimal\n",
             if interrupted { "interrupted" } else { "stopped" },
-            begin.elapsed().as_secs(),
+            patience.seconds(),
             made.supervisor.state_count(),
             supervisor.state_count()
         )

@@ -1,7 +1,6 @@
 //! `understudy supervisor-to-ladder`: a proved ladder program of a supervisor.
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
@@ -10,7 +9,7 @@ use understudy_supervisor::ladder::{
     Conversion, InputOutputMap, Located, Mode, Modules, convert, read_map, table,
 };
 use understudy_supervisor::proof::{
-    Finding, FindingSeverity, ProofSettings, Proving, Verdict, findings, prove_telling,
+    Finding, FindingSeverity, ProofSettings, Proving, Verdict, findings, prove_with_progress,
 };
 use understudy_supervisor::{Automaton, Label, Model, Signal};
 use understudy_text::{Diagnostic, Report};
@@ -18,8 +17,8 @@ use understudy_text::{Diagnostic, Report};
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::files;
+use crate::patience::Patience;
 use crate::supervisors::automata::{self, Sources};
-use crate::supervisors::reduction::BETWEEN;
 
 /// Convert a supervisor to a proved ladder program
 #[derive(Debug, Args)]
@@ -107,26 +106,20 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         mode,
         ..ProofSettings::default()
     };
-    let begin = Instant::now();
-    let mut told = begin;
-    let mut tell = |at: Proving| {
-        if told.elapsed() >= BETWEEN {
-            told = Instant::now();
-            console.note(&format!(
-                "{} s: proof of {} states so far, {} of them scanned with every input",
-                begin.elapsed().as_secs(),
-                at.reached,
-                at.scanned
-            ));
-        }
+    let patience = Patience::new(None, console);
+    let mut report = |at: Proving| {
+        patience.goes_on_with(format_args!(
+            "proof of {} states so far, {} of them scanned with every input",
+            at.reached, at.scanned
+        ));
     };
-    let verdict = prove_telling(
+    let verdict = prove_with_progress(
         &conversion.program,
         &modules,
         &map,
         &conversion.correspondence,
         settings,
-        &mut tell,
+        &mut report,
     )?;
     Ok(answer(arguments, &modules, &conversion, &found, verdict))
 }

@@ -16,7 +16,7 @@ use understudy_verification::prove_parity_while;
 use super::programs::{Group, Programs};
 use crate::answer::{Answer, Status};
 use crate::files;
-use crate::programs::verify::patience::Patience;
+use crate::patience::Patience;
 
 /// Properties by program, with their file.
 pub(super) type Asked = BTreeMap<String, Vec<(Report, Properties)>>;

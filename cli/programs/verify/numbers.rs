@@ -9,9 +9,9 @@ use understudy_verification::property::{Property, read_one};
 use understudy_verification::symbolic::Resolved;
 
 use super::answer::{self, Finding, ProgramAnswer};
-use super::patience::Patience;
 use super::{Arguments, Asked, asked, bounds};
 use crate::answer::{Answer, Status};
+use crate::patience::Patience;
 
 /// The standard property of a program with numbers.
 const STANDARD: &str = "never program.fault";

@@ -47,18 +47,23 @@ fn generation(bencher: Bencher, states: u32) {
 fn proof_of_a_large_one(bencher: Bencher, states: u32) {
     let automaton = large(states);
     let modules = Modules::supervisor(&automaton);
-    let map = InputOutputMap::direct("large", &modules.alphabet());
+    proof(bencher, "large", &modules, Mode::Requested);
+}
+
+/// Proof of the ladder of `modules`.
+fn proof(bencher: Bencher, name: &str, modules: &Modules, mode: Mode) {
+    let map = InputOutputMap::direct(name, &modules.alphabet());
     let Conversion {
         program,
         correspondence,
         ..
-    } = convert(&modules, &map, Mode::Requested).expect("the map fits");
+    } = convert(modules, &map, mode).expect("the map fits");
     let settings = ProofSettings {
-        mode: Mode::Requested,
+        mode,
         ..ProofSettings::default()
     };
     bencher.bench_local(|| {
-        let verdict = prove(&program, &modules, &map, &correspondence, settings);
+        let verdict = prove(&program, modules, &map, &correspondence, settings);
         match verdict.expect("a verdict") {
             Verdict::Proved(proof) => proof,
             Verdict::Refuted(found) => panic!("{found}"),
@@ -79,21 +84,5 @@ fn proof_of_the_agv(bencher: Bencher, mode: Mode) {
         supervisors: &supervisors,
         plants: &plants,
     };
-    let map = InputOutputMap::direct("agv", &modules.alphabet());
-    let Conversion {
-        program,
-        correspondence,
-        ..
-    } = convert(&modules, &map, mode).expect("the map fits");
-    let settings = ProofSettings {
-        mode,
-        ..ProofSettings::default()
-    };
-    bencher.bench_local(|| {
-        let verdict = prove(&program, &modules, &map, &correspondence, settings);
-        match verdict.expect("a verdict") {
-            Verdict::Proved(proof) => proof,
-            Verdict::Refuted(found) => panic!("{found}"),
-        }
-    });
+    proof(bencher, "agv", &modules, mode);
 }

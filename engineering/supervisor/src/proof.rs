@@ -15,7 +15,7 @@ mod timers;
 mod verdict;
 mod view;
 
-pub use explore::{ProofSettings, Proving, prove, prove_telling};
+pub use explore::{ProofSettings, Proving, prove, prove_with_progress};
 pub use findings::{
     Finding, FindingKind, FindingSeverity, HybridFindingsError, findings, hybrid_findings,
 };

@@ -24,12 +24,6 @@ pub fn transpose(block: &mut [u64; 64]) {
 /// Scans in one pass.
 pub const LANES: usize = 64;
 
-/// Words of a signal in a wide pass, which takes less time for each scan.
-const WORDS: usize = 8;
-
-/// Scans in one wide pass.
-pub const WIDE: usize = LANES * WORDS;
-
 /// A circuit and the memory that its passes need.
 pub struct Lanes {
     scan: Scan,
@@ -76,75 +70,53 @@ impl Lanes {
         runs
     }
 
-    /// One scan of each of `runs`, at most [`WIDE`].
+    /// One scan of each of `runs`, at most [`LANES`].
+    ///
+    /// # Panics
+    /// Where there are more.
     pub fn step(&mut self, runs: &mut [Run]) {
-        if runs.len() <= LANES {
-            self.pass::<1>(runs);
-        } else {
-            self.pass::<WORDS>(runs);
-        }
-    }
-
-    fn pass<const W: usize>(&mut self, runs: &mut [Run]) {
-        self.state.resize(W * self.scan.register_count(), 0);
-        self.inputs.resize(W * self.scan.input_count(), 0);
-        self.outputs.resize(W * self.scan.output_count(), 0);
-        let (state, _) = self.state.as_chunks_mut::<W>();
-        let (inputs, _) = self.inputs.as_chunks_mut::<W>();
-        let (outputs, _) = self.outputs.as_chunks_mut::<W>();
-        spread(runs, |run| &run.state, state);
-        spread(runs, |run| &run.signals, inputs);
-        self.scan
-            .step_wide(&mut self.scratch, state, inputs, outputs);
+        assert!(runs.len() <= LANES, "{} runs", runs.len());
+        self.state.resize(self.scan.register_count(), 0);
+        self.inputs.resize(self.scan.input_count(), 0);
+        self.outputs.resize(self.scan.output_count(), 0);
+        spread(runs, |run| &run.state, &mut self.state);
+        spread(runs, |run| &run.signals, &mut self.inputs);
+        self.scan.step_lanes(
+            &mut self.scratch,
+            &mut self.state,
+            &self.inputs,
+            &mut self.outputs,
+        );
         for run in runs.iter_mut() {
             run.signals.clear();
-            run.signals.resize(outputs.len().div_ceil(64), 0);
+            run.signals.resize(self.outputs.len().div_ceil(64), 0);
         }
-        gather(state, runs, |run| &mut run.state);
-        gather(outputs, runs, |run| &mut run.signals);
+        gather(&self.state, runs, |run| &mut run.state);
+        gather(&self.outputs, runs, |run| &mut run.signals);
     }
 }
 
-/// Bit l of word k of `lanes` becomes bit k of the image of run l; wide words have the runs of one after those of the other.
-fn spread<const W: usize>(runs: &[Run], image: impl Fn(&Run) -> &Vec<u64>, lanes: &mut [[u64; W]]) {
+/// Bit l of word k of `lanes` becomes bit k of the image of run l.
+fn spread(runs: &[Run], image: impl Fn(&Run) -> &Vec<u64>, lanes: &mut [u64]) {
     for (place, lanes) in lanes.chunks_mut(64).enumerate() {
-        for word in 0..W {
-            let mut block = [0; 64];
-            for (row, run) in block.iter_mut().zip(runs.iter().skip(LANES * word)) {
-                *row = image(run)[place];
-            }
-            turn(&mut block);
-            for (lanes, row) in lanes.iter_mut().zip(&block) {
-                lanes[word] = *row;
-            }
+        let mut block = [0; 64];
+        for (row, run) in block.iter_mut().zip(runs) {
+            *row = image(run)[place];
         }
+        transpose(&mut block);
+        lanes.copy_from_slice(&block[..lanes.len()]);
     }
 }
 
 /// The inverse of [`spread`]; bits past the width are 0.
-fn gather<const W: usize>(
-    lanes: &[[u64; W]],
-    runs: &mut [Run],
-    image: impl Fn(&mut Run) -> &mut Vec<u64>,
-) {
+fn gather(lanes: &[u64], runs: &mut [Run], image: impl Fn(&mut Run) -> &mut Vec<u64>) {
     for (place, lanes) in lanes.chunks(64).enumerate() {
-        for word in 0..W {
-            let mut block = [0; 64];
-            for (row, lanes) in block.iter_mut().zip(lanes) {
-                *row = lanes[word];
-            }
-            turn(&mut block);
-            for (row, run) in block.iter().zip(runs.iter_mut().skip(LANES * word)) {
-                image(run)[place] = *row;
-            }
+        let mut block = [0; 64];
+        block[..lanes.len()].copy_from_slice(lanes);
+        transpose(&mut block);
+        for (row, run) in block.iter().zip(runs.iter_mut()) {
+            image(run)[place] = *row;
         }
-    }
-}
-
-/// [`transpose`]; of state bits of which few are on, most blocks are 0.
-fn turn(block: &mut [u64; 64]) {
-    if block.iter().any(|&word| word != 0) {
-        transpose(block);
     }
 }
 
@@ -153,9 +125,9 @@ mod tests {
     use super::*;
     use crate::circuit::CircuitBuilder;
 
-    /// x(t+1) = x + u over 70 bits, y = x: in narrow and in wide passes each run is that of one lane.
+    /// x(t+1) = x + u over 70 bits, y = x: each run is that of one lane.
     #[test]
-    fn runs_of_wide_passes_are_those_of_narrow_ones() {
+    fn each_run_is_that_of_one_lane() {
         let mut builder = CircuitBuilder::new("sum");
         for place in 0..70 {
             let input = builder.input(format!("u{place}"));
@@ -166,7 +138,7 @@ mod tests {
         }
         let circuit = builder.finish().expect("names differ");
         let mut lanes = Lanes::new(Scan::new(&circuit));
-        for count in [1, 64, 65, 130, WIDE] {
+        for count in [1, 2, 63, LANES] {
             let run = |number: u64| Run {
                 state: vec![number * number, number & 63],
                 signals: vec![number, 1],

@@ -8,6 +8,23 @@ pub fn bit(image: &[u64], place: usize) -> bool {
     image[place / 64] >> (place % 64) & 1 == 1
 }
 
+/// The places of the ones in a word, ascending.
+pub fn ones(mut word: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let place = word.trailing_zeros() as usize;
+        (word != 0).then(|| {
+            word &= word - 1;
+            place
+        })
+    })
+}
+
+/// The places of the ones in an image, ascending.
+pub fn ones_in(image: &[u64]) -> impl Iterator<Item = usize> {
+    let words = image.iter().enumerate();
+    words.flat_map(|(place, &word)| ones(word).map(move |bit| 64 * place + bit))
+}
+
 /// The image of `bits`.
 pub fn pack(bits: impl IntoIterator<Item = bool>) -> Vec<u64> {
     let mut image = Vec::new();

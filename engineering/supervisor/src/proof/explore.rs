@@ -7,7 +7,7 @@ use std::time::Duration;
 use hashbrown::HashTable;
 use rustc_hash::FxBuildHasher;
 use understudy_ladder::{Name, Program};
-use understudy_logic::{Circuit, SPARSE, Scan, Sparse, SparseRun, pack};
+use understudy_logic::{Circuit, SPARSE, Scan, Sparse, SparseRun, ones_in, pack};
 
 use super::environment::Environment;
 use super::reference::{Allowed, Happening, Joint, Reference};
@@ -41,7 +41,7 @@ impl Default for ProofSettings {
     }
 }
 
-/// How far a proof is.
+/// Progress of a proof.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Proving {
     /// States of ladder and inputs that were reached.
@@ -65,20 +65,20 @@ pub fn prove(
     correspondence: &Correspondence,
     settings: ProofSettings,
 ) -> Result<Verdict, ProofError> {
-    prove_telling(program, modules, map, correspondence, settings, &mut |_| {})
+    prove_with_progress(program, modules, map, correspondence, settings, &mut |_| {})
 }
 
-/// As [`prove`], and tells many times a second how far it is.
+/// As [`prove`]; reports its progress many times a second.
 ///
 /// # Errors
 /// As [`prove`].
-pub fn prove_telling(
+pub fn prove_with_progress(
     program: &Program,
     modules: &Modules,
     map: &InputOutputMap,
     correspondence: &Correspondence,
     settings: ProofSettings,
-    tell: &mut dyn FnMut(Proving),
+    report: &mut dyn FnMut(Proving),
 ) -> Result<Verdict, ProofError> {
     let partition = Partition::new(map, modules).map_err(ProofError::Partition)?;
     let (freed, timers) = free_timers(program);
@@ -108,7 +108,7 @@ pub fn prove_telling(
         used: HashSet::new(),
         scans: 0,
     };
-    exploration.run(tell)
+    exploration.run(report)
 }
 
 /// A reached state, and how.
@@ -140,8 +140,8 @@ struct Exploration<'a> {
 }
 
 impl Exploration<'_> {
-    fn run(&mut self, tell: &mut dyn FnMut(Proving)) -> Result<Verdict, ProofError> {
-        let on: Box<[u32]> = ones(self.sparse.scan().initial())
+    fn run(&mut self, report: &mut dyn FnMut(Proving)) -> Result<Verdict, ProofError> {
+        let on: Box<[u32]> = ones_in(self.sparse.scan().initial())
             .map(|place| place as u32)
             .collect();
         let seen = self.see(&on, &[]);
@@ -171,7 +171,7 @@ impl Exploration<'_> {
                     return Ok(Verdict::Refuted(Box::new(counterexample)));
                 }
             }
-            tell(Proving {
+            report(Proving {
                 reached: self.nodes.len(),
                 scanned: next,
             });
@@ -300,7 +300,7 @@ impl Exploration<'_> {
         let registers = registers
             .iter()
             .map(|&place| self.view.registers[place as usize]);
-        let outputs = ones(outputs).map(|place| self.view.outputs[place]);
+        let outputs = ones_in(outputs).map(|place| self.view.outputs[place]);
         for bit in registers.chain(outputs) {
             match bit {
                 Bit::Other => {}
@@ -445,12 +445,4 @@ impl Exploration<'_> {
             states: self.state_names(seen.states.iter().map(Vec::as_slice)),
         }
     }
-}
-
-/// The places of the bits that are 1, ascending.
-fn ones(image: &[u64]) -> impl Iterator<Item = usize> {
-    image.iter().enumerate().flat_map(|(place, &word)| {
-        let ones = (0..64).filter(move |bit| word >> bit & 1 == 1);
-        ones.map(move |bit| 64 * place + bit)
-    })
 }

@@ -1,7 +1,8 @@
-//! Scans in which few registers are on: what is the same in the scan of the state 0 is not computed for each run.
+//! Scans of many runs at once of which each has few registers on: constants and copies are found first, and not computed.
 
 use super::{Instruction, Operand, SUM, Scan};
 use crate::lanes::LANES;
+use crate::packed::ones;
 
 /// Words of a signal in a sparse pass. The more runs, the less of the time is that of instructions which no run needs.
 const WORDS: usize = 64;
@@ -24,9 +25,9 @@ pub struct SparseRun {
 /// A circuit of which few registers are on at once, as the states of an automaton, and the memory that its passes need.
 pub struct Sparse {
     scan: Scan,
-    /// By the places of the scan: where the value is in `wide`, in the operands of this pass.
+    /// The value of each place of the scan, as an operand of this pass.
     found: Vec<Operand>,
-    /// The values that are not the same in all runs; the first is 0.
+    /// The values that the operands of this pass name; the first is 0.
     wide: Vec<Wide>,
 }
 
@@ -128,13 +129,10 @@ fn each_one(
     if operand == ZERO {
         return;
     }
-    for (mut word, runs) in operand.value(wide).into_iter().zip(runs.chunks_mut(LANES)) {
-        if runs.len() < LANES {
-            word &= (1 << runs.len()) - 1;
-        }
-        while word != 0 {
-            with(&mut runs[word.trailing_zeros() as usize]);
-            word &= word - 1;
+    for (word, runs) in operand.value(wide).into_iter().zip(runs.chunks_mut(LANES)) {
+        let count = runs.len();
+        for lane in ones(word).take_while(|lane| *lane < count) {
+            with(&mut runs[lane]);
         }
     }
 }

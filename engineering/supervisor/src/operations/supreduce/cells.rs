@@ -3,6 +3,8 @@
 //! A merge that is refused once is always refused: cells only grow, and a larger cell asks for more. So a cell that was tried with all
 //! others is *closed*: no later merge can change it. Most attempts end at a closed cell, in their first step.
 
+use understudy_logic::ones;
+
 use super::demands::Demands;
 use super::sieve::Sieve;
 use crate::automaton::{Automaton, Edge, State};
@@ -210,7 +212,7 @@ impl Cells {
                 if !self.spend(self.left, &mut |left| go_on(place, left)) {
                     return End::Stopped;
                 }
-                for bit in bits(sieve.left(word)) {
+                for bit in ones(sieve.left(word)) {
                     let other = sieve.state(64 * word + bit);
                     // A cell before this one that is still open has a root behind it.
                     if other == state {
@@ -271,7 +273,7 @@ impl Cells {
         self.may_merge(left, right)
             && (0..sets).all(|set| {
                 let set_of = |cell: u32| self.defined[cell as usize * sets + set];
-                bits(set_of(left) & set_of(right)).all(|bit| {
+                ones(set_of(left) & set_of(right)).all(|bit| {
                     let event = set * 64 + bit;
                     let one = self.root(self.targets[row(left) + event]);
                     let other = self.root(self.targets[row(right) + event]);
@@ -357,7 +359,7 @@ impl Cells {
         );
         let row = |cell: u32| cell as usize * self.events + set * 64;
         let (kept, joined) = (row(kept), row(joined));
-        for bit in bits(from & to) {
+        for bit in ones(from & to) {
             let one = self.find(self.targets[kept + bit]);
             let other = self.find(self.targets[joined + bit]);
             if one != other {
@@ -372,7 +374,7 @@ impl Cells {
             self.undo.push(Change::Defined(place, to));
             self.defined[place] = to | from;
         }
-        for bit in bits(from & !to) {
+        for bit in ones(from & !to) {
             self.targets[kept + bit] = self.targets[joined + bit];
             self.undo.push(Change::Target(kept + bit));
         }
@@ -425,15 +427,4 @@ impl Cells {
         // A cell represents many states; the name of one would mislead.
         Automaton::from_parts("SIMSUP".to_owned(), alphabet, marked, first, edges)
     }
-}
-
-/// The places of the bits of a set, ascending.
-pub(super) fn bits(mut set: u64) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let place = set.trailing_zeros() as usize;
-        (set != 0).then(|| {
-            set &= set - 1;
-            place
-        })
-    })
 }

@@ -1,6 +1,7 @@
-//! Time limit and progress messages of a proof.
+//! Time limit and progress messages of a command.
 
 use std::cell::{Cell, RefCell};
+use std::fmt::Display;
 use std::time::{Duration, Instant};
 
 use understudy_verification::Work;
@@ -37,16 +38,25 @@ impl<'c> Patience<'c> {
         self.about.replace(about);
     }
 
-    /// Whether time is left; prints the progress every few seconds.
+    /// Whether time is left; prints the progress on the subject every few seconds.
     pub(crate) fn goes_on(&self, work: Work) -> bool {
+        self.goes_on_with(format_args!("{}, {work}", self.about.borrow()))
+    }
+
+    /// The same with all words of the progress.
+    pub(crate) fn goes_on_with(&self, progress: impl Display) -> bool {
         let now = Instant::now();
         if now - self.told.get() >= BETWEEN {
             self.told.set(now);
-            let seconds = (now - self.begin).as_secs();
-            let line = format!("{seconds} s: {}, {work}", self.about.borrow());
+            let line = format!("{} s: {progress}", self.seconds());
             self.console.borrow_mut().note(&line);
         }
         self.budget.is_none_or(|budget| now - self.begin < budget)
+    }
+
+    /// Whole seconds since the start.
+    pub(crate) fn seconds(&self) -> u64 {
+        self.begin.elapsed().as_secs()
     }
 
     /// Whether the time limit has passed.
