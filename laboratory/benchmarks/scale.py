@@ -7,7 +7,8 @@
 LINK is udp or zenoh. Every controller runs the press of examples/press-cell; no plant is simulated. A line has the time from the
 first process to the first cycle in which all members are synchronised, the cycles without a proved output (all, and those next
 to a stall of the host), wrong outputs, UDP datagrams sent in a cycle, and the processor time of a member in a cycle, its journal
-included (that of the kernel in parentheses: by ticks of the clock, so only roughly). Datagrams are those of the whole machine, so nothing else may use UDP meanwhile.
+included (in parentheses that of the kernel, roughly, because it is counted in ticks of the clock). Datagrams are those of the
+whole machine, so nothing else may use UDP meanwhile.
 """
 
 import json
