@@ -97,10 +97,7 @@ impl Answer {
 
     /// Files with errors.
     pub fn bad_files(reports: Vec<Report>) -> Self {
-        Self {
-            status: Status::BadInput,
-            ..Self::done("", Value::Null).with_reports(reports)
-        }
+        Self { status: Status::BadInput, ..Self::done("", Value::Null).with_reports(reports) }
     }
 
     pub(crate) fn with_reports(mut self, reports: Vec<Report>) -> Self {
@@ -110,10 +107,7 @@ impl Answer {
 
     /// Files that the command used: the text counts their warnings, JSON lists them.
     pub(crate) fn with_used(self, reports: Vec<Report>) -> Self {
-        Self {
-            counts_warnings: true,
-            ..self.with_reports(reports)
-        }
+        Self { counts_warnings: true, ..self.with_reports(reports) }
     }
 
     pub(crate) fn with_numbers(mut self, numbers: Map<String, Value>) -> Self {
@@ -155,18 +149,13 @@ impl Answer {
         message: impl ToString,
     ) -> Self {
         self.status = status;
-        self.failures.push(Failure {
-            code: code.to_owned(),
-            message: message.to_string(),
-        });
+        self.failures.push(Failure { code: code.to_owned(), message: message.to_string() });
         self
     }
 
     /// Message of the first failure.
     pub fn first_failure(&self) -> Option<&str> {
-        self.failures
-            .first()
-            .map(|failure| failure.message.as_str())
+        self.failures.first().map(|failure| failure.message.as_str())
     }
 
     /// Limits the number and the length of failures.
@@ -292,11 +281,7 @@ fn placed((report, found): (&Report, Vec<Diagnostic>)) -> Vec<PlacedDiagnostic<'
         let end = lines.position(diagnostic.span.end);
         let related = diagnostic.related.into_iter().map(|related| {
             let Position { line, column } = lines.position(related.span.start);
-            PlacedRelated {
-                line,
-                column,
-                message: related.message,
-            }
+            PlacedRelated { line, column, message: related.message }
         });
         PlacedDiagnostic {
             file: &report.name,

@@ -93,11 +93,7 @@ pub(crate) fn parse(parser: Command, groups: &[Group]) -> Result<Call, clap::Err
     // The parser requires one of the commands.
     let (entry, matches) =
         found.ok_or_else(|| clap::Error::new(clap::error::ErrorKind::MissingSubcommand))?;
-    Ok(Call {
-        json,
-        name: entry.name,
-        run: (entry.bind)(matches)?,
-    })
+    Ok(Call { json, name: entry.name, run: (entry.bind)(matches)? })
 }
 
 /// The exit statuses of all commands.
@@ -227,11 +223,7 @@ mod tests {
         for entry in groups().iter().flat_map(|group| &group.entries) {
             let about = entry.parser.get_about().map(ToString::to_string);
             let length = about.map_or(0, |about| about.chars().count());
-            assert!(
-                (10..=70).contains(&length),
-                "{}: {length} characters",
-                entry.name
-            );
+            assert!((10..=70).contains(&length), "{}: {length} characters", entry.name);
         }
     }
 }

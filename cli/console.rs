@@ -33,12 +33,7 @@ pub struct Console {
 impl Console {
     /// Prints text and progress, or one JSON document at the end.
     pub fn new(json: bool) -> Self {
-        Self {
-            json,
-            progress: None,
-            synchronised: false,
-            said: String::new(),
-        }
+        Self { json, progress: None, synchronised: false, said: String::new() }
     }
 
     /// Whether the answer is JSON.
@@ -50,11 +45,7 @@ impl Console {
     pub fn finish(self, command: &str, mut answer: Answer) -> ExitCode {
         answer.bound();
         // The reader may have closed the pipe.
-        let _ = if self.json {
-            print_json(command, &answer)
-        } else {
-            print_text(&answer)
-        };
+        let _ = if self.json { print_json(command, &answer) } else { print_text(&answer) };
         ExitCode::from(answer.status.code())
     }
 
@@ -67,16 +58,12 @@ impl Console {
         match progress {
             Progress::Cycle { cycle, cycles } if bar => {
                 let words = "cycle {pos} of {len}, {eta} left";
-                let bar = self
-                    .progress
-                    .get_or_insert_with(|| progress_bar(*cycles, words));
+                let bar = self.progress.get_or_insert_with(|| progress_bar(*cycles, words));
                 bar.set_position(*cycle);
             }
             Progress::Failure { done, of } if bar => {
                 let words = "failure {pos} of {len}, {eta} left";
-                let bar = self
-                    .progress
-                    .get_or_insert_with(|| progress_bar(*of, words));
+                let bar = self.progress.get_or_insert_with(|| progress_bar(*of, words));
                 bar.set_position(*done);
             }
             Progress::Failure { done, of } => {
@@ -210,17 +197,12 @@ fn print_count(reports: &[Report]) -> io::Result<()> {
     let files: Vec<&str> = match reports.first() {
         Some(first) if names(first) => vec![&first.name],
         _ => {
-            let warned = reports
-                .iter()
-                .filter(|report| !report.diagnostics.is_empty());
+            let warned = reports.iter().filter(|report| !report.diagnostics.is_empty());
             warned.map(|report| report.name.as_str()).collect()
         }
     };
     let files = files.join(" ");
-    writeln!(
-        io::stderr(),
-        "{warnings}; `understudy check {files}` lists {them}"
-    )
+    writeln!(io::stderr(), "{warnings}; `understudy check {files}` lists {them}")
 }
 
 /// Prints all findings of a file at once.
@@ -228,11 +210,7 @@ fn print_report(report: &Report, found: &[Diagnostic]) -> io::Result<()> {
     if found.is_empty() {
         return Ok(());
     }
-    let choice = if io::stderr().is_terminal() {
-        ColorChoice::Auto
-    } else {
-        ColorChoice::Never
-    };
+    let choice = if io::stderr().is_terminal() { ColorChoice::Auto } else { ColorChoice::Never };
     let lines = Lines::new(&report.text);
     let config = Config::default();
     let mut errors = BufferedStandardStream::stderr(choice);

@@ -13,23 +13,15 @@ use crate::member;
 
 /// What a machine that runs members needs.
 pub(crate) fn members() -> Group {
-    Group {
-        name: "members",
-        title: "Run members",
-        entries: of_members().into(),
-    }
+    Group { name: "members", title: "Run members", entries: of_members().into() }
 }
 
 fn of_members() -> [Entry; 4] {
     [
         command("doctor", |it, console| doctor::run(&it, console)),
         command("node", |it, _| member::run_station(&it)),
-        command("remote-io", |it: member::RemoteIoArguments, _| {
-            member::run_remote_io(&it.common)
-        }),
-        command("plant", |it: member::PlantArguments, _| {
-            member::run_plant(&it.common)
-        }),
+        command("remote-io", |it: member::RemoteIoArguments, _| member::run_remote_io(&it.common)),
+        command("plant", |it: member::PlantArguments, _| member::run_plant(&it.common)),
     ]
 }
 
@@ -44,9 +36,5 @@ pub(crate) fn group() -> Group {
     entries.push(command("operate", |it, _| operate::run(&it)));
     entries.push(command("gateway", |it, console| gateway::run(&it, console)));
 
-    Group {
-        name: "deployment",
-        title: "Deploy and operate clusters",
-        entries,
-    }
+    Group { name: "deployment", title: "Deploy and operate clusters", entries }
 }

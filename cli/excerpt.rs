@@ -77,11 +77,7 @@ impl<'r> Shown<'r> {
         let excerpt = Excerpt::new(name, text, lines, places);
         let first = Label::primary((), excerpt.mapped(lines, &primary));
         let first = first.with_message(diagnostic.label.clone().unwrap_or_default());
-        let mut shown = Self {
-            labels: vec![first],
-            notes: Vec::new(),
-            excerpt,
-        };
+        let mut shown = Self { labels: vec![first], notes: Vec::new(), excerpt };
         for (place, message) in &related {
             if shown.excerpt.shows(lines, place.start) {
                 let label = Label::secondary((), shown.excerpt.mapped(lines, place));
@@ -119,11 +115,7 @@ impl<'r> Excerpt<'r> {
                 wanted.insert(pair[0] + 1, lines.range(pair[0] + 1).start);
             }
         }
-        let mut excerpt = Self {
-            name,
-            text: String::new(),
-            lines: BTreeMap::new(),
-        };
+        let mut excerpt = Self { name, text: String::new(), lines: BTreeMap::new() };
         for (number, focus) in wanted {
             let whole = lines.range(number);
             excerpt.add(text, number, whole, focus);
@@ -146,16 +138,7 @@ impl<'r> Excerpt<'r> {
         }
         self.text.push_str(&text[line.end..whole.end]);
         let before = text[line.start..shown.start].chars().count();
-        self.lines.insert(
-            number,
-            Line {
-                shown,
-                before,
-                start,
-                text: at,
-                end,
-            },
-        );
+        self.lines.insert(number, Line { shown, before, start, text: at, end });
     }
 
     /// Whether the excerpt contains a byte of the file.
@@ -179,9 +162,7 @@ impl<'r> Excerpt<'r> {
     fn line(&self, number: usize) -> Result<&Line, Error> {
         let max = self.lines.keys().next_back().copied().unwrap_or(0);
         let given = number;
-        self.lines
-            .get(&number)
-            .ok_or(Error::LineTooLarge { given, max })
+        self.lines.get(&number).ok_or(Error::LineTooLarge { given, max })
     }
 }
 
@@ -198,11 +179,7 @@ fn window(text: &str, line: Range<usize>, focus: usize) -> Range<usize> {
     }
     let place = |(place, _)| place;
     let before = text[line.start..focus].char_indices().rev();
-    let start = line.start
-        + before
-            .take(COLUMNS_BEFORE)
-            .last()
-            .map_or(focus - line.start, place);
+    let start = line.start + before.take(COLUMNS_BEFORE).last().map_or(focus - line.start, place);
     let behind = text[start..line.end].char_indices().nth(MAXIMUM_COLUMNS);
     start..start + behind.map_or(line.end - start, place)
 }

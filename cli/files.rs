@@ -51,43 +51,25 @@ const FIRST_FILES: [&str; 3] = ["cluster.toml", "model.toml", "reconfiguration.t
 pub(crate) fn unreadable(path: &Path, error: &io::Error) -> String {
     let (reason, meant) = if path.is_dir() {
         let first = FIRST_FILES.iter().map(|name| path.join(name));
-        (
-            "it is a folder".to_owned(),
-            first.into_iter().find(|file| file.exists()),
-        )
+        ("it is a folder".to_owned(), first.into_iter().find(|file| file.exists()))
     } else if error.kind() == io::ErrorKind::NotFound {
         (error.to_string(), nearest_file(path))
     } else {
         (error.to_string(), None)
     };
     let meant = meant.map(|file| format!("; did you mean {}?", file.display()));
-    format!(
-        "{} cannot be read: {reason}{}",
-        path.display(),
-        meant.unwrap_or_default()
-    )
+    format!("{} cannot be read: {reason}{}", path.display(), meant.unwrap_or_default())
 }
 
 /// File in the same folder with the most similar name.
 fn nearest_file(path: &Path) -> Option<PathBuf> {
     let folder = path.parent()?;
-    let place = if folder == Path::new("") {
-        Path::new(".")
-    } else {
-        folder
-    };
+    let place = if folder == Path::new("") { Path::new(".") } else { folder };
     let entries = fs::read_dir(place).ok()?.filter_map(Result::ok);
-    let names: Vec<String> = entries
-        .filter_map(|entry| entry.file_name().into_string().ok())
-        .collect();
+    let names: Vec<String> =
+        entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();
     let name = path.file_name()?.to_str()?;
-    let nearest = nearest(
-        name,
-        names
-            .iter()
-            .map(String::as_str)
-            .filter(|known| *known != name),
-    )?;
+    let nearest = nearest(name, names.iter().map(String::as_str).filter(|known| *known != name))?;
     Some(folder.join(nearest))
 }
 
@@ -102,20 +84,12 @@ pub(crate) fn program(path: &Path, wanted: Wanted<'_>) -> Result<(Source, Report
     if wanted.program.is_none() {
         let parsed = parse_program(&name, &text);
         if !has_errors(&parsed.diagnostics) {
-            let report = Report {
-                name,
-                text,
-                diagnostics: parsed.diagnostics,
-            };
+            let report = Report { name, text, diagnostics: parsed.diagnostics };
             return Ok((Source::Ladder(parsed.program), report));
         }
     }
     let read = read_source(&name, &text, wanted);
-    let report = Report {
-        name,
-        text,
-        diagnostics: read.diagnostics,
-    };
+    let report = Report { name, text, diagnostics: read.diagnostics };
     match read.source {
         Some(source) if !report.has_errors() => Ok((source, report)),
         _ => Err(Answer::bad_files(vec![report])),
@@ -130,11 +104,7 @@ pub fn ladder(path: &Path) -> Result<(Program, Report), Answer> {
     let text = text_of(Kind::Program, path)?;
     let name = path.display().to_string();
     let parsed = parse_program(&name, &text);
-    let report = Report {
-        name,
-        text,
-        diagnostics: parsed.diagnostics,
-    };
+    let report = Report { name, text, diagnostics: parsed.diagnostics };
     if report.has_errors() {
         let typed = read_source(&report.name, &report.text, Wanted::default()).source;
         let answer = Answer::bad_files(vec![report]);
@@ -221,14 +191,8 @@ pub(crate) fn cluster(path: &Path, overrides: Overrides) -> Result<(Cluster, Vec
 /// A valid scenario for a cluster.
 pub(crate) fn scenario(path: &Path, cluster: &Cluster) -> Result<Scenario, Answer> {
     let text = text_of(Kind::Scenario, path)?;
-    let found = read_scenario(
-        &path.display().to_string(),
-        &text,
-        Some(&Members::of(cluster)),
-    );
-    found
-        .scenario
-        .ok_or_else(|| Answer::bad_files(vec![found.report]))
+    let found = read_scenario(&path.display().to_string(), &text, Some(&Members::of(cluster)));
+    found.scenario.ok_or_else(|| Answer::bad_files(vec![found.report]))
 }
 
 /// A file to write.
@@ -243,10 +207,8 @@ pub(crate) fn write_template(
     folder: &Path,
     files: &[TemplateFile],
 ) -> Result<Vec<PathBuf>, Answer> {
-    let files = files.iter().map(|file| NewFile {
-        name: file.name.to_owned(),
-        bytes: file.text.into(),
-    });
+    let files =
+        files.iter().map(|file| NewFile { name: file.name.to_owned(), bytes: file.text.into() });
     write_new(folder, &files.collect::<Vec<_>>())
 }
 

@@ -19,9 +19,7 @@ pub(crate) fn group() -> Group {
             command("watch", |it, console| watch::run(&it, console)),
             command("top", |it, console| top::run(&it, console)),
             command("why", |it, _| why::run(&it)),
-            command("journal", |it, console| {
-                journal::run(&it, console.is_json())
-            }),
+            command("journal", |it, console| journal::run(&it, console.is_json())),
             command("diff", |it, _| diff::run(&it)),
             command("animate", |it, _| animate::run(&it)),
         ],

@@ -1,10 +1,7 @@
 //! The command line: parses, calls one function per command, prints. [`main`] is the `understudy` command; the other items are what the
 //! benchmarks run clusters with.
 
-#![allow(
-    clippy::disallowed_methods,
-    reason = "the command line names runs by the time"
-)]
+#![allow(clippy::disallowed_methods, reason = "the command line names runs by the time")]
 
 mod answer;
 mod commands;

@@ -87,11 +87,7 @@ pub fn run_station(arguments: &Arguments) -> Result<Answer, Answer> {
 /// Runs one remote I/O as this process.
 pub fn run_remote_io(arguments: &Arguments) -> Result<Answer, Answer> {
     let remote_io = |member: Member| matches!(member, Member::RemoteIo(_));
-    let wanted = (
-        remote_io as fn(Member) -> bool,
-        "remote I/O",
-        "understudy remote-io",
-    );
+    let wanted = (remote_io as fn(Member) -> bool, "remote I/O", "understudy remote-io");
     run(arguments, wanted, understudy_member::run_remote_io)
 }
 
@@ -160,11 +156,7 @@ fn failed(error: &MemberError) -> Answer {
     if let MemberError::Keys(errors) = error {
         return crate::deployment::keys::failed(errors);
     }
-    let status = if error.is_of_input() {
-        Status::BadInput
-    } else {
-        Status::Failed
-    };
+    let status = if error.is_of_input() { Status::BadInput } else { Status::Failed };
     Answer::failed(status, error.code(), error)
 }
 

@@ -76,30 +76,17 @@ impl OverrideArguments {
 
     /// The same overrides with a period.
     pub(crate) fn with_period(&self, period: Duration) -> Self {
-        Self {
-            period: Some(period),
-            ..self.clone()
-        }
+        Self { period: Some(period), ..self.clone() }
     }
 
     /// The overrides for the given link, or for each link.
     pub fn each_link(&self) -> Vec<(LinkKind, Self)> {
-        let links = [
-            (LinkKind::Udp, LinkArgument::Udp),
-            (LinkKind::Zenoh, LinkArgument::Zenoh),
-        ];
-        let asked = links
-            .into_iter()
-            .filter(|(_, link)| self.link.is_none_or(|asked| asked == *link));
+        let links = [(LinkKind::Udp, LinkArgument::Udp), (LinkKind::Zenoh, LinkArgument::Zenoh)];
+        let asked =
+            links.into_iter().filter(|(_, link)| self.link.is_none_or(|asked| asked == *link));
         let over = asked.map(|(kind, link)| {
             let link = Some(link);
-            (
-                kind,
-                Self {
-                    link,
-                    ..self.clone()
-                },
-            )
+            (kind, Self { link, ..self.clone() })
         });
         over.collect()
     }
@@ -115,19 +102,9 @@ impl OverrideArguments {
                 arguments.extend([name.to_owned(), value.get_name().to_owned()]);
             }
         };
-        word(
-            "--link",
-            self.link.and_then(|link| link.to_possible_value()),
-        );
-        word(
-            "--security",
-            self.security
-                .and_then(|security| security.to_possible_value()),
-        );
-        word(
-            "--mode",
-            self.mode.and_then(|mode| mode.to_possible_value()),
-        );
+        word("--link", self.link.and_then(|link| link.to_possible_value()));
+        word("--security", self.security.and_then(|security| security.to_possible_value()));
+        word("--mode", self.mode.and_then(|mode| mode.to_possible_value()));
         arguments
     }
 }

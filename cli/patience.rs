@@ -61,7 +61,6 @@ impl<'c> Patience<'c> {
 
     /// Whether the time limit has passed.
     pub(crate) fn is_over(&self) -> bool {
-        self.budget
-            .is_some_and(|budget| self.begin.elapsed() >= budget)
+        self.budget.is_some_and(|budget| self.begin.elapsed() >= budget)
     }
 }

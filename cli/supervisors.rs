@@ -42,9 +42,7 @@ pub(crate) fn group() -> Group {
         title: "Synthesise supervisors",
         entries: vec![
             command("synth", |it, console| synth::run(&it, console)),
-            command("supervisor-to-ladder", |it, console| {
-                supervisor_to_ladder::run(&it, console)
-            }),
+            command("supervisor-to-ladder", |it, console| supervisor_to_ladder::run(&it, console)),
             command("des", |it, console| des::run(&it, console)),
             command("petri", |it, _| petri::run(&it)),
             command("reconfigure", |it, _| reconfigure::run(&it)),

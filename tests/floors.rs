@@ -32,9 +32,7 @@ const IMPURE: [&str; 14] = [
 
 /// The cells of each row of the table below a heading of `ARCHITECTURE.md`.
 fn table(heading: &str) -> Vec<Vec<&'static str>> {
-    let (_, section) = ARCHITECTURE
-        .split_once(&format!("\n## {heading}\n"))
-        .expect("the heading");
+    let (_, section) = ARCHITECTURE.split_once(&format!("\n## {heading}\n")).expect("the heading");
     let rows = section
         .lines()
         .skip_while(|line| !line.starts_with('|'))
@@ -64,21 +62,11 @@ fn root() -> &'static Path {
 
 fn metadata() -> Value {
     let output = Command::new(env!("CARGO"))
-        .args([
-            "metadata",
-            "--no-deps",
-            "--offline",
-            "--format-version",
-            "1",
-        ])
+        .args(["metadata", "--no-deps", "--offline", "--format-version", "1"])
         .current_dir(root())
         .output()
         .expect("cargo runs");
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     serde_json::from_slice(&output.stdout).expect("cargo prints JSON")
 }
 
@@ -107,10 +95,8 @@ fn no_dependency_points_up() {
         let floor = floors.get(folder.as_str());
         *floor.unwrap_or_else(|| panic!("{folder} has no floor in ARCHITECTURE.md"))
     };
-    let by_name: BTreeMap<&str, usize> = packages
-        .iter()
-        .map(|package| (text(package, "name"), floor_of(package)))
-        .collect();
+    let by_name: BTreeMap<&str, usize> =
+        packages.iter().map(|package| (text(package, "name"), floor_of(package))).collect();
     for package in packages {
         let name = text(package, "name");
         let floor = by_name[name];
@@ -187,10 +173,7 @@ fn every_path_that_is_named_exists() {
         .chain(["docs", "examples", "deployment"])
         .collect();
     let mut named = 0;
-    for path in texts
-        .iter()
-        .flat_map(|text| text.split('`').skip(1).step_by(2))
-    {
+    for path in texts.iter().flat_map(|text| text.split('`').skip(1).step_by(2)) {
         let is_a_path = path.split_once('/').is_some_and(|(top, rest)| {
             tops.contains(&top) && !rest.contains(['{', '*', ' ', '?']) && !rest.contains("NAME")
         });
@@ -212,9 +195,7 @@ fn lines_of_code(folder: &Path, show: &mut dyn FnMut(&Path, &str)) -> usize {
         } else if path.extension().is_some_and(|extension| extension == "rs") {
             let source = std::fs::read_to_string(&path).expect("a readable source");
             let code = source.split("#[cfg(test)]").next().unwrap_or_default();
-            let lines = code
-                .lines()
-                .filter(|line| !line.trim_start().starts_with("//"));
+            let lines = code.lines().filter(|line| !line.trim_start().starts_with("//"));
             for line in lines {
                 show(&path, line);
                 shown += 1;

@@ -36,11 +36,7 @@ impl Phrase {
             start: word.trim_end_matches('*').chars().collect(),
             open: word.ends_with('*'),
         };
-        Self {
-            text,
-            parts: text.split_whitespace().map(part).collect(),
-            replacement,
-        }
+        Self { text, parts: text.split_whitespace().map(part).collect(), replacement }
     }
 
     /// Where the phrase ends that begins at `start` of the text in small letters.
@@ -48,9 +44,7 @@ impl Phrase {
         let mut at = start;
         for (index, part) in self.parts.iter().enumerate() {
             if index > 0 {
-                let blank = text[at..]
-                    .iter()
-                    .take_while(|letter| letter.is_whitespace());
+                let blank = text[at..].iter().take_while(|letter| letter.is_whitespace());
                 match blank.count() {
                     0 => return None,
                     count => at += count,
@@ -93,10 +87,8 @@ fn phrases() -> (Vec<Phrase>, Vec<Phrase>) {
 
 /// Each hit: its line, counted from 1, and the phrase.
 fn hits<'a>(text: &str, banned: &'a [Phrase], allowed: &[Phrase]) -> Vec<(usize, &'a Phrase)> {
-    let letters: Vec<char> = text
-        .chars()
-        .map(|letter| letter.to_lowercase().next().unwrap_or(letter))
-        .collect();
+    let letters: Vec<char> =
+        text.chars().map(|letter| letter.to_lowercase().next().unwrap_or(letter)).collect();
     let mut found = Vec::new();
     let mut line = 1;
     let mut allowed_until = 0;
@@ -112,14 +104,9 @@ fn hits<'a>(text: &str, banned: &'a [Phrase], allowed: &[Phrase]) -> Vec<(usize,
         if at < allowed_until {
             continue;
         }
-        let here = banned
-            .iter()
-            .filter(|phrase| phrase.end(&letters, at).is_some());
+        let here = banned.iter().filter(|phrase| phrase.end(&letters, at).is_some());
         // Of two phrases that begin at one place, the longer one.
-        found.extend(
-            here.max_by_key(|phrase| phrase.text.len())
-                .map(|phrase| (line, phrase)),
-        );
+        found.extend(here.max_by_key(|phrase| phrase.text.len()).map(|phrase| (line, phrase)));
     }
     found
 }
@@ -186,19 +173,14 @@ fn prose_of_code(text: &str, is_rust: bool) -> String {
 fn end_of_string(rest: &[char], is_rust: bool) -> Option<usize> {
     let quote = *rest.first()?;
     if is_rust && quote == 'r' {
-        let hashes = rest[1..]
-            .iter()
-            .take_while(|letter| **letter == '#')
-            .count();
+        let hashes = rest[1..].iter().take_while(|letter| **letter == '#').count();
         if rest.get(1 + hashes) != Some(&'"') {
             return None;
         }
         let mut end = vec!['"'];
         end.extend(std::iter::repeat_n('#', hashes));
         let body = 2 + hashes;
-        let close = rest[body..]
-            .windows(end.len())
-            .position(|window| window == end)?;
+        let close = rest[body..].windows(end.len()).position(|window| window == end)?;
         return Some(body + close + end.len());
     }
     if is_rust && quote == '\'' {
@@ -247,22 +229,10 @@ fn files_below(folder: &Path, found: &mut Vec<PathBuf>) {
 /// Everything that people read, by its path in the project.
 fn examined() -> BTreeMap<String, String> {
     let mut files = Vec::new();
-    for page in [
-        "README.md",
-        "ARCHITECTURE.md",
-        "CONTRIBUTING.md",
-        "CHANGELOG.md",
-    ] {
+    for page in ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md"] {
         files.push(root().join(page));
     }
-    let folders = [
-        "docs",
-        "examples",
-        "deployment",
-        "clients",
-        "cli",
-        "observation/watch/assets",
-    ];
+    let folders = ["docs", "examples", "deployment", "clients", "cli", "observation/watch/assets"];
     for folder in folders {
         files_below(&root().join(folder), &mut files);
     }
@@ -295,30 +265,20 @@ fn no_banned_phrase_is_added() {
         if found.len() > before {
             let _ = writeln!(risen, "{path}: {} hits, {before} known", found.len());
             for (line, phrase) in &found {
-                let _ = writeln!(
-                    risen,
-                    "  {path}:{line}: `{}`: {}",
-                    phrase.text, phrase.replacement
-                );
+                let _ =
+                    writeln!(risen, "  {path}:{line}: `{}`: {}", phrase.text, phrase.replacement);
             }
         } else if found.len() < before {
             let _ = writeln!(fallen, "{path}: {} hits, {before} known", found.len());
         }
         // A number falls, or is new for a list that has no baseline yet.
-        let count = if known.is_empty() {
-            found.len()
-        } else {
-            found.len().min(before)
-        };
+        let count = if known.is_empty() { found.len() } else { found.len().min(before) };
         if count > 0 {
             counts.insert(path, count);
         }
     }
     if update {
-        let text: String = counts
-            .iter()
-            .map(|(path, count)| format!("{count} {path}\n"))
-            .collect();
+        let text: String = counts.iter().map(|(path, count)| format!("{count} {path}\n")).collect();
         fs::create_dir_all(root().join("tests/language")).expect("a folder");
         fs::write(root().join(BASELINE), text).expect("written");
         fallen.clear();
@@ -326,10 +286,7 @@ fn no_banned_phrase_is_added() {
             risen.clear();
         }
     }
-    assert!(
-        risen.is_empty(),
-        "banned phrases; use the replacement:\n{risen}"
-    );
+    assert!(risen.is_empty(), "banned phrases; use the replacement:\n{risen}");
     assert!(
         fallen.is_empty(),
         "fewer banned phrases than {BASELINE} says; `{UPDATE}=update cargo test --test language` lowers it:\n{fallen}"
@@ -342,27 +299,15 @@ fn phrases_are_found_as_the_list_says() {
     fn check(prose: &str, expected: &[(usize, &str)]) {
         let (banned, allowed) = phrases();
         let found = hits(prose, &banned, &allowed);
-        let found: Vec<_> = found
-            .iter()
-            .map(|(line, phrase)| (*line, phrase.text))
-            .collect();
+        let found: Vec<_> = found.iter().map(|(line, phrase)| (*line, phrase.text)).collect();
         assert_eq!(found, expected, "{prose}");
     }
     check("A member is synchronised.", &[]);
     check("Nobody\nis in\nstep.", &[(1, "nobody"), (2, "in step")]);
-    check(
-        "mishaps; in steps; a third party; the party",
-        &[(1, "mishap*"), (1, "party")],
-    );
-    check(
-        &prose_of_markdown("a `party` and\n```\nparty\n```\nparties"),
-        &[(5, "parties")],
-    );
+    check("mishaps; in steps; a third party; the party", &[(1, "mishap*"), (1, "party")]);
+    check(&prose_of_markdown("a `party` and\n```\nparty\n```\nparties"), &[(5, "parties")]);
     let rust = "/// Nobody.\n// nobody\nlet party = \"no party\"; let c = '\"'; let raw = r#\"a \"party\"\"#;";
-    check(
-        &prose_of_code(rust, true),
-        &[(1, "nobody"), (3, "party"), (3, "party")],
-    );
+    check(&prose_of_code(rust, true), &[(1, "nobody"), (3, "party"), (3, "party")]);
     check(
         &prose_of_code("const party = 'nobody'; // party", false),
         &[(1, "nobody"), (1, "party")],

@@ -114,29 +114,22 @@ enum Prefer {
 fn reserve(text: &str) -> Result<u8, String> {
     let number = text.strip_suffix('%').unwrap_or(text).trim();
     let percent = number.parse().ok();
-    percent
-        .filter(|percent| *percent <= MOST_RESERVE_PERCENT)
-        .ok_or_else(|| {
-            format!("{text:?} is not a percentage: expected 0% to {MOST_RESERVE_PERCENT}%")
-        })
+    percent.filter(|percent| *percent <= MOST_RESERVE_PERCENT).ok_or_else(|| {
+        format!("{text:?} is not a percentage: expected 0% to {MOST_RESERVE_PERCENT}%")
+    })
 }
 
 fn assumption(text: &str) -> Result<(FamilyQuantity, u64), String> {
     let (name, value) = text.split_once('=').unwrap_or((text, ""));
     let known = FamilyQuantity::ALL.into_iter();
-    let Some(quantity) = known
-        .into_iter()
-        .find(|known| known.name() == name.trim().replace('-', "_"))
+    let Some(quantity) =
+        known.into_iter().find(|known| known.name() == name.trim().replace('-', "_"))
     else {
         let names = FamilyQuantity::ALL.map(FamilyQuantity::name).join(", ");
-        return Err(format!(
-            "`{name}` is not a figure of a family; known figures: {names}"
-        ));
+        return Err(format!("`{name}` is not a figure of a family; known figures: {names}"));
     };
     let value = FamilyQuantity::parse(value.trim());
-    value
-        .map(|value| (quantity, value))
-        .ok_or_else(|| format!("expected {quantity}=NUMBER"))
+    value.map(|value| (quantity, value)).ok_or_else(|| format!("expected {quantity}=NUMBER"))
 }
 
 fn stock(text: &str) -> Result<Stock, String> {
@@ -160,22 +153,16 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     let patience = Patience::new(Some(arguments.budget), console);
     let items = items(arguments, &programs, &patience)?;
     let found = allocate(&catalogue, &items, &options).map_err(|errors| {
-        errors
-            .iter()
-            .fold(Answer::done("", Value::Null), |answer, error| {
-                answer.and_failure(Status::BadInput, error.code(), message(error))
-            })
+        errors.iter().fold(Answer::done("", Value::Null), |answer, error| {
+            answer.and_failure(Status::BadInput, error.code(), message(error))
+        })
     })?;
     let mut answer_text = text(&found, arguments.all);
     if let Some(folder) = &arguments.report {
         let page = write_report(folder, &found, &options.terms, &programs.title(), about)?;
         answer_text.push_str(&format!("report: {page}\n"));
     }
-    let status = if found.is_complete() {
-        Status::Done
-    } else {
-        Status::Failed
-    };
+    let status = if found.is_complete() { Status::Done } else { Status::Failed };
     let answer = Answer::done(answer_text, json!(found)).with_status(status);
     Ok(answer.with_used(programs.reports))
 }
@@ -229,9 +216,7 @@ fn items(
     let alone = programs.groups.len() == 1
         && programs.groups[0].cluster.is_none()
         && programs.groups[0].members.len() == 1;
-    let io = arguments
-        .io
-        .unwrap_or(if alone { Io::Local } else { Io::Remote });
+    let io = arguments.io.unwrap_or(if alone { Io::Local } else { Io::Remote });
     let asked = verified::asked(&arguments.properties, programs)?;
     let mut items = Vec::new();
     for (number, group) in programs.groups.iter().enumerate() {

@@ -134,29 +134,18 @@ fn kind(text: &str) -> Result<Kind, String> {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     match &arguments.what {
-        What::List {
-            vendor,
-            family,
-            file,
-        } => list(file, vendor.as_deref(), family.as_deref()),
+        What::List { vendor, family, file } => list(file, vendor.as_deref(), family.as_deref()),
         What::Show { model, file } => show(file, model),
         What::Add { entry, file } => add(file, entry),
-        What::Import {
-            from,
-            update,
-            empty,
-            file,
-        } => import(file, from, *update, *empty),
+        What::Import { from, update, empty, file } => import(file, from, *update, *empty),
         What::Export { output, file } => export(file, output.as_deref()),
     }
 }
 
 fn refused(errors: &[AdditionError]) -> Answer {
-    errors
-        .iter()
-        .fold(Answer::done("", Value::Null), |answer, error| {
-            answer.and_failure(Status::BadInput, error.code(), message(error))
-        })
+    errors.iter().fold(Answer::done("", Value::Null), |answer, error| {
+        answer.and_failure(Status::BadInput, error.code(), message(error))
+    })
 }
 
 /// Catalogue at `path`, or the built-in one, with its name.
@@ -234,11 +223,8 @@ fn show(file: &FileArgument, name: &str) -> Result<Answer, Answer> {
     let found = catalogue.named(name);
     if found.is_empty() {
         let like = catalogue.like(name);
-        let hint = if like.is_empty() {
-            String::new()
-        } else {
-            format!("; similar: {}", like.join(", "))
-        };
+        let hint =
+            if like.is_empty() { String::new() } else { format!("; similar: {}", like.join(", ")) };
         let message = format!("the catalogue has no `{name}`{hint}");
         return Err(Answer::failed(Status::BadInput, "U1131", message));
     }
@@ -257,12 +243,7 @@ fn show(file: &FileArgument, name: &str) -> Result<Answer, Answer> {
 }
 
 fn push_shown(text: &mut String, controller: &Controller) {
-    let _ = writeln!(
-        text,
-        "{controller}, {}, {}",
-        controller.family,
-        controller.kind.name()
-    );
+    let _ = writeln!(text, "{controller}, {}, {}", controller.family, controller.kind.name());
     for (quantity, figure) in &controller.numbers {
         let _ = writeln!(text, "  {quantity}: {}", quantity.text(figure.value));
         let _ = writeln!(text, "      {}", figure.source);
@@ -302,15 +283,11 @@ fn add(file: &WrittenFile, entry: &Entry) -> Result<Answer, Answer> {
         let (name, value) = (name.trim(), value.trim());
         let source = entry.source.clone();
         let number = Quantity::ALL.into_iter().find(|known| known.name() == name);
-        let words = Statement::ALL
-            .into_iter()
-            .find(|known| known.name() == name);
+        let words = Statement::ALL.into_iter().find(|known| known.name() == name);
         if let Some(quantity) = number {
             match quantity.parse(value) {
                 Some(value) => {
-                    controller
-                        .numbers
-                        .insert(quantity, Figure { value, source });
+                    controller.numbers.insert(quantity, Figure { value, source });
                 }
                 None => bad(format!("`{value}` is not a valid {quantity}")),
             }
@@ -323,10 +300,7 @@ fn add(file: &WrittenFile, entry: &Entry) -> Result<Answer, Answer> {
                 .into_iter()
                 .chain(Statement::ALL.map(Statement::name))
                 .collect();
-            bad(format!(
-                "`{text}` is not a figure; known figures: {}",
-                known.join(", ")
-            ));
+            bad(format!("`{text}` is not a figure; known figures: {}", known.join(", ")));
         }
     }
     if !wrong.failures.is_empty() {
@@ -361,12 +335,7 @@ fn put(file: &WrittenFile, part: &Catalogue, update: bool, empty: bool) -> Resul
     let added = catalogue.add(part, mode);
     let added = added.map_err(|errors| refused(&errors))?;
     files::replace(path, &file::write(&catalogue))?;
-    let Added {
-        models,
-        updated,
-        family_figures,
-        changed,
-    } = &added;
+    let Added { models, updated, family_figures, changed } = &added;
     let mut text = format!(
         "{}: {models} added, {updated} updated, {family_figures} figures of families\n",
         path.display()

@@ -84,9 +84,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     let overrides = arguments.overrides.overrides();
     let wanted = overrides.period.unwrap_or(PERIOD);
     let path = arguments.cluster.as_ref();
-    let cluster = path
-        .map(|path| files::cluster(path, overrides))
-        .transpose()?;
+    let cluster = path.map(|path| files::cluster(path, overrides)).transpose()?;
     let cluster = cluster.map(|(cluster, _)| cluster);
     let agreement = cluster.as_ref().map(Cluster::agreement);
     let period = agreement.map_or(wanted, |agreement| agreement.schedule.period());
@@ -101,24 +99,14 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         findings.extend(of_member(arguments, cluster, member)?);
     }
     let look_again = || examine_machine(period);
-    let fixed = arguments
-        .fix
-        .then(|| fix::fix(&findings, &look_again, arguments.yes, console));
+    let fixed = arguments.fix.then(|| fix::fix(&findings, &look_again, arguments.yes, console));
     let (found, findings) = match &fixed {
         Some(fixed) => (findings.clone(), fixed.applied_to(findings)),
         None => (Vec::new(), findings),
     };
     let worst = findings.iter().map(|finding| finding.health).max();
-    let status = if worst == Some(Health::Bad) {
-        Status::Failed
-    } else {
-        Status::Done
-    };
-    let result = Examined {
-        configuration: hash,
-        findings: &findings,
-        fixed: fixed.as_ref(),
-    };
+    let status = if worst == Some(Health::Bad) { Status::Failed } else { Status::Done };
+    let result = Examined { configuration: hash, findings: &findings, fixed: fixed.as_ref() };
     let mut words = text(&findings);
     if let Some(fixed) = &fixed {
         words += &fixed.text(&found);
@@ -164,13 +152,8 @@ fn of_member(
         return Ok(findings);
     };
     let patience = (agreement.schedule.period() * arguments.listen).max(LEAST_PATIENCE);
-    let heard = examine_peers(
-        &endpoints,
-        link_kind(cluster),
-        guard,
-        agreement.configuration,
-        patience,
-    );
+    let heard =
+        examine_peers(&endpoints, link_kind(cluster), guard, agreement.configuration, patience);
     match heard {
         Ok(heard) => findings.extend(heard),
         Err(BusError::PortInUse { .. }) => findings.push(Finding::good(
@@ -256,12 +239,7 @@ fn text(findings: &[Finding]) -> String {
             let _ = writeln!(text, "{:24}command: {command}", "");
         }
     }
-    let count = |health| {
-        findings
-            .iter()
-            .filter(|finding| finding.health == health)
-            .count()
-    };
+    let count = |health| findings.iter().filter(|finding| finding.health == health).count();
     let (bad, warnings) = (count(Health::Bad), count(Health::Warning));
     let verdict = if bad == 0 { "ready" } else { "NOT READY" };
     let _ = writeln!(text, "{verdict}: {bad} bad, {warnings} warnings");

@@ -120,11 +120,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
             serve_metrics(&run, *listen, &mut ready).map_err(failed)?;
             Ok(ended())
         }
-        What::Modbus {
-            run,
-            listen,
-            allow_writes,
-        } => {
+        What::Modbus { run, listen, allow_writes } => {
             let run = run.open()?;
             let gate = allow_writes.then(|| WriteGate::new(&run));
             let run = Followed::new(&run).map_err(failed)?;
@@ -145,25 +141,15 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
             };
             let interrupted = interruption()?;
             let ends = || interrupted.load(Ordering::Relaxed) || run.is_finished();
-            forward_signals(&gate, *from, keys.as_ref(), &ends, &mut |said| {
-                console.note(said)
-            })
-            .map_err(failed)?;
+            forward_signals(&gate, *from, keys.as_ref(), &ends, &mut |said| console.note(said))
+                .map_err(failed)?;
             Ok(ended())
         }
         What::Registers { run } => {
             let map = RegisterMap::new(run.open()?.cluster()).map_err(failed)?;
-            Ok(Answer::done(
-                table(&map),
-                json!({ "registers": map.places() }),
-            ))
+            Ok(Answer::done(table(&map), json!({ "registers": map.places() })))
         }
-        What::Zenoh {
-            run,
-            listen,
-            rate,
-            allow_writes,
-        } => {
+        What::Zenoh { run, listen, rate, allow_writes } => {
             let run = run.open()?;
             let gate = allow_writes.then(|| WriteGate::new(&run));
             let run = Followed::new(&run).map_err(failed)?;
@@ -196,11 +182,8 @@ fn table(map: &RegisterMap) -> String {
             1 => place.address.to_string(),
             _ => format!("{}-{last}", place.address),
         };
-        let _ = writeln!(
-            text,
-            "{area:14}  {addresses:>9}  {:width$}  {}",
-            place.name, place.meaning
-        );
+        let _ =
+            writeln!(text, "{area:14}  {addresses:>9}  {:width$}  {}", place.name, place.meaning);
     }
     text
 }

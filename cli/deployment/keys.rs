@@ -120,11 +120,7 @@ struct DaysArgument {
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let now = Date::of(SystemTime::now());
     let (issued, without_address) = match &arguments.what {
-        What::Init {
-            cluster,
-            folder,
-            days,
-        } => {
+        What::Init { cluster, folder, days } => {
             let cluster = read(cluster)?;
             let members = cluster.members();
             let names = members.filter_map(|member| cluster.member_name(member));
@@ -136,20 +132,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
             let issued = issued.map_err(|errors| failed(&errors))?;
             (issued, without_address(&cluster, &names))
         }
-        What::Issue {
-            cluster,
-            names,
-            people,
-            folder,
-            days,
-        } => {
+        What::Issue { cluster, names, people, folder, days } => {
             let cluster = read(cluster)?;
             let mut authority = open(folder)?;
             let holders = people.holders();
-            let people = People {
-                holders: &holders,
-                address: people.address,
-            };
+            let people = People { holders: &holders, address: people.address };
             let issued = authority.issue(&cluster, names, people, days.days, now);
             let issued = issued.map_err(|errors| failed(&errors))?;
             (issued, without_address(&cluster, names))
@@ -165,9 +152,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let has_addresses = without_address.is_empty();
     let answer = changed(&issued, without_address, now);
     Ok(match &arguments.what {
-        What::Init {
-            cluster, folder, ..
-        } if has_addresses => with_doctor(answer, cluster, &folder.folder, &issued),
+        What::Init { cluster, folder, .. } if has_addresses => {
+            with_doctor(answer, cluster, &folder.folder, &issued)
+        }
         What::Init { cluster, .. } => answer.and_next(&[&"lab", cluster]),
         _ => answer,
     })
@@ -179,14 +166,7 @@ fn with_doctor(answer: Answer, cluster: &Path, folder: &Path, issued: &Issued) -
         return answer;
     };
     let keys = folder.join("members").join(&member.name);
-    answer.and_next(&[
-        &"doctor",
-        &cluster,
-        &"--name",
-        &member.name,
-        &"--keys",
-        &keys,
-    ])
+    answer.and_next(&[&"doctor", &cluster, &"--name", &member.name, &"--keys", &keys])
 }
 
 fn read(path: &Path) -> Result<Cluster, Answer> {
@@ -200,20 +180,11 @@ fn open(folder: &FolderArgument) -> Result<Authority, Answer> {
 /// Answer with all errors: a failed run if writing failed, otherwise invalid input.
 pub(crate) fn failed(errors: &[KeysError]) -> Answer {
     let writing = |error: &KeysError| {
-        matches!(
-            error,
-            KeysError::Write { .. } | KeysError::Certificate { .. }
-        )
+        matches!(error, KeysError::Write { .. } | KeysError::Certificate { .. })
     };
-    let status = if errors.iter().any(writing) {
-        Status::Failed
-    } else {
-        Status::BadInput
-    };
+    let status = if errors.iter().any(writing) { Status::Failed } else { Status::BadInput };
     let answer = Answer::done("", serde_json::Value::Null).with_status(status);
-    errors.iter().fold(answer, |answer, error| {
-        answer.and_failure(status, error.code(), error)
-    })
+    errors.iter().fold(answer, |answer, error| answer.and_failure(status, error.code(), error))
 }
 
 #[derive(Serialize)]
@@ -260,10 +231,8 @@ fn shown(holder: &Holder, now: Date) -> Shown<'_> {
 fn table(holders: &[Holder], now: Date) -> String {
     let width = holders.iter().map(|holder| holder.name.len()).max();
     let width = width.unwrap_or(0).max(4);
-    let mut text = format!(
-        "{:width$}  role      generation  expires               state\n",
-        "name"
-    );
+    let mut text =
+        format!("{:width$}  role      generation  expires               state\n", "name");
     for holder in holders {
         let shown = shown(holder, now);
         let role = shown.role.word();
@@ -316,11 +285,7 @@ fn changed(issued: &Issued, without_address: Vec<String>, now: Date) -> Answer {
         let _ = writeln!(text, "  {folder}");
     }
     let list = List {
-        holders: issued
-            .holders
-            .iter()
-            .map(|holder| shown(holder, now))
-            .collect(),
+        holders: issued.holders.iter().map(|holder| shown(holder, now)).collect(),
         folders,
         without_address,
     };

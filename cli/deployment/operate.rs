@@ -76,10 +76,7 @@ pub(crate) struct Arguments {
 impl What {
     /// Whether it is for an alarm, and not for a member.
     fn is_of_alarm(self) -> bool {
-        matches!(
-            self,
-            Self::AcknowledgeAlarm | Self::ShelveAlarm | Self::UnshelveAlarm
-        )
+        matches!(self, Self::AcknowledgeAlarm | Self::ShelveAlarm | Self::UnshelveAlarm)
     }
 }
 
@@ -93,9 +90,7 @@ impl Arguments {
     /// Reply to `cold-start` or `accept-state`.
     fn choice(&self) -> StateChoice {
         match self.what {
-            What::AcceptState => StateChoice::Newest {
-                cycle: self.cycle.map(Cycle),
-            },
+            What::AcceptState => StateChoice::Newest { cycle: self.cycle.map(Cycle) },
             _ => StateChoice::Cold,
         }
     }
@@ -151,20 +146,16 @@ fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
     let word = arguments.word();
     let command = match arguments.what {
         What::Force => Command::Force(force(arguments, written(arguments)?.cluster())?),
-        What::Unforce => Command::Unforce {
-            signal: place(arguments, written(arguments)?.cluster())?.0,
-        },
-        What::Write => Command::Write(write(
-            arguments,
-            written(arguments)?.cluster(),
-            Role::Engineer,
-        )?),
+        What::Unforce => {
+            Command::Unforce { signal: place(arguments, written(arguments)?.cluster())?.0 }
+        }
+        What::Write => {
+            Command::Write(write(arguments, written(arguments)?.cluster(), Role::Engineer)?)
+        }
         What::Kill => Command::Kill,
         What::Restart => Command::Restart,
         What::Release => Command::Release,
-        What::ColdStart | What::AcceptState => Command::Choose {
-            choice: arguments.choice(),
-        },
+        What::ColdStart | What::AcceptState => Command::Choose { choice: arguments.choice() },
         What::Status
         | What::Configuration
         | What::Stop
@@ -193,10 +184,7 @@ fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
     let mut text = format!("{word} {}: done", arguments.name);
     let mut result = json!({ "run": run.path(), "name": arguments.name, "done": word });
     if let Some(cycle) = done.cycle {
-        text = format!(
-            "{word} {}: in effect since cycle {cycle} of the cluster",
-            arguments.name
-        );
+        text = format!("{word} {}: in effect since cycle {cycle} of the cluster", arguments.name);
         result["cycle"] = json!(cycle);
     }
     Ok(Answer::done(text, result).and_next(&[&"top", &run.path()]))
@@ -212,20 +200,13 @@ fn place<'a>(
     let bad = |message: String| Answer::failed(Status::BadInput, "U0556", message);
     let member = crate::member::find(cluster, &arguments.name)?;
     let Member::RemoteIo(program) = member else {
-        let message = format!(
-            "`{}` is not a remote I/O: signals are forced there",
-            arguments.name
-        );
+        let message = format!("`{}` is not a remote I/O: signals are forced there", arguments.name);
         return Err(bad(message));
     };
     let Interface { inputs, outputs } = &cluster.controllers()[program.index()].interface;
     let name = name.trim();
-    let input = inputs
-        .find(name)
-        .map(|point| (SignalPlace::Input(point.bit as u16), point.of));
-    let output = outputs
-        .find(name)
-        .map(|point| (SignalPlace::Output(point.bit as u16), point.of));
+    let input = inputs.find(name).map(|point| (SignalPlace::Input(point.bit as u16), point.of));
+    let output = outputs.find(name).map(|point| (SignalPlace::Output(point.bit as u16), point.of));
     let (place, of) = input.or(output).ok_or_else(|| {
         let names: Vec<&str> = inputs.names().chain(outputs.names()).collect();
         let names = names.join(", ");
@@ -249,9 +230,7 @@ fn force(arguments: &Arguments, cluster: &Cluster) -> Result<Force, Answer> {
         owner: crate::inspect::top::owner(),
         reason: arguments.reason.clone(),
     };
-    force
-        .check()
-        .map_err(|error| Answer::failed(Status::BadInput, "U0556", error.to_string()))?;
+    force.check().map_err(|error| Answer::failed(Status::BadInput, "U0556", error.to_string()))?;
     Ok(force)
 }
 
@@ -299,10 +278,7 @@ fn outcome(arguments: &Arguments, text: &str) -> Result<Answer, Answer> {
         .map_err(|_| refused(&Refusal::Said(format!("U0556: {text:.200}"))))?;
     let done = Done::of_write(answer.outcome).map_err(|refusal| refused(&refusal))?;
     let cycle = done.cycle.unwrap_or_default();
-    let text = format!(
-        "write {}: in effect since cycle {cycle} of the cluster",
-        arguments.name
-    );
+    let text = format!("write {}: in effect since cycle {cycle} of the cluster", arguments.name);
     let result = json!({ "name": arguments.name, "done": "write", "cycle": cycle });
     Ok(Answer::done(text, result))
 }

@@ -73,10 +73,8 @@ fn counted(programs: &Programs, with_instructions: bool) -> Answer {
 
 /// Table of counts with one column per program.
 fn table(counted: &[(String, Program)]) -> String {
-    let resources: Vec<Resources> = counted
-        .iter()
-        .map(|(_, program)| Resources::of(program))
-        .collect();
+    let resources: Vec<Resources> =
+        counted.iter().map(|(_, program)| Resources::of(program)).collect();
     let names = counted.iter().map(|(name, _)| name.as_str());
     let found: Vec<_> = names.zip(Resources::table(&resources)).collect();
     let Some((_, rows)) = found.first() else {

@@ -38,11 +38,8 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
-    let scene = Scene {
-        program: arguments.program.as_deref(),
-        from: arguments.from,
-        to: arguments.to,
-    };
+    let scene =
+        Scene { program: arguments.program.as_deref(), from: arguments.from, to: arguments.to };
     let until = arguments.to.unwrap_or(i64::MAX);
     let run = arguments.run.open()?;
     let model = match arguments.from {

@@ -26,12 +26,7 @@ pub(crate) struct Arguments {
 }
 
 /// Bounds of the comparison: a million changes of signals; states are not compared.
-const BOUNDS: Bounds = Bounds {
-    cycles: 64,
-    events: 100_000,
-    changes: 1_000_000,
-    timings: 1,
-};
+const BOUNDS: Bounds = Bounds { cycles: 64, events: 100_000, changes: 1_000_000, timings: 1 };
 
 pub(crate) fn run(arguments: &Arguments) -> Answer {
     let read = |path: &Path| -> Result<Model, ViewError> { Run::open(path)?.read(BOUNDS) };

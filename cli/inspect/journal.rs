@@ -83,10 +83,7 @@ pub(crate) fn run(arguments: &Arguments, json: bool) -> Result<Answer, Answer> {
     for trouble in &troubles {
         text += &format!("       -  {trouble}\n");
     }
-    Ok(Answer::done(
-        text,
-        json!({ "lines": lines, "troubles": troubles }),
-    ))
+    Ok(Answer::done(text, json!({ "lines": lines, "troubles": troubles })))
 }
 
 /// The present records, and the errors between them.
@@ -116,11 +113,7 @@ fn followed(run: &Run, mut listing: Listing, mut source: Source, json: bool) -> 
         let over = run.is_finished();
         let taken = source.poll(&mut |found| {
             let text = |line: &JournalLine| {
-                if json {
-                    serde_json::to_string(line).unwrap_or_default()
-                } else {
-                    line.to_text()
-                }
+                if json { serde_json::to_string(line).unwrap_or_default() } else { line.to_text() }
             };
             let lines = match found {
                 Ok(record) => listing.take(&record).iter().map(text).collect(),

@@ -102,9 +102,7 @@ fn open(arguments: &Arguments, console: &mut Console) -> Result<Opened, Answer> 
     let path = arguments.run.run.as_path();
     let (cluster, _) = files::cluster(path, Default::default())?;
     let (out, limit) = (&arguments.run.out, JOURNAL_LIMIT_BYTES);
-    let attached = arguments
-        .elsewhere
-        .attach(path, &cluster, out, limit, console)?;
+    let attached = arguments.elsewhere.attach(path, &cluster, out, limit, console)?;
     Ok((Run::open(attached.0.path())?, Some(attached)))
 }
 
@@ -173,11 +171,7 @@ fn show(
         let past = following.past_percent();
         terminal.draw(|frame| screen.draw_live(frame, &model, progress, past, Instant::now()))?;
         let is_idle = progress.is_at_end() && past.is_none();
-        let wait = if is_idle || screen.is_paused() {
-            LOOK
-        } else {
-            Duration::ZERO
-        };
+        let wait = if is_idle || screen.is_paused() { LOOK } else { Duration::ZERO };
         if !event::poll(wait)? {
             continue;
         }

@@ -90,11 +90,7 @@ pub(crate) struct BesideArguments {
 
 impl BesideArguments {
     pub(crate) fn page(&self) -> Option<Page> {
-        Some(Page {
-            address: self.watch?,
-            arguments: self.page.clone(),
-            stays: false,
-        })
+        Some(Page { address: self.watch?, arguments: self.page.clone(), stays: false })
     }
 }
 
@@ -109,10 +105,7 @@ pub(crate) struct Page {
 impl Page {
     /// The page of a cluster that keeps running after its scenario and then accepts commands.
     pub(crate) fn staying(self) -> Self {
-        Self {
-            stays: true,
-            ..self
-        }
+        Self { stays: true, ..self }
     }
 
     pub(crate) fn stays(&self) -> bool {
@@ -141,11 +134,7 @@ impl Page {
     ) -> Commanding {
         let takes = self.may_command() || self.stays;
         let forbidden = (!takes).then_some("the page was started without --allow-commands");
-        Commanding {
-            commander,
-            forbidden: forbidden.map(str::to_owned),
-            impossible,
-        }
+        Commanding { commander, forbidden: forbidden.map(str::to_owned), impossible }
     }
 
     fn serve(
@@ -163,9 +152,7 @@ impl Page {
                 address: self.address,
                 commanding,
                 logins,
-                certificate: certificate
-                    .zip(key)
-                    .map(|(chain, key)| Certificate { chain, key }),
+                certificate: certificate.zip(key).map(|(chain, key)| Certificate { chain, key }),
                 names: self.arguments.known_as.clone(),
             })
         });
@@ -195,11 +182,7 @@ struct Watched {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
-    let page = Page {
-        address: arguments.address,
-        arguments: arguments.page.clone(),
-        stays: false,
-    };
+    let page = Page { address: arguments.address, arguments: arguments.page.clone(), stays: false };
     if arguments.target.is_dir() {
         watch_run(&arguments.target, &page, console)
     } else {
@@ -250,9 +233,7 @@ fn watch_elsewhere(
 ) -> Result<Answer, Answer> {
     let (target, run) = (&arguments.target, &arguments.run);
     let (directory, attached) =
-        arguments
-            .elsewhere
-            .attach(target, cluster, &run.out, run.journal_limit, console)?;
+        arguments.elsewhere.attach(target, cluster, &run.out, run.journal_limit, console)?;
     let commanding = page.commanding(attached.commander(), understudy_attach::impossible());
     serve_until_asked_to_end(directory.path(), page, commanding, console)
 }
@@ -304,9 +285,7 @@ fn run_and_watch(
     let directory = files::run_directory(&arguments.out)?;
     let file = target.clone();
     let page = Some(page);
-    let (_, run) = judged(
-        cluster, &scenario, file, arguments, &directory, page, console,
-    )?;
+    let (_, run) = judged(cluster, &scenario, file, arguments, &directory, page, console)?;
     let answer = watched(directory.path());
     Ok(match run.failure {
         Some(failure) => answer.and_failure(Status::Failed, failure.code(), &failure),

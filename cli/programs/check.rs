@@ -99,16 +99,8 @@ impl Size {
     }
 
     fn text(self) -> String {
-        let Self {
-            state_bytes,
-            operations,
-            bounded_by_budget,
-        } = self;
-        let budget = if bounded_by_budget {
-            ", the limit for its loops"
-        } else {
-            ""
-        };
+        let Self { state_bytes, operations, bounded_by_budget } = self;
+        let budget = if bounded_by_budget { ", the limit for its loops" } else { "" };
         format!("; state {state_bytes} bytes, at most {operations} operations a scan{budget}")
     }
 }
@@ -152,10 +144,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
             Kind::Model => found.add_model(path),
             Kind::Program => {
                 let name = path.display().to_string();
-                let wanted = Wanted {
-                    period: Some(PERIOD),
-                    program: arguments.program.as_deref(),
-                };
+                let wanted = Wanted { period: Some(PERIOD), program: arguments.program.as_deref() };
                 let file = read_source(&name, &text, wanted);
                 let mut diagnostics = file.diagnostics;
                 match &file.source {
@@ -253,11 +242,7 @@ impl Found<'_> {
     }
 
     fn add_file(&mut self, kind: Kind, path: &Path, text: String, diagnostics: Vec<Diagnostic>) {
-        let report = Report {
-            name: path.display().to_string(),
-            text,
-            diagnostics,
-        };
+        let report = Report { name: path.display().to_string(), text, diagnostics };
         self.add(kind, report);
     }
 
@@ -286,11 +271,7 @@ impl Found<'_> {
 
     /// Reports each ladder once, also if several files name it.
     fn add(&mut self, kind: Kind, report: Report) {
-        if !self
-            .reports
-            .iter()
-            .any(|(_, known)| known.name == report.name)
-        {
+        if !self.reports.iter().any(|(_, known)| known.name == report.name) {
             self.reports.push((kind, report));
         }
     }
@@ -298,9 +279,7 @@ impl Found<'_> {
     fn answer(self) -> Answer {
         let count = |report: &Report, severity| {
             let diagnostics = report.diagnostics.iter();
-            diagnostics
-                .filter(|diagnostic| diagnostic.severity == severity)
-                .count()
+            diagnostics.filter(|diagnostic| diagnostic.severity == severity).count()
         };
         let checked = self.reports.iter().map(|(kind, report)| CheckedFile {
             name: report.name.clone(),
@@ -324,22 +303,14 @@ impl Found<'_> {
         let errors = files.iter().map(|file| file.errors).sum();
         let warnings = files.iter().map(|file| file.warnings).sum();
         let mut text = String::new();
-        let width = files
-            .iter()
-            .map(|file| file.name.chars().count())
-            .max()
-            .unwrap_or(0);
+        let width = files.iter().map(|file| file.name.chars().count()).max().unwrap_or(0);
         for file in &files {
             let verdict = match (file.errors, file.warnings) {
                 (0, 0) => "right".to_owned(),
                 (0, warnings) => format!("right, {}", number(warnings, "warning")),
                 (errors, 0) => number(errors, "error"),
                 (errors, warnings) => {
-                    format!(
-                        "{}, {}",
-                        number(errors, "error"),
-                        number(warnings, "warning")
-                    )
+                    format!("{}, {}", number(errors, "error"), number(warnings, "warning"))
                 }
             };
             let kind = file.kind.unwrap_or("");
@@ -358,16 +329,8 @@ impl Found<'_> {
             more += &file.size.map(Size::text).unwrap_or_default();
             let _ = writeln!(text, "{:width$}  {kind:8}  {verdict}{more}", file.name);
         }
-        let status = if errors == 0 {
-            Status::Done
-        } else {
-            Status::BadInput
-        };
-        let result = Result {
-            files,
-            errors,
-            warnings,
-        };
+        let status = if errors == 0 { Status::Done } else { Status::BadInput };
+        let result = Result { files, errors, warnings };
         let mut answer = Answer::done(text, result)
             .with_status(status)
             .with_reports(self.reports.into_iter().map(|(_, report)| report).collect());

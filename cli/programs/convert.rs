@@ -88,25 +88,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let form = arguments.from.map(Form::format);
     let reading = match form.or_else(|| Format::of(&name, &source)) {
         Some(format) => read(format, &name, &source, arguments.unit.as_deref()),
-        None => Reading {
-            diagnostics: vec![unknown_form(&source)],
-            ..Reading::default()
-        },
+        None => Reading { diagnostics: vec![unknown_form(&source)], ..Reading::default() },
     };
-    let mut report = Report {
-        name,
-        text: source,
-        diagnostics: reading.diagnostics,
-    };
-    let mut kept = if arguments.fidelity {
-        fidelity_text(&reading.fidelity, &report)
-    } else {
-        String::new()
-    };
-    let wanted = Wanted {
-        program: arguments.unit.as_deref(),
-        period: arguments.period,
-    };
+    let mut report = Report { name, text: source, diagnostics: reading.diagnostics };
+    let mut kept =
+        if arguments.fidelity { fidelity_text(&reading.fidelity, &report) } else { String::new() };
+    let wanted = Wanted { program: arguments.unit.as_deref(), period: arguments.period };
     let form = form_of_output(arguments);
     let failed = |error: WriteError| (code(&error), error.to_string());
     let written = match (&reading.program, form) {
@@ -226,13 +213,7 @@ fn fidelity_text(fidelity: &Fidelity, report: &Report) -> String {
 
 /// Findings from reading the written text back.
 fn written_text(written: &Written) -> String {
-    let Compared {
-        signals,
-        blocks,
-        comments,
-        scans,
-        proved,
-    } = written.compared;
+    let Compared { signals, blocks, comments, scans, proved } = written.compared;
     let lost = match written.losses.len() {
         0 => "written completely".to_owned(),
         1 => "not written completely: see the warning".to_owned(),

@@ -134,10 +134,7 @@ pub(crate) fn subject(
 ) -> std::result::Result<(Subject, Report), Answer> {
     let text = files::text(&arguments.program_file)?;
     let name = arguments.program_file.display().to_string();
-    let wanted = |period| Wanted {
-        period: Some(period),
-        program: arguments.program.as_deref(),
-    };
+    let wanted = |period| Wanted { period: Some(period), program: arguments.program.as_deref() };
     let mut read = read_source(&name, &text, wanted(arguments.period.unwrap_or(PERIOD)));
     // A period in the file is known only after it was read.
     let period = arguments.period.or(read.period).unwrap_or(PERIOD);
@@ -147,11 +144,7 @@ pub(crate) fn subject(
     if let Some(Source::Library(_)) = read.source {
         read.diagnostics.push(no_program());
     }
-    let report = Report {
-        name,
-        text,
-        diagnostics: read.diagnostics,
-    };
+    let report = Report { name, text, diagnostics: read.diagnostics };
     let (name, executable, interface, typed) = match read.source {
         Some(Source::Ladder(program)) => {
             let circuit = lowered(&program, period)?;
@@ -165,13 +158,7 @@ pub(crate) fn subject(
         }
         Some(Source::Library(_)) | None => return Err(Answer::bad_files(vec![report])),
     };
-    let subject = Subject {
-        name,
-        executable,
-        interface,
-        period,
-        typed,
-    };
+    let subject = Subject { name, executable, interface, period, typed };
     Ok((subject, report))
 }
 
@@ -222,11 +209,8 @@ fn values(
     let inputs = line.split("->").next().unwrap_or_default();
     let words: Vec<&str> = inputs.split_whitespace().collect();
     if words.len() != points.len() {
-        let message = format!(
-            "a scan has {} inputs, and this line has {}",
-            points.len(),
-            words.len()
-        );
+        let message =
+            format!("a scan has {} inputs, and this line has {}", points.len(), words.len());
         let named: Vec<String> = points
             .iter()
             .take(MAXIMUM_REPORTED)
@@ -249,11 +233,7 @@ fn values(
         };
         read.push(stored);
     }
-    if wrong.is_empty() {
-        Ok(read)
-    } else {
-        Err(wrong)
-    }
+    if wrong.is_empty() { Ok(read) } else { Err(wrong) }
 }
 
 fn expected(of: Elementary) -> String {
@@ -263,16 +243,8 @@ fn expected(of: Elementary) -> String {
         Elementary::Lreal => "write 16 hexadecimal digits, or a number with a point".to_owned(),
         _ if of.is_time() => "write nanoseconds, such as 1500000000 for 1.5 s".to_owned(),
         _ => {
-            let half = if of.is_signed() {
-                of.mask() >> 1
-            } else {
-                of.mask()
-            };
-            let least = if of.is_signed() {
-                -i128::from(half) - 1
-            } else {
-                0
-            };
+            let half = if of.is_signed() { of.mask() >> 1 } else { of.mask() };
+            let least = if of.is_signed() { -i128::from(half) - 1 } else { 0 };
             format!("write a decimal number from {least} to {half}")
         }
     }
@@ -288,12 +260,7 @@ impl Subject {
             faults: digest.faults,
             digest: format!("{:016x}", digest.outputs),
         };
-        let Digested {
-            program,
-            faults,
-            digest,
-            ..
-        } = &result;
+        let Digested { program, faults, digest, .. } = &result;
         let text = format!("{program}: digest {digest} of {scans} scans, {faults} program faults");
         Answer::done(text, result)
     }
@@ -311,14 +278,8 @@ impl Subject {
             for (point, value) in declared(inputs).zip(values) {
                 point.set(&mut read, *value);
             }
-            self.executable
-                .step(&mut scratch, &mut state, &read, &mut driven);
-            let _ = writeln!(
-                text,
-                "{} -> {}",
-                written(inputs, &read),
-                written(outputs, &driven)
-            );
+            self.executable.step(&mut scratch, &mut state, &read, &mut driven);
+            let _ = writeln!(text, "{} -> {}", written(inputs, &read), written(outputs, &driven));
             let found = self
                 .typed
                 .as_ref()
@@ -333,10 +294,8 @@ impl Subject {
             });
         }
         let signals = |points: &Points| {
-            let signals = declared(points).map(|point| Signal {
-                name: point.name.clone(),
-                of: point.of.name(),
-            });
+            let signals = declared(points)
+                .map(|point| Signal { name: point.name.clone(), of: point.of.name() });
             signals.collect()
         };
         let result = Result {
@@ -359,9 +318,8 @@ impl Subject {
 
 /// The values of an image in the notation of the file.
 pub(crate) fn written(points: &Points, image: &[u64]) -> String {
-    let values: Vec<String> = declared(points)
-        .map(|point| point.of.write(point.get(image)))
-        .collect();
+    let values: Vec<String> =
+        declared(points).map(|point| point.of.write(point.get(image))).collect();
     values.join(" ")
 }
 

@@ -95,18 +95,12 @@ enum Smv {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
-    let is_cluster = arguments
-        .file
-        .extension()
-        .is_some_and(|extension| extension == "toml");
+    let is_cluster = arguments.file.extension().is_some_and(|extension| extension == "toml");
     let patience = Patience::new(arguments.budget, console);
     if is_cluster {
         return cluster(arguments, &patience);
     }
-    let wanted = Wanted {
-        period: Some(arguments.period),
-        program: arguments.program.as_deref(),
-    };
+    let wanted = Wanted { period: Some(arguments.period), program: arguments.program.as_deref() };
     let (program, mut report) = match files::program(&arguments.file, wanted)? {
         (Source::Typed(program), report) => {
             return numbers::of_program(arguments, &program, report, &patience);
@@ -125,28 +119,24 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
             return Err(answer);
         }
     };
-    let answer = match arguments.smv {
-        Some(form) => {
-            let text = text_for_nusmv(form, &program, &subject, &asked);
-            files::deliver(arguments.output.as_deref(), &text, json!({ "text": text }))?
-        }
-        None => {
-            let go_on = |work| patience.goes_on(work);
-            let bounds = bounds(arguments, &go_on);
-            patience.turn_to("the order and the effect of the rungs".to_owned());
-            let remarks = subject
-                .remarks(&program, arguments.period, bounds)
-                .map_err(not_lowered)?;
-            let found = remarks.found.iter();
-            report
-                .diagnostics
-                .extend(found.map(|remark| remark.diagnostic.clone()));
-            proved(
-                arguments, &program, &subject, &remarks, &asked, &patience, bounds,
-            )?
-            .and_next(&[&"init", &"cell", &"--from", &arguments.file])
-        }
-    };
+    let answer =
+        match arguments.smv {
+            Some(form) => {
+                let text = text_for_nusmv(form, &program, &subject, &asked);
+                files::deliver(arguments.output.as_deref(), &text, json!({ "text": text }))?
+            }
+            None => {
+                let go_on = |work| patience.goes_on(work);
+                let bounds = bounds(arguments, &go_on);
+                patience.turn_to("the order and the effect of the rungs".to_owned());
+                let remarks =
+                    subject.remarks(&program, arguments.period, bounds).map_err(not_lowered)?;
+                let found = remarks.found.iter();
+                report.diagnostics.extend(found.map(|remark| remark.diagnostic.clone()));
+                proved(arguments, &program, &subject, &remarks, &asked, &patience, bounds)?
+                    .and_next(&[&"init", &"cell", &"--from", &arguments.file])
+            }
+        };
     Ok(answer.with_used(vec![report]))
 }
 
@@ -156,12 +146,7 @@ fn not_lowered(error: impl Display) -> Answer {
 }
 
 fn bounds<'a>(arguments: &Arguments, go_on: GoOn<'a>) -> Bounds<'a> {
-    Bounds {
-        nodes: arguments.nodes,
-        scans: arguments.induction,
-        go_on,
-        ..Bounds::default()
-    }
+    Bounds { nodes: arguments.nodes, scans: arguments.induction, go_on, ..Bounds::default() }
 }
 
 /// The requested properties and fairness conditions over the signals of the program.
@@ -215,26 +200,15 @@ fn asked(arguments: &Arguments, resolve: Resolve<'_>) -> Result<Asked, Answer> {
         }
         if has_errors(&diagnostics) {
             diagnostics.sort_by_key(|found| found.span.start);
-            wrong.push(Report {
-                name,
-                text,
-                diagnostics,
-            });
+            wrong.push(Report { name, text, diagnostics });
         }
     }
-    if wrong.is_empty() {
-        Ok(asked)
-    } else {
-        Err(Answer::bad_files(wrong))
-    }
+    if wrong.is_empty() { Ok(asked) } else { Err(Answer::bad_files(wrong)) }
 }
 
 fn text_for_nusmv(form: Smv, program: &Program, subject: &Subject, asked: &Asked) -> String {
-    let formulas: Vec<Resolved> = asked
-        .properties
-        .iter()
-        .map(|(_, formula)| formula.clone())
-        .collect();
+    let formulas: Vec<Resolved> =
+        asked.properties.iter().map(|(_, formula)| formula.clone()).collect();
     match form {
         Smv::Scan => smv::of_circuit(subject.circuit(), &formulas, &asked.fair),
         Smv::Rungs => smv::of_rungs(program),
@@ -252,11 +226,8 @@ fn proved(
 ) -> Result<Answer, Answer> {
     patience.turn_to("the states of every output".to_owned());
     let mut program = ProgramAnswer::of(subject, bounds, remarks);
-    let formulas: Vec<Resolved> = asked
-        .properties
-        .iter()
-        .map(|(_, formula)| formula.clone())
-        .collect();
+    let formulas: Vec<Resolved> =
+        asked.properties.iter().map(|(_, formula)| formula.clone()).collect();
     let mut answered = 0;
     let about = |answered| format!("{answered} of {} properties answered", formulas.len());
     patience.turn_to(about(0));
@@ -265,9 +236,7 @@ fn proved(
         patience.turn_to(about(answered));
     });
     for ((property, formula), proof) in asked.properties.iter().zip(answers) {
-        program
-            .properties
-            .push(Finding::new(subject.circuit(), property, formula, proof));
+        program.properties.push(Finding::new(subject.circuit(), property, formula, proof));
     }
     let page = arguments.draw.as_deref();
     let page = page.map(|path| draw(path, arguments.period, ladder, subject, &program));
@@ -312,9 +281,7 @@ fn cluster(arguments: &Arguments, patience: &Patience<'_>) -> Result<Answer, Ans
         match (controller.ladder(), controller.code.typed()) {
             (Some(ladder), _) => {
                 let subject = Subject::new(ladder, period).map_err(not_lowered)?;
-                let remarks = subject
-                    .remarks(ladder, period, bounds)
-                    .map_err(not_lowered)?;
+                let remarks = subject.remarks(ladder, period, bounds).map_err(not_lowered)?;
                 programs.push(ProgramAnswer::of(&subject, bounds, &remarks));
             }
             (None, Some(program)) => programs.push(numbers::standard(program, bounds)?),
@@ -331,9 +298,8 @@ fn cluster(arguments: &Arguments, patience: &Patience<'_>) -> Result<Answer, Ans
 /// Result of the proof of the understudy.
 fn parity_proof(cluster: &Cluster, understudy: &ParityController) -> Result<String, String> {
     let controllers = cluster.controllers().iter();
-    let members: Vec<Circuit> = controllers
-        .filter_map(|controller| controller.circuit().cloned())
-        .collect();
+    let members: Vec<Circuit> =
+        controllers.filter_map(|controller| controller.circuit().cloned()).collect();
     match prove_parity(&members, understudy.circuit()) {
         Ok(proof) => Ok(format!(
             "the understudy equals the sum of its members: {} registers and {} outputs compared",

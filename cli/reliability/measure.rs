@@ -127,15 +127,9 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     };
     let found =
         hold_against_model(&cluster, &planned, measured).map_err(|errors| refused(&errors))?;
-    let status = if found.is_met() {
-        Status::Done
-    } else {
-        Status::Failed
-    };
-    let mut answer = Answer::done(found.to_text(), &found)
-        .with_used(reports)
-        .with_status(status)
-        .and_next(&[
+    let status = if found.is_met() { Status::Done } else { Status::Failed };
+    let mut answer =
+        Answer::done(found.to_text(), &found).with_used(reports).with_status(status).and_next(&[
             &"reliability",
             &arguments.cluster,
             &"--mtbf",
@@ -150,12 +144,8 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         }
     }
     if let Some(folder) = &arguments.report {
-        let written = write_report(
-            folder,
-            &planned.options,
-            Some(&cluster),
-            Some(found.assessment),
-        );
+        let written =
+            write_report(folder, &planned.options, Some(&cluster), Some(found.assessment));
         match written {
             Ok(said) => answer.text.push_str(&said),
             Err(failed) => {
@@ -173,9 +163,7 @@ fn in_the_simulator(
     planned: &Planned,
     console: &mut Console,
 ) -> Result<Measured, Answer> {
-    planned
-        .check_length()
-        .map_err(|error| not_begun(&[error]))?;
+    planned.check_length().map_err(|error| not_begun(&[error]))?;
     let of = planned.plan.failures;
     let measured = run_campaign(cluster, &planned.plan, &mut |done| {
         console.show(&Progress::Failure { done, of });
@@ -220,8 +208,7 @@ fn on_processes(
 }
 
 fn not_begun(errors: &[QuestionError]) -> Answer {
-    errors.iter().fold(
-        Answer::done("", ()).with_status(Status::BadInput),
-        |answer, error| answer.and_failure(Status::BadInput, error.code(), error),
-    )
+    errors.iter().fold(Answer::done("", ()).with_status(Status::BadInput), |answer, error| {
+        answer.and_failure(Status::BadInput, error.code(), error)
+    })
 }

@@ -25,12 +25,7 @@ pub(crate) struct Arguments {
     #[arg(value_name = "RUN")]
     run: PathBuf,
     /// Prediction period
-    #[arg(
-        long,
-        value_name = "TIME",
-        default_value = "24h",
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "TIME", default_value = "24h", allow_hyphen_values = true)]
     ahead: String,
     /// MTTR, for a journal without repairs
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
@@ -47,11 +42,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     };
     let bad = |code: &str, message: String| Answer::failed(Status::BadInput, code, message);
     let folder = arguments.run.is_dir();
-    let journal = if folder {
-        arguments.run.join("journal.jsonl")
-    } else {
-        arguments.run.clone()
-    };
+    let journal = if folder { arguments.run.join("journal.jsonl") } else { arguments.run.clone() };
     let told = File::open(&journal).and_then(|_| records_of(&journal));
     let told = told.map_err(|error| {
         let replica = arguments.run.join("replica-1");
@@ -65,16 +56,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     })?;
     let view = observe_journal(told).map_err(|error| {
         let said = error.to_string();
-        let said = said
-            .trim_start_matches(error.code())
-            .trim_start_matches(": ");
+        let said = said.trim_start_matches(error.code()).trim_start_matches(": ");
         bad(error.code(), format!("{}: {said}", journal.display()))
     })?;
-    let mode = if folder {
-        mode_of(&arguments.run)
-    } else {
-        Mode::Full
-    };
+    let mode = if folder { mode_of(&arguments.run) } else { Mode::Full };
     let found = look_ahead(view, mode, ahead, mttr).map_err(|errors| refused(&errors))?;
     Ok(Answer::done(found.to_text(), &found))
 }

@@ -67,12 +67,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "R")]
     crews: Option<u32>,
     /// Coverage c: probability that a failure is masked
-    #[arg(
-        long,
-        value_name = "C",
-        default_value_t = 1.0,
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "C", default_value_t = 1.0, allow_hyphen_values = true)]
     coverage: f64,
     /// Number of equal groups without a shared understudy
     #[arg(long, value_name = "G", default_value_t = 1)]
@@ -81,12 +76,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     detection: Option<String>,
     /// Common-cause factor beta: share of failures that affect all stations
-    #[arg(
-        long,
-        value_name = "BETA",
-        default_value_t = 0.0,
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "BETA", default_value_t = 0.0, allow_hyphen_values = true)]
     beta: f64,
     /// Convention for beta
     #[arg(long, value_enum, default_value = "additive")]
@@ -177,9 +167,8 @@ fn of_cluster(arguments: &Arguments) -> Result<Answer, Answer> {
     wrong.extend(options.system().err().unwrap_or_default());
     times.finish(wrong)?;
     let found = calculate(&options).map_err(|errors| refused(&errors))?;
-    let (cluster, reports) = cluster.map_or((None, Vec::new()), |(cluster, reports)| {
-        (Some(cluster), reports)
-    });
+    let (cluster, reports) =
+        cluster.map_or((None, Vec::new()), |(cluster, reports)| (Some(cluster), reports));
     let mut text = found.to_text();
     if let Some(folder) = &arguments.report {
         text.push_str(&write_report(folder, &options, cluster.as_ref(), None)?);
@@ -207,10 +196,11 @@ fn calculated(text: String, found: &Calculated, reports: Vec<Report>) -> Answer 
 
 /// Answer with all errors of a question.
 pub(crate) fn refused(errors: &[ReliabilityError]) -> Answer {
-    errors.iter().fold(
-        Answer::done("", json!(null)).with_status(Status::BadInput),
-        |answer, error| answer.and_failure(Status::BadInput, error.code(), error),
-    )
+    errors
+        .iter()
+        .fold(Answer::done("", json!(null)).with_status(Status::BadInput), |answer, error| {
+            answer.and_failure(Status::BadInput, error.code(), error)
+        })
 }
 
 /// Collects the errors of several times.
@@ -262,12 +252,9 @@ impl Times {
             return Ok(());
         }
         let answer = Answer::done("", json!(null)).with_status(Status::BadInput);
-        let answer = self
-            .wrong
-            .into_iter()
-            .fold(answer, |answer, (code, message)| {
-                answer.and_failure(Status::BadInput, code, message)
-            });
+        let answer = self.wrong.into_iter().fold(answer, |answer, (code, message)| {
+            answer.and_failure(Status::BadInput, code, message)
+        });
         Err(others.iter().fold(answer, |answer, error| {
             answer.and_failure(Status::BadInput, error.code(), error)
         }))

@@ -138,26 +138,26 @@ fn campaign(arguments: &Arguments, path: &Path, console: &mut Console) -> Result
     };
     let processors = std::thread::available_parallelism().map_or(1, usize::from);
     let threads = arguments.jobs.map_or(processors, usize::from);
-    let bar = console.bar(
-        plan.shard.share(plan.runs),
-        "run {pos} of {len}, {eta} left",
-    );
+    let bar = console.bar(plan.shard.share(plan.runs), "run {pos} of {len}, {eta} left");
     let interrupted = interruption()?;
     let start = Instant::now();
     let in_time = || {
         bar.inc(1);
-        let in_budget = arguments
-            .budget
-            .is_none_or(|budget| start.elapsed() < budget);
+        let in_budget = arguments.budget.is_none_or(|budget| start.elapsed() < budget);
         in_budget && !interrupted.load(Ordering::Relaxed)
     };
     let findings = inject(&cluster, &plan, threads, &in_time)
         .map_err(|error| Answer::failed(Status::Failed, "U0530", error))?;
     let took = start.elapsed();
     bar.finish_and_clear();
-    let mut answer = kept(&findings, arguments.out.as_deref())?
-        .with_used(reports)
-        .and_next(&[&"model-check", &path, &"--faults", &"1", &"--cycles", &"2"]);
+    let mut answer = kept(&findings, arguments.out.as_deref())?.with_used(reports).and_next(&[
+        &"model-check",
+        &path,
+        &"--faults",
+        &"1",
+        &"--cycles",
+        &"2",
+    ]);
     if interrupted.load(Ordering::Relaxed) {
         answer.text.push_str(&format!(
             "interrupted: partial findings of {} of {} runs\n",
@@ -201,11 +201,9 @@ fn merged(shards: &[PathBuf], out: Option<&Path>) -> Result<Answer, Answer> {
             })
         })?
     } else {
-        return Err(failures
-            .into_iter()
-            .fold(Answer::done("", ()), |answer, failure| {
-                answer.and_failure(Status::BadInput, &failure.code, failure.message)
-            }));
+        return Err(failures.into_iter().fold(Answer::done("", ()), |answer, failure| {
+            answer.and_failure(Status::BadInput, &failure.code, failure.message)
+        }));
     };
     kept(&findings, out)
 }
@@ -229,16 +227,8 @@ fn kept(findings: &Findings, out: Option<&Path>) -> Result<Answer, Answer> {
     } else if let Some(failure) = findings.failures.first() {
         text.push_str(&format!("\nFirst failure:\n\n{}", failure.scenario));
     }
-    let status = if findings.is_good() {
-        Status::Done
-    } else {
-        Status::Failed
-    };
-    let found = Found {
-        directory: out.map(|out| out.display().to_string()),
-        scenarios,
-        findings,
-    };
+    let status = if findings.is_good() { Status::Done } else { Status::Failed };
+    let found = Found { directory: out.map(|out| out.display().to_string()), scenarios, findings };
     Ok(Answer::done(text, found).with_status(status))
 }
 

@@ -31,11 +31,7 @@ impl ClusterRun {
         files::write_template(&folder, press_cell())?;
         let file = folder.join("cluster.toml");
         let (cluster, _) = files::cluster(&file, arguments.overrides.overrides())?;
-        Ok(Self {
-            cluster,
-            directory,
-            file,
-        })
+        Ok(Self { cluster, directory, file })
     }
 
     /// The cluster of a file.
@@ -45,11 +41,7 @@ impl ClusterRun {
     pub fn of_file(file: PathBuf, arguments: &RunArguments) -> Result<Self, Answer> {
         let (cluster, _) = files::cluster(&file, arguments.overrides.overrides())?;
         let directory = files::run_directory(&arguments.out)?;
-        Ok(Self {
-            cluster,
-            directory,
-            file,
-        })
+        Ok(Self { cluster, directory, file })
     }
 
     /// Directory of the run.
@@ -68,15 +60,7 @@ impl ClusterRun {
         console: &mut Console,
     ) -> Result<(Summary, Judged), Answer> {
         let file = self.file.clone();
-        judged(
-            &self.cluster,
-            scenario,
-            file,
-            arguments,
-            &self.directory,
-            None,
-            console,
-        )
+        judged(&self.cluster, scenario, file, arguments, &self.directory, None, console)
     }
 
     /// Runs a scenario in the laboratory, writes the results and returns the answer.
@@ -89,14 +73,6 @@ impl ClusterRun {
     ) -> Result<Answer, Answer> {
         let scenario = scenario.clone().shortened(arguments.cycles);
         let file = self.file.clone();
-        in_laboratory(
-            &self.cluster,
-            &scenario,
-            file,
-            arguments,
-            &self.directory,
-            page,
-            console,
-        )
+        in_laboratory(&self.cluster, &scenario, file, arguments, &self.directory, page, console)
     }
 }

@@ -82,11 +82,6 @@ fn demonstrate(
 /// Divisor of the cycles that limits the experiment to [`LONGEST`] at long periods.
 fn divisor(cluster: &Cluster) -> NonZeroU64 {
     let period = cluster.agreement().schedule.period();
-    let divisor = (period * TABLE_TWO_CYCLES)
-        .as_nanos()
-        .div_ceil(LONGEST.as_nanos());
-    u64::try_from(divisor)
-        .ok()
-        .and_then(NonZeroU64::new)
-        .unwrap_or(NonZeroU64::MIN)
+    let divisor = (period * TABLE_TWO_CYCLES).as_nanos().div_ceil(LONGEST.as_nanos());
+    u64::try_from(divisor).ok().and_then(NonZeroU64::new).unwrap_or(NonZeroU64::MIN)
 }

@@ -39,12 +39,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let (subject, report) = subject(&arguments.subject)?;
-    let Subject {
-        executable,
-        interface,
-        typed,
-        ..
-    } = subject;
+    let Subject { executable, interface, typed, .. } = subject;
     let equipment = Equipment::new(executable, interface.clone()).map_err(failed)?;
     if arguments.registers {
         return Ok(registers(&equipment).with_used(vec![report]));

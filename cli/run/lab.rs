@@ -93,18 +93,12 @@ enum HostArgument {
 impl NetworkArguments {
     /// The same arguments with a loss of `share`, unless a loss was given.
     pub fn losing(&self, share: Share) -> Self {
-        Self {
-            impairment: self.impairment.losing(share),
-            ..self.clone()
-        }
+        Self { impairment: self.impairment.losing(share), ..self.clone() }
     }
 
     /// The same arguments with another seed.
     pub fn seeded(&self, seed: u64) -> Self {
-        Self {
-            network_seed: seed,
-            ..self.clone()
-        }
+        Self { network_seed: seed, ..self.clone() }
     }
 
     pub(crate) fn settings(&self) -> NetworkSettings {
@@ -187,15 +181,8 @@ pub(crate) fn in_laboratory(
     page: Option<&Page>,
     console: &mut Console,
 ) -> Result<Answer, Answer> {
-    let (summary, run) = judged(
-        cluster,
-        scenario,
-        cluster_file,
-        arguments,
-        directory,
-        page,
-        console,
-    )?;
+    let (summary, run) =
+        judged(cluster, scenario, cluster_file, arguments, directory, page, console)?;
     let answered = answer(&summary, Some(directory.path()));
     let path = directory.path();
     let mut answer = match first_reconstructed(cluster, &summary) {
@@ -251,11 +238,7 @@ pub(crate) fn judged(
     let network = arguments.network.settings();
     let settings = LaboratorySettings {
         journal_limit_bytes: arguments.journal_limit,
-        deaths: if arguments.restart {
-            Deaths::Restarted
-        } else {
-            Deaths::Survived
-        },
+        deaths: if arguments.restart { Deaths::Restarted } else { Deaths::Survived },
         ..laboratory_settings(cluster, cluster_file, &arguments.overrides, network)?
     };
     let served = page.map(|page| page.beside(directory.path(), console));
@@ -277,20 +260,16 @@ pub(crate) fn judged(
         let (summary, _) = summarised(account, Vec::new(), JournalState::default());
         let verdict = summary.verdict();
         if let Some(served) = &served {
-            console
-                .borrow_mut()
-                .note(&invitation(&verdict, &served.url()));
+            console.borrow_mut().note(&invitation(&verdict, &served.url()));
         }
         verdict
     };
-    let afterwards = page.filter(|page| page.stays()).map(|page| Afterwards {
-        judge: Box::new(judge),
-        refuse_until_then: !page.may_command(),
-    });
+    let afterwards = page
+        .filter(|page| page.stays())
+        .map(|page| Afterwards { judge: Box::new(judge), refuse_until_then: !page.may_command() });
     let mut watch = |progress| console.borrow_mut().show(&progress);
-    let run = run_commanded(
-        cluster, scenario, settings, directory, commands, afterwards, &mut watch,
-    );
+    let run =
+        run_commanded(cluster, scenario, settings, directory, commands, afterwards, &mut watch);
     let run = run.map_err(|error| {
         directory.take_back();
         Answer::failed(Status::Failed, error.code(), &error)
@@ -300,9 +279,7 @@ pub(crate) fn judged(
         summary.passed = false;
         summary.inconclusive = None;
     }
-    let judged = Judged {
-        written: write_results(directory, &summary, &account),
-        failure: run.failure,
-    };
+    let judged =
+        Judged { written: write_results(directory, &summary, &account), failure: run.failure };
     Ok((summary, judged))
 }

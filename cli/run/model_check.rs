@@ -104,11 +104,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
             let broken = verdict.counterexamples.iter();
             let broken = broken.filter(|example| example.property == property.name);
             let scenario = broken.map(|example| scenario(&cluster, example)).next();
-            Property {
-                name: property.name,
-                holds: scenario.is_none(),
-                scenario,
-            }
+            Property { name: property.name, holds: scenario.is_none(), scenario }
         })
         .collect();
     let broken = properties.iter().find_map(|it| it.scenario.as_deref());
@@ -116,11 +112,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         files::write(path, text)?;
     }
     let holds = broken.is_none();
-    let found = Found {
-        states: verdict.states,
-        depth: verdict.depth,
-        properties,
-    };
+    let found = Found { states: verdict.states, depth: verdict.depth, properties };
     let mut answer = Answer::done(text(&found), found)
         .with_used(reports)
         .and_next(&[&"lab", &arguments.cluster]);
@@ -158,17 +150,10 @@ fn start(arguments: &Arguments, cluster: &Cluster) -> Result<Start, Answer> {
         }
     }
     if unknown.is_empty() {
-        return Ok(Start {
-            restarted,
-            behind,
-            broken,
-        });
+        return Ok(Start { restarted, behind, broken });
     }
-    let known: Vec<&str> = cluster
-        .members()
-        .filter(plays)
-        .filter_map(|member| cluster.member_name(member))
-        .collect();
+    let known: Vec<&str> =
+        cluster.members().filter(plays).filter_map(|member| cluster.member_name(member)).collect();
     let mut answer = Answer::bad_files(Vec::new());
     for name in unknown {
         let known = understudy_text::spelling::suggestion(&name, known.iter().copied());
@@ -214,19 +199,12 @@ fn scenario(cluster: &Cluster, example: &Counterexample) -> String {
 }
 
 fn text(found: &Found) -> String {
-    let mut text = format!(
-        "{} states, runs of up to {} steps\n",
-        found.states, found.depth
-    );
+    let mut text = format!("{} states, runs of up to {} steps\n", found.states, found.depth);
     for property in &found.properties {
         let verdict = if property.holds { "holds" } else { "BROKEN" };
         text.push_str(&format!("{verdict:<7} {}\n", property.name));
     }
-    for scenario in found
-        .properties
-        .iter()
-        .filter_map(|it| it.scenario.as_ref())
-    {
+    for scenario in found.properties.iter().filter_map(|it| it.scenario.as_ref()) {
         text.push_str(&format!("\n{scenario}"));
     }
     text

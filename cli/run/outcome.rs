@@ -44,18 +44,10 @@ pub(crate) fn circumstances(
 
 /// Description of this machine.
 pub(crate) fn machine() -> Vec<String> {
-    let read = |path| {
-        std::fs::read_to_string(path)
-            .unwrap_or_default()
-            .trim()
-            .to_owned()
-    };
+    let read = |path| std::fs::read_to_string(path).unwrap_or_default().trim().to_owned();
     let kernel = read("/proc/sys/kernel/osrelease");
     let processors = std::thread::available_parallelism().map_or(1, usize::from);
-    vec![format!(
-        "{} {kernel}, {processors} processors",
-        std::env::consts::OS
-    )]
+    vec![format!("{} {kernel}, {processors} processors", std::env::consts::OS)]
 }
 
 /// Command line that repeats this command.
@@ -82,10 +74,7 @@ pub(crate) fn answer(summary: &Summary, directory: Option<&Path>) -> Answer {
         (false, Some(_)) => Status::Inconclusive,
         (false, None) => Status::Failed,
     };
-    let result = Result {
-        directory: directory.map(|path| path.display().to_string()),
-        summary,
-    };
+    let result = Result { directory: directory.map(|path| path.display().to_string()), summary };
     Answer::done(text(summary, directory), result).with_status(status)
 }
 
@@ -95,16 +84,8 @@ fn text(summary: &Summary, directory: Option<&Path>) -> String {
     if summary.cycles_run > 0 {
         push_cycles(&mut text, summary);
     }
-    for expectation in summary
-        .expectations
-        .iter()
-        .filter(|expectation| !expectation.met)
-    {
-        let _ = writeln!(
-            text,
-            "NOT MET: {}; found {}",
-            expectation.expected, expectation.found
-        );
+    for expectation in summary.expectations.iter().filter(|expectation| !expectation.met) {
+        let _ = writeln!(text, "NOT MET: {}; found {}", expectation.expected, expectation.found);
     }
     for alarm in &summary.alarms {
         let _ = writeln!(text, "alarm {alarm}");
@@ -159,11 +140,7 @@ fn push_cycles(text: &mut String, summary: &Summary) {
     let names = names.chain(summary.plants.iter().map(|plant| &plant.name));
     let width = names.map(|name| name.chars().count()).max().unwrap_or(0);
     for plant in &summary.plants {
-        let verdict = if plant.functional {
-            "functional throughout"
-        } else {
-            "NOT FUNCTIONAL"
-        };
+        let verdict = if plant.functional { "functional throughout" } else { "NOT FUNCTIONAL" };
         let plant_faults = match plant.plant_faults {
             0 => String::new(),
             plant_faults => format!(", {plant_faults} plant faults"),
@@ -185,12 +162,8 @@ fn push_cycles(text: &mut String, summary: &Summary) {
             (counts.fail_safe_by_stall, "fail-safe in host stalls"),
             (counts.missed, "missed"),
         ];
-        let shown = numbers
-            .iter()
-            .filter(|(number, word)| *number > 0 || *word == "held");
-        let shown: Vec<String> = shown
-            .map(|(number, word)| format!("{number} {word}"))
-            .collect();
+        let shown = numbers.iter().filter(|(number, word)| *number > 0 || *word == "held");
+        let shown: Vec<String> = shown.map(|(number, word)| format!("{number} {word}")).collect();
         let _ = writeln!(
             text,
             "{:width$}  {}, {} wrong",

@@ -80,9 +80,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let repeat = repeat(arguments, seed);
     let circumstances = circumstances(&cluster, World::Simulator, Some(seed), machine(), repeat);
     let (summary, account) = Summary::new(account, &scenario, circumstances, journal);
-    let written = directory.as_ref().map_or(Ok(()), |directory| {
-        write_results(directory, &summary, &account)
-    });
+    let written =
+        directory.as_ref().map_or(Ok(()), |directory| write_results(directory, &summary, &account));
     let mut answer =
         answer(&summary, directory.as_ref().map(RunDirectory::path)).with_used(reports);
     answer.text = format!("seed {seed}\n{}", answer.text);

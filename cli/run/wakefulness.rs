@@ -28,10 +28,7 @@ pub(crate) fn with_period(arguments: &RunArguments, console: &mut Console) -> Ru
         period.as_millis(),
         rights(measured)
     ));
-    RunArguments {
-        overrides: arguments.overrides.with_period(period),
-        ..arguments.clone()
-    }
+    RunArguments { overrides: arguments.overrides.with_period(period), ..arguments.clone() }
 }
 
 /// The arguments with twice the period, after a run for which this host was too slow.
@@ -43,10 +40,7 @@ pub(crate) fn with_longer_period(arguments: &RunArguments, console: &mut Console
         period.as_millis(),
         longer.as_millis()
     ));
-    RunArguments {
-        overrides: arguments.overrides.with_period(longer),
-        ..arguments.clone()
-    }
+    RunArguments { overrides: arguments.overrides.with_period(longer), ..arguments.clone() }
 }
 
 /// Warns if this host cannot keep the period of a cluster.

@@ -24,10 +24,7 @@ pub(crate) fn one_each(paths: &[&PathBuf]) -> Result<Sources<Vec<Automaton>>, An
     gather(paths, |path| {
         let Sources { mut read, reports } = all_of(path)?;
         if let (Some(only), true) = (read.pop(), read.is_empty()) {
-            return Ok(Sources {
-                read: vec![only],
-                reports,
-            });
+            return Ok(Sources { read: vec![only], reports });
         }
         let message = format!(
             "{} has several automata; operations require files of one automaton each (`understudy synth` reads models)",
@@ -46,10 +43,7 @@ fn gather(
     paths: &[&PathBuf],
     read_one: impl Fn(&Path) -> Result<Sources<Vec<Automaton>>, Answer>,
 ) -> Result<Sources<Vec<Automaton>>, Answer> {
-    let mut sources = Sources {
-        read: Vec::new(),
-        reports: Vec::new(),
-    };
+    let mut sources = Sources { read: Vec::new(), reports: Vec::new() };
     let mut failures = Vec::new();
     let mut right = true;
     for path in paths {
@@ -78,41 +72,23 @@ fn all_of(path: &Path) -> Result<Sources<Vec<Automaton>>, Answer> {
     if is_model(path) {
         let Sources { read, reports } = model(path)?;
         let roles = [read.plants, read.specifications, read.supervisors];
-        return Ok(Sources {
-            read: roles.into_iter().flatten().collect(),
-            reports,
-        });
+        return Ok(Sources { read: roles.into_iter().flatten().collect(), reports });
     }
     let text = files::text_of(Kind::Ads, path)?;
     let read = read_ads(&text);
-    let report = Report {
-        name: path.display().to_string(),
-        text,
-        diagnostics: read.diagnostics,
-    };
+    let report = Report { name: path.display().to_string(), text, diagnostics: read.diagnostics };
     match read.automaton {
         Some(automaton) if automaton.name().is_empty() => {
-            let stem = path
-                .file_stem()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned();
-            Ok(Sources {
-                read: vec![automaton.with_name(stem)],
-                reports: vec![report],
-            })
+            let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            Ok(Sources { read: vec![automaton.with_name(stem)], reports: vec![report] })
         }
-        Some(automaton) => Ok(Sources {
-            read: vec![automaton],
-            reports: vec![report],
-        }),
+        Some(automaton) => Ok(Sources { read: vec![automaton], reports: vec![report] }),
         None => Err(Answer::bad_files(vec![report])),
     }
 }
 
 pub(crate) fn is_model(path: &Path) -> bool {
-    path.extension()
-        .is_some_and(|extension| extension == "toml")
+    path.extension().is_some_and(|extension| extension == "toml")
 }
 
 /// Reads a model and the files that it names, relative to its folder.
@@ -121,15 +97,13 @@ pub(crate) fn model(path: &Path) -> Result<Sources<Model>, Answer> {
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
     let read = read_model(&text, |file| named_file(&folder, file));
     let name = path.display().to_string();
-    let mut reports = vec![Report {
-        name,
-        text,
-        diagnostics: read.diagnostics,
-    }];
-    reports.extend(read.files.into_iter().map(|report| Report {
-        name: folder.join(&report.name).display().to_string(),
-        ..report
-    }));
+    let mut reports = vec![Report { name, text, diagnostics: read.diagnostics }];
+    reports.extend(
+        read.files.into_iter().map(|report| Report {
+            name: folder.join(&report.name).display().to_string(),
+            ..report
+        }),
+    );
     match read.model {
         Some(read) => Ok(Sources { read, reports }),
         None => Err(Answer::bad_files(reports)),
@@ -138,11 +112,7 @@ pub(crate) fn model(path: &Path) -> Result<Sources<Model>, Answer> {
 
 /// Writes an automaton in the format of the file extension.
 pub(crate) fn write(path: &Path, automaton: &Automaton) -> Result<(), Answer> {
-    let ending = path
-        .extension()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .to_lowercase();
+    let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     let text = match ending.as_str() {
         "ads" => write_ads(automaton, &[])?,
         "toml" => write_model(&Model {
@@ -178,10 +148,8 @@ pub(crate) fn summary(automaton: &Automaton) -> String {
     );
     let blocked = automaton.blocked_events();
     if !blocked.is_empty() {
-        let names: Vec<String> = blocked
-            .iter()
-            .map(|&label| automaton.alphabet().name(label))
-            .collect();
+        let names: Vec<String> =
+            blocked.iter().map(|&label| automaton.alphabet().name(label)).collect();
         text.push_str(&format!(
             "; events without a transition: {} (not stored in .ADS files)",
             names.join(" ")

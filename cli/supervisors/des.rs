@@ -122,18 +122,13 @@ enum Operation {
 
 fn pair(text: &str) -> Result<(State, State), String> {
     let numbers = text.split_once(':').and_then(|(left, right)| {
-        Some((
-            State::new(left.parse().ok()?),
-            State::new(right.parse().ok()?),
-        ))
+        Some((State::new(left.parse().ok()?), State::new(right.parse().ok()?)))
     });
     numbers.ok_or_else(|| "expected a pair of states such as 1:2".to_owned())
 }
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
-    let bounds = Bounds {
-        memory_bytes: arguments.memory.saturating_mul(1_000_000),
-    };
+    let bounds = Bounds { memory_bytes: arguments.memory.saturating_mul(1_000_000) };
     let files = arguments.operation.files();
     let sources = match arguments.operation {
         Operation::Check { .. } => automata::all(&files),
@@ -193,15 +188,10 @@ impl Operation {
             | Self::Project { file, .. }
             | Self::Convert { file }
             | Self::Avalanche { file } => vec![file],
-            Self::Supcon {
-                plant,
-                specification,
-                ..
-            } => vec![plant, specification],
-            Self::Condat { plant, supervisor }
-            | Self::Supreduce {
-                plant, supervisor, ..
-            } => vec![plant, supervisor],
+            Self::Supcon { plant, specification, .. } => vec![plant, specification],
+            Self::Condat { plant, supervisor } | Self::Supreduce { plant, supervisor, .. } => {
+                vec![plant, supervisor]
+            }
             Self::Isomorph { left, right } | Self::Mutex { left, right, .. } => vec![left, right],
         }
     }
@@ -254,10 +244,7 @@ impl Operation {
                     format!("{}: no event causes the avalanche effect", parts[0].name())
                 } else {
                     let names = word(parts[0], &events.to_vec());
-                    format!(
-                        "{}: the avalanche effect is caused by {names}",
-                        parts[0].name()
-                    )
+                    format!("{}: the avalanche effect is caused by {names}", parts[0].name())
                 };
                 Outcome::Answer(Answer::done(text, json!({ "events": numbers })))
             }
@@ -267,24 +254,16 @@ impl Operation {
 
 /// First pair with an unknown state.
 fn no_such_state(parts: &[&Automaton], pairs: &[(State, State)]) -> Option<AutomatonError> {
-    let sides = pairs
-        .iter()
-        .flat_map(|&(left, right)| [(left, parts[0]), (right, parts[1])]);
+    let sides = pairs.iter().flat_map(|&(left, right)| [(left, parts[0]), (right, parts[1])]);
     let mut wrong =
         sides.filter(|(state, part)| !part.is_empty() && state.index() >= part.state_count());
     wrong
         .next()
-        .map(|(state, part)| AutomatonError::NoSuchState {
-            state,
-            states: part.state_count(),
-        })
+        .map(|(state, part)| AutomatonError::NoSuchState { state, states: part.state_count() })
 }
 
 fn word(automaton: &Automaton, labels: &[Label]) -> String {
-    let names: Vec<String> = labels
-        .iter()
-        .map(|&label| automaton.alphabet().name(label))
-        .collect();
+    let names: Vec<String> = labels.iter().map(|&label| automaton.alphabet().name(label)).collect();
     names.join(" ")
 }
 
@@ -324,11 +303,8 @@ fn supervisor(
     lifted: bool,
     bounds: Bounds,
 ) -> Result<Outcome, TooLarge> {
-    let specification = if lifted {
-        lift(specification, plant.alphabet())
-    } else {
-        specification.clone()
-    };
+    let specification =
+        if lifted { lift(specification, plant.alphabet()) } else { specification.clone() };
     let result = supcon(plant, &specification, bounds)?;
     let model = Model {
         alphabet: plant.alphabet().union([specification.alphabet()]),
@@ -337,9 +313,7 @@ fn supervisor(
         ..Model::default()
     };
     let findings = synthesis_findings(&model, &result);
-    let lines = findings
-        .iter()
-        .map(|finding| format!("{}: {}\n", finding.code, finding.message));
+    let lines = findings.iter().map(|finding| format!("{}: {}\n", finding.code, finding.message));
     let answer = Answer::done(
         lines.collect::<String>(),
         json!({
@@ -363,11 +337,7 @@ fn control_data(
     let data = condat(plant, supervisor, bounds)?;
     let rows = data.table.iter();
     let lines = rows.map(|(&state, events)| {
-        format!(
-            "{}: {}\n",
-            supervisor.state_name(state),
-            word(plant, events)
-        )
+        format!("{}: {}\n", supervisor.state_name(state), word(plant, events))
     });
     let text = format!(
         "{}{} states disable events, {} pairs",
@@ -375,21 +345,14 @@ fn control_data(
         data.states_with_disablement(),
         data.pairs()
     );
-    let table = data
-        .table
-        .iter()
-        .map(|(state, events)| (state.to_string(), json!(numbers(events))));
+    let table =
+        data.table.iter().map(|(state, events)| (state.to_string(), json!(numbers(events))));
     let result = json!({
         "states_with_disablement": data.states_with_disablement(),
         "pairs": data.pairs(),
         "table": table.collect::<serde_json::Map<_, _>>(),
     });
-    Ok(refusing(
-        Answer::done(text, result),
-        plant,
-        supervisor,
-        &data,
-    ))
+    Ok(refusing(Answer::done(text, result), plant, supervisor, &data))
 }
 
 /// Adds the states in which a supervisor disables uncontrollable events.
@@ -452,11 +415,7 @@ fn compare(left: &Automaton, right: &Automaton) -> Answer {
         ),
         Difference::Marked { word } => format!("after {} only one of them is marked", said(word)),
         Difference::Merged { word, other } => {
-            format!(
-                "{} and {} lead to the same state in only one of them",
-                said(word),
-                said(other)
-            )
+            format!("{} and {} lead to the same state in only one of them", said(word), said(other))
         }
         Difference::Unreachable { name, reached } => {
             format!(
@@ -470,19 +429,10 @@ fn compare(left: &Automaton, right: &Automaton) -> Answer {
 
 fn conflict(parts: &[&Automaton], bounds: Bounds) -> Result<Answer, TooLarge> {
     let Some(conflict) = nonconflict(parts, bounds)? else {
-        return Ok(Answer::done(
-            "nonconflicting",
-            json!({ "nonconflicting": true }),
-        ));
+        return Ok(Answer::done("nonconflicting", json!({ "nonconflicting": true })));
     };
-    let names = parts[0]
-        .alphabet()
-        .union(parts[1..].iter().map(|part| part.alphabet()));
-    let words: Vec<String> = conflict
-        .word
-        .iter()
-        .map(|&label| names.name(label))
-        .collect();
+    let names = parts[0].alphabet().union(parts[1..].iter().map(|part| part.alphabet()));
+    let words: Vec<String> = conflict.word.iter().map(|&label| names.name(label)).collect();
     let states = parts.iter().zip(&conflict.states);
     let states: Vec<String> = states
         .map(|(part, &state)| format!("{} in {}", part.name(), part.state_name(state)))

@@ -38,12 +38,7 @@ pub(crate) struct Arguments {
     #[arg(long, short, value_name = "FILE", global = true)]
     output: Option<PathBuf>,
     /// Maximum number of markings
-    #[arg(
-        long,
-        value_name = "NUMBER",
-        default_value_t = 1_000_000,
-        global = true
-    )]
+    #[arg(long, value_name = "NUMBER", default_value_t = 1_000_000, global = true)]
     markings: usize,
 }
 
@@ -106,11 +101,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let path = arguments.operation.net();
     let text = files::text_of(Kind::Net, path)?;
     let read = read_net(&text);
-    let report = Report {
-        name: path.display().to_string(),
-        text,
-        diagnostics: read.diagnostics,
-    };
+    let report = Report { name: path.display().to_string(), text, diagnostics: read.diagnostics };
     let Some(file) = read.file else {
         return Err(Answer::bad_files(vec![report]));
     };
@@ -143,11 +134,8 @@ fn bounds(file: &NetFile, limit: usize) -> Result<Answer, Answer> {
         of_places.insert(place.name.clone(), json!(bound));
     }
     let (markings, dead) = (explored.markings().len(), explored.dead_transitions());
-    let stuck: Vec<String> = explored
-        .dead_markings()
-        .into_iter()
-        .map(|marking| net.name_of(marking))
-        .collect();
+    let stuck: Vec<String> =
+        explored.dead_markings().into_iter().map(|marking| net.name_of(marking)).collect();
     let is_safe = bounds.iter().all(|&bound| bound <= 1);
     text.push_str(&format!(
         "{markings} markings{}",
@@ -157,10 +145,7 @@ fn bounds(file: &NetFile, limit: usize) -> Result<Answer, Answer> {
         text.push_str(&format!("\nnever enabled: {}", dead.join(" ")));
     }
     if let Some(first) = stuck.first() {
-        text.push_str(&format!(
-            "\n{} deadlock markings, the first is {first}",
-            stuck.len()
-        ));
+        text.push_str(&format!("\n{} deadlock markings, the first is {first}", stuck.len()));
     }
     let result = json!({
         "places": of_places,
@@ -232,9 +217,7 @@ fn ladder(
     mut report: Report,
 ) -> Result<Answer, Answer> {
     let named = supervisors(paths)?.into_iter();
-    let named: Vec<Automaton> = named
-        .map(|one| one.with_event_names(&file.events))
-        .collect();
+    let named: Vec<Automaton> = named.map(|one| one.with_event_names(&file.events)).collect();
     let made = to_ladder(&file.net, &named, limit);
     let mut made = match made {
         Ok(made) => made,
@@ -299,11 +282,7 @@ fn proved(
         },
         "findings": found.as_ref().ok().map(|found| listed(found)),
     });
-    if let Some(answer) = found
-        .as_ref()
-        .ok()
-        .and_then(|found| withheld(found, &result))
-    {
+    if let Some(answer) = found.as_ref().ok().and_then(|found| withheld(found, &result)) {
         return Err(answer);
     }
     result["ladder"] = json!(ladder);
@@ -320,10 +299,7 @@ fn proved(
         said_before, proof.states, proof.scans, proof.markings
     );
     if !proof.never_fired.is_empty() {
-        text.push_str(&format!(
-            "; transitions that never fire: {}",
-            proof.never_fired.join(" ")
-        ));
+        text.push_str(&format!("; transitions that never fire: {}", proof.never_fired.join(" ")));
     }
     let answer = Answer::done(text, result).and_written(path);
     Ok(answer.and_next(&[&"verify", &path]))

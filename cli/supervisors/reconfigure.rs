@@ -45,9 +45,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let outcome = analyse(&project).map_err(|failure| failed(&failure))?;
     for span in &outcome.idle {
         let message = "this relation affects no reachable state of the ladder";
-        reports[0]
-            .diagnostics
-            .push(Diagnostic::warning("U1251", message, span.clone()));
+        reports[0].diagnostics.push(Diagnostic::warning("U1251", message, span.clone()));
     }
     let name = project.ladder.name.to_string();
     let report = outcome.report(&name);
@@ -86,9 +84,8 @@ fn read(path: &Path) -> Result<(Project, Vec<Report>), Answer> {
 /// Reads a project and the ladder programs that it names, relative to its folder.
 pub(crate) fn read_project(path: &Path, text: &str) -> Loaded {
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-    let mut loaded = project::read(&path.display().to_string(), text, &mut |name| {
-        named_file(&folder, name)
-    });
+    let mut loaded =
+        project::read(&path.display().to_string(), text, &mut |name| named_file(&folder, name));
     for report in loaded.reports.iter_mut().skip(1) {
         report.name = folder.join(&report.name).display().to_string();
     }
@@ -114,9 +111,7 @@ fn failed(failure: &Failure) -> Answer {
         _ => Status::BadInput,
     };
     let text = failure.to_string();
-    let message = text
-        .split_once(": ")
-        .map_or(text.as_str(), |(_, message)| message);
+    let message = text.split_once(": ").map_or(text.as_str(), |(_, message)| message);
     Answer::failed(status, failure.code(), message)
 }
 

@@ -81,31 +81,19 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         signals.extend(plant.signals.into_iter().map(Signal::without_place));
         plants.extend(some(path, plant.plants, "plant")?);
     }
-    let supervisors = some(
-        &arguments.supervisor,
-        supervisor.model.supervisors.clone(),
-        "supervisor",
-    )?;
+    let supervisors =
+        some(&arguments.supervisor, supervisor.model.supervisors.clone(), "supervisor")?;
     let (map, report) = read_signals(arguments, &supervisors, &plants, supervisor, signals)?;
     let name = |automata: Vec<Automaton>| -> Vec<Automaton> {
-        automata
-            .into_iter()
-            .map(|automaton| map.name_events(automaton))
-            .collect()
+        automata.into_iter().map(|automaton| map.name_events(automaton)).collect()
     };
     let (supervisors, plants) = (name(supervisors), name(plants));
-    let modules = Modules {
-        supervisors: &supervisors,
-        plants: &plants,
-    };
+    let modules = Modules { supervisors: &supervisors, plants: &plants };
     let mode = Mode::from(arguments.mode);
     let conversion = convert(&modules, &map, mode)
         .map_err(|diagnostics| bad_map(report.clone(), diagnostics))?;
     let found = findings(&modules)?;
-    let settings = ProofSettings {
-        mode,
-        ..ProofSettings::default()
-    };
+    let settings = ProofSettings { mode, ..ProofSettings::default() };
     let patience = Patience::new(None, console);
     let mut report = |at: Proving| {
         patience.goes_on_with(format_args!(
@@ -133,18 +121,11 @@ struct Source {
 fn source(path: &Path) -> Result<Source, Answer> {
     if automata::is_model(path) {
         let Sources { read, mut reports } = automata::model(path)?;
-        return Ok(Source {
-            model: read,
-            report: reports.swap_remove(0),
-        });
+        return Ok(Source { model: read, report: reports.swap_remove(0) });
     }
     let Sources { read, mut reports } = automata::all(&[&path.to_owned()])?;
     Ok(Source {
-        model: Model {
-            plants: read.clone(),
-            supervisors: read,
-            ..Model::default()
-        },
+        model: Model { plants: read.clone(), supervisors: read, ..Model::default() },
         report: reports.swap_remove(0),
     })
 }
@@ -166,10 +147,7 @@ fn read_signals(
     supervisor: Source,
     signals: Vec<Signal>,
 ) -> Result<(InputOutputMap, Report), Answer> {
-    let modules = Modules {
-        supervisors,
-        plants,
-    };
+    let modules = Modules { supervisors, plants };
     let alphabet = modules.alphabet();
     let addresses = supervisor.model.addresses;
     let Some(path) = &arguments.io else {
@@ -180,11 +158,7 @@ fn read_signals(
     };
     let text = files::text(path)?;
     let read = read_map(&text);
-    let report = Report {
-        name: path.display().to_string(),
-        text,
-        diagnostics: read.diagnostics,
-    };
+    let report = Report { name: path.display().to_string(), text, diagnostics: read.diagnostics };
     let Some(map) = read.map else {
         return Err(Answer::bad_files(vec![report]));
     };
@@ -197,9 +171,7 @@ fn read_signals(
 
 fn bad_map(mut report: Report, diagnostics: Vec<Diagnostic>) -> Answer {
     report.diagnostics.extend(diagnostics);
-    report
-        .diagnostics
-        .sort_by_key(|diagnostic| diagnostic.span.start);
+    report.diagnostics.sort_by_key(|diagnostic| diagnostic.span.start);
     Answer::bad_files(vec![report])
 }
 
@@ -221,12 +193,7 @@ pub(crate) fn notes(found: &[Finding]) -> String {
 
 /// Findings as JSON.
 pub(crate) fn listed(found: &[Finding]) -> Value {
-    let numbers = |labels: &[Label]| {
-        labels
-            .iter()
-            .map(|label| label.number())
-            .collect::<Vec<_>>()
-    };
+    let numbers = |labels: &[Label]| labels.iter().map(|label| label.number()).collect::<Vec<_>>();
     let listed = found.iter().map(|finding| {
         json!({
             "code": finding.code(),
@@ -242,9 +209,8 @@ pub(crate) fn listed(found: &[Finding]) -> Value {
 
 /// Answer with findings that are errors: each is a failure, and the ladder is withheld.
 pub(crate) fn withheld(found: &[Finding], result: &Value) -> Option<Answer> {
-    let (errors, warnings): (Vec<&Finding>, Vec<&Finding>) = found
-        .iter()
-        .partition(|finding| finding.severity == FindingSeverity::Error);
+    let (errors, warnings): (Vec<&Finding>, Vec<&Finding>) =
+        found.iter().partition(|finding| finding.severity == FindingSeverity::Error);
     if errors.is_empty() {
         return None;
     }
@@ -294,10 +260,7 @@ fn answer(
     let ladder = print(program);
     let text = if arguments.table {
         let tables = modules.all().zip(&conversion.rows);
-        tables
-            .map(|(automaton, rows)| table(automaton, rows))
-            .collect::<Vec<_>>()
-            .join("\n")
+        tables.map(|(automaton, rows)| table(automaton, rows)).collect::<Vec<_>>().join("\n")
     } else {
         ladder.clone()
     };

@@ -73,15 +73,9 @@ enum Engine {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
-    let Sources {
-        read: model,
-        reports,
-    } = automata::model(&arguments.model)?;
+    let Sources { read: model, reports } = automata::model(&arguments.model)?;
     let findings = model_findings(&model);
-    let answer = if findings
-        .iter()
-        .any(|finding| finding.severity == Severity::Error)
-    {
+    let answer = if findings.iter().any(|finding| finding.severity == Severity::Error) {
         with_findings(Answer::done("", json!({})), &findings, Status::BadInput)
     } else {
         made(arguments, model, console).into()
@@ -100,9 +94,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
 }
 
 fn made(arguments: &Arguments, model: Model, console: &mut Console) -> Result<Answer, Answer> {
-    let bounds = Bounds {
-        memory_bytes: arguments.memory.saturating_mul(1_000_000),
-    };
+    let bounds = Bounds { memory_bytes: arguments.memory.saturating_mul(1_000_000) };
     match arguments.engine {
         Engine::Explicit => explicit(arguments, model, bounds, console),
         Engine::Specified => specified(arguments, model, bounds),
@@ -119,24 +111,14 @@ fn explicit(
 ) -> Result<Answer, Answer> {
     let result = synthesise(&model.plants(), &model.specifications(), bounds)?;
     let findings = synthesis_findings(&model, &result);
-    let (supervisor, warning) = reduced(
-        arguments,
-        &model.plants(),
-        result.supervisor,
-        bounds,
-        console,
-    )?;
+    let (supervisor, warning) =
+        reduced(arguments, &model.plants(), result.supervisor, bounds, console)?;
     let supervisor = named(arguments, supervisor);
     let mut value = description(&supervisor);
     value["engine"] = json!("explicit");
     value["explored_states"] = json!(result.explored_states);
     let answer = Answer::done(warning + &summary(&supervisor), value);
-    written(
-        arguments,
-        model,
-        vec![supervisor],
-        with_findings(answer, &findings, Status::Failed),
-    )
+    written(arguments, model, vec![supervisor], with_findings(answer, &findings, Status::Failed))
 }
 
 fn specified(arguments: &Arguments, model: Model, bounds: Bounds) -> Result<Answer, Answer> {
@@ -150,10 +132,7 @@ fn specified(arguments: &Arguments, model: Model, bounds: Bounds) -> Result<Answ
     let mut value = description(&result.supervisor);
     value["engine"] = json!("specified");
     let mut lines = vec![summary(&result.supervisor)];
-    if findings
-        .iter()
-        .any(|finding| finding.severity == Severity::Error)
-    {
+    if findings.iter().any(|finding| finding.severity == Severity::Error) {
         let answer = Answer::done(lines.join("\n"), value);
         return Ok(with_findings(answer, &findings, Status::Failed));
     }
@@ -177,23 +156,13 @@ fn modular(
     let mut values = Vec::new();
     let mut warnings = String::new();
     for local in &result.local {
-        let specification = local
-            .specification
-            .map(|number| model.specifications[number].name());
-        let plants: Vec<&Automaton> = local
-            .plants
-            .iter()
-            .map(|&plant| &model.plants[plant])
-            .collect();
+        let specification = local.specification.map(|number| model.specifications[number].name());
+        let plants: Vec<&Automaton> =
+            local.plants.iter().map(|&plant| &model.plants[plant]).collect();
         let name = arguments.name.as_deref().unwrap_or("SUPER");
         let name = format!("{name}_{}", specification.unwrap_or(plants[0].name()));
-        let (supervisor, warning) = reduced(
-            arguments,
-            &plants,
-            local.result.supervisor.clone(),
-            bounds,
-            console,
-        )?;
+        let (supervisor, warning) =
+            reduced(arguments, &plants, local.result.supervisor.clone(), bounds, console)?;
         let supervisor = supervisor.with_name(name);
         warnings.push_str(&warning);
         let mut value = description(&supervisor);
@@ -324,10 +293,7 @@ fn written(
     };
     match supervisors.as_slice() {
         _ if automata::is_model(path) => {
-            let model = Model {
-                supervisors,
-                ..model
-            };
+            let model = Model { supervisors, ..model };
             files::write(path, &write_model(&model))?;
         }
         [only] => automata::write(path, only)?,

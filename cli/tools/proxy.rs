@@ -80,10 +80,7 @@ pub(crate) struct ImpairmentArguments {
 impl ImpairmentArguments {
     /// The same arguments with a loss of `share`, unless a loss was given.
     pub(crate) fn losing(&self, share: Share) -> Self {
-        Self {
-            loss: Some(self.loss.unwrap_or(share)),
-            ..self.clone()
-        }
+        Self { loss: Some(self.loss.unwrap_or(share)), ..self.clone() }
     }
 
     pub(crate) fn impairment(&self) -> Impairment {
@@ -121,11 +118,7 @@ pub fn run(arguments: &Arguments, console: &mut Console) -> Answer {
             TransportArgument::Tcp => Transport::Tcp,
         },
         forth: impairment,
-        back: if arguments.one_way {
-            Impairment::default()
-        } else {
-            impairment
-        },
+        back: if arguments.one_way { Impairment::default() } else { impairment },
     };
     let mut listened = listen;
     let ran = run_proxy(&[route], arguments.seed, |addresses| {
@@ -140,11 +133,7 @@ pub fn run(arguments: &Arguments, console: &mut Console) -> Answer {
                 "{} received, {} forwarded, {} lost by impairment, {} refused",
                 counters.came, counters.passed, counters.lost, counters.refused
             );
-            let carried = Carried {
-                listened,
-                to,
-                counters,
-            };
+            let carried = Carried { listened, to, counters };
             Answer::done(text, carried)
         }
         Err(error) => Answer::failed(Status::Failed, error.code(), error),

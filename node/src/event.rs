@@ -120,16 +120,8 @@ pub enum Event {
 
 impl From<Refusal> for Event {
     fn from(refusal: Refusal) -> Self {
-        let Refusal {
-            member,
-            theirs,
-            ours,
-        } = refusal;
-        Self::Refused {
-            member,
-            theirs,
-            ours,
-        }
+        let Refusal { member, theirs, ours } = refusal;
+        Self::Refused { member, theirs, ours }
     }
 }
 

@@ -31,12 +31,7 @@ pub(crate) fn outputs<'a>(
         return None;
     }
     let mut outputs = Image::zero(generated.output_count());
-    generated.step(
-        scratch,
-        &mut state.words,
-        &inputs.words,
-        outputs.words_mut(),
-    );
+    generated.step(scratch, &mut state.words, &inputs.words, outputs.words_mut());
     Some(outputs)
 }
 

@@ -243,10 +243,7 @@ impl Replica {
         if self.remembered == Remembered::Nothing
             && recalled.inputs.width() == program.executable.input_count()
         {
-            let recalled = Recalled {
-                witnessed: false,
-                ..recalled.clone()
-            };
+            let recalled = Recalled { witnessed: false, ..recalled.clone() };
             self.remembered = Remembered::Relayed(recalled);
         }
     }
@@ -287,11 +284,7 @@ impl Replica {
         if sample.before.after(newest) != sample.after {
             return Followed::Changed;
         }
-        if self
-            .held
-            .as_ref()
-            .is_some_and(|held| held.state.lineage == sample.before)
-        {
+        if self.held.as_ref().is_some_and(|held| held.state.lineage == sample.before) {
             self.step(program, scratch, newest, moment);
             return self.synchronised(shadow_cycles);
         }
@@ -305,10 +298,8 @@ impl Replica {
         }
         let genesis = Lineage::genesis(program.hash, sample.born);
         if let Some(place) = lineages.iter().position(|&lineage| lineage == genesis) {
-            let initial = Image::from_words(
-                program.executable.state_count(),
-                program.executable.initial(),
-            );
+            let initial =
+                Image::from_words(program.executable.state_count(), program.executable.initial());
             self.past.clear();
             self.held = Some(Held {
                 born: sample.born,

@@ -37,11 +37,7 @@ impl Settings {
     pub fn runs(&self) -> impl Iterator<Item = ProgramId> + use<> {
         let own = self.station.0;
         let controllers = self.agreement.schedule.controllers() as u8;
-        let range = if own < controllers {
-            own..own + 1
-        } else {
-            0..controllers
-        };
+        let range = if own < controllers { own..own + 1 } else { 0..controllers };
         range.map(ProgramId)
     }
 }

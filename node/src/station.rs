@@ -178,9 +178,7 @@ impl Station {
     }
 
     fn publishes(&self) -> bool {
-        self.replicas
-            .iter()
-            .any(|replica| replica.standing() == Standing::Proven)
+        self.replicas.iter().any(|replica| replica.standing() == Standing::Proven)
     }
 
     fn report(&mut self, event: Event) {
@@ -245,12 +243,7 @@ impl Station {
             Followed::Synchronised | Followed::Lost | Followed::Changed => None,
         };
         if let Some((lineage, from)) = adopted {
-            self.report(Event::Adopted {
-                moment,
-                program,
-                lineage,
-                from,
-            });
+            self.report(Event::Adopted { moment, program, lineage, from });
         }
     }
 

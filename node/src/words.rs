@@ -18,10 +18,7 @@ use understudy_wire::{Image, ProgramId, ProgramSet, Word};
 
 /// The word of a controller.
 pub fn of_controller(program: ProgramId, outputs: &Image) -> SmallVec<[Word; 2]> {
-    smallvec::smallvec![Word {
-        mask: ProgramSet::only(program),
-        sum: outputs.clone(),
-    }]
+    smallvec::smallvec![Word { mask: ProgramSet::only(program), sum: outputs.clone() }]
 }
 
 /// The masks of the parity words of an understudy that knows the outputs of `known`, in a cluster of the programs `all`,
@@ -51,9 +48,7 @@ pub fn of_understudy<'a>(
     outputs_of: impl Fn(ProgramId) -> Option<&'a Image>,
 ) -> SmallVec<[Word; 2]> {
     let masks = masks_of_understudy(mode, all, known, published).into_iter();
-    masks
-        .filter_map(|mask| understudy_parity::sum(mask, &outputs_of))
-        .collect()
+    masks.filter_map(|mask| understudy_parity::sum(mask, &outputs_of)).collect()
 }
 
 #[cfg(test)]

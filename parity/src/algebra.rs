@@ -89,8 +89,7 @@ pub fn reconstruct<'a>(
     let others = word.mask.without(ProgramSet::only(wanted));
     let mut sum = word.sum.clone();
     add_all(&mut sum, others, output_of).map_err(|other| ErasureError::Two { wanted, other })?;
-    sum.narrowed(width)
-        .ok_or(ErasureError::Width { wanted, width })
+    sum.narrowed(width).ok_or(ErasureError::Width { wanted, width })
 }
 
 /// Adds the outputs of all programs of `mask`, or names the first that has none.

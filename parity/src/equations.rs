@@ -97,17 +97,11 @@ impl Equations {
             equation(defines, Some(register.initial), register.next)
         });
         let outputs = circuit.outputs().iter().enumerate().map(|(place, output)| {
-            let defines = Legend {
-                symbol: symbol('y', own, place + 1),
-                name: output.name.clone(),
-            };
+            let defines = Legend { symbol: symbol('y', own, place + 1), name: output.name.clone() };
             equation(defines, None, output.value)
         });
         Self {
-            programs: summands
-                .iter()
-                .map(|summand| summand.name.clone())
-                .collect(),
+            programs: summands.iter().map(|summand| summand.name.clone()).collect(),
             inputs: (0..)
                 .zip(circuit.inputs())
                 .map(|(index, _)| legend(Variable::Input(index)))
@@ -141,25 +135,10 @@ impl Equations {
         let polynomial: Side = |equation| equation.polynomial.as_ref();
         let boolean: Side = |equation| equation.boolean.as_ref();
         let sections: [(&str, &[Equation], &str, Side); 4] = [
-            (
-                "Next state over GF(2), (34)",
-                &self.states,
-                "(t+1)",
-                polynomial,
-            ),
+            ("Next state over GF(2), (34)", &self.states, "(t+1)", polynomial),
             ("Outputs over GF(2), (35)", &self.outputs, "(t)", polynomial),
-            (
-                "Next state in Boolean algebra, (39)",
-                &self.states,
-                "(t+1)",
-                boolean,
-            ),
-            (
-                "Outputs in Boolean algebra, (40)",
-                &self.outputs,
-                "(t)",
-                boolean,
-            ),
+            ("Next state in Boolean algebra, (39)", &self.states, "(t+1)", boolean),
+            ("Outputs in Boolean algebra, (40)", &self.outputs, "(t)", boolean),
         ];
         for (title, equations, time, side) in sections {
             let _ = writeln!(text, "\n{title}");
@@ -200,9 +179,7 @@ fn both(
 ) -> Formula {
     Formula {
         symbols: print(Style::Symbols, &|variable| symbol_of(summands, variable)),
-        names: print(Style::Names, &|variable| {
-            circuit.variable_name(variable).to_owned()
-        }),
+        names: print(Style::Names, &|variable| circuit.variable_name(variable).to_owned()),
     }
 }
 

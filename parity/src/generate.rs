@@ -108,11 +108,8 @@ pub fn generate<C: Borrow<Circuit>>(summands: &[C]) -> Result<ParityController, 
     for summand in summands {
         let summand: &Circuit = summand.borrow();
         let qualified = |signal: &str| format!("{}.{signal}", summand.name());
-        let inputs: Vec<Expression> = summand
-            .inputs()
-            .iter()
-            .map(|input| builder.input(qualified(input)))
-            .collect();
+        let inputs: Vec<Expression> =
+            summand.inputs().iter().map(|input| builder.input(qualified(input))).collect();
         let registers: Vec<_> = summand
             .registers()
             .iter()
@@ -150,10 +147,7 @@ pub fn generate<C: Borrow<Circuit>>(summands: &[C]) -> Result<ParityController, 
     for (index, parity) in parities.into_iter().flatten().enumerate() {
         builder.output(format!("parity_{}", index + 1), parity);
     }
-    Ok(ParityController {
-        circuit: builder.finish()?,
-        summands: places,
-    })
+    Ok(ParityController { circuit: builder.finish()?, summands: places })
 }
 
 fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Result<(), ParityError> {

@@ -100,10 +100,7 @@ fn check(circuit: &Circuit, symbols: &[(String, Variable)], roots: &[Expression]
         };
         let printed = parse(&mut graph, row, &signal);
         let ours = diagrams.of(circuit.graph(), root).expect("small");
-        assert!(
-            ours == diagrams.of(&graph, printed).expect("small"),
-            "{row}"
-        );
+        assert!(ours == diagrams.of(&graph, printed).expect("small"), "{row}");
         let form = NormalForm::of(&graph, printed, 1_000).expect("small");
         let factored = Polynomial::of(circuit.graph(), root).expect("small");
         assert_eq!(factored.normal_form(1_000), Some(form), "{row}");
@@ -116,11 +113,7 @@ fn next(circuit: &Circuit) -> Vec<Expression> {
 }
 
 fn values(circuit: &Circuit) -> Vec<Expression> {
-    circuit
-        .outputs()
-        .iter()
-        .map(|output| output.value)
-        .collect()
+    circuit.outputs().iter().map(|output| output.value).collect()
 }
 
 #[test]
@@ -160,13 +153,10 @@ fn the_equations_read_like_the_paper() {
     let equations = Equations::of(&generated);
     let letter_by_letter = |equations: &[Equation], polynomials: &[&str], booleans: &[&str]| {
         for ((equation, polynomial), boolean) in equations.iter().zip(polynomials).zip(booleans) {
-            for (ours, printed) in [
-                (&equation.polynomial, polynomial),
-                (&equation.boolean, boolean),
-            ] {
-                let ours = ours
-                    .as_ref()
-                    .map(|formula| formula.symbols.replace(' ', ""));
+            for (ours, printed) in
+                [(&equation.polynomial, polynomial), (&equation.boolean, boolean)]
+            {
+                let ours = ours.as_ref().map(|formula| formula.symbols.replace(' ', ""));
                 assert_eq!(ours, Some(printed.replace(' ', "")));
             }
         }
@@ -191,9 +181,7 @@ fn theorems_hold_everywhere() {
     assert_eq!((inputs, registers), (10, 9));
     for block in 0..1_u64 << (inputs + registers - 6) {
         let lane = |place: usize| -> u64 {
-            (0..64).fold(0, |word, lane| {
-                word | ((block << 6 | lane) >> place & 1) << lane
-            })
+            (0..64).fold(0, |word, lane| word | ((block << 6 | lane) >> place & 1) << lane)
         };
         let u: Vec<u64> = (0..inputs).map(lane).collect();
         let x: Vec<u64> = (inputs..inputs + registers).map(lane).collect();
@@ -202,12 +190,7 @@ fn theorems_hold_everywhere() {
         for (scan, member) in scans.iter().zip(generated.summands()) {
             let mut state = x[member.registers.clone()].to_vec();
             let mut output = vec![0; member.outputs];
-            scan.step_lanes(
-                &mut scratch,
-                &mut state,
-                &u[member.inputs.clone()],
-                &mut output,
-            );
+            scan.step_lanes(&mut scratch, &mut state, &u[member.inputs.clone()], &mut output);
             states.extend(state);
             outputs.push(output);
         }
@@ -221,10 +204,7 @@ fn theorems_hold_everywhere() {
             .iter()
             .map(|output| Image::from_words(64 * output.len(), output).expect("whole words"));
         let own: Vec<Image> = images.by_ref().take(2).collect();
-        let word = Word {
-            mask: ProgramSet::first(2),
-            sum: images.next().expect("y(3)"),
-        };
+        let word = Word { mask: ProgramSet::first(2), sum: images.next().expect("y(3)") };
         let every = |program: ProgramId| own.get(program.index());
         let zero = syndrome(&word, every).expect("both outputs are there");
         assert!(zero.is_zero(), "(10)");

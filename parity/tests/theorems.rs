@@ -56,9 +56,7 @@ fn step(scan: &Scan, scratch: &mut Scratch, state: &mut [u64], inputs: u64) -> I
 
 fn named(recipes: &[Recipe]) -> Vec<Circuit> {
     let numbered = recipes.iter().enumerate();
-    numbered
-        .map(|(number, recipe)| circuit(&format!("p{number}"), recipe))
-        .collect()
+    numbered.map(|(number, recipe)| circuit(&format!("p{number}"), recipe)).collect()
 }
 
 /// Theorem 1, Theorem 2, and what is refused, for the outputs y(1)..y(N), y(N+1) of one cycle.
@@ -66,10 +64,7 @@ fn check(outputs: &[Image], widths: &[usize]) {
     let programs = widths.len();
     let (own, parity) = outputs.split_at(programs);
     let all = ProgramSet::first(programs);
-    let paper = Word {
-        mask: all,
-        sum: parity[0].clone(),
-    };
+    let paper = Word { mask: all, sum: parity[0].clone() };
     let every = |program: ProgramId| own.get(program.index());
     assert_eq!(sum(all, every), Some(paper.clone()), "(9)");
     let zero = syndrome(&paper, every).expect("every output is there");

@@ -27,9 +27,11 @@ fn duplex_of_a_million_states(bencher: Bencher<'_, '_>) {
             builder.transition(degraded, degraded + 1, whole * 2.0 * FAILURE_RATE);
         }
         if degraded > 0 {
-            builder
-                .transition(degraded, degraded - 1, down * REPAIR_RATE)
-                .transition(degraded, failed, down * FAILURE_RATE);
+            builder.transition(degraded, degraded - 1, down * REPAIR_RATE).transition(
+                degraded,
+                failed,
+                down * FAILURE_RATE,
+            );
         }
     }
     let chain = builder.build().expect("a chain");

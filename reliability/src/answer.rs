@@ -133,9 +133,8 @@ impl Answer {
     /// # Errors
     /// A number that JSON cannot hold.
     pub fn to_json(&self) -> Result<String, ReliabilityError> {
-        serde_json::to_string_pretty(self).map_err(|error| ReliabilityError::Report {
-            why: error.to_string(),
-        })
+        serde_json::to_string_pretty(self)
+            .map_err(|error| ReliabilityError::Report { why: error.to_string() })
     }
 
     /// The answer for people.

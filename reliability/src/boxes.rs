@@ -29,10 +29,8 @@ impl FromStr for UnequalBoxes {
     type Err = ReliabilityError;
 
     fn from_str(text: &str) -> Result<Self, ReliabilityError> {
-        let wrong = |why: &str| ReliabilityError::BoxText {
-            text: text.to_owned(),
-            why: why.to_owned(),
-        };
+        let wrong =
+            |why: &str| ReliabilityError::BoxText { text: text.to_owned(), why: why.to_owned() };
         let (which, times) = text.split_once('=').ok_or_else(|| wrong("missing ="))?;
         let (mtbf, mttr) = times
             .split_once(',')
@@ -41,10 +39,7 @@ impl FromStr for UnequalBoxes {
             None => (which, 1),
             Some((name, count)) => {
                 let count = count.trim().parse().ok().filter(|count| *count > 0);
-                (
-                    name,
-                    count.ok_or_else(|| wrong("after * stands how many there are"))?,
-                )
+                (name, count.ok_or_else(|| wrong("after * stands how many there are"))?)
             }
         };
         let name = name.trim();
@@ -66,14 +61,11 @@ impl FromStr for crate::system::SharedPart {
     type Err = ReliabilityError;
 
     fn from_str(text: &str) -> Result<Self, ReliabilityError> {
-        let parts = text
-            .split_once('=')
-            .map(|(name, time)| (name.trim(), time.trim()));
+        let parts = text.split_once('=').map(|(name, time)| (name.trim(), time.trim()));
         match parts {
-            Some((name, mtbf)) if !name.is_empty() => Ok(Self {
-                name: name.to_owned(),
-                mtbf: mtbf.parse()?,
-            }),
+            Some((name, mtbf)) if !name.is_empty() => {
+                Ok(Self { name: name.to_owned(), mtbf: mtbf.parse()? })
+            }
             _ => Err(ReliabilityError::BoxText {
                 text: text.to_owned(),
                 why: "expected NAME=MTBF".to_owned(),

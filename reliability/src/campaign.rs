@@ -108,25 +108,15 @@ pub fn assess(
     let chain = system.chain()?;
     let law = Law::of_chain(&chain).map_err(one)?;
     let mut random = Pcg64::seed_from_u64(seed);
-    let hours: Vec<f64> = campaign
-        .failures
-        .iter()
-        .map(|failure| failure.hours)
-        .collect();
+    let hours: Vec<f64> = campaign.failures.iter().map(|failure| failure.hours).collect();
     let mttf_hours = times_to_failure(&hours, &campaign.censored_hours, confidence).map_err(one)?;
     let tested = |null, random: &mut Pcg64| {
         let enough = hours.len() >= 5 && campaign.censored_hours.is_empty();
-        enough
-            .then(|| fit(&hours, &law, null, 1_000, random))
-            .transpose()
-            .map_err(one)
+        enough.then(|| fit(&hours, &law, null, 1_000, random)).transpose().map_err(one)
     };
     let mean_of = |times: &[f64], unfinished: &[f64]| {
         let total = (!times.is_empty()).then_some(times);
-        total
-            .map(|times| times_to_failure(times, unfinished, confidence))
-            .transpose()
-            .map_err(one)
+        total.map(|times| times_to_failure(times, unfinished, confidence)).transpose().map_err(one)
     };
     let mut causes = BTreeMap::new();
     for failure in &campaign.failures {
@@ -153,12 +143,7 @@ pub fn assess(
         rare_event: rare_event(&chain, 100_000, confidence, &mut random).map_err(one)?,
         causes,
         running: running(&hours, confidence).map_err(one)?,
-        log: campaign
-            .failures
-            .iter()
-            .take(MAXIMUM_LOG)
-            .cloned()
-            .collect(),
+        log: campaign.failures.iter().take(MAXIMUM_LOG).cloned().collect(),
         doubts: Vec::new(),
     };
     found.doubts = doubts(&found, system);
@@ -200,10 +185,7 @@ fn doubts(found: &Assessment, system: &System) -> Vec<String> {
     }
     for (fit, what) in [
         (&found.fit, "The times do"),
-        (
-            &found.shape_fit,
-            "The shape of the times, whatever their mean is, does",
-        ),
+        (&found.shape_fit, "The shape of the times, whatever their mean is, does"),
     ] {
         if let Some(fit) = fit
             && fit.anderson_darling_p < 0.01

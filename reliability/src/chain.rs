@@ -149,16 +149,11 @@ impl ChainBuilder {
     pub fn build(self) -> Result<Chain, Vec<ReliabilityError>> {
         let states = self.failures.len();
         if states > MAXIMUM_STATES {
-            return Err(vec![ReliabilityError::TooManyStates {
-                maximum: MAXIMUM_STATES,
-            }]);
+            return Err(vec![ReliabilityError::TooManyStates { maximum: MAXIMUM_STATES }]);
         }
         let mut errors = Vec::new();
         if self.start >= states {
-            errors.push(ReliabilityError::NoSuchState {
-                place: self.start,
-                states,
-            });
+            errors.push(ReliabilityError::NoSuchState { place: self.start, states });
         }
         for &(from, to, per_hour) in &self.transitions {
             let (from, to) = (from as usize, to as usize);
@@ -182,9 +177,7 @@ impl ChainBuilder {
             Chain::from_transitions(self.names, self.failures, self.start, self.transitions);
         let level = chain.levels();
         match level.iter().position(|level| *level == u32::MAX) {
-            Some(place) => Err(vec![ReliabilityError::Unreachable {
-                state: chain.name(place),
-            }]),
+            Some(place) => Err(vec![ReliabilityError::Unreachable { state: chain.name(place) }]),
             None => Ok(chain),
         }
     }
@@ -210,14 +203,7 @@ impl Chain {
             (targets[*place], rates[*place]) = (to, rate);
             *place += 1;
         }
-        let mut chain = Self {
-            names,
-            rows,
-            targets,
-            rates,
-            failures,
-            start,
-        };
+        let mut chain = Self { names, rows, targets, rates, failures, start };
         chain.sort_rows();
         chain
     }
@@ -273,16 +259,12 @@ impl Chain {
     pub fn successors(&self, place: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let row = self.rows[place]..self.rows[place + 1];
         let targets = self.targets[row.clone()].iter();
-        targets
-            .map(|target| *target as usize)
-            .zip(self.rates[row].iter().copied())
+        targets.map(|target| *target as usize).zip(self.rates[row].iter().copied())
     }
 
     /// Rate of leaving a state, per hour.
     pub fn leaving(&self, place: usize) -> f64 {
-        self.rates[self.rows[place]..self.rows[place + 1]]
-            .iter()
-            .sum()
+        self.rates[self.rows[place]..self.rows[place + 1]].iter().sum()
     }
 
     /// Steps from the start to each state; `u32::MAX` where it cannot be reached.
@@ -316,9 +298,8 @@ impl Chain {
             let leaving = |&state: &usize| self.successors(state).map(move |(to, _)| (state, to));
             alive.iter().flat_map(leaving)
         });
-        let mut doomed: Vec<usize> = (0..self.states())
-            .filter(|state| self.failures[*state])
-            .collect();
+        let mut doomed: Vec<usize> =
+            (0..self.states()).filter(|state| self.failures[*state]).collect();
         let mut reaches = self.failures.clone();
         while let Some(state) = doomed.pop() {
             for source in sources.of(state) {
@@ -328,9 +309,7 @@ impl Chain {
             }
         }
         match alive.iter().find(|state| !reaches[**state]) {
-            Some(&state) => Err(ReliabilityError::NeverFails {
-                state: self.name(state),
-            }),
+            Some(&state) => Err(ReliabilityError::NeverFails { state: self.name(state) }),
             None => Ok(()),
         }
     }

@@ -104,11 +104,9 @@ pub fn answer_chain(
     };
     let mttf_hours = kept(chain.mttf());
     let deviation_hours = match mttf_hours {
-        Some(_) => kept(
-            chain
-                .time_to_failure()
-                .map(|moments| moments.variance_hours_squared.sqrt()),
-        ),
+        Some(_) => {
+            kept(chain.time_to_failure().map(|moments| moments.variance_hours_squared.sqrt()))
+        }
         None => None,
     };
     let steady = match chain.steady_state() {
@@ -148,11 +146,7 @@ pub fn answer_chain(
             None => Some(0.0),
             Some(_) => stated(failures().map(|state| steady[state]).sum()),
         }),
-        by_state: ByState {
-            chain,
-            steady,
-            at_mission,
-        },
+        by_state: ByState { chain, steady, at_mission },
         mission,
         remarks,
     })
@@ -167,14 +161,10 @@ impl ChainAnswer<'_> {
                 let _ = writeln!(text, "{name:<24} {value}");
             }
         };
-        line(
-            "MTTF",
-            self.mttf_hours.map(|hours| format!("{} h", grouped(hours))),
-        );
+        line("MTTF", self.mttf_hours.map(|hours| format!("{} h", grouped(hours))));
         line(
             "standard deviation",
-            self.deviation_hours
-                .map(|hours| format!("{} h", grouped(hours))),
+            self.deviation_hours.map(|hours| format!("{} h", grouped(hours))),
         );
         let tiny = || probability(None, 6);
         if let Some(share) = self.unavailability {
@@ -182,26 +172,16 @@ impl ChainAnswer<'_> {
         }
         if let Some(at) = &self.mission {
             let hours = grouped(at.mission_hours);
-            line(
-                &format!("R({hours} h)"),
-                Some(probability(at.reliability, 12)),
-            );
+            line(&format!("R({hours} h)"), Some(probability(at.reliability, 12)));
             line(
                 &format!("1 - R({hours} h)"),
-                Some(
-                    at.unreliability
-                        .map_or_else(tiny, |share| format!("{share:.6e}")),
-                ),
+                Some(at.unreliability.map_or_else(tiny, |share| format!("{share:.6e}"))),
             );
         }
         for state in self.by_state.iter().take(MAXIMUM_LISTED) {
-            let steady = state
-                .steady
-                .map(|share| format!("{share:.6e} in the long run"));
+            let steady = state.steady.map(|share| format!("{share:.6e} in the long run"));
             let later = self.mission.as_ref().map(|_| {
-                let share = state
-                    .at_mission
-                    .map_or_else(tiny, |share| format!("{share:.6e}"));
+                let share = state.at_mission.map_or_else(tiny, |share| format!("{share:.6e}"));
                 format!("{share} at the end of the mission")
             });
             let said: Vec<String> = [steady, later].into_iter().flatten().collect();

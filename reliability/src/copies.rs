@@ -52,15 +52,10 @@ impl System {
             let found = chain.transient(hours, AfterFailure::Final);
             found.map_err(|error| vec![error])
         };
-        let independent = self
-            .crews
-            .is_none_or(|crews| crews >= self.controller_count());
+        let independent = self.crews.is_none_or(|crews| crews >= self.controller_count());
         if !independent {
             let found = at(self.chain_of_copies(&kinds, lethal, copies)?)?;
-            return Ok(Survival {
-                working: found.working,
-                failed: found.failed,
-            });
+            return Ok(Survival { working: found.working, failed: found.failed });
         }
         let mut logarithm = -lethal * hours;
         for kind in kinds {
@@ -68,19 +63,15 @@ impl System {
             let alone = self.chain_of_copies(&[Kind { units: 1, ..kind }], 0.0, copies)?;
             logarithm += units * at(alone)?.log_working();
         }
-        Ok(Survival {
-            working: logarithm.exp(),
-            failed: -logarithm.exp_m1(),
-        })
+        Ok(Survival { working: logarithm.exp(), failed: -logarithm.exp_m1() })
     }
 
     /// Controllers by kind; kinds that cannot be told apart are one.
     fn copied(&self) -> Vec<Kind> {
         let alone = match self.common_cause {
-            Some(CommonCause {
-                beta,
-                convention: CommonCauseConvention::Split,
-            }) => 1.0 - beta.get(),
+            Some(CommonCause { beta, convention: CommonCauseConvention::Split }) => {
+                1.0 - beta.get()
+            }
             _ => 1.0,
         };
         let mut kinds: Vec<Kind> = Vec::new();
@@ -91,11 +82,7 @@ impl System {
             });
             match known {
                 Some(known) => known.units += kind.count,
-                None => kinds.push(Kind {
-                    units: kind.count,
-                    failure_rate,
-                    repair_rate,
-                }),
+                None => kinds.push(Kind { units: kind.count, failure_rate, repair_rate }),
             }
         }
         kinds
@@ -106,10 +93,7 @@ impl System {
         let shared: f64 = self.shared.iter().map(|part| part.mtbf.rate()).sum();
         let rates = self.controllers.iter().map(|kind| kind.mtbf.rate());
         let fastest = rates.fold(0.0, f64::max);
-        shared
-            + self
-                .common_cause
-                .map_or(0.0, |cause| cause.beta.get() * fastest)
+        shared + self.common_cause.map_or(0.0, |cause| cause.beta.get() * fastest)
     }
 
     fn chain_of_copies(

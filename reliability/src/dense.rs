@@ -25,9 +25,8 @@ impl Series {
             return false;
         }
         let positive = sums.iter().filter(|sum| **sum > 0.0);
-        let (reached, least) = positive.fold((0, 1.0_f64), |(reached, least), sum| {
-            (reached + 1, least.min(*sum))
-        });
+        let (reached, least) =
+            positive.fold((0, 1.0_f64), |(reached, least), sum| (reached + 1, least.min(*sum)));
         // Each step reaches further, until one reaches nothing new.
         let all = reached == self.reached;
         self.reached = reached;
@@ -86,11 +85,7 @@ pub(crate) struct Dense {
 
 impl Dense {
     pub(crate) fn zero(size: usize) -> Self {
-        Self {
-            size,
-            high: vec![0.0; size * size],
-            low: vec![0.0; size * size],
-        }
+        Self { size, high: vec![0.0; size * size], low: vec![0.0; size * size] }
     }
 
     fn identity(size: usize) -> Self {
@@ -103,10 +98,7 @@ impl Dense {
 
     fn at(&self, row: usize, column: usize) -> Extended {
         let place = row * self.size + column;
-        Extended {
-            high: self.high[place],
-            low: self.low[place],
-        }
+        Extended { high: self.high[place], low: self.low[place] }
     }
 
     pub(crate) fn set(&mut self, row: usize, column: usize, value: Extended) {
@@ -127,9 +119,7 @@ impl Dense {
     fn apply(&self, distribution: &[Extended]) -> Vec<Extended> {
         let column = |column| {
             let terms = distribution.iter().enumerate();
-            terms
-                .map(|(row, share)| *share * self.at(row, column))
-                .sum()
+            terms.map(|(row, share)| *share * self.at(row, column)).sum()
         };
         (0..self.size).map(column).collect()
     }

@@ -66,9 +66,7 @@ pub(crate) type Band = Vec<(f64, f64, f64)>;
 type Refused = DrawingAreaErrorKind<std::io::Error>;
 
 fn refused(error: impl std::fmt::Display) -> ReliabilityError {
-    ReliabilityError::Report {
-        why: error.to_string(),
-    }
+    ReliabilityError::Report { why: error.to_string() }
 }
 
 /// Curves over one abscissa, with an optional band behind them.
@@ -80,9 +78,7 @@ pub(crate) fn curves(
     legend: Legend,
 ) -> Result<String, ReliabilityError> {
     let points = || curves.iter().flat_map(|curve| curve.points.iter().copied());
-    let ends = band
-        .iter()
-        .flat_map(|&(x, low, high)| [(x, low), (x, high)]);
+    let ends = band.iter().flat_map(|&(x, low, high)| [(x, low), (x, high)]);
     let all: Vec<(f64, f64)> = points().chain(ends).collect();
     let (left, right) = bounds(all.iter().map(|point| point.0), x.scale, true);
     let (bottom, top) = bounds(all.iter().map(|point| point.1), y.scale, false);
@@ -90,33 +86,15 @@ pub(crate) fn curves(
     {
         let area = SVGBackend::with_string(&mut svg, (WIDTH, HEIGHT)).into_drawing_area();
         let drawn = match (x.scale, y.scale) {
-            (Scale::Linear, Scale::Linear) => plot(
-                &area,
-                left..right,
-                bottom..top,
-                (x, y),
-                curves,
-                band,
-                legend,
-            ),
-            (Scale::Linear, Scale::Logarithmic) => plot(
-                &area,
-                left..right,
-                (bottom..top).log_scale(),
-                (x, y),
-                curves,
-                band,
-                legend,
-            ),
-            (Scale::Logarithmic, Scale::Linear) => plot(
-                &area,
-                (left..right).log_scale(),
-                bottom..top,
-                (x, y),
-                curves,
-                band,
-                legend,
-            ),
+            (Scale::Linear, Scale::Linear) => {
+                plot(&area, left..right, bottom..top, (x, y), curves, band, legend)
+            }
+            (Scale::Linear, Scale::Logarithmic) => {
+                plot(&area, left..right, (bottom..top).log_scale(), (x, y), curves, band, legend)
+            }
+            (Scale::Logarithmic, Scale::Linear) => {
+                plot(&area, (left..right).log_scale(), bottom..top, (x, y), curves, band, legend)
+            }
             (Scale::Logarithmic, Scale::Logarithmic) => plot(
                 &area,
                 (left..right).log_scale(),
@@ -235,11 +213,7 @@ pub(crate) fn tornado(
     bars: &[Bar],
 ) -> Result<String, ReliabilityError> {
     let height = 64 + 34 * bars.len().max(1) as u32;
-    let ends = || {
-        bars.iter()
-            .flat_map(|(_, low, high)| [*low, *high])
-            .chain([centre])
-    };
+    let ends = || bars.iter().flat_map(|(_, low, high)| [*low, *high]).chain([centre]);
     let (left, right) = bounds(ends(), Scale::Logarithmic, false);
     let mut svg = String::new();
     {

@@ -65,10 +65,7 @@ impl Chain {
     pub fn time_to_failure(&self) -> Result<TimeToFailure, ReliabilityError> {
         let alive = Alive::failing(self)?;
         if alive.order.is_empty() {
-            return Ok(TimeToFailure {
-                mean_hours: 0.0,
-                variance_hours_squared: 0.0,
-            });
+            return Ok(TimeToFailure { mean_hours: 0.0, variance_hours_squared: 0.0 });
         }
         let Some(width) = alive.band() else {
             return Err(ReliabilityError::TooManyStates {
@@ -104,9 +101,7 @@ impl Chain {
         let by_place = eliminated.visits();
         let total: f64 = by_place.iter().sum();
         if !total.is_finite() {
-            return Err(ReliabilityError::OutOfRange {
-                what: "the steady state".into(),
-            });
+            return Err(ReliabilityError::OutOfRange { what: "the steady state".into() });
         }
         for (place, state) in all.order.iter().enumerate() {
             probability[*state] = by_place[place] / total;
@@ -130,9 +125,7 @@ impl Chain {
             }
         }
         match returns.iter().position(|returns| !returns) {
-            Some(state) => Err(ReliabilityError::NotErgodic {
-                state: self.name(state),
-            }),
+            Some(state) => Err(ReliabilityError::NotErgodic { state: self.name(state) }),
             None => Ok(()),
         }
     }
@@ -142,9 +135,7 @@ fn in_range(value: f64) -> Result<f64, ReliabilityError> {
     if value.is_finite() {
         Ok(value)
     } else {
-        Err(ReliabilityError::OutOfRange {
-            what: "the mean time to failure".into(),
-        })
+        Err(ReliabilityError::OutOfRange { what: "the mean time to failure".into() })
     }
 }
 
@@ -178,21 +169,14 @@ impl<'a> Alive<'a> {
         for (index, state) in order.iter().enumerate() {
             place[*state] = index as u32;
         }
-        Self {
-            chain,
-            order,
-            place,
-        }
+        Self { chain, order, place }
     }
 
     /// Rates out of the state at `place`: to another place, or (nothing) to a failure.
     fn rates(&self, place: usize) -> impl Iterator<Item = (Option<usize>, f64)> + '_ {
-        self.chain.successors(self.order[place]).map(|(to, rate)| {
-            (
-                (self.place[to] != u32::MAX).then(|| self.place[to] as usize),
-                rate,
-            )
-        })
+        self.chain
+            .successors(self.order[place])
+            .map(|(to, rate)| ((self.place[to] != u32::MAX).then(|| self.place[to] as usize), rate))
     }
 
     /// Half the width of the band, where the elimination is affordable.
@@ -225,9 +209,7 @@ impl<'a> Alive<'a> {
         if eliminated.leaving[0] > 0.0 {
             return Ok(());
         }
-        Err(ReliabilityError::NeverFails {
-            state: self.chain.name(self.order[0]),
-        })
+        Err(ReliabilityError::NeverFails { state: self.chain.name(self.order[0]) })
     }
 
     /// A state that leads nowhere but to states that are already out belongs to a set that is never left.
@@ -278,11 +260,7 @@ impl<'a> Alive<'a> {
             }
         }
         leaving[0] = lethal[0];
-        Ok(Eliminated {
-            width,
-            band,
-            leaving,
-        })
+        Ok(Eliminated { width, band, leaving })
     }
 
     /// The mean time by cycles through the start: the mean length of a cycle, over the probability that it ends in a failure. Both are
@@ -323,11 +301,7 @@ impl<'a> Alive<'a> {
             sweeps += 1;
             // The sum of all changes to come, as a geometric series.
             let ratio = change / before;
-            let rest = if change == 0.0 {
-                0.0
-            } else {
-                change * ratio / (1.0 - ratio)
-            };
+            let rest = if change == 0.0 { 0.0 } else { change * ratio / (1.0 - ratio) };
             if sweeps > 2 && ratio < 1.0 && (0.0..PRECISION).contains(&rest) && last.1 > 0.0 {
                 return Ok(last.0 / last.1);
             }
@@ -335,11 +309,7 @@ impl<'a> Alive<'a> {
         let ratio = change / before;
         Err(ReliabilityError::Precision {
             asked: PRECISION,
-            reached: if ratio < 1.0 {
-                change / (1.0 - ratio)
-            } else {
-                1.0
-            },
+            reached: if ratio < 1.0 { change / (1.0 - ratio) } else { 1.0 },
         })
     }
 }
@@ -378,11 +348,7 @@ impl Eliminated {
         for place in 1..states {
             let first = place.saturating_sub(width);
             let row = &self.band[place * stride + first + width - place..place * stride + width];
-            let known: f64 = row
-                .iter()
-                .zip(&value[first..place])
-                .map(|(a, b)| a * b)
-                .sum();
+            let known: f64 = row.iter().zip(&value[first..place]).map(|(a, b)| a * b).sum();
             value[place] = (value[place] + known) / self.leaving[place];
         }
         value

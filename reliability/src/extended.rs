@@ -15,14 +15,8 @@ pub(crate) struct Extended {
 }
 
 impl Extended {
-    pub(crate) const ZERO: Self = Self {
-        high: 0.0,
-        low: 0.0,
-    };
-    pub(crate) const ONE: Self = Self {
-        high: 1.0,
-        low: 0.0,
-    };
+    pub(crate) const ZERO: Self = Self { high: 0.0, low: 0.0 };
+    pub(crate) const ONE: Self = Self { high: 1.0, low: 0.0 };
 
     /// The nearest double.
     pub(crate) fn get(self) -> f64 {
@@ -32,10 +26,7 @@ impl Extended {
     /// `high + low` where `high` is the larger one.
     fn renormalised(high: f64, low: f64) -> Self {
         let sum = high + low;
-        Self {
-            high: sum,
-            low: low - (sum - high),
-        }
+        Self { high: sum, low: low - (sum - high) }
     }
 }
 
@@ -65,10 +56,7 @@ pub(crate) fn two_product(a: f64, b: f64) -> (f64, f64) {
 
 impl From<f64> for Extended {
     fn from(value: f64) -> Self {
-        Self {
-            high: value,
-            low: 0.0,
-        }
+        Self { high: value, low: 0.0 }
     }
 }
 
@@ -95,10 +83,7 @@ impl Sub for Extended {
     type Output = Self;
 
     fn sub(self, other: Self) -> Self {
-        self + Self {
-            high: -other.high,
-            low: -other.low,
-        }
+        self + Self { high: -other.high, low: -other.low }
     }
 }
 
@@ -108,10 +93,7 @@ impl Mul for Extended {
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
         let (product, error) = two_product(self.high, other.high);
-        Self::renormalised(
-            product,
-            error + (self.high * other.low + self.low * other.high),
-        )
+        Self::renormalised(product, error + (self.high * other.low + self.low * other.high))
     }
 }
 

@@ -58,10 +58,7 @@ pub fn figures_5_and_6(
             per_added_hours: mttf_hours / f64::from(added),
             gained_per_added_hours: (mttf_hours - simplex_hours) / f64::from(added),
         };
-        let duplex = system
-            .copies_chain(2)?
-            .mttf()
-            .map_err(|error| vec![error])?;
+        let duplex = system.copies_chain(2)?.mttf().map_err(|error| vec![error])?;
         points.push(FigurePoint {
             controllers: n,
             simplex_hours,

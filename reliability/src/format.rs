@@ -57,15 +57,8 @@ pub fn read_chain(name: &str, text: impl Into<String>) -> ReadChain {
     let text = text.into();
     let (chain, mut diagnostics) = Reader::new(&text).read();
     diagnostics.sort_by_key(|finding| finding.span.start);
-    let report = Report {
-        name: name.into(),
-        text,
-        diagnostics,
-    };
-    ReadChain {
-        chain: chain.filter(|_| !report.has_errors()),
-        report,
-    }
+    let report = Report { name: name.into(), text, diagnostics };
+    ReadChain { chain: chain.filter(|_| !report.has_errors()), report }
 }
 
 /// A chain of millions of states is read too: what there is of each state or transition is small, and names are parts of the text.
@@ -95,10 +88,7 @@ struct Span {
 
 impl From<&Range<usize>> for Span {
     fn from(range: &Range<usize>) -> Self {
-        Self {
-            start: range.start as u32,
-            end: range.end as u32,
-        }
+        Self { start: range.start as u32, end: range.end as u32 }
     }
 }
 
@@ -126,22 +116,16 @@ struct Line<'a> {
 
 impl<'a> Reader<'a> {
     fn new(text: &'a str) -> Self {
-        Self {
-            text,
-            ..Self::default()
-        }
+        Self { text, ..Self::default() }
     }
 
     /// The chain of the text, and what was found in it.
     fn read(mut self) -> (Option<Chain>, Vec<Diagnostic>) {
         let text = self.text;
         if text.len() > MAXIMUM_TEXT_BYTES {
-            let message = format!(
-                "the text has {} bytes, more than {MAXIMUM_TEXT_BYTES}",
-                text.len()
-            );
-            self.findings
-                .push(Diagnostic::error("U0730", message, 0..0));
+            let message =
+                format!("the text has {} bytes, more than {MAXIMUM_TEXT_BYTES}", text.len());
+            self.findings.push(Diagnostic::error("U0730", message, 0..0));
             return (None, self.findings);
         }
         self.builder.reserve(text.matches("->").count());
@@ -198,19 +182,11 @@ impl<'a> Reader<'a> {
         }
         let at = offset + line.len() - text.len();
         let value = self.value(text, at);
-        let constant = Constant {
-            value,
-            span: span.clone(),
-            used: false,
-        };
+        let constant = Constant { value, span: span.clone(), used: false };
         if let Some(before) = self.constants.get(name) {
             self.findings.push(
-                Diagnostic::error(
-                    "U0722",
-                    format!("the constant {name} is declared twice"),
-                    span,
-                )
-                .with_related(before.span.clone(), "first occurrence"),
+                Diagnostic::error("U0722", format!("the constant {name} is declared twice"), span)
+                    .with_related(before.span.clone(), "first occurrence"),
             );
         } else {
             self.constants.insert(name.into(), constant);
@@ -255,8 +231,7 @@ impl<'a> Reader<'a> {
                         format!("{word} is not a property of a state"),
                         span,
                     );
-                    self.findings
-                        .push(finding.with_help(suggestion(word, ["start", "failure"])));
+                    self.findings.push(finding.with_help(suggestion(word, ["start", "failure"])));
                 }
             }
         }
@@ -279,31 +254,18 @@ impl<'a> Reader<'a> {
         let Some(value) = value else { return };
         let said = rate.trim();
         if value.dimension != -1 {
-            let message = format!(
-                "{said} is {}, and a rate is a number over a time",
-                value.said()
-            );
+            let message = format!("{said} is {}, and a rate is a number over a time", value.said());
             self.findings.push(
                 Diagnostic::error("U0725", message, rate_span.clone())
                     .with_label("expected a rate")
                     .with_help("write a number over a time, such as `3 / 10000h`"),
             );
         } else if !(value.number > 0.0 && value.number.is_finite()) {
-            let message = format!(
-                "the rate is {} per hour; it must be positive and finite",
-                value.number
-            );
-            self.findings
-                .push(Diagnostic::error("U0724", message, rate_span.clone()));
+            let message =
+                format!("the rate is {} per hour; it must be positive and finite", value.number);
+            self.findings.push(Diagnostic::error("U0724", message, rate_span.clone()));
         } else if named {
-            let line = Line {
-                from,
-                from_span,
-                to,
-                to_span,
-                per_hour: value.number,
-                rate_span,
-            };
+            let line = Line { from, from_span, to, to_span, per_hour: value.number, rate_span };
             let from = self.place(from);
             self.last = from.unwrap_or(self.last);
             match (from, self.place(to)) {
@@ -353,8 +315,7 @@ impl<'a> Reader<'a> {
         if from == to {
             let span = line.from_span.start..line.rate_span.end;
             let message = format!("the transition from {} leads to itself", line.from);
-            self.findings
-                .push(Diagnostic::error("U0729", message, span));
+            self.findings.push(Diagnostic::error("U0729", message, span));
         } else {
             let (from, to) = (from as usize, to as usize);
             self.builder.transition(from, to, line.per_hour);
@@ -363,10 +324,10 @@ impl<'a> Reader<'a> {
 
     fn build(mut self, end: usize) -> (Option<Chain>, Vec<Diagnostic>) {
         if self.declared.is_empty() {
-            self.findings.push(
-                Diagnostic::error("U0726", "the chain has no state", end..end)
-                    .with_help("write `state name` for each, and `state name failure` where the system has failed"),
-            );
+            self.findings
+                .push(Diagnostic::error("U0726", "the chain has no state", end..end).with_help(
+                "write `state name` for each, and `state name failure` where the system has failed",
+            ));
             return (None, self.findings);
         }
         for line in std::mem::take(&mut self.open) {
@@ -456,8 +417,7 @@ impl<'a> Reader<'a> {
                 let message = format!(
                     "no failure can be reached from the state {state}: the mean time to failure is infinite"
                 );
-                self.findings
-                    .push(Diagnostic::warning("U0732", message, span));
+                self.findings.push(Diagnostic::warning("U0732", message, span));
             }
             Err(_) => self.findings.push(
                 Diagnostic::warning(
@@ -483,9 +443,7 @@ fn split_at_arrow(line: &str) -> Option<(&str, &str)> {
 
 /// Position of a part of a line in the text.
 fn span_of(line: &str, part: &str, offset: usize) -> Range<usize> {
-    let start = offset
-        + (part.as_ptr() as usize)
-            .saturating_sub(line.as_ptr() as usize)
-            .min(line.len());
+    let start =
+        offset + (part.as_ptr() as usize).saturating_sub(line.as_ptr() as usize).min(line.len());
     start..start + part.len()
 }

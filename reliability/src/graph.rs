@@ -57,12 +57,7 @@ pub(crate) fn graph(chain: &Chain) -> String {
         }
     }
     if (0..chain.states()).any(|state| chain.is_failure(state)) {
-        nodes.push(Node {
-            name: "failed".into(),
-            x: right,
-            y: middle,
-            column: None,
-        });
+        nodes.push(Node { name: "failed".into(), x: right, y: middle, column: None });
     }
     let left_out = node_of.iter().filter(|node| node.is_none()).count();
     draw(chain, &nodes, &node_of, left_out, right, rows)
@@ -116,11 +111,7 @@ fn draw(
     }
     for node in nodes {
         let (x, y) = (node.x - NODE_WIDTH / 2, node.y - NODE_HEIGHT / 2);
-        let fill = if node.column.is_none() {
-            "#F3C6C1"
-        } else {
-            "#FFFFFF"
-        };
+        let fill = if node.column.is_none() { "#F3C6C1" } else { "#FFFFFF" };
         let _ = write!(
             svg,
             "<rect x=\"{x}\" y=\"{y}\" width=\"{NODE_WIDTH}\" height=\"{NODE_HEIGHT}\" rx=\"9\" fill=\"{fill}\" stroke=\"#1A202C\"/>"
@@ -161,11 +152,7 @@ fn edge(
     let far = (to.x - from.x).abs() > COLUMN_WIDTH;
     let middle = i32::midpoint(top, bottom);
     // Far ones from the upper half go over all boxes, others below them.
-    let above = if from.y == middle {
-        dx < 0.0
-    } else {
-        from.y < middle
-    };
+    let above = if from.y == middle { dx < 0.0 } else { from.y < middle };
     let (nx, ny) = match (far, above) {
         (true, true) => (0.0, -1.0),
         (true, false) => (0.0, 1.0),
@@ -189,22 +176,14 @@ fn edge(
     let control = if far {
         // Half way, the curve is where the control point and the ends have pulled it in equal parts.
         let height = f64::from(if above { top - 16 } else { bottom + 32 });
-        (
-            f64::midpoint(start.0, end.0),
-            2.0 * height - f64::midpoint(start.1, end.1),
-        )
+        (f64::midpoint(start.0, end.0), 2.0 * height - f64::midpoint(start.1, end.1))
     } else {
-        (
-            f64::midpoint(start.0, end.0) + nx,
-            f64::midpoint(start.1, end.1) + ny,
-        )
+        (f64::midpoint(start.0, end.0) + nx, f64::midpoint(start.1, end.1) + ny)
     };
     // Nearer to its origin, so that the rates of both directions do not overlap.
     let at = |start: f64, control: f64, end: f64| 0.42 * start + 0.46 * control + 0.12 * end;
-    let place = (
-        at(start.0, control.0, end.0),
-        at(start.1, control.1, end.1) + 4.0 + 9.0 * ny.signum(),
-    );
+    let place =
+        (at(start.0, control.0, end.0), at(start.1, control.1, end.1) + 4.0 + 9.0 * ny.signum());
     let _ = write!(
         svg,
         "<path d=\"M{:.1},{:.1}Q{:.1},{:.1} {:.1},{:.1}\" fill=\"none\" stroke=\"#1A202C\" marker-end=\"url(#head)\"/>",

@@ -68,16 +68,9 @@ impl Options {
     pub fn system(&self) -> Result<System, Vec<ReliabilityError>> {
         let coverage = Probability::new("the coverage", self.coverage);
         let beta = Probability::new("the share beta of common causes", self.beta);
-        let mut errors: Vec<ReliabilityError> = [&coverage, &beta]
-            .into_iter()
-            .filter_map(|found| found.clone().err())
-            .collect();
-        let kind = |name: &str, count, mtbf, mttr| BoxKind {
-            name: name.into(),
-            count,
-            mtbf,
-            mttr,
-        };
+        let mut errors: Vec<ReliabilityError> =
+            [&coverage, &beta].into_iter().filter_map(|found| found.clone().err()).collect();
+        let kind = |name: &str, count, mtbf, mttr| BoxKind { name: name.into(), count, mtbf, mttr };
         let apart = || self.unequal.iter().filter(|boxes| !boxes.understudies);
         let apart_count: u64 = apart().map(|boxes| u64::from(boxes.count)).sum();
         if apart_count > u64::from(self.controllers) {
@@ -110,20 +103,13 @@ impl Options {
             common_cause: beta
                 .ok()
                 .filter(|beta| beta.get() > 0.0)
-                .map(|beta| CommonCause {
-                    beta,
-                    convention: self.convention,
-                }),
+                .map(|beta| CommonCause { beta, convention: self.convention }),
             shared: self.shared.clone(),
         };
         if let Err(found) = system.check() {
             errors.extend(found);
         }
-        if errors.is_empty() {
-            Ok(system)
-        } else {
-            Err(errors)
-        }
+        if errors.is_empty() { Ok(system) } else { Err(errors) }
     }
 }
 

@@ -24,11 +24,7 @@ impl PoissonWeights {
     /// Of the law with this mean, which is not negative.
     pub(crate) fn new(mean: f64) -> Self {
         if mean <= 0.0 {
-            return Self {
-                mean: 0.0,
-                first: 0,
-                weights: vec![Extended::ONE],
-            };
+            return Self { mean: 0.0, first: 0, weights: vec![Extended::ONE] };
         }
         let exact = Extended::from(mean);
         let mode = mean.floor();
@@ -58,11 +54,7 @@ impl PoissonWeights {
         let sum = |side: &[Extended]| side.iter().rev().copied().sum::<Extended>();
         let total = sum(&below) + sum(&above) + Extended::ONE;
         let weights = below.into_iter().rev().chain([Extended::ONE]).chain(above);
-        Self {
-            mean,
-            first,
-            weights: weights.map(|weight| weight / total).collect(),
-        }
+        Self { mean, first, weights: weights.map(|weight| weight / total).collect() }
     }
 
     /// The largest count that is kept.
@@ -73,20 +65,13 @@ impl PoissonWeights {
     /// At least the sum of the weights past a count.
     pub(crate) fn past(&self, count: usize) -> f64 {
         let ratio = self.mean / (count + 2) as f64;
-        if ratio < 1.0 {
-            self.at(count + 1).high / (1.0 - ratio)
-        } else {
-            1.0
-        }
+        if ratio < 1.0 { self.at(count + 1).high / (1.0 - ratio) } else { 1.0 }
     }
 
     /// The weight of a count.
     pub(crate) fn at(&self, count: usize) -> Extended {
         let place = count.checked_sub(self.first);
-        place
-            .and_then(|place| self.weights.get(place))
-            .copied()
-            .unwrap_or(Extended::ZERO)
+        place.and_then(|place| self.weights.get(place)).copied().unwrap_or(Extended::ZERO)
     }
 }
 

@@ -40,10 +40,7 @@ impl Hours {
         if (MINIMUM_HOURS..=MAXIMUM_HOURS).contains(&hours) {
             Ok(Self(hours))
         } else {
-            Err(ReliabilityError::Time {
-                what: what.into(),
-                hours,
-            })
+            Err(ReliabilityError::Time { what: what.into(), hours })
         }
     }
 
@@ -63,16 +60,11 @@ impl FromStr for Hours {
 
     /// `10000h`, `24 h`, `30d`, `1.5e4h`, `20min`, `10ms`; a year (`y`) has 365 days.
     fn from_str(text: &str) -> Result<Self, ReliabilityError> {
-        let refused = |why: String| ReliabilityError::TimeText {
-            text: text.into(),
-            why,
-        };
+        let refused = |why: String| ReliabilityError::TimeText { text: text.into(), why };
         let trimmed = text.trim();
         let unit_at = trimmed
             .rfind(|character: char| !character.is_ascii_alphabetic())
-            .map_or(0, |last| {
-                last + trimmed[last..].chars().next().map_or(1, char::len_utf8)
-            });
+            .map_or(0, |last| last + trimmed[last..].chars().next().map_or(1, char::len_utf8));
         let (number, unit) = (trimmed[..unit_at].trim_end(), &trimmed[unit_at..]);
         if unit.is_empty() {
             return Err(refused(format!(
@@ -89,19 +81,15 @@ impl FromStr for Hours {
                 "{unit:?} is not a unit; expected us, ms, s, min, h, d and y"
             )));
         };
-        let value: f64 = number
-            .parse()
-            .map_err(|_| refused(format!("{number:?} is not a number")))?;
+        let value: f64 =
+            number.parse().map_err(|_| refused(format!("{number:?} is not a number")))?;
         Self::new(trimmed, value * length)
     }
 }
 
 /// The length in hours of a unit of time.
 pub(crate) fn unit_length(unit: &str) -> Option<f64> {
-    UNITS
-        .iter()
-        .find(|(name, _)| *name == unit)
-        .map(|(_, length)| *length)
+    UNITS.iter().find(|(name, _)| *name == unit).map(|(_, length)| *length)
 }
 
 impl fmt::Display for Hours {
@@ -129,10 +117,7 @@ impl Probability {
         if (0.0..=1.0).contains(&value) {
             Ok(Self(value))
         } else {
-            Err(ReliabilityError::Probability {
-                what: what.into(),
-                value,
-            })
+            Err(ReliabilityError::Probability { what: what.into(), value })
         }
     }
 
@@ -164,10 +149,7 @@ pub(crate) fn rate(what: &str, per_hour: f64) -> Result<f64, ReliabilityError> {
     if is_rate(per_hour) {
         Ok(per_hour)
     } else {
-        Err(ReliabilityError::Rate {
-            what: what.into(),
-            per_hour,
-        })
+        Err(ReliabilityError::Rate { what: what.into(), per_hour })
     }
 }
 
@@ -190,9 +172,7 @@ pub fn grouped(value: f64) -> String {
     let decimals = (5 - magnitude.log10().floor() as i32).clamp(0, 9) as usize;
     let text = format!("{value:.decimals$}");
     let (whole, fraction) = text.split_once('.').unwrap_or((&text, ""));
-    let (sign, digits) = whole
-        .strip_prefix('-')
-        .map_or(("", whole), |digits| ("-", digits));
+    let (sign, digits) = whole.strip_prefix('-').map_or(("", whole), |digits| ("-", digits));
     let mut spaced = String::new();
     for (place, digit) in digits.chars().enumerate() {
         if place > 0 && (digits.len() - place).is_multiple_of(3) {
@@ -213,9 +193,7 @@ mod tests {
         let found = text.parse::<Hours>().map(Hours::get);
         match expected {
             Ok(hours) => assert!(
-                found
-                    .as_ref()
-                    .is_ok_and(|found| (found / hours - 1.0).abs() < 1e-15),
+                found.as_ref().is_ok_and(|found| (found / hours - 1.0).abs() < 1e-15),
                 "{text}: {found:?}"
             ),
             Err(part) => {

@@ -108,10 +108,8 @@ pub fn report_data(
     let answer = calculate(options)?;
     let system = options.system()?;
     let chain = system.chain()?;
-    let longest = answer
-        .mttf_cluster_hours
-        .max(answer.mttf_duplex_hours)
-        .max(answer.mttf_paper_hours);
+    let longest =
+        answer.mttf_cluster_hours.max(answer.mttf_duplex_hours).max(answer.mttf_paper_hours);
     let compared = [
         ("this cluster", system.chain()?),
         ("paper's model", system.as_paper().chain()?),
@@ -121,10 +119,7 @@ pub fn report_data(
     let (mut over_time, mut left_out) = (Vec::new(), Vec::new());
     for (name, chain) in compared {
         match curve(&chain, answer.mttf_simplex_hours / 30.0, 3.0 * longest) {
-            Ok(points) => over_time.push(OverTime {
-                name: name.into(),
-                points,
-            }),
+            Ok(points) => over_time.push(OverTime { name: name.into(), points }),
             Err(error) => left_out.push(format!("The curve of {name} is left out: {error}.")),
         }
     }
@@ -148,28 +143,19 @@ pub fn report_data(
 /// R and hazard at times that grow by even factors.
 fn curve(chain: &Chain, from: f64, to: f64) -> Result<Vec<(f64, f64, f64)>, ReliabilityError> {
     let factor = (to / from).powf(1.0 / (CURVE_POINTS - 1) as f64);
-    let hours: Vec<f64> = (0..CURVE_POINTS)
-        .map(|point| from * factor.powi(point as i32))
-        .collect();
+    let hours: Vec<f64> = (0..CURVE_POINTS).map(|point| from * factor.powi(point as i32)).collect();
     let lethal: Vec<f64> = (0..chain.states())
         .map(|state| {
             if chain.is_failure(state) {
                 return 0.0;
             }
-            let exits = chain
-                .successors(state)
-                .filter(|(to, _)| chain.is_failure(*to));
+            let exits = chain.successors(state).filter(|(to, _)| chain.is_failure(*to));
             exits.map(|(_, rate)| rate).sum()
         })
         .collect();
     let found = chain.transients(&hours, AfterFailure::Final)?;
     let points = hours.iter().zip(found).map(|(hours, at)| {
-        let density: f64 = at
-            .probabilities
-            .iter()
-            .zip(&lethal)
-            .map(|(p, rate)| p * rate)
-            .sum();
+        let density: f64 = at.probabilities.iter().zip(&lethal).map(|(p, rate)| p * rate).sum();
         (*hours, at.working, density / at.working)
     });
     Ok(points.filter(|(_, alive, _)| *alive > 1e-9).collect())
@@ -245,19 +231,13 @@ fn assumptions(options: &Options) -> Vec<String> {
 /// # Errors
 /// [`ReliabilityError::Report`] where a library refuses.
 pub fn report(data: &ReportData) -> Result<Report, ReliabilityError> {
-    let refused = |error: minijinja::Error| ReliabilityError::Report {
-        why: format!("{error:#}"),
-    };
+    let refused = |error: minijinja::Error| ReliabilityError::Report { why: format!("{error:#}") };
     let mut environment = Environment::new();
     environment.add_filter("grouped", grouped);
     environment.add_filter("small", |value: f64| format!("{value:.4e}"));
     environment.add_filter("probability", probability);
-    environment.add_filter("fixed", |value: f64, digits: usize| {
-        format!("{value:.digits$}")
-    });
-    environment
-        .add_template("report.html", TEMPLATE)
-        .map_err(refused)?;
+    environment.add_filter("fixed", |value: f64, digits: usize| format!("{value:.digits$}"));
+    environment.add_template("report.html", TEMPLATE).map_err(refused)?;
     let template = environment.get_template("report.html").map_err(refused)?;
     let pictures = pictures(data)?;
     let html = template
@@ -266,27 +246,16 @@ pub fn report(data: &ReportData) -> Result<Report, ReliabilityError> {
             pictures => pictures,
         })
         .map_err(refused)?;
-    let json = serde_json::to_string_pretty(data).map_err(|error| ReliabilityError::Report {
-        why: error.to_string(),
-    })?;
-    Ok(Report {
-        html,
-        json,
-        csv: csv(data),
-    })
+    let json = serde_json::to_string_pretty(data)
+        .map_err(|error| ReliabilityError::Report { why: error.to_string() })?;
+    Ok(Report { html, json, csv: csv(data) })
 }
 
 /// Drawings are this program's own and must not be escaped.
 fn pictures(data: &ReportData) -> Result<Value, ReliabilityError> {
     let safe = Value::from_safe_string;
-    let log = |name| Axis {
-        name,
-        scale: Scale::Logarithmic,
-    };
-    let linear = |name| Axis {
-        name,
-        scale: Scale::Linear,
-    };
+    let log = |name| Axis { name, scale: Scale::Logarithmic };
+    let linear = |name| Axis { name, scale: Scale::Linear };
     let over = |name: &str, pick: &dyn Fn(&FigurePoint) -> f64| Curve {
         name: name.into(),
         points: data
@@ -307,20 +276,14 @@ fn pictures(data: &ReportData) -> Result<Value, ReliabilityError> {
         over("full duplex", &|point| point.duplex.per_added_hours),
     ];
     let gained = [
-        over("this cluster", &|point| {
-            point.cluster.gained_per_added_hours
-        }),
+        over("this cluster", &|point| point.cluster.gained_per_added_hours),
         over("paper's model", &|point| point.paper.gained_per_added_hours),
         over("full duplex", &|point| point.duplex.gained_per_added_hours),
     ];
     let in_time = |pick: &dyn Fn(&(f64, f64, f64)) -> f64| -> Vec<Curve> {
         let curve = |over: &OverTime| Curve {
             name: over.name.clone(),
-            points: over
-                .points
-                .iter()
-                .map(|point| (point.0, pick(point)))
-                .collect(),
+            points: over.points.iter().map(|point| (point.0, pick(point))).collect(),
         };
         data.over_time.iter().map(curve).collect()
     };
@@ -329,37 +292,24 @@ fn pictures(data: &ReportData) -> Result<Value, ReliabilityError> {
         .sensitivities
         .iter()
         .map(|bar| {
-            (
-                format!("{}, {}", bar.parameter, bar.value),
-                bar.halved_hours,
-                bar.doubled_hours,
-            )
+            (format!("{}, {}", bar.parameter, bar.value), bar.halved_hours, bar.doubled_hours)
         })
         .collect();
     let none = Vec::new();
     let system = &data.system;
     let running = match &data.measured {
         Some(measured) if measured.running.len() > 1 => {
-            let points = || {
-                measured
-                    .running
-                    .iter()
-                    .map(|(count, at)| (*count as f64, at))
-            };
+            let points = || measured.running.iter().map(|(count, at)| (*count as f64, at));
             let band = points()
                 .map(|(count, at)| (count, at.lower, at.upper.unwrap_or(at.lower)))
                 .collect();
             let estimate = Curve {
                 name: "measured, with its interval".into(),
-                points: points()
-                    .filter_map(|(count, at)| Some((count, at.estimate?)))
-                    .collect(),
+                points: points().filter_map(|(count, at)| Some((count, at.estimate?))).collect(),
             };
             let model = Curve {
                 name: "calculated".into(),
-                points: points()
-                    .map(|(count, _)| (count, measured.model_hours))
-                    .collect(),
+                points: points().map(|(count, _)| (count, measured.model_hours)).collect(),
             };
             let drawn = curves(
                 &linear("failures of the system"),
@@ -393,22 +343,12 @@ fn csv(data: &ReportData) -> String {
     for point in &data.figures {
         let n = f64::from(point.controllers);
         row("mttf_simplex_hours", n, point.simplex_hours);
-        for (name, per_unit) in [
-            ("paper", point.paper),
-            ("cluster", point.cluster),
-            ("duplex", point.duplex),
-        ] {
+        for (name, per_unit) in
+            [("paper", point.paper), ("cluster", point.cluster), ("duplex", point.duplex)]
+        {
             row(&format!("mttf_{name}_hours"), n, per_unit.mttf_hours);
-            row(
-                &format!("mttf_per_added_{name}_hours"),
-                n,
-                per_unit.per_added_hours,
-            );
-            row(
-                &format!("mttf_gained_per_added_{name}_hours"),
-                n,
-                per_unit.gained_per_added_hours,
-            );
+            row(&format!("mttf_per_added_{name}_hours"), n, per_unit.per_added_hours);
+            row(&format!("mttf_gained_per_added_{name}_hours"), n, per_unit.gained_per_added_hours);
         }
     }
     for over in &data.over_time {

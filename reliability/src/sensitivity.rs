@@ -60,11 +60,7 @@ fn parameters(system: &System) -> Vec<(String, String, Change)> {
     let mut parameters: Vec<(String, String, Change)> = Vec::new();
     let kinds = system.controllers.len();
     for index in 0..=kinds {
-        let kind = if index < kinds {
-            &system.controllers[index]
-        } else {
-            &system.understudies
-        };
+        let kind = if index < kinds { &system.controllers[index] } else { &system.understudies };
         if kind.count == 0 {
             continue;
         }
@@ -104,10 +100,8 @@ fn parameters(system: &System) -> Vec<(String, String, Change)> {
             "time to detect".into(),
             latency.to_string(),
             Box::new(|system, factor| {
-                system.detection = system
-                    .detection
-                    .map(|latency| scaled(latency, factor))
-                    .transpose()?;
+                system.detection =
+                    system.detection.map(|latency| scaled(latency, factor)).transpose()?;
                 Ok(())
             }),
         ));
@@ -234,12 +228,7 @@ pub fn what_if(
                 }
                 None => None,
             };
-            Ok(WhatIf {
-                change,
-                mttf_hours,
-                factor: mttf_hours / now,
-                unreliability,
-            })
+            Ok(WhatIf { change, mttf_hours, factor: mttf_hours / now, unreliability })
         })
         .collect()
 }

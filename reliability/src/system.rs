@@ -143,18 +143,9 @@ impl System {
         };
         count("the number of groups", self.groups, 1, MAXIMUM_BOXES);
         for kind in &self.controllers {
-            count(
-                &format!("the number of {}", kind.name),
-                kind.count,
-                1,
-                MAXIMUM_BOXES,
-            );
+            count(&format!("the number of {}", kind.name), kind.count, 1, MAXIMUM_BOXES);
         }
-        let total: u64 = self
-            .controllers
-            .iter()
-            .map(|kind| u64::from(kind.count))
-            .sum();
+        let total: u64 = self.controllers.iter().map(|kind| u64::from(kind.count)).sum();
         let boxes = total + u64::from(self.groups) * u64::from(self.understudies.count);
         let boxes = u32::try_from(boxes).unwrap_or(u32::MAX);
         count("the number of boxes", boxes, 1, MAXIMUM_BOXES);
@@ -172,11 +163,7 @@ impl System {
                 });
             }
         }
-        if errors.is_empty() {
-            Ok(())
-        } else {
-            Err(errors)
-        }
+        if errors.is_empty() { Ok(()) } else { Err(errors) }
     }
 
     /// Markov chain of this system. In its first state all stations work; its last state is `failed`.
@@ -185,11 +172,8 @@ impl System {
     /// The errors of [`System::check`], and more states than [`MAXIMUM_MODEL_STATES`].
     pub fn chain(&self) -> Result<Chain, Vec<ReliabilityError>> {
         self.check()?;
-        let mut groups = Groups {
-            kinds: self.kinds(),
-            numbers: HashMap::new(),
-            states: Vec::new(),
-        };
+        let mut groups =
+            Groups { kinds: self.kinds(), numbers: HashMap::new(), states: Vec::new() };
         let whole = groups.number(vec![(0, 0); groups.kinds.len()]);
         let first: SystemState = vec![(whole, self.groups)];
         let names = std::cell::RefCell::new(groups);
@@ -205,22 +189,16 @@ impl System {
     /// Kinds of one group. Boxes that cannot be told apart are one kind; under the paper's rule that holds for the understudy too.
     fn kinds(&self) -> Vec<Kind> {
         let split = match self.common_cause {
-            Some(CommonCause {
-                beta,
-                convention: CommonCauseConvention::Split,
-            }) => 1.0 - beta.get(),
+            Some(CommonCause { beta, convention: CommonCauseConvention::Split }) => {
+                1.0 - beta.get()
+            }
             _ => 1.0,
         };
         let mut kinds: Vec<Kind> = Vec::new();
-        let controllers = self
-            .controllers
-            .iter()
-            .map(|kind| (kind, kind.count / self.groups, false));
-        let understudies = (
-            &self.understudies,
-            self.understudies.count,
-            self.rule == Rule::AsBuilt,
-        );
+        let controllers =
+            self.controllers.iter().map(|kind| (kind, kind.count / self.groups, false));
+        let understudies =
+            (&self.understudies, self.understudies.count, self.rule == Rule::AsBuilt);
         for (kind, count, understudy) in controllers.chain([understudies]) {
             let failure_rate = kind.mtbf.rate() * split;
             let repair_rate = kind.mttr.rate();
@@ -230,12 +208,7 @@ impl System {
             });
             match alike {
                 Some(known) => known.count += count,
-                None => kinds.push(Kind {
-                    count,
-                    failure_rate,
-                    repair_rate,
-                    understudy,
-                }),
+                None => kinds.push(Kind { count, failure_rate, repair_rate, understudy }),
             }
         }
         kinds
@@ -249,21 +222,13 @@ impl System {
             .iter()
             .chain((self.understudies.count > 0).then_some(&self.understudies));
         let fastest = kinds.map(|kind| kind.mtbf.rate()).fold(0.0, f64::max);
-        shared
-            + self
-                .common_cause
-                .map_or(0.0, |cause| cause.beta.get() * fastest)
+        shared + self.common_cause.map_or(0.0, |cause| cause.beta.get() * fastest)
     }
 
     fn group_fails(&self, kinds: &[Kind], state: &GroupState) -> bool {
         let down = |understudy: bool| -> u32 {
-            let kinds = kinds
-                .iter()
-                .zip(state)
-                .filter(|(kind, _)| kind.understudy == understudy);
-            kinds
-                .map(|(_, (undetected, detected))| undetected + detected)
-                .sum()
+            let kinds = kinds.iter().zip(state).filter(|(kind, _)| kind.understudy == understudy);
+            kinds.map(|(_, (undetected, detected))| undetected + detected).sum()
         };
         match self.rule {
             Rule::Paper => down(false) > 1,
@@ -404,10 +369,6 @@ impl Groups {
                 parts.push(down.join(", "));
             }
         }
-        if parts.is_empty() {
-            "all work".into()
-        } else {
-            parts.join("; ")
-        }
+        if parts.is_empty() { "all work".into() } else { parts.join("; ") }
     }
 }

@@ -37,11 +37,7 @@ pub struct Transient {
 impl Transient {
     /// ln of the probability of a state that is no failure.
     pub fn log_working(&self) -> f64 {
-        if self.failed < 0.5 {
-            (-self.failed).ln_1p()
-        } else {
-            self.working.ln()
-        }
+        if self.failed < 0.5 { (-self.failed).ln_1p() } else { self.working.ln() }
     }
 }
 
@@ -180,11 +176,8 @@ impl Steps {
             rows[state + 1] += rows[state];
         }
         // A little faster than the fastest state, so that none is left for certain and the chain does not swing.
-        let fastest = if leaving > 0.0 {
-            2.0_f64.powi((leaving * 1.01).log2().ceil() as i32)
-        } else {
-            0.0
-        };
+        let fastest =
+            if leaving > 0.0 { 2.0_f64.powi((leaving * 1.01).log2().ceil() as i32) } else { 0.0 };
         if !fastest.is_finite() || (leaving > 0.0 && fastest < f64::MIN_POSITIVE) {
             return Err(ReliabilityError::OutOfRange {
                 what: format!("a rate of {leaving:e} per hour"),
@@ -203,13 +196,7 @@ impl Steps {
                 fill[to] += 1;
             }
         }
-        Ok(Self {
-            fastest,
-            stays,
-            rows,
-            sources,
-            shares,
-        })
+        Ok(Self { fastest, stays, rows, sources, shares })
     }
 
     /// As a full matrix.

@@ -82,11 +82,7 @@ mod tests {
             let sensors = Image::from_bits((4..8).map(bit));
             let seen: Vec<bool> = seen(&channels, &last, &sensors, None).bits().collect();
             for input in 0..2 {
-                let expected = if bit(6 + input) {
-                    bit(input)
-                } else {
-                    bit(4 + input)
-                };
+                let expected = if bit(6 + input) { bit(input) } else { bit(4 + input) };
                 assert_eq!(seen[input as usize], expected, "{case:08b}");
             }
             assert_eq!(seen[2..], [bit(6), bit(7)]);

@@ -121,11 +121,7 @@ impl Diagnosis {
         if !unknown.is_empty() {
             return Err(unknown);
         }
-        Ok(Self {
-            scan: Scan::new(circuit),
-            inputs: sources,
-            outputs: meanings,
-        })
+        Ok(Self { scan: Scan::new(circuit), inputs: sources, outputs: meanings })
     }
 }
 
@@ -136,11 +132,7 @@ impl Diagnosing {
             Image::from_words(scan.register_count(), scan.initial())
                 .expect("a circuit packs its initial state")
         });
-        Self {
-            registers: registers.unwrap_or_default(),
-            recalled: None,
-            released: false,
-        }
+        Self { registers: registers.unwrap_or_default(), recalled: None, released: false }
     }
 
     /// u(i) of the last sample before a restart.

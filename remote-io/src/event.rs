@@ -319,16 +319,8 @@ pub enum Missing {
 
 impl From<Refusal> for Event {
     fn from(refusal: Refusal) -> Self {
-        let Refusal {
-            member,
-            theirs,
-            ours,
-        } = refusal;
-        Self::Refused {
-            member,
-            theirs,
-            ours,
-        }
+        let Refusal { member, theirs, ours } = refusal;
+        Self::Refused { member, theirs, ours }
     }
 }
 

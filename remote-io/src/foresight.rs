@@ -34,11 +34,8 @@ impl Foreseen<'_> {
         width: usize,
         excluded: StationSet,
     ) -> Result<(Source, Image), Missing> {
-        let received = Received {
-            turns: self.turns,
-            controllers: self.controllers,
-            mode: self.mode,
-        };
+        let received =
+            Received { turns: self.turns, controllers: self.controllers, mode: self.mode };
         let mut trust = Trust::excluding(excluded);
         let (selection, _) = received.select(program, truth, width, &mut trust, ValueFault::Hold);
         match selection {

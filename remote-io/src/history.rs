@@ -38,13 +38,7 @@ impl History {
 
     /// A program that goes on from a lineage that a station holds.
     pub(crate) fn from(born: Moment, base: Lineage, capacity: usize) -> Self {
-        Self {
-            born,
-            base,
-            samples: VecDeque::with_capacity(capacity),
-            confirmed: 0,
-            capacity,
-        }
+        Self { born, base, samples: VecDeque::with_capacity(capacity), confirmed: 0, capacity }
     }
 
     pub(crate) fn born(&self) -> Moment {
@@ -72,17 +66,12 @@ impl History {
     }
 
     pub(crate) fn samples(&self) -> SmallVec<[Image; 2]> {
-        self.samples
-            .iter()
-            .map(|(inputs, _)| inputs.clone())
-            .collect()
+        self.samples.iter().map(|(inputs, _)| inputs.clone()).collect()
     }
 
     /// How many samples from the base lead to `lineage`; none where it is not of this history.
     pub(crate) fn place(&self, lineage: Lineage) -> Option<usize> {
-        (0..=self.samples.len())
-            .rev()
-            .find(|&place| self.lineage_after(place) == lineage)
+        (0..=self.samples.len()).rev().find(|&place| self.lineage_after(place) == lineage)
     }
 
     /// A station holds the state at `place`.
@@ -103,9 +92,7 @@ impl History {
         let mut void = 0;
         if self.samples.len() == self.capacity {
             let floor = floor.and_then(|floor| self.place(floor)).unwrap_or(0);
-            let newest = living
-                .map_or(self.confirmed, |(_, newest)| newest)
-                .max(floor);
+            let newest = living.map_or(self.confirmed, |(_, newest)| newest).max(floor);
             // Sliding on would lose the oldest living station, and nothing is lost by void samples.
             let keeps_oldest = living.is_some_and(|(oldest, _)| oldest == 0);
             if newest == 0 || (newest < self.samples.len() && keeps_oldest) {
@@ -171,10 +158,7 @@ mod tests {
             }
             for cycle in 0..20 {
                 history.push(&input(cycle), None, None);
-                assert!(
-                    history.place(last).is_some(),
-                    "{followed} followed, then {cycle} alone"
-                );
+                assert!(history.place(last).is_some(), "{followed} followed, then {cycle} alone");
             }
         }
     }

@@ -65,11 +65,7 @@ impl Holders {
         holding: Option<&Holding>,
         recalled: Option<&Recalled>,
     ) {
-        if let Some(entry) = self
-            .entries
-            .iter_mut()
-            .find(|entry| entry.station == station)
-        {
+        if let Some(entry) = self.entries.iter_mut().find(|entry| entry.station == station) {
             entry.holding = holding.copied();
             // A station that has restarted recalls nothing of its earlier life.
             entry.recalled = recalled.cloned();
@@ -111,10 +107,7 @@ impl Holders {
             .entries
             .iter()
             .filter(|entry| self.listened > self.gone_after && entry.silent > self.gone_after);
-        silent
-            .map(|entry| entry.station)
-            .collect::<StationSet>()
-            .or(self.recalled_gone)
+        silent.map(|entry| entry.station).collect::<StationSet>().or(self.recalled_gone)
     }
 
     /// Whether no output can have been applied that came of a newer state than `holding`, as far as living stations
@@ -133,11 +126,8 @@ impl Holders {
             all.or(StationSet::only(station)).or(recalled.accounted_for)
         });
         let all = self.entries.iter();
-        let newest = recalling()
-            .filter_map(|(_, recalled)| recalled.applied)
-            .max();
-        all.map(|entry| entry.station)
-            .all(|station| accounted_for.contains(station))
+        let newest = recalling().filter_map(|(_, recalled)| recalled.applied).max();
+        all.map(|entry| entry.station).all(|station| accounted_for.contains(station))
             && newest.is_none_or(|applied| applied <= holding.stepped)
     }
 
@@ -190,9 +180,7 @@ impl Holders {
         let mut entries = self.entries.iter();
         let entry = entries.find(|entry| entry.station == station);
         let recalled = entry.and_then(|entry| entry.recalled.as_ref());
-        recalled
-            .into_iter()
-            .flat_map(|recalled| recalled.writes.iter().copied())
+        recalled.into_iter().flat_map(|recalled| recalled.writes.iter().copied())
     }
 
     /// States that living stations hold.
@@ -207,25 +195,19 @@ impl Holders {
     /// them the applied outputs came from.
     pub(crate) fn disputed(&self) -> Option<StationSet> {
         let (_, newest) = self.newest()?;
-        let equal = self
-            .holdings()
-            .filter(|(_, other)| other.stepped == newest.stepped);
-        let differ = equal
-            .clone()
-            .any(|(_, other)| other.lineage != newest.lineage);
+        let equal = self.holdings().filter(|(_, other)| other.stepped == newest.stepped);
+        let differ = equal.clone().any(|(_, other)| other.lineage != newest.lineage);
         differ.then(|| equal.map(|(station, _)| station).collect())
     }
 
     /// The state that was stepped last. A later sample is a newer history, because only one remote I/O makes samples.
     pub(crate) fn newest(&self) -> Option<(StationId, &Holding)> {
         // The first of equals: the controller before the understudies.
-        self.holdings().reduce(|best, other| {
-            if other.1.stepped > best.1.stepped {
-                other
-            } else {
-                best
-            }
-        })
+        self.holdings().reduce(
+            |best, other| {
+                if other.1.stepped > best.1.stepped { other } else { best }
+            },
+        )
     }
 
     fn lives(&self, entry: &Holder) -> bool {

@@ -91,32 +91,10 @@ mod tests {
         let real = |value: f32| u64::from(value.to_bits());
         let down = [real(7.5), real(5.0), real(2.5), real(1.0), real(1.0)];
         check(Elementary::Real, 2.5, real(10.0), real(1.0), &down);
-        let up = [
-            (-0.75f64).to_bits(),
-            (-0.5f64).to_bits(),
-            (-0.5f64).to_bits(),
-        ];
-        check(
-            Elementary::Lreal,
-            0.25,
-            (-1.0f64).to_bits(),
-            (-0.5f64).to_bits(),
-            &up,
-        );
-        check(
-            Elementary::Real,
-            2.5,
-            real(f32::NAN),
-            real(1.0),
-            &[real(1.0)],
-        );
-        check(
-            Elementary::Real,
-            2.5,
-            real(f32::INFINITY),
-            real(1.0),
-            &[real(1.0)],
-        );
+        let up = [(-0.75f64).to_bits(), (-0.5f64).to_bits(), (-0.5f64).to_bits()];
+        check(Elementary::Lreal, 0.25, (-1.0f64).to_bits(), (-0.5f64).to_bits(), &up);
+        check(Elementary::Real, 2.5, real(f32::NAN), real(1.0), &[real(1.0)]);
+        check(Elementary::Real, 2.5, real(f32::INFINITY), real(1.0), &[real(1.0)]);
     }
 
     #[test]
@@ -125,28 +103,15 @@ mod tests {
         let below = |value: i16| u64::from(value as u16);
         check(Elementary::Int, 2.0, below(-3), 2, &[below(-1), 1, 2, 2]);
         check(Elementary::Ulint, 1e30, u64::MAX, 5, &[5]);
-        check(
-            Elementary::Ulint,
-            1.0,
-            u64::MAX,
-            5,
-            &[u64::MAX - 1, u64::MAX - 2],
-        );
+        check(Elementary::Ulint, 1.0, u64::MAX, 5, &[u64::MAX - 1, u64::MAX - 2]);
     }
 
     #[test]
     fn outputs_without_a_ramp_change_at_once() {
-        let place = PointPlace {
-            bit: 16,
-            of: Elementary::Int,
-        };
+        let place = PointPlace { bit: 16, of: Elementary::Int };
         let image = |switch: u64, number: u64| {
             let mut image = Image::zero(32);
-            PointPlace {
-                bit: 0,
-                of: Elementary::Int,
-            }
-            .set(&mut image, switch);
+            PointPlace { bit: 0, of: Elementary::Int }.set(&mut image, switch);
             place.set(&mut image, number);
             image
         };

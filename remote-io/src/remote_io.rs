@@ -213,8 +213,7 @@ impl RemoteIo {
         match self.member.arrival(now, frame) {
             Arrival::Stale => {
                 if self.member.admits(&frame.header) {
-                    self.holders
-                        .hear(station, own_holding(&frame.body, self.settings.program));
+                    self.holders.hear(station, own_holding(&frame.body, self.settings.program));
                 }
                 return;
             }
@@ -326,9 +325,7 @@ impl RemoteIo {
         let period = self.settings.agreement.schedule.period();
         let passed = now.since(self.decides_at()).as_nanos() / period.as_nanos();
         let passed = u32::try_from(passed).unwrap_or(u32::MAX);
-        self.deadline = Deadline::Passed {
-            idle: idle.saturating_add(1).saturating_add(passed),
-        };
+        self.deadline = Deadline::Passed { idle: idle.saturating_add(1).saturating_add(passed) };
     }
 }
 

@@ -105,9 +105,7 @@ impl<'a> Received<'a> {
             });
         }
         for station in self.understudies() {
-            let turn = self
-                .turn_of(station)
-                .filter(|_| !excluded.contains(station));
+            let turn = self.turn_of(station).filter(|_| !excluded.contains(station));
             let Some((turn, holding)) =
                 turn.and_then(|turn| Some((turn, Holding::of(&turn.holdings, me)?)))
             else {
@@ -195,11 +193,8 @@ impl<'a> Received<'a> {
     /// Stations that published no output in this cycle.
     fn silent(&self) -> StationSet {
         let all = (0..self.turns.len() as u8).map(StationId);
-        all.filter(|&station| {
-            self.turn_of(station)
-                .is_none_or(|turn| turn.words.is_empty())
-        })
-        .collect()
+        all.filter(|&station| self.turn_of(station).is_none_or(|turn| turn.words.is_empty()))
+            .collect()
     }
 
     fn understudies(&self) -> impl Iterator<Item = StationId> + use<'a> {
@@ -235,12 +230,8 @@ mod tests {
         Corrupted,
     }
 
-    const CASES: [Controller; 4] = [
-        Controller::Silent,
-        Controller::True,
-        Controller::Stale,
-        Controller::Corrupted,
-    ];
+    const CASES: [Controller; 4] =
+        [Controller::Silent, Controller::True, Controller::Stale, Controller::Corrupted];
 
     fn image(program: usize, flipped: bool) -> Image {
         let word = OUTPUTS[program] ^ u64::from(flipped);
@@ -288,11 +279,7 @@ mod tests {
             mask: ProgramSet::only(ProgramId(program as u8)),
             sum: image(program, case != Controller::True),
         };
-        Some(frame(
-            program,
-            &[holding(program, lineage, digest)],
-            &[word],
-        ))
+        Some(frame(program, &[holding(program, lineage, digest)], &[word]))
     }
 
     /// An understudy without a fault, with one word over `mask` and one for each other program of `alone`.
@@ -308,12 +295,7 @@ mod tests {
         let together = ProgramSet::from_bits(mask);
         let words: Vec<Word> = [together]
             .into_iter()
-            .chain(
-                ProgramSet::from_bits(alone)
-                    .without(together)
-                    .iter()
-                    .map(ProgramSet::only),
-            )
+            .chain(ProgramSet::from_bits(alone).without(together).iter().map(ProgramSet::only))
             .filter(|mask| !mask.is_empty())
             .map(word)
             .collect();
@@ -335,15 +317,10 @@ mod tests {
     }
 
     fn check(cases: [Controller; 3], mask: u128, alone: u128, with_understudy: bool) {
-        let mut turns: Vec<Option<Arc<Frame>>> = (0..3)
-            .map(|program| controller(program, cases[program]))
-            .collect();
+        let mut turns: Vec<Option<Arc<Frame>>> =
+            (0..3).map(|program| controller(program, cases[program])).collect();
         turns.push(with_understudy.then(|| understudy(mask, alone)));
-        let received = Received {
-            turns: &turns,
-            controllers: 3,
-            mode: Mode::Full,
-        };
+        let received = Received { turns: &turns, controllers: 3, mode: Mode::Full };
         for me in 0..3 {
             let (selection, accusation) = select(received, me, ValueFault::Alarm);
             let others = (0..3).filter(|&other| other != me && mask >> other & 1 == 1);
@@ -375,10 +352,7 @@ mod tests {
                 _ => assert!(matches!(selection, Selection::Missing(_))),
             }
         }
-        let corrupted = cases
-            .iter()
-            .filter(|&&case| case == Controller::Corrupted)
-            .count();
+        let corrupted = cases.iter().filter(|&&case| case == Controller::Corrupted).count();
         let differences = received.digest_differences().len();
         assert_eq!(differences, if with_understudy { corrupted } else { 0 });
         assert_eq!(received.syndromes().count(), 0);
@@ -399,20 +373,15 @@ mod tests {
     #[test]
     fn a_corrupted_output_leaves_a_syndrome() {
         for program in 0..3 {
-            let mut turns: Vec<Option<Arc<Frame>>> = (0..3)
-                .map(|program| controller(program, Controller::True))
-                .collect();
+            let mut turns: Vec<Option<Arc<Frame>>> =
+                (0..3).map(|program| controller(program, Controller::True)).collect();
             let word = Word {
                 mask: ProgramSet::only(ProgramId(program as u8)),
                 sum: image(program, true),
             };
             turns[program] = Some(frame(program, &[holding(program, TRUE, 1)], &[word]));
             turns.push(Some(understudy(0b111, 0)));
-            let received = Received {
-                turns: &turns,
-                controllers: 3,
-                mode: Mode::Full,
-            };
+            let received = Received { turns: &turns, controllers: 3, mode: Mode::Full };
             let syndromes: Vec<_> = received.syndromes().collect();
             assert_eq!(syndromes.len(), 1);
             assert_eq!(syndromes[0].0.words(), [1]);
@@ -431,11 +400,7 @@ mod tests {
                     _ => controller(rank, Controller::True),
                 })
                 .collect();
-            let received = Received {
-                turns: &turns,
-                controllers: 3,
-                mode: Mode::Paper,
-            };
+            let received = Received { turns: &turns, controllers: 3, mode: Mode::Paper };
             for (me, width) in (0..).zip(WIDTHS) {
                 let (selection, _) = received.select(
                     ProgramId(me),

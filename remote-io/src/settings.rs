@@ -57,10 +57,7 @@ impl Settings {
             let first = usize::from(place.bit);
             first..first + place.of.bits() as usize
         });
-        let of_groups = self
-            .operator_inputs
-            .iter()
-            .filter_map(|input| input.valid());
+        let of_groups = self.operator_inputs.iter().filter_map(|input| input.valid());
         let valid = self.signals.iter().filter_map(|signal| signal.valid);
         places.chain(valid.chain(of_groups).map(usize::from))
     }

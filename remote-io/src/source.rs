@@ -120,11 +120,7 @@ fn is_number(of: Elementary, stored: u64) -> bool {
 
 /// Whether one value is at most the other.
 pub fn in_order(of: Elementary, one: u64, other: u64) -> bool {
-    if of.is_real() {
-        real(of, one) <= real(of, other)
-    } else {
-        of.signed(one) <= of.signed(other)
-    }
+    if of.is_real() { real(of, one) <= real(of, other) } else { of.signed(one) <= of.signed(other) }
 }
 
 /// Input whose value is an output of another program.

@@ -45,10 +45,7 @@ pub(crate) struct Accusation {
 impl Trust {
     /// For a remote I/O that has found these stations faulty.
     pub(crate) fn excluding(excluded: StationSet) -> Self {
-        Self {
-            excluded,
-            ..Self::default()
-        }
+        Self { excluded, ..Self::default() }
     }
 
     /// Stations whose votes do not count.
@@ -79,10 +76,7 @@ impl Trust {
             Finding::Majority { place, wrong } => {
                 self.excluded = self.excluded.or(wrong);
                 self.accused = StationSet::EMPTY;
-                let accusation = Accusation {
-                    accused: wrong,
-                    located: true,
-                };
+                let accusation = Accusation { accused: wrong, located: true };
                 (Judgement::Believed(place), Some(accusation))
             }
             Finding::Tie { in_outputs_only } => {
@@ -91,10 +85,7 @@ impl Trust {
                 self.in_outputs_only =
                     in_outputs_only && (self.accused.is_empty() || self.in_outputs_only);
                 self.accused = self.accused.or(voters);
-                let accusation = Accusation {
-                    accused: voters,
-                    located: false,
-                };
+                let accusation = Accusation { accused: voters, located: false };
                 (Judgement::Doubted, news.then_some(accusation))
             }
         }

@@ -56,13 +56,7 @@ pub(crate) fn find(votes: &[Vote]) -> Finding {
     // A vote equal to the first independent one, which is that of the controller where it votes, supports it.
     let direct = votes.iter().find(|vote| vote.independent);
     let counts = |vote: &&Vote| vote.independent || direct.is_some_and(|direct| same(vote, direct));
-    let support = |one: &Vote| {
-        votes
-            .iter()
-            .filter(|vote| same(vote, one))
-            .filter(counts)
-            .count()
-    };
+    let support = |one: &Vote| votes.iter().filter(|vote| same(vote, one)).filter(counts).count();
     let (place, best) = votes
         .iter()
         .enumerate()
@@ -75,9 +69,7 @@ pub(crate) fn find(votes: &[Vote]) -> Finding {
         let wrong = others.map(|vote| vote.station).collect();
         return Finding::Majority { place, wrong };
     }
-    Finding::Tie {
-        in_outputs_only: votes.iter().all(|vote| vote.digest == first.digest),
-    }
+    Finding::Tie { in_outputs_only: votes.iter().all(|vote| vote.digest == first.digest) }
 }
 
 #[cfg(test)]
@@ -135,15 +127,10 @@ mod tests {
         let direct = vote(0, 7, 1, true);
         let shared = [vote(2, 7, 0, false), vote(3, 7, 0, false)];
         let [second, third] = shared;
-        let tie = Finding::Tie {
-            in_outputs_only: true,
-        };
+        let tie = Finding::Tie { in_outputs_only: true };
         assert_eq!(find(&[direct.clone(), second.clone(), third]), tie);
         let for_it = vote(3, 7, 1, false);
-        let located = Finding::Majority {
-            place: 0,
-            wrong: StationSet::only(StationId(2)),
-        };
+        let located = Finding::Majority { place: 0, wrong: StationSet::only(StationId(2)) };
         assert_eq!(find(&[direct, second, for_it]), located);
     }
 }

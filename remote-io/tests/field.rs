@@ -47,9 +47,7 @@ impl Bench {
             _ => None,
         });
         let applied = said.iter().rev().find_map(|output| match output {
-            Output::Report(Event::Applied {
-                source, missing, ..
-            }) => Some((*source, *missing)),
+            Output::Report(Event::Applied { source, missing, .. }) => Some((*source, *missing)),
             _ => None,
         });
         let (source, missing) = applied.expect("it drives at every deadline");
@@ -63,10 +61,7 @@ impl Bench {
         let header = Header {
             cluster: agreement.cluster,
             configuration: agreement.configuration,
-            moment: Moment {
-                epoch: Epoch(1),
-                cycle: Cycle(u64::from(self.cycle)),
-            },
+            moment: Moment { epoch: Epoch(1), cycle: Cycle(u64::from(self.cycle)) },
             sender: Member::Station(StationId(0)),
             alone: false,
         };
@@ -79,8 +74,7 @@ impl Bench {
         };
         for body in [Body::Sync, Body::Join(join)] {
             let frame = Arc::new(Frame { header, body });
-            self.remote_io
-                .handle_input(self.start(), Input::Frame(&frame));
+            self.remote_io.handle_input(self.start(), Input::Frame(&frame));
         }
         let mut said: Vec<Output<Event>> = self.drain();
         let deadline = self.start() + agreement.schedule.deadline();
@@ -123,18 +117,10 @@ fn settings() -> Settings {
 
 #[test]
 fn a_forced_signal_is_sampled_and_driven_so_until_its_time_is_over() {
-    let mut bench = Bench {
-        remote_io: RemoteIo::new(Time::default(), settings()),
-        cycle: 0,
-    };
-    bench.tell(Input::RemoteIo(RemoteIoInput::Field(&Image::from_bits([
-        true, false,
-    ]))));
+    let mut bench = Bench { remote_io: RemoteIo::new(Time::default(), settings()), cycle: 0 };
+    bench.tell(Input::RemoteIo(RemoteIoInput::Field(&Image::from_bits([true, false]))));
     let started = (0..60).find_map(|_| bench.cycle().0);
-    assert!(
-        started.is_some(),
-        "it starts cold where nobody holds a state"
-    );
+    assert!(started.is_some(), "it starts cold where nobody holds a state");
     let force = |signal, value: bool, seconds| Force {
         signal,
         value: value.into(),
@@ -143,28 +129,12 @@ fn a_forced_signal_is_sampled_and_driven_so_until_its_time_is_over() {
         reason: "a test".to_owned(),
     };
     let (input, output) = (SignalPlace::Input(1), SignalPlace::Output(0));
-    bench.tell(Input::RemoteIo(RemoteIoInput::Force(&force(
-        input, true, 1,
-    ))));
-    bench.tell(Input::RemoteIo(RemoteIoInput::Force(&force(
-        output, true, 1,
-    ))));
+    bench.tell(Input::RemoteIo(RemoteIoInput::Force(&force(input, true, 1))));
+    bench.tell(Input::RemoteIo(RemoteIoInput::Force(&force(output, true, 1))));
     // None of these is a force.
-    bench.tell(Input::RemoteIo(RemoteIoInput::Force(&force(
-        SignalPlace::Input(2),
-        true,
-        1,
-    ))));
-    bench.tell(Input::RemoteIo(RemoteIoInput::Force(&force(
-        SignalPlace::Output(1),
-        true,
-        1,
-    ))));
-    bench.tell(Input::RemoteIo(RemoteIoInput::Force(&force(
-        SignalPlace::Input(0),
-        false,
-        0,
-    ))));
+    bench.tell(Input::RemoteIo(RemoteIoInput::Force(&force(SignalPlace::Input(2), true, 1))));
+    bench.tell(Input::RemoteIo(RemoteIoInput::Force(&force(SignalPlace::Output(1), true, 1))));
+    bench.tell(Input::RemoteIo(RemoteIoInput::Force(&force(SignalPlace::Input(0), false, 0))));
     let said = bench.drain();
     assert_eq!(forced_and_ended(&said), (2, 0), "{said:?}");
     let frames = |bench: &mut Bench| {
@@ -191,12 +161,7 @@ fn a_forced_signal_is_sampled_and_driven_so_until_its_time_is_over() {
     bench.tell(Input::RemoteIo(RemoteIoInput::Unforce(output)));
     bench.tell(Input::RemoteIo(RemoteIoInput::Unforce(output)));
     assert_eq!(forced_and_ended(&bench.drain()), (0, 1), "taken back once");
-    let one = (
-        image(&[true, true]),
-        fail_safe.clone(),
-        fail_safe.clone(),
-        0,
-    );
+    let one = (image(&[true, true]), fail_safe.clone(), fail_safe.clone(), 0);
     assert_eq!(frames(&mut bench), one);
     // A second later.
     bench.cycle += 100;
@@ -221,10 +186,7 @@ fn forced_and_ended(said: &[Output<Event>]) -> (usize, usize) {
 
 #[test]
 fn without_sensors_nothing_is_sampled_and_the_program_stands_still() {
-    let mut bench = Bench {
-        remote_io: RemoteIo::new(Time::default(), settings()),
-        cycle: 0,
-    };
+    let mut bench = Bench { remote_io: RemoteIo::new(Time::default(), settings()), cycle: 0 };
     let sensors = Image::from_bits([true, false]);
     bench.tell(Input::RemoteIo(RemoteIoInput::Field(&sensors)));
     // It listens first whether somebody holds a state.

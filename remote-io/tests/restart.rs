@@ -15,10 +15,7 @@ const PERIOD: Duration = Duration::from_millis(10);
 const LISTEN_CYCLES: u64 = 2;
 
 fn moment(cycle: u64) -> Moment {
-    Moment {
-        epoch: Epoch(1),
-        cycle: Cycle(cycle),
-    }
+    Moment { epoch: Epoch(1), cycle: Cycle(cycle) }
 }
 
 /// What a station says to hold: (lineage, the cycle of its last sample).
@@ -121,11 +118,8 @@ const NEVER: u64 = u64::MAX;
 
 #[test]
 fn the_state_that_was_stepped_last_is_the_one() {
-    for held in [
-        [(7, 50), (8, 49), (9, 48)],
-        [(8, 49), (7, 50), (7, 50)],
-        [(9, 1), (8, 2), (7, 3)],
-    ] {
+    for held in [[(7, 50), (8, 49), (9, 48)], [(8, 49), (7, 50), (7, 50)], [(9, 1), (8, 2), (7, 3)]]
+    {
         let newest = held.iter().position(|&(lineage, _)| lineage == 7);
         let events = run(held.map(Some), Release::Automatic, NEVER, 6);
         assert_eq!(chosen(&events), Some((7, newest.map(|rank| rank as u8))));
@@ -137,10 +131,8 @@ fn the_operator_decides_between_different_states_of_one_cycle() {
     let held = [Some((7, 50)), Some((8, 50)), Some((9, 48))];
     let asked = run(held, Release::Automatic, NEVER, 40);
     assert_eq!(chosen(&asked), None);
-    let disputes: Vec<&Event> = asked
-        .iter()
-        .filter(|event| matches!(event, Event::Disputed { .. }))
-        .collect();
+    let disputes: Vec<&Event> =
+        asked.iter().filter(|event| matches!(event, Event::Disputed { .. })).collect();
     let [Event::Disputed { stations, .. }] = disputes[..] else {
         panic!("{disputes:?}");
     };
@@ -164,9 +156,7 @@ fn where_nobody_holds_a_state_the_program_starts_cold_and_the_operator_releases_
             |event| matches!(event, Event::StartedCold { awaits_release, .. } if *awaits_release),
         );
         assert_eq!(waits, release == Release::Operator);
-        let released = events
-            .iter()
-            .any(|event| matches!(event, Event::Released { .. }));
+        let released = events.iter().any(|event| matches!(event, Event::Released { .. }));
         assert_eq!(released, release == Release::Operator);
     }
 }

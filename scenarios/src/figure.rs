@@ -91,9 +91,7 @@ pub fn figure(account: &Account, summary: &Summary) -> Result<String, FigureErro
     let mut svg = String::new();
     draw(&mut svg, &panels, end).map_err(|error| FigureError(error.to_string()))?;
     // The style sheet belongs behind the opening tag.
-    let place = svg
-        .find("<svg")
-        .and_then(|tag| Some(tag + svg[tag..].find('>')? + 1));
+    let place = svg.find("<svg").and_then(|tag| Some(tag + svg[tag..].find('>')? + 1));
     if let Some(place) = place {
         svg.insert_str(place, STYLE);
     }
@@ -152,12 +150,12 @@ fn draw_panel(
         let base = (lanes - 1 - index) as f64;
         draw_lane(&mut chart, lane, base)?;
         let (_, y) = chart.backend_coord(&(0.0, base + 0.42));
-        let style = TextStyle::from(("sans-serif", 11).into_font())
-            .color(&INK)
-            .pos(plotters::style::text_anchor::Pos::new(
+        let style = TextStyle::from(("sans-serif", 11).into_font()).color(&INK).pos(
+            plotters::style::text_anchor::Pos::new(
                 plotters::style::text_anchor::HPos::Right,
                 plotters::style::text_anchor::VPos::Center,
-            ));
+            ),
+        );
         let place = (LABELS_WIDTH - 8 - left + left, y - top);
         area.draw_text(&lane.name, &style, place)?;
     }
@@ -183,10 +181,7 @@ fn draw_lane<'a>(
     lines.push(line);
     let style = lane.colour.stroke_width(1);
     chart.draw_series(
-        lines
-            .into_iter()
-            .filter(|line| !line.is_empty())
-            .map(|line| PathElement::new(line, style)),
+        lines.into_iter().filter(|line| !line.is_empty()).map(|line| PathElement::new(line, style)),
     )?;
     Ok(())
 }
@@ -201,10 +196,7 @@ fn panels(account: &Account, summary: &Summary) -> Vec<Panel> {
         u8::try_from(index)
             .ok()
             .filter(|index| *index < 26)
-            .map_or_else(
-                || (index + 1).to_string(),
-                |index| char::from(b'a' + index).to_string(),
-            )
+            .map_or_else(|| (index + 1).to_string(), |index| char::from(b'a' + index).to_string())
     });
     let mut letters = letters;
     let mut letter = || letters.next().unwrap_or_default();
@@ -241,16 +233,8 @@ fn panels(account: &Account, summary: &Summary) -> Vec<Panel> {
             let signals = terms.signals.get(station.index());
             signals.map_or_else(Vec::new, |own| point_lanes(trace, &own.output_points))
         };
-        let kind = if understudy {
-            "understudy"
-        } else {
-            "controller"
-        };
-        let what = if understudy {
-            "parity outputs"
-        } else {
-            "outputs"
-        };
+        let kind = if understudy { "understudy" } else { "controller" };
+        let what = if understudy { "parity outputs" } else { "outputs" };
         panels.push(Panel {
             title: if name == kind {
                 format!("({}) {name}: {what}", letter())
@@ -272,11 +256,7 @@ fn bounded(mut lanes: Vec<Lane>) -> Vec<Lane> {
     if lanes.len() > MAXIMUM_LANES {
         let left_out = lanes.len() - MAXIMUM_LANES + 1;
         lanes.truncate(MAXIMUM_LANES - 1);
-        lanes.push(Lane {
-            name: format!("({left_out} more)"),
-            colour: SIGNAL,
-            steps: Vec::new(),
-        });
+        lanes.push(Lane { name: format!("({left_out} more)"), colour: SIGNAL, steps: Vec::new() });
     }
     lanes
 }
@@ -300,12 +280,9 @@ fn bit_lanes(trace: &Trace<Image>, names: &[String]) -> Vec<Lane> {
 /// A lane for each point: high and low for a BOOL; a number lies between its least and its greatest value, which stand behind its name.
 fn point_lanes(trace: &Trace<Image>, points: &Points) -> Vec<Lane> {
     let lanes = points.iter().map(|point| {
-        let spans = trace
-            .spans()
-            .filter(|(.., image)| image.width() >= points.width());
-        let values: Vec<Step> = spans
-            .map(|(from, to, image)| (from, to, drawn(point, image)))
-            .collect();
+        let spans = trace.spans().filter(|(.., image)| image.width() >= points.width());
+        let values: Vec<Step> =
+            spans.map(|(from, to, image)| (from, to, drawn(point, image))).collect();
         let finite = values.iter().map(|(.., value)| *value);
         let (low, high) = finite
             .filter(|value| value.is_finite())

@@ -22,10 +22,8 @@ const MAXIMUM_SLOWNESS: Duration = Duration::from_secs(1);
 const ANY: Kind = Kind::Count(0, u64::MAX);
 const SHARE: Kind = Kind::Number(0.0, 1.0);
 const LATENCY: Kind = Kind::Time(Duration::ZERO, MAXIMUM_LATENCY);
-const VALUE: Kind = Kind::Either(
-    &Kind::Flag,
-    &Kind::Either(&Kind::Number(f64::MIN, f64::MAX), &Kind::Text),
-);
+const VALUE: Kind =
+    Kind::Either(&Kind::Flag, &Kind::Either(&Kind::Number(f64::MIN, f64::MAX), &Kind::Text));
 const SOURCE: Kind = Kind::Word(|| SOURCES.into_iter().map(source_word).collect());
 
 /// The whole file.

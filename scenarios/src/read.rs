@@ -54,36 +54,24 @@ pub struct ReadScenario {
 ///
 /// Without a cluster, names are not known: then names are taken as they come and the scenario is only checked, not answered.
 pub fn read(name: &str, text: &str, members: Option<&Members>) -> ReadScenario {
-    let mut reader = Reader {
-        members,
-        diagnostics: Vec::new(),
-    };
+    let mut reader = Reader { members, diagnostics: Vec::new() };
     let root = parse(text, &CODES, &mut reader.diagnostics);
     let scenario = root.as_ref().and_then(|root| {
-        let table = Placed {
-            value: root.get_ref(),
-            span: 0..0,
-        };
+        let table = Placed { value: root.get_ref(), span: 0..0 };
         reader.scenario(Fields::of(&SCENARIO, table, &CODES))
     });
     let mut diagnostics = reader.diagnostics;
     diagnostics.sort_by_key(|diagnostic| (diagnostic.span.start, diagnostic.span.end));
     ReadScenario {
         scenario: scenario.filter(|_| members.is_some() && !has_errors(&diagnostics)),
-        report: Report {
-            name: name.to_owned(),
-            text: text.to_owned(),
-            diagnostics,
-        },
+        report: Report { name: name.to_owned(), text: text.to_owned(), diagnostics },
     }
 }
 
 /// Whether a TOML text looks like a scenario rather than like another file of this project.
 pub fn looks_like_a_scenario(text: &str) -> bool {
     let (table, _) = DeTable::parse_recoverable(text);
-    ["step", "expect", "cycles"]
-        .iter()
-        .any(|key| table.get_ref().contains_key(*key))
+    ["step", "expect", "cycles"].iter().any(|key| table.get_ref().contains_key(*key))
 }
 
 struct Reader<'p> {
@@ -141,10 +129,7 @@ impl Reader<'_> {
         let place = fields.span();
         fields.finish(found);
         let cycles = (from.is_some() || to.is_some()).then(|| {
-            let place = to
-                .as_ref()
-                .or(from.as_ref())
-                .map_or(place, |bound| bound.span.clone());
+            let place = to.as_ref().or(from.as_ref()).map_or(place, |bound| bound.span.clone());
             let from = from.map_or(0, |from| from.value);
             let to = to.map_or(end, |to| to.value);
             self.range(from, to, end, place)
@@ -155,15 +140,10 @@ impl Reader<'_> {
     /// A range of cycles; an error where it is empty or past the end.
     fn range(&mut self, from: u64, to: u64, end: u64, place: Range<usize>) -> Range<u64> {
         if from >= to || to > end {
-            let why = if from >= to {
-                "no cycle"
-            } else {
-                "past the end"
-            };
+            let why = if from >= to { "no cycle" } else { "past the end" };
             let message =
                 format!("cycles {from} up to, not including, {to} of a run of {end}: {why}");
-            self.diagnostics
-                .push(Diagnostic::error("U0310", message, place));
+            self.diagnostics.push(Diagnostic::error("U0310", message, place));
         }
         from..to
     }
@@ -193,18 +173,12 @@ impl Reader<'_> {
             fail_safe,
             plant_faults,
             protected: protected.unwrap_or(false),
-            functional: functional
-                .iter()
-                .filter_map(|name| self.plant(name))
-                .collect(),
+            functional: functional.iter().filter_map(|name| self.plant(name)).collect(),
             finished: finished
                 .iter()
                 .filter_map(|(name, parts)| Some((self.plant(name)?, *parts)))
                 .collect(),
-            during: during
-                .into_iter()
-                .filter_map(|fields| self.during(fields, end))
-                .collect(),
+            during: during.into_iter().filter_map(|fields| self.during(fields, end)).collect(),
         }
     }
 
@@ -218,10 +192,7 @@ impl Reader<'_> {
         fields.finish(found);
         let mut sources = Vec::new();
         for Placed { value: word, span } in words {
-            match SOURCES
-                .into_iter()
-                .find(|source| source_word(*source) == word)
-            {
+            match SOURCES.into_iter().find(|source| source_word(*source) == word) {
                 Some(source) => sources.push(source),
                 None => {
                     let message = format!("there is no source `{word}`");
@@ -244,12 +215,7 @@ impl Reader<'_> {
                 return None;
             }
         };
-        Some(During {
-            from,
-            to: to.value,
-            remote_io,
-            sources: sources_or_any(sources),
-        })
+        Some(During { from, to: to.value, remote_io, sources: sources_or_any(sources) })
     }
 
     fn plant(&mut self, name: &Placed<&str>) -> Option<ProgramId> {
@@ -290,9 +256,5 @@ impl Reader<'_> {
 
 /// An empty list only comes with an error or a missing key, which are reported; then anything would do.
 fn sources_or_any(sources: Vec<Source>) -> Vec<Source> {
-    if sources.is_empty() {
-        SOURCES.to_vec()
-    } else {
-        sources
-    }
+    if sources.is_empty() { SOURCES.to_vec() } else { sources }
 }

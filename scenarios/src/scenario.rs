@@ -38,10 +38,7 @@ pub const TABLE_TWO: &str = include_str!("../table-two.toml");
 impl Scenario {
     /// What a simulated network is, and when.
     pub fn disturbance(&self) -> Option<Disturbance> {
-        Some(Disturbance {
-            network: self.network?,
-            cycles: self.network_cycles.clone(),
-        })
+        Some(Disturbance { network: self.network?, cycles: self.network_cycles.clone() })
     }
 
     /// Whether it does nothing to the cluster and expects nothing of it: a cluster that merely runs.
@@ -75,9 +72,7 @@ impl Scenario {
     pub fn compressed(mut self, divisor: NonZeroU64) -> Self {
         let earlier = |cycle: &mut u64| *cycle /= divisor;
         earlier(&mut self.cycles);
-        self.steps
-            .iter_mut()
-            .for_each(|step| earlier(&mut step.at_cycle));
+        self.steps.iter_mut().for_each(|step| earlier(&mut step.at_cycle));
         for during in &mut self.expect.during {
             earlier(&mut during.from);
             earlier(&mut during.to);

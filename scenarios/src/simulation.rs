@@ -53,10 +53,8 @@ pub fn simulate(
             account.observe(&record);
         }
     };
-    let ran = simulation.run(
-        scenario.cycles,
-        PATIENCE_CYCLES,
-        &mut |now, cycle, member, record| {
+    let ran =
+        simulation.run(scenario.cycles, PATIENCE_CYCLES, &mut |now, cycle, member, record| {
             let happening = match record {
                 Simulated::Station(event) => Happening::Station(event.clone()),
                 Simulated::RemoteIo(event) => Happening::RemoteIo(event.clone()),
@@ -94,17 +92,16 @@ pub fn simulate(
                 let plant = Member::Plant(program);
                 take(&Record::of_member(now.0, plant, &members, event), None);
             }
-        },
-    );
+        });
     ran?;
     Ok(account)
 }
 
 fn applied(happening: &Happening) -> Option<(Moment, Image)> {
     match happening {
-        Happening::RemoteIo(RemoteIoEvent::Applied {
-            moment, outputs, ..
-        }) => Some((*moment, outputs.clone())),
+        Happening::RemoteIo(RemoteIoEvent::Applied { moment, outputs, .. }) => {
+            Some((*moment, outputs.clone()))
+        }
         _ => None,
     }
 }

@@ -208,11 +208,7 @@ pub struct AlarmSummary {
 impl fmt::Display for AlarmSummary {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let priority = self.priority.word();
-        write!(
-            formatter,
-            "{} ({priority}): {}; raised ",
-            self.name, self.text
-        )?;
+        write!(formatter, "{} ({priority}): {}; raised ", self.name, self.text)?;
         match self.raised {
             1 => formatter.write_str("once")?,
             times => write!(formatter, "{times} times, first")?,
@@ -330,10 +326,7 @@ impl Summary {
             refused: account
                 .refused
                 .iter()
-                .map(|(name, why)| RefusedSummary {
-                    name: name.clone(),
-                    why: why.clone(),
-                })
+                .map(|(name, why)| RefusedSummary { name: name.clone(), why: why.clone() })
                 .collect(),
             stalls: finished.stalls,
             alarms: alarms.collect(),
@@ -342,11 +335,7 @@ impl Summary {
         };
         summary.expectations = expectations::expectations(&summary, &account, scenario);
         let complete = summary.cycles_run == summary.cycles_asked && !summary.interrupted;
-        summary.passed = complete
-            && summary
-                .expectations
-                .iter()
-                .all(|expectation| expectation.met);
+        summary.passed = complete && summary.expectations.iter().all(|expectation| expectation.met);
         if complete {
             summary.inconclusive = summary.late_host();
         }

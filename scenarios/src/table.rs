@@ -46,21 +46,13 @@ impl Table {
     /// Of a run.
     pub fn new(summary: &Summary) -> Self {
         let mut starts: Vec<u64> = vec![0];
-        starts.extend(
-            summary
-                .stations
-                .iter()
-                .flat_map(|row| froms(&row.intervals)),
-        );
+        starts.extend(summary.stations.iter().flat_map(|row| froms(&row.intervals)));
         starts.extend(summary.plants.iter().flat_map(|row| froms(&row.intervals)));
         starts.retain(|&start| start < summary.cycles_run);
         starts.sort_unstable();
         starts.dedup();
         let left_out = starts.len().saturating_sub(MAXIMUM_COLUMNS);
-        let end = starts
-            .get(MAXIMUM_COLUMNS)
-            .copied()
-            .unwrap_or(summary.cycles_run);
+        let end = starts.get(MAXIMUM_COLUMNS).copied().unwrap_or(summary.cycles_run);
         starts.truncate(MAXIMUM_COLUMNS);
         let ends = starts.iter().skip(1).copied().chain([end]);
         let columns = starts.iter().zip(ends).map(|(from, to)| match to - from {
@@ -75,11 +67,7 @@ impl Table {
             name: plant.name.clone(),
             cells: cells(&starts, &plant.intervals, service_word),
         });
-        Self {
-            columns: columns.collect(),
-            rows: stations.chain(plants).collect(),
-            left_out,
-        }
+        Self { columns: columns.collect(), rows: stations.chain(plants).collect(), left_out }
     }
 }
 
@@ -94,9 +82,8 @@ fn cells<T: Copy>(
 ) -> Vec<Cell> {
     let mut cells: Vec<Cell> = Vec::new();
     for &start in starts {
-        let interval = intervals
-            .iter()
-            .find(|interval| (interval.from..interval.to).contains(&start));
+        let interval =
+            intervals.iter().find(|interval| (interval.from..interval.to).contains(&start));
         let text = interval.map_or("", |interval| word(interval.state));
         match cells.last_mut() {
             Some(last) if last.text == text => last.span += 1,
@@ -133,31 +120,17 @@ impl Table {
                 let (start, end) = (column, column + cell.span);
                 column = end;
                 let span = end.min(to).checked_sub(start.max(from))?;
-                (span > 0).then_some(Cell {
-                    span,
-                    text: cell.text,
-                })
+                (span > 0).then_some(Cell { span, text: cell.text })
             });
-            Row {
-                name: row.name.clone(),
-                cells: cells.collect(),
-            }
+            Row { name: row.name.clone(), cells: cells.collect() }
         });
-        Self {
-            columns: self.columns[from..to].to_vec(),
-            rows: rows.collect(),
-            left_out: 0,
-        }
+        Self { columns: self.columns[from..to].to_vec(), rows: rows.collect(), left_out: 0 }
     }
 
     /// The width of each column with its gap: of its cycles, and of states that are not joined with their neighbours.
     fn widths(&self) -> Vec<usize> {
         let length = |text: &str| text.chars().count();
-        let mut widths: Vec<usize> = self
-            .columns
-            .iter()
-            .map(|column| length(column) + 2)
-            .collect();
+        let mut widths: Vec<usize> = self.columns.iter().map(|column| length(column) + 2).collect();
         for row in &self.rows {
             let mut column = 0;
             for cell in &row.cells {
@@ -214,11 +187,7 @@ impl fmt::Display for Table {
             from = to;
         }
         if self.left_out > 0 {
-            writeln!(
-                formatter,
-                "({} more columns are in summary.json)",
-                self.left_out
-            )?;
+            writeln!(formatter, "({} more columns are in summary.json)", self.left_out)?;
         }
         Ok(())
     }
@@ -231,34 +200,17 @@ mod tests {
     #[test]
     fn a_wide_table_goes_on_below() {
         let table = Table {
-            columns: (0..30)
-                .map(|column| format!("{column}0–{column}9"))
-                .collect(),
+            columns: (0..30).map(|column| format!("{column}0–{column}9")).collect(),
             rows: vec![
                 Row {
                     name: "robot".into(),
                     cells: vec![
-                        Cell {
-                            span: 14,
-                            text: "on",
-                        },
-                        Cell {
-                            span: 2,
-                            text: "OFF",
-                        },
-                        Cell {
-                            span: 14,
-                            text: "on",
-                        },
+                        Cell { span: 14, text: "on" },
+                        Cell { span: 2, text: "OFF" },
+                        Cell { span: 14, text: "on" },
                     ],
                 },
-                Row {
-                    name: "arm".into(),
-                    cells: vec![Cell {
-                        span: 30,
-                        text: "functional",
-                    }],
-                },
+                Row { name: "arm".into(), cells: vec![Cell { span: 30, text: "functional" }] },
             ],
             left_out: 3,
         };

@@ -118,17 +118,13 @@ fn write_expectation(text: &mut String, expect: &Expectation, members: &Members)
     }
     if !expect.finished.is_empty() {
         let finished = expect.finished.iter();
-        let counts: Vec<String> = finished
-            .map(|(&program, count)| format!("{} = {count}", plant(program)))
-            .collect();
+        let counts: Vec<String> =
+            finished.map(|(&program, count)| format!("{} = {count}", plant(program))).collect();
         let _ = writeln!(text, "finished = {{ {} }}", counts.join(", "));
     }
     for during in &expect.during {
-        let sources: Vec<String> = during
-            .sources
-            .iter()
-            .map(|&source| quoted(source_word(source)))
-            .collect();
+        let sources: Vec<String> =
+            during.sources.iter().map(|&source| quoted(source_word(source))).collect();
         let _ = writeln!(
             text,
             "\n[[expect.during]]\nfrom = {}\nto = {}\nremote_io = {}\nsource = [{}]",

@@ -26,13 +26,7 @@ struct Reference {
 
 impl Reference {
     fn sampled(&mut self, cluster: &Cluster, program: ProgramId, event: &RemoteIoEvent) {
-        let RemoteIoEvent::Sampled {
-            moment,
-            inputs,
-            born,
-            before,
-        } = event
-        else {
+        let RemoteIoEvent::Sampled { moment, inputs, born, before } = event else {
             return;
         };
         let found = &cluster.programs()[program.index()];
@@ -62,9 +56,7 @@ impl Reference {
     }
 
     fn lineages(&self, all: ProgramSet, moment: Moment) -> Vec<Lineage> {
-        all.iter()
-            .filter_map(|program| Some(self.outputs.get(&(program, moment))?.0))
-            .collect()
+        all.iter().filter_map(|program| Some(self.outputs.get(&(program, moment))?.0)).collect()
     }
 }
 
@@ -77,11 +69,8 @@ fn parity_outputs(mode: Mode, text: &str) -> BTreeMap<Vec<u64>, Image> {
     let all = ProgramSet::first(cluster.controllers().len());
     let mut reference = Reference::default();
     let mut published: Vec<(StationId, Moment, Vec<Word>)> = Vec::new();
-    let run = simulate(
-        &cluster,
-        &scenario,
-        1,
-        &mut |record| match (record.member, &record.event) {
+    let run =
+        simulate(&cluster, &scenario, 1, &mut |record| match (record.member, &record.event) {
             (Some(Member::RemoteIo(program)), Happening::RemoteIo(event)) => {
                 reference.sampled(&cluster, program, event);
             }
@@ -90,22 +79,15 @@ fn parity_outputs(mode: Mode, text: &str) -> BTreeMap<Vec<u64>, Image> {
                 Happening::Station(StationEvent::Published { moment, words }),
             ) => published.push((station, *moment, words.to_vec())),
             _ => {}
-        },
-    );
+        });
     run.expect("the cluster is synchronised");
     let mut outputs = BTreeMap::new();
     for (station, moment, words) in published {
         for word in &words {
             let truth = reference.sum(word.mask, moment);
-            assert_eq!(
-                truth.as_ref(),
-                Some(word),
-                "{mode:?} {station:?} {moment:?}"
-            );
+            assert_eq!(truth.as_ref(), Some(word), "{mode:?} {station:?} {moment:?}");
         }
-        let covered = words
-            .iter()
-            .fold(ProgramSet::EMPTY, |covered, word| covered.or(word.mask));
+        let covered = words.iter().fold(ProgramSet::EMPTY, |covered, word| covered.or(word.mask));
         let understudy = cluster.agreement().schedule.is_understudy(station);
         if understudy && covered == all {
             let mut total = Image::default();
@@ -121,18 +103,14 @@ fn parity_outputs(mode: Mode, text: &str) -> BTreeMap<Vec<u64>, Image> {
 fn check(text: &str) {
     let replicas = parity_outputs(Mode::Full, text);
     let generated = parity_outputs(Mode::Paper, text);
-    let both = generated
-        .iter()
-        .filter_map(|(lineages, output)| Some((output, replicas.get(lineages)?)));
+    let both =
+        generated.iter().filter_map(|(lineages, output)| Some((output, replicas.get(lineages)?)));
     let mut compared = 0;
     for (generated, replicas) in both {
         assert_eq!(generated, replicas, "(9)");
         compared += 1;
     }
-    assert!(
-        compared > 50,
-        "{compared} cycles of both modes are the same"
-    );
+    assert!(compared > 50, "{compared} cycles of both modes are the same");
 }
 
 #[test]

@@ -36,9 +36,7 @@ fn run(mode: Mode, text: &str, seed: u64) -> (Vec<u8>, Summary, Account) {
     let scenario = scenario(&cluster, text);
     let mut bytes = Vec::new();
     let mut journal = Journal::new(&mut bytes);
-    let account = simulate(&cluster, &scenario, seed, &mut |record| {
-        journal.write(record)
-    });
+    let account = simulate(&cluster, &scenario, seed, &mut |record| journal.write(record));
     let account = account.expect("the cluster comes into step");
     let state = journal.finish();
     let (summary, account) = Summary::new(account, &scenario, circumstances(), state);
@@ -115,10 +113,7 @@ during = [{ from = 40, to = 60, remote_io = "robot-io", source = "direct" }]
         .iter()
         .map(|expectation| {
             let met = if expectation.met { "met" } else { "NOT MET" };
-            format!(
-                "{met}: {}; found {}",
-                expectation.expected, expectation.found
-            )
+            format!("{met}: {}; found {}", expectation.expected, expectation.found)
         })
         .collect();
     insta::assert_snapshot!(lines.join("\n"), @r"
@@ -150,11 +145,8 @@ fn an_output_that_was_changed_is_found() {
     let (bytes, ..) = run(Mode::Full, text, 3);
     let mut deadlines = 0;
     let changed = account_of(&bytes, text, |mut record| {
-        if let Happening::RemoteIo(Event::Applied {
-            outputs,
-            source: Source::Direct,
-            ..
-        }) = &mut record.event
+        if let Happening::RemoteIo(Event::Applied { outputs, source: Source::Direct, .. }) =
+            &mut record.event
         {
             deadlines += 1;
             if deadlines == 150 {
@@ -194,10 +186,7 @@ fn what_was_not_written_is_not_judged_and_is_said() {
         if !(sampled && samples == 30) {
             return Some(record);
         }
-        Some(Record {
-            event: Happening::Host(HostEvent::JournalLost { records: 1 }),
-            ..record
-        })
+        Some(Record { event: Happening::Host(HostEvent::JournalLost { records: 1 }), ..record })
     });
     assert_eq!(lacking.violation_count, 0, "{:?}", lacking.violations);
     assert!(!lacking.passed);
@@ -251,25 +240,16 @@ source = "reconstructed"
             Happening::RemoteIo(Event::Applied { moment, .. }) if record.name == "press-io" => {
                 let (moment, late) = (*moment, std::time::Duration::from_millis(5));
                 let event = Happening::RemoteIo(Event::Stalled { moment, late });
-                Some(Record {
-                    event,
-                    ..record.clone()
-                })
+                Some(Record { event, ..record.clone() })
             }
             _ => None,
         };
         woken_late.into_iter().chain([record])
     });
-    let found: Vec<&str> = stalled
-        .expectations
-        .iter()
-        .map(|expected| expected.found.as_str())
-        .collect();
+    let found: Vec<&str> =
+        stalled.expectations.iter().map(|expected| expected.found.as_str()).collect();
     assert!(stalled.passed, "{found:?}");
-    assert_eq!(
-        found.last().copied(),
-        Some("as expected, but for 10 while the host stood still")
-    );
+    assert_eq!(found.last().copied(), Some("as expected, but for 10 while the host stood still"));
 }
 
 /// A host that woke a member late once may have cost more than the cycle in which that was seen: neither passed nor failed.
@@ -287,14 +267,8 @@ fn a_run_on_a_late_host_is_inconclusive() {
             if let Happening::RemoteIo(Event::Applied { moment, .. }) = &record.event {
                 seen += 1;
                 let late_by = std::time::Duration::from_millis(5);
-                let event = Happening::RemoteIo(Event::Stalled {
-                    moment: *moment,
-                    late: late_by,
-                });
-                late = (seen == 40).then(|| Record {
-                    event,
-                    ..record.clone()
-                });
+                let event = Happening::RemoteIo(Event::Stalled { moment: *moment, late: late_by });
+                late = (seen == 40).then(|| Record { event, ..record.clone() });
             }
             late.into_iter().chain([record])
         })
@@ -343,10 +317,7 @@ fn the_cycle_in_which_a_run_is_interrupted_is_none_of_it() {
     for teller in ["robot-io", "press-io"] {
         let mut told = 0;
         let summary = account_of(&bytes, text, |record| {
-            let tells = matches!(
-                record.event,
-                Happening::RemoteIo(RemoteIoEvent::Applied { .. })
-            );
+            let tells = matches!(record.event, Happening::RemoteIo(RemoteIoEvent::Applied { .. }));
             told += u32::from(tells && record.name == teller);
             match told {
                 0..=150 => vec![record],
@@ -397,12 +368,6 @@ fn the_report_and_the_figure_show_the_run() {
     }
     let report = report(&summary, &figure).expect("a report");
     assert!(report.contains(&figure), "in one file");
-    assert!(
-        report.contains("understudy simulate &lt;cluster&gt; &amp; more"),
-        "escaped"
-    );
-    assert!(
-        !report.contains("http://") || !report.contains("<link"),
-        "alone"
-    );
+    assert!(report.contains("understudy simulate &lt;cluster&gt; &amp; more"), "escaped");
+    assert!(!report.contains("http://") || !report.contains("<link"), "alone");
 }

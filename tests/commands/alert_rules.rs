@@ -60,11 +60,7 @@ fn every_rule_asks_for_what_a_run_exposes() {
     let folder = finished_run("gateway_alerts");
     let answer = understudy_in(&folder, &["gateway", "metrics", "runs/latest", "--once"]);
     assert_eq!(answer.status, 0, "{}", answer.errors);
-    let samples: Vec<&str> = answer
-        .output
-        .lines()
-        .filter(|line| !line.starts_with('#'))
-        .collect();
+    let samples: Vec<&str> = answer.output.lines().filter(|line| !line.starts_with('#')).collect();
     let of = |metric: &str| {
         let start = format!("{metric}{{");
         let own = samples.iter().filter(move |line| line.starts_with(&start));
@@ -85,10 +81,7 @@ fn every_rule_asks_for_what_a_run_exposes() {
         "understudy_records_received",
         "understudy_journal_records_lost_total",
     ] {
-        assert!(
-            rules.iter().any(|rule| rule[1].contains(asked)),
-            "no rule asks for {asked}"
-        );
+        assert!(rules.iter().any(|rule| rule[1].contains(asked)), "no rule asks for {asked}");
     }
     for [name, expression, summary] in &rules {
         let metrics = metric_names(expression);
@@ -108,30 +101,21 @@ fn every_rule_asks_for_what_a_run_exposes() {
         for label in summary.split("$labels.").skip(1) {
             let label = label.split(' ').next().expect("a name");
             let start = format!("{label}=\"");
-            let is_exposed = metrics
-                .iter()
-                .any(|metric| of(metric).iter().any(|line| line.contains(&start)));
-            assert!(
-                is_exposed || label == "instance",
-                "{name}: no label {label}"
-            );
+            let is_exposed =
+                metrics.iter().any(|metric| of(metric).iter().any(|line| line.contains(&start)));
+            assert!(is_exposed || label == "instance", "{name}: no label {label}");
         }
     }
     let state = |state: &str| format!("state=\"{state}\"}} 1");
     let run = of("understudy_run_state");
-    assert!(
-        run.iter().any(|line| line.ends_with(&state("finished"))),
-        "{run:?}"
-    );
+    assert!(run.iter().any(|line| line.ends_with(&state("finished"))), "{run:?}");
 }
 
 #[test]
 fn promtool_reads_every_rule() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let checked = Command::new("promtool")
-        .args(["check", "rules", RULES])
-        .current_dir(root)
-        .output();
+    let checked =
+        Command::new("promtool").args(["check", "rules", RULES]).current_dir(root).output();
     let checked = match checked {
         Ok(checked) => checked,
         Err(error) => {

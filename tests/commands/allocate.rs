@@ -37,11 +37,7 @@ fn the_press_cell_gets_a_box_for_every_member() {
     assert_snapshot!(answer.shown());
     let document = understudy(&["allocate", PRESS_CELL, "--json"]).json();
     let boxes = document["result"]["boxes"].as_array().expect("boxes");
-    assert_eq!(
-        boxes.len(),
-        5,
-        "two controllers, the understudy, two remote I/Os"
-    );
+    assert_eq!(boxes.len(), 5, "two controllers, the understudy, two remote I/Os");
     let items = document["result"]["items"].as_array().expect("items");
     for item in items {
         assert_eq!(item["left_over"], Value::Null, "{}", item["name"]);
@@ -85,43 +81,19 @@ fn a_property_that_does_not_hold_keeps_a_program_from_its_controller() {
     let asked = format!("painting={}", file.display());
     let answer = understudy(&["allocate", PAINTING, "--properties", &asked]);
     assert_eq!(answer.status, 1);
-    assert!(
-        answer
-            .output
-            .contains("no box for painting: not recommended"),
-        "{}",
-        answer.output
-    );
+    assert!(answer.output.contains("no box for painting: not recommended"), "{}", answer.output);
     let insisted = understudy(&["allocate", PAINTING, "--properties", &asked, "--unverified"]);
     assert_eq!(insisted.status, 0, "{}", insisted.shown());
-    assert!(
-        insisted.output.contains("does not hold"),
-        "{}",
-        insisted.output
-    );
+    assert!(insisted.output.contains("does not hold"), "{}", insisted.output);
 }
 
 #[test]
 fn what_is_asked_wrongly_is_said_whole() {
-    let arguments = [
-        "allocate",
-        PAINTING,
-        "--require",
-        "inputs>3",
-        "--require",
-        "colour=red",
-    ];
+    let arguments = ["allocate", PAINTING, "--require", "inputs>3", "--require", "colour=red"];
     let answer = understudy(&arguments);
     assert_eq!(answer.status, 2);
     assert_snapshot!(answer.shown());
-    let arguments = [
-        "allocate",
-        PAINTING,
-        "--stock",
-        "CPU 1214=1",
-        "--stock",
-        "Nothing=2",
-    ];
+    let arguments = ["allocate", PAINTING, "--stock", "CPU 1214=1", "--stock", "Nothing=2"];
     assert_snapshot!(understudy(&arguments).shown());
 }
 
@@ -142,65 +114,28 @@ fn a_catalogue_of_ones_own_is_made_filled_and_exported() {
         "digital_inputs=16",
         "comm_ports=1x Ethernet",
     ];
-    let added = understudy(
-        &[
-            &["catalogue", "add", "--catalogue", &database],
-            &figures[..],
-        ]
-        .concat(),
-    );
+    let added =
+        understudy(&[&["catalogue", "add", "--catalogue", &database], &figures[..]].concat());
     assert_eq!(added.status, 0, "{}", added.shown());
-    assert!(
-        added.output.contains("1 added, 0 updated"),
-        "{}",
-        added.output
-    );
-    let again = understudy(
-        &[
-            &["catalogue", "add", "--catalogue", &database],
-            &figures[..],
-        ]
-        .concat(),
-    );
+    assert!(added.output.contains("1 added, 0 updated"), "{}", added.output);
+    let again =
+        understudy(&[&["catalogue", "add", "--catalogue", &database], &figures[..]].concat());
     assert_eq!(again.status, 2);
     assert!(again.errors.contains("U1125"), "{}", again.errors);
 
     let text = "vendor,model,family,kind,price,currency,source_url\nWorks,A1,A,plc,249.50,EUR,quotation 17\n";
     fs::write(&prices, text).expect("written");
-    let imported = understudy(&[
-        "catalogue",
-        "import",
-        &prices,
-        "--catalogue",
-        &database,
-        "--update",
-    ]);
-    assert!(
-        imported.output.contains("0 added, 1 updated"),
-        "{}",
-        imported.shown()
-    );
+    let imported =
+        understudy(&["catalogue", "import", &prices, "--catalogue", &database, "--update"]);
+    assert!(imported.output.contains("0 added, 1 updated"), "{}", imported.shown());
     let shown = understudy(&["catalogue", "show", "A1", "--catalogue", &database]);
     assert_snapshot!(shown.shown());
 
-    let written = understudy(&[
-        "catalogue",
-        "export",
-        "--catalogue",
-        &database,
-        "--output",
-        &exported,
-    ]);
+    let written =
+        understudy(&["catalogue", "export", "--catalogue", &database, "--output", &exported]);
     assert_eq!(written.status, 0, "{}", written.shown());
     let copy = file("copy.csv");
-    let copied = understudy(&[
-        "catalogue",
-        "import",
-        &exported,
-        "--catalogue",
-        &copy,
-        "--empty",
-    ]);
+    let copied = understudy(&["catalogue", "import", &exported, "--catalogue", &copy, "--empty"]);
     assert!(copied.output.contains("88 added"), "{}", copied.shown());
     let listed =
         |name: &str| understudy(&["catalogue", "list", "--catalogue", name, "--json"]).json();

@@ -28,10 +28,7 @@ fn recorded(name: &str) -> PathBuf {
 #[test]
 fn the_picture_of_the_readme_is_drawn_from_a_recorded_run() {
     let folder = recorded("animate");
-    let drawn = understudy_in(
-        &folder,
-        &["animate", "run", "--output", "kill.svg", "--json"],
-    );
+    let drawn = understudy_in(&folder, &["animate", "run", "--output", "kill.svg", "--json"]);
     assert_eq!(drawn.status, 0, "{}", drawn.shown());
     let result = drawn.json()["result"].clone();
     assert_eq!((&result["from"], &result["to"]), (&176.into(), &355.into()));
@@ -56,10 +53,7 @@ fn a_part_of_a_run_is_animated() {
     assert_eq!(part.status, 0, "{}", part.shown());
     let picture = fs::read_to_string(folder.join("part.svg")).expect("a picture");
     // All of it is direct: nothing else may be drawn.
-    assert!(
-        picture.contains("→ direct") && !picture.contains("reconstructed"),
-        "{picture}"
-    );
+    assert!(picture.contains("→ direct") && !picture.contains("reconstructed"), "{picture}");
     assert!(!picture.contains("killed"), "{picture}");
 }
 
@@ -76,11 +70,7 @@ fn what_is_not_in_the_journal_is_not_drawn() {
     };
     check(&["--program", "robbot"], "U0577", "robot, press");
     check(&["--from", "5000"], "U0575", "170 to 362");
-    check(
-        &["--from", "200", "--to", "190"],
-        "U0579",
-        "190, comes before",
-    );
+    check(&["--from", "200", "--to", "190"], "U0579", "190, comes before");
     let journal = folder.join("run/journal.jsonl");
     let text = fs::read_to_string(&journal).expect("a journal");
     let undisturbed = text.lines().filter(|line| !line.contains("\"fault\""));

@@ -26,12 +26,7 @@ fn pages_below(folder: &Path, found: &mut Vec<PathBuf>) {
 
 /// The pages in the folder of the project itself.
 fn top_pages() -> Vec<PathBuf> {
-    let names = [
-        "README.md",
-        "ARCHITECTURE.md",
-        "CONTRIBUTING.md",
-        "CHANGELOG.md",
-    ];
+    let names = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md"];
     names.iter().map(|name| root().join(name)).collect()
 }
 
@@ -54,9 +49,7 @@ fn prose(text: &str) -> String {
 fn links(text: &str) -> Vec<String> {
     let prose = prose(text);
     let parts = prose.split("](").skip(1);
-    parts
-        .filter_map(|part| Some(part.split_once(')')?.0.to_owned()))
-        .collect()
+    parts.filter_map(|part| Some(part.split_once(')')?.0.to_owned())).collect()
 }
 
 /// As GitHub and mdBook name the place of a heading.
@@ -144,10 +137,7 @@ fn blocks(text: &str) -> Vec<(String, String)> {
     while let Some(line) = lines.next() {
         if let Some(words) = line.strip_prefix("```") {
             let body = lines.by_ref().take_while(|line| *line != "```");
-            blocks.push((
-                words.to_owned(),
-                body.flat_map(|line| [line, "\n"]).collect(),
-            ));
+            blocks.push((words.to_owned(), body.flat_map(|line| [line, "\n"]).collect()));
         }
     }
     blocks
@@ -156,15 +146,8 @@ fn blocks(text: &str) -> Vec<(String, String)> {
 /// The commands of a block, for the binary that was built. Real processes have tests of their own.
 fn commands(body: &str) -> String {
     let body = body.replace("cargo run --release -- ", "understudy ");
-    let apart = [
-        "understudy demo",
-        "understudy lab ",
-        "understudy watch ",
-        "cargo ",
-    ];
-    let kept = body
-        .lines()
-        .filter(|line| !apart.iter().any(|command| line.starts_with(command)));
+    let apart = ["understudy demo", "understudy lab ", "understudy watch ", "cargo "];
+    let kept = body.lines().filter(|line| !apart.iter().any(|command| line.starts_with(command)));
     kept.flat_map(|line| [line, "\n"]).collect()
 }
 
@@ -178,9 +161,7 @@ fn walk_through(page: &Path) -> PathBuf {
     for shared in ["examples", "scenarios"] {
         symlink(root().join(shared), folder.join(shared)).expect("a link");
     }
-    let programs = Path::new(env!("CARGO_BIN_EXE_understudy"))
-        .parent()
-        .expect("a folder");
+    let programs = Path::new(env!("CARGO_BIN_EXE_understudy")).parent().expect("a folder");
     let path = std::env::var("PATH").unwrap_or_default();
     let blocks = blocks(&text);
     for (words, body) in &blocks {
@@ -197,15 +178,8 @@ fn walk_through(page: &Path) -> PathBuf {
             .env("PATH", format!("{}:{path}", programs.display()))
             .output()
             .expect("a shell");
-        let said: String = String::from_utf8_lossy(&output.stderr)
-            .chars()
-            .take(1000)
-            .collect();
-        assert!(
-            output.status.success(),
-            "{}:\n{body}\n{said}",
-            page.display()
-        );
+        let said: String = String::from_utf8_lossy(&output.stderr).chars().take(1000).collect();
+        assert!(output.status.success(), "{}:\n{body}\n{said}", page.display());
     }
     folder
 }
@@ -241,19 +215,13 @@ fn the_gallery_shows_what_its_commands_draw() {
             other.push(format!("cp {} {}", made.display(), shown.display()));
         }
     }
-    assert!(
-        other.is_empty(),
-        "pictures are others now; renew them:\n{}",
-        other.join("\n")
-    );
+    assert!(other.is_empty(), "pictures are others now; renew them:\n{}", other.join("\n"));
 }
 
 /// Commands of this program as a page has them: in blocks of a shell, in indented lines, and between backticks.
 fn published(text: &str) -> Vec<String> {
     let text = text.replace("\\\n", " ");
-    let shells = blocks(&text)
-        .into_iter()
-        .filter(|(words, _)| words == "sh" || words == "console");
+    let shells = blocks(&text).into_iter().filter(|(words, _)| words == "sh" || words == "console");
     let prose = prose(&text);
     let indented = prose.lines().filter_map(|line| line.strip_prefix("    "));
     let between = prose.split('`').skip(1).step_by(2);
@@ -261,8 +229,7 @@ fn published(text: &str) -> Vec<String> {
     let written = written.iter().flat_map(|body| body.lines());
     let all = written.chain(indented).chain(between).map(str::trim_start);
     let ours = all.map(|line| line.replace("cargo run --release -- ", "understudy "));
-    ours.filter(|command| command.starts_with("understudy ") && !command.contains('\n'))
-        .collect()
+    ours.filter(|command| command.starts_with("understudy ") && !command.contains('\n')).collect()
 }
 
 #[test]
@@ -307,17 +274,11 @@ fn every_command_and_option_that_is_named_exists() {
                 Some(help) => {
                     let known =
                         |option: &&str| help.split([' ', '\n', ',']).any(|word| word == *option);
-                    options
-                        .filter(|option| *option != "--" && !known(option))
-                        .collect()
+                    options.filter(|option| *option != "--" && !known(option)).collect()
                 }
             };
             if !unknown.is_empty() {
-                wrong.push(format!(
-                    "{}: {command}: {}",
-                    page.display(),
-                    unknown.join(" ")
-                ));
+                wrong.push(format!("{}: {command}: {}", page.display(), unknown.join(" ")));
             }
         }
     }
@@ -348,13 +309,7 @@ fn a_release_is_copied_and_installed_once() {
         .output()
         .expect("a shell");
     let matched = String::from_utf8(shell.stdout).expect("text");
-    assert_eq!(
-        matched,
-        "release/understudy-runtime-0.1.0-aarch64-unknown-linux-musl\n"
-    );
-    let installs = page
-        .lines()
-        .filter(|line| line.contains("/usr/local/bin"))
-        .count();
+    assert_eq!(matched, "release/understudy-runtime-0.1.0-aarch64-unknown-linux-musl\n");
+    let installs = page.lines().filter(|line| line.contains("/usr/local/bin")).count();
     assert_eq!(installs, 1, "the binary is installed by one command");
 }

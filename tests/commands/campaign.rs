@@ -19,9 +19,7 @@ const PRESS_CELL: &str = "examples/press-cell/cluster.toml";
 
 fn campaign(out: &Path, more: &[&str]) -> Answer {
     let out = out.to_str().expect("text");
-    let fixed = [
-        "campaign", PRESS_CELL, "--seed", "5", "--cycles", "150", "--out", out,
-    ];
+    let fixed = ["campaign", PRESS_CELL, "--seed", "5", "--cycles", "150", "--out", out];
     understudy(&[&fixed, more].concat())
 }
 
@@ -30,11 +28,7 @@ fn nothing_wrong_is_found() {
     let folder = empty_folder("campaign");
     let answer = campaign(&folder, &["--runs", "60"]);
     assert_eq!(answer.status, 0, "{}{}", answer.output, answer.errors);
-    assert!(
-        answer.output.contains("wrong: 0 of 60 runs"),
-        "{}",
-        answer.output
-    );
+    assert!(answer.output.contains("wrong: 0 of 60 runs"), "{}", answer.output);
     let page = fs::read_to_string(folder.join("campaign.html")).expect("a page");
     assert!(page.contains("one-way-cut"));
 }
@@ -42,30 +36,18 @@ fn nothing_wrong_is_found() {
 #[test]
 fn merged_shards_are_the_whole_and_failures_fail_again() {
     let folder = empty_folder("campaign_shards");
-    let asked = [
-        "--runs",
-        "8",
-        "--property",
-        "held",
-        "--faults",
-        "isolation,slow",
-    ];
+    let asked = ["--runs", "8", "--property", "held", "--faults", "isolation,slow"];
     let whole = folder.join("whole");
     let answer = campaign(&whole, &[&asked[..], &["--jobs", "1"]].concat());
     assert_eq!(answer.status, 1, "{}{}", answer.output, answer.errors);
     let shards = ["1/2", "2/2"].map(|shard| {
         let out = folder.join(shard.replace('/', "-of-"));
-        campaign(
-            &out,
-            &[&asked[..], &["--jobs", "3", "--shard", shard]].concat(),
-        );
+        campaign(&out, &[&asked[..], &["--jobs", "3", "--shard", shard]].concat());
         out.to_str().expect("text").to_owned()
     });
     let merged = folder.join("merged");
     let out = merged.to_str().expect("text");
-    let answer = understudy(&[
-        "campaign", "merge", &shards[1], &shards[0], "--out", out, "--json",
-    ]);
+    let answer = understudy(&["campaign", "merge", &shards[1], &shards[0], "--out", out, "--json"]);
     assert_eq!(answer.status, 1, "{}", answer.errors);
     let text = |folder: &Path| fs::read_to_string(folder.join("campaign.json")).expect("findings");
     assert_eq!(text(&merged), text(&whole));
@@ -76,11 +58,7 @@ fn merged_shards_are_the_whole_and_failures_fail_again() {
         let path = scenario.as_str().expect("a path");
         let again = understudy(&["simulate", PRESS_CELL, "--scenario", path]);
         assert_eq!(again.status, 1, "{path}: {}", again.output);
-        assert!(
-            again.output.contains("NOT MET: no cycles held"),
-            "{}",
-            again.output
-        );
+        assert!(again.output.contains("NOT MET: no cycles held"), "{}", again.output);
     }
 }
 
@@ -127,11 +105,7 @@ fn what_is_wrong_with_the_arguments_is_said() {
     let check = |arguments: &[&str], expected: &str| {
         let answer = understudy(&[&["campaign"], arguments].concat());
         assert_eq!(answer.status, 2, "{arguments:?}");
-        assert!(
-            answer.errors.contains(expected),
-            "{arguments:?}: {}",
-            answer.errors
-        );
+        assert!(answer.errors.contains(expected), "{arguments:?}: {}", answer.errors);
     };
     check(&[], "CLUSTER.toml");
     check(&[PRESS_CELL, "--shard", "9/8"], "from 1 to N");

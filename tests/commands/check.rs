@@ -30,10 +30,7 @@ fn everything_that_is_wrong_is_found_at_once() {
         "cluster.toml",
         "[cluster]\nname = \"cell\"\nperod = \"10ms\"\n\n[[controller]]\nname = \"pump\"\nladder = \"pump.ladder\"\n",
     );
-    write(
-        "pump.ladder",
-        "program pump\ninput full\noutput run\nrung \"run\"\n  /ful ( run )\n",
-    );
+    write("pump.ladder", "program pump\ninput full\noutput run\nrung \"run\"\n  /ful ( run )\n");
     write(
         "kill.toml",
         "title = \"Kill\"\ncycles = 10\n[[step]]\nat = 20\naction = \"kill\"\nstation = \"pump\"\n",
@@ -51,10 +48,7 @@ fn everything_that_is_wrong_is_found_at_once() {
         .iter()
         .filter_map(|diagnostic| diagnostic["code"].as_str())
         .collect();
-    assert!(
-        codes.contains(&"U0305") && codes.contains(&"U0306"),
-        "{codes:?}"
-    );
+    assert!(codes.contains(&"U0305") && codes.contains(&"U0306"), "{codes:?}");
     assert_eq!(document["failures"][0]["code"], "U0601");
 }
 
@@ -64,17 +58,9 @@ fn a_scenario_is_checked_against_the_cluster_beside_it() {
     let written = understudy_in(&folder, &["init", "."]);
     assert_eq!(written.status, 0, "{}", written.errors);
     let text = fs::read_to_string(folder.join("kill.toml")).expect("a scenario");
-    fs::write(
-        folder.join("other.toml"),
-        text.replace("\"tank\"", "\"tnk\""),
-    )
-    .expect("written");
+    fs::write(folder.join("other.toml"), text.replace("\"tank\"", "\"tnk\"")).expect("written");
     assert_eq!(understudy_in(&folder, &["check", "kill.toml"]).status, 0);
     let answer = understudy_in(&folder, &["check", "other.toml"]);
     assert_eq!(answer.status, 2);
-    assert!(
-        answer.errors.contains("did you mean `tank`?"),
-        "{}",
-        answer.errors
-    );
+    assert!(answer.errors.contains("did you mean `tank`?"), "{}", answer.errors);
 }

@@ -38,14 +38,14 @@ fn what_is_written_is_read_again_by_every_command() {
 #[test]
 fn a_file_with_errors_is_not_converted() {
     let folder = empty_folder("convert_wrong");
-    let pump = fs::read_to_string(format!(
-        "{}/examples/plcopen/pump.xml",
-        env!("CARGO_MANIFEST_DIR")
-    ))
-    .expect("an example");
-    let wrong = pump
-        .replace("<variable>empty</variable>", "<variable>emty</variable>")
-        .replacen("refLocalId=\"15\"", "refLocalId=\"150\"", 1);
+    let pump =
+        fs::read_to_string(format!("{}/examples/plcopen/pump.xml", env!("CARGO_MANIFEST_DIR")))
+            .expect("an example");
+    let wrong = pump.replace("<variable>empty</variable>", "<variable>emty</variable>").replacen(
+        "refLocalId=\"15\"",
+        "refLocalId=\"150\"",
+        1,
+    );
     fs::write(folder.join("pump.xml"), wrong).expect("written");
     let answer = understudy_in(&folder, &["convert", "pump.xml", "pump.ladder"]);
     assert_eq!(answer.status, 2);
@@ -68,10 +68,7 @@ rung
     /a {TON late 300ms} ( cell.empty )
 ";
     fs::write(folder.join("memory.ladder"), text).expect("written");
-    let answer = understudy_in(
-        &folder,
-        &["convert", "memory.ladder", "memory.st", "--fidelity"],
-    );
+    let answer = understudy_in(&folder, &["convert", "memory.ladder", "memory.st", "--fidelity"]);
     insta::assert_snapshot!(answer.shown());
     insta::assert_snapshot!(fs::read_to_string(folder.join("memory.st")).expect("written"));
     let back = ["convert", "memory.st", "back.ladder", "--json"];

@@ -35,38 +35,19 @@ fn from_machines_to_a_reduced_supervisor_as_in_tct() {
     let (supervisor, reduced) = (file("SUPER.ADS"), file("SIMSUP.toml"));
     let made = des(&["sync", &given("MACH1"), &given("MACH2"), "-o", &plant]);
     assert_eq!(counts(&made), (9, 24));
-    des(&[
-        "sync",
-        &given("BUFSPEC"),
-        &given("BRSPEC"),
-        "-o",
-        &specification,
-    ]);
-    let made = des(&[
-        "supcon",
-        &plant,
-        &specification,
-        "--lift",
-        "-o",
-        &supervisor,
-    ]);
+    des(&["sync", &given("BUFSPEC"), &given("BRSPEC"), "-o", &specification]);
+    let made = des(&["supcon", &plant, &specification, "--lift", "-o", &supervisor]);
     assert_eq!(counts(&made), (12, 24));
     assert_eq!(made.json()["result"]["marked"], json!([0]));
     let same = des(&["isomorph", &supervisor, &given("_SUPER")]);
-    assert_eq!(
-        (same.status, &same.json()["result"]["isomorphic"]),
-        (0, &json!(true))
-    );
+    assert_eq!((same.status, &same.json()["result"]["isomorphic"]), (0, &json!(true)));
     let other = des(&["isomorph", &supervisor, &plant]);
     assert_eq!(other.status, 1);
     let made = des(&["supreduce", &plant, &supervisor, "-o", &reduced]);
     assert_eq!(counts(&made), (3, 14));
     let data = des(&["condat", &plant, &given("_SUPER")]).json();
     assert_eq!(
-        (
-            &data["result"]["states_with_disablement"],
-            &data["result"]["pairs"]
-        ),
+        (&data["result"]["states_with_disablement"], &data["result"]["pairs"]),
         (&json!(7), &json!(7))
     );
     assert_eq!(data["result"]["table"]["10"], json!([13]));
@@ -105,11 +86,7 @@ fn every_engine_synthesises_the_small_factory() {
     assert_eq!(counts(&reduced), (3, 14));
     let bounded = understudy(&["synth", MODEL, "--memory", "0"]);
     assert_eq!(bounded.status, 1);
-    assert!(
-        bounded.errors.contains("--engine symbolic"),
-        "{}",
-        bounded.errors
-    );
+    assert!(bounded.errors.contains("--engine symbolic"), "{}", bounded.errors);
 }
 
 /// A machine that may fail, and what forbids that.
@@ -168,12 +145,7 @@ fn a_ladder_with_errors_is_not_written() {
                 transitions = [\"off start on\", \"on full stuck\"]\n";
     std::fs::write(&model, text).expect("written");
     let (model, out) = (model.to_str().expect("text"), folder.join("made.ladder"));
-    let to_file = [
-        "supervisor-to-ladder",
-        model,
-        "-o",
-        out.to_str().expect("text"),
-    ];
+    let to_file = ["supervisor-to-ladder", model, "-o", out.to_str().expect("text")];
     for arguments in [&to_file[..], &to_file[..2]] {
         let answer = understudy(arguments);
         assert_eq!(answer.status, 1, "{}", answer.output);
@@ -255,10 +227,7 @@ fn a_reduction_that_ends_early_keeps_its_result() {
     let mut errors = BufReader::new(process.stderr.take().expect("a pipe"));
     let mut line = String::new();
     errors.read_line(&mut line).expect("text");
-    assert!(
-        line.contains("order 1 of 2: ") && line.contains(" of 20000 states tried, "),
-        "{line}"
-    );
+    assert!(line.contains("order 1 of 2: ") && line.contains(" of 20000 states tried, "), "{line}");
     let id = i32::try_from(process.id()).expect("a process id");
     kill(Pid::from_raw(id), Signal::SIGINT).expect("it runs");
     let mut output = String::new();
@@ -266,10 +235,7 @@ fn a_reduction_that_ends_early_keeps_its_result() {
     stdout.read_to_string(&mut output).expect("text");
     let status = process.wait().expect("it ends");
     assert!(status.success(), "{status}: {output}");
-    assert!(
-        output.contains("warning[U0847]: the reduction was interrupted after "),
-        "{output}"
-    );
+    assert!(output.contains("warning[U0847]: the reduction was interrupted after "), "{output}");
     let kept = counts(&des(&["convert", &out]));
     assert!(kept.0 <= states, "{kept:?} after {states}");
 }

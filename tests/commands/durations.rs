@@ -20,9 +20,7 @@ const CALLS: [&[&str]; 10] = [
 fn every_command_takes_the_same_durations() {
     let folder = empty_folder("durations");
     for call in CALLS {
-        for duration in [
-            "1.5ms", "1500us", "10 ms", "1m30s", "10min", "2h", "200000ns",
-        ] {
+        for duration in ["1.5ms", "1500us", "10 ms", "1m30s", "10min", "2h", "200000ns"] {
             let answer = understudy_in(&folder, &[call, &[duration]].concat());
             let errors = &answer.errors;
             assert!(
@@ -41,11 +39,7 @@ fn every_command_refuses_other_texts_in_the_same_words() {
             let answer = understudy_in(&folder, &[call, &[text]].concat());
             let expected =
                 format!("invalid duration `{text}`: expected a number with a unit, such as `10ms`");
-            let errors = answer
-                .errors
-                .split_whitespace()
-                .collect::<Vec<_>>()
-                .join(" ");
+            let errors = answer.errors.split_whitespace().collect::<Vec<_>>().join(" ");
             assert_eq!(answer.status, 2, "{call:?} {text}");
             assert!(errors.contains(&expected), "{call:?} {text}: {errors}");
         }

@@ -22,10 +22,7 @@ fn folders() -> Vec<PathBuf> {
 }
 
 fn name(path: &Path) -> String {
-    path.file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned()
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 fn text(path: &Path) -> &str {
@@ -35,8 +32,7 @@ fn text(path: &Path) -> &str {
 /// The scenarios of a cluster's folder.
 fn scenarios(folder: &Path) -> Vec<PathBuf> {
     let is_scenario = |path: &PathBuf| {
-        path.extension()
-            .is_some_and(|extension| extension == "toml")
+        path.extension().is_some_and(|extension| extension == "toml")
             && fs::read_to_string(path).is_ok_and(|text| text.contains("\ncycles = "))
     };
     entries(folder).into_iter().filter(is_scenario).collect()
@@ -44,11 +40,7 @@ fn scenarios(folder: &Path) -> Vec<PathBuf> {
 
 fn succeeds(arguments: &[&str]) -> Answer {
     let answer = understudy(arguments);
-    assert_eq!(
-        answer.status, 0,
-        "{arguments:?}\n{}{}",
-        answer.output, answer.errors
-    );
+    assert_eq!(answer.status, 0, "{arguments:?}\n{}{}", answer.output, answer.errors);
     answer
 }
 
@@ -57,9 +49,7 @@ fn succeeds(arguments: &[&str]) -> Answer {
 fn every_file_is_right() {
     let is_read = |path: &PathBuf| {
         let extension = path.extension().unwrap_or_default();
-        ["ladder", "toml", "ADS", "xml", "st", "ld"]
-            .iter()
-            .any(|read| extension == *read)
+        ["ladder", "toml", "ADS", "xml", "st", "ld"].iter().any(|read| extension == *read)
     };
     for folder in folders() {
         let mut files = entries(&folder);
@@ -107,10 +97,8 @@ fn changes(names: &[String], before: u64, now: u64) -> Vec<String> {
 fn the_complete_controller_lights_burns_and_shuts_down() {
     let out = empty_folder("examples_boiler_run");
     let folder = "examples/boiler";
-    let (cluster, scenario) = (
-        format!("{folder}/cluster.toml"),
-        format!("{folder}/kill-each.toml"),
-    );
+    let (cluster, scenario) =
+        (format!("{folder}/cluster.toml"), format!("{folder}/kill-each.toml"));
     let run = ["simulate", &cluster, "--scenario", &scenario, "--seed", "1"];
     succeeds(&[&run[..], &["--out", text(&out)]].concat());
     let ladder = format!("{}/{folder}/complete.ladder", env!("CARGO_MANIFEST_DIR"));
@@ -149,10 +137,7 @@ fn every_example_is_explained_and_in_the_gallery() {
             format!("](../../examples/{name})"),
             format!("](../pictures/examples/{name}.svg)"),
         ] {
-            assert!(
-                gallery.contains(&part),
-                "docs/reference/examples.md lacks {part}"
-            );
+            assert!(gallery.contains(&part), "docs/reference/examples.md lacks {part}");
         }
     }
 }
@@ -183,16 +168,11 @@ fn models_have_the_counts_of_other_tools() {
         let (states, theirs) = (&counts(&reduced)[0], &expected["supreduce_TCT"][0]);
         assert!(states.as_u64() <= theirs.as_u64(), "{example}: {states}");
         // The named model is TCT's.
-        let theirs = format!(
-            "engineering/supervisor/tests/data/{}/_SUPER.ADS",
-            example.replace('-', "_")
-        );
+        let theirs =
+            format!("engineering/supervisor/tests/data/{}/_SUPER.ADS", example.replace('-', "_"));
         succeeds(&["des", "isomorph", text(&super_file), &theirs]);
         let avalanche = succeeds(&["des", "avalanche", &theirs, "--json"]).json();
-        assert_eq!(
-            avalanche["result"]["events"], expected["avalanche_super"],
-            "{example}"
-        );
+        assert_eq!(avalanche["result"]["events"], expected["avalanche_super"], "{example}");
     }
 }
 
@@ -201,10 +181,8 @@ fn the_papers_small_automata_have_their_avalanche_events_and_ladders_without() {
     for example in ["TEST", "FIG4", "FIG6"] {
         let out = empty_folder(&format!("examples_{example}"));
         let file = format!("examples/avalanche/{example}.ADS");
-        let expected = format!(
-            "{}/examples/avalanche/{example}.expected.json",
-            env!("CARGO_MANIFEST_DIR")
-        );
+        let expected =
+            format!("{}/examples/avalanche/{example}.expected.json", env!("CARGO_MANIFEST_DIR"));
         let expected = fs::read_to_string(expected).expect("a reference");
         let expected: Value = serde_json::from_str(&expected).expect("JSON");
         let found = succeeds(&["des", "avalanche", &file, "--json"]).json();
@@ -227,18 +205,13 @@ fn the_boilers_ladders_are_made_from_their_models() {
     for name in ["pilot", "main", "complete"] {
         let model = format!("examples/boiler/{name}.toml");
         let map = format!("examples/boiler/{name}-map.toml");
-        let (supervisors, ladder) = (
-            out.join(format!("{name}-supervisors.toml")),
-            out.join(format!("{name}.ladder")),
-        );
+        let (supervisors, ladder) =
+            (out.join(format!("{name}-supervisors.toml")), out.join(format!("{name}.ladder")));
         let (supervisors, made) = (text(&supervisors), text(&ladder));
         succeeds(&["synth", &model, "--engine", "specified", "-o", supervisors]);
         let convert = ["supervisor-to-ladder", supervisors, "--io", &map];
         succeeds(&[&convert[..], &["--plant", &model, "-o", made]].concat());
-        let ours = format!(
-            "{}/examples/boiler/{name}.ladder",
-            env!("CARGO_MANIFEST_DIR")
-        );
+        let ours = format!("{}/examples/boiler/{name}.ladder", env!("CARGO_MANIFEST_DIR"));
         let (made, ours) = (fs::read(made), fs::read(ours));
         assert!(
             made.expect("written") == ours.expect("there"),

@@ -64,18 +64,10 @@ fn every_code_has_a_page_and_every_page_a_code() {
     let mut sources = BTreeMap::new();
     add_sources(Path::new(env!("CARGO_MANIFEST_DIR")), &mut sources);
     let explained: BTreeSet<&str> = pages().map(|page| page.code).collect();
-    let lacking: Vec<_> = sources
-        .iter()
-        .filter(|(code, _)| !explained.contains(code.as_str()))
-        .collect();
-    assert!(
-        lacking.is_empty(),
-        "write a section in docs/errors for each of these: {lacking:?}"
-    );
-    let orphans: Vec<_> = explained
-        .iter()
-        .filter(|code| !sources.contains_key(**code))
-        .collect();
+    let lacking: Vec<_> =
+        sources.iter().filter(|(code, _)| !explained.contains(code.as_str())).collect();
+    assert!(lacking.is_empty(), "write a section in docs/errors for each of these: {lacking:?}");
+    let orphans: Vec<_> = explained.iter().filter(|code| !sources.contains_key(**code)).collect();
     assert!(orphans.is_empty(), "no source has these: {orphans:?}");
 }
 
@@ -130,10 +122,7 @@ fn answer_of(page: &Page, folder: &Path, path: &str) -> String {
         said.push_str(&String::from_utf8_lossy(&output.stdout));
         said.push_str(&String::from_utf8_lossy(&output.stderr));
     };
-    Example::of(page.group)
-        .commands
-        .iter()
-        .for_each(|script| run(script));
+    Example::of(page.group).commands.iter().for_each(|script| run(script));
     let example = Example::of(page.text);
     for (name, text) in &example.files {
         fs::write(folder.join(name), text).expect("written");
@@ -146,14 +135,8 @@ fn answer_of(page: &Page, folder: &Path, path: &str) -> String {
 fn the_example_of_each_page_answers_with_its_code() {
     let root = empty_folder("explain");
     let project = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let programs = Path::new(env!("CARGO_BIN_EXE_understudy"))
-        .parent()
-        .expect("a folder");
-    let path = format!(
-        "{}:{}",
-        programs.display(),
-        std::env::var("PATH").unwrap_or_default()
-    );
+    let programs = Path::new(env!("CARGO_BIN_EXE_understudy")).parent().expect("a folder");
+    let path = format!("{}:{}", programs.display(), std::env::var("PATH").unwrap_or_default());
     let waiting: Mutex<Vec<Page>> = Mutex::new(pages().collect());
     let wrong: Mutex<Vec<String>> = Mutex::default();
     let work = || {
@@ -177,9 +160,8 @@ fn the_example_of_each_page_answers_with_its_code() {
             let found = codes(&said);
             // What else comes of it stands on the page too.
             let others = found.iter().filter(|code| *code != page.code);
-            let unmentioned: Vec<_> = others
-                .filter(|code| !page.text.contains(code.as_str()))
-                .collect();
+            let unmentioned: Vec<_> =
+                others.filter(|code| !page.text.contains(code.as_str())).collect();
             if !found.contains(page.code) || !unmentioned.is_empty() {
                 let cut: String = said.chars().take(600).collect();
                 let line = format!("{} answers {found:?}:\n{cut}", page.code);
@@ -192,10 +174,5 @@ fn the_example_of_each_page_answers_with_its_code() {
         scope.spawn(work);
     });
     let wrong = wrong.into_inner().expect("whole");
-    assert!(
-        wrong.is_empty(),
-        "{} pages:\n{}",
-        wrong.len(),
-        wrong[..wrong.len().min(5)].join("\n")
-    );
+    assert!(wrong.is_empty(), "{} pages:\n{}", wrong.len(), wrong[..wrong.len().min(5)].join("\n"));
 }

@@ -24,16 +24,8 @@ pub(crate) fn finished_run(name: &str) -> PathBuf {
     let folder = empty_folder(name);
     let made = understudy_in(&folder, &["init", "."]);
     assert_eq!(made.status, 0, "{}", made.errors);
-    let arguments = [
-        "simulate",
-        "cluster.toml",
-        "--scenario",
-        "kill.toml",
-        "--seed",
-        "1",
-        "--out",
-        "runs",
-    ];
+    let arguments =
+        ["simulate", "cluster.toml", "--scenario", "kill.toml", "--seed", "1", "--out", "runs"];
     let run = understudy_in(&folder, &arguments);
     assert_eq!(run.status, 0, "{}", run.errors);
     folder
@@ -60,19 +52,13 @@ fn metrics_count_what_the_journal_has() {
     let summary: Value = serde_json::from_str(&summary).expect("JSON");
     assert!(summary.is_object());
     let deadlines = |program: &str, source: &str| {
-        let labels = [
-            format!("program=\"{program}\""),
-            format!("source=\"{source}\""),
-        ];
+        let labels = [format!("program=\"{program}\""), format!("source=\"{source}\"")];
         let labels: Vec<&str> = labels.iter().map(String::as_str).collect();
         metric(text, "understudy_deadlines_total", &labels).unwrap_or_default()
     };
     for program in ["tank", "conveyor"] {
         assert!(deadlines(program, "reconstructed") >= 90.0, "{text}");
-        assert!(
-            deadlines(program, "direct") > deadlines(program, "reconstructed"),
-            "{text}"
-        );
+        assert!(deadlines(program, "direct") > deadlines(program, "reconstructed"), "{text}");
     }
     let silent = metric(
         text,
@@ -83,54 +69,26 @@ fn metrics_count_what_the_journal_has() {
     let margins = metric(text, "understudy_cycle_margin_seconds_count", &[]);
     assert!(margins.is_some_and(|count| count > 100.0), "{margins:?}");
     // The deadline of a period of 10 ms is a bound.
-    for name in [
-        "understudy_token_seconds",
-        "understudy_cycle_margin_seconds",
-    ] {
+    for name in ["understudy_token_seconds", "understudy_cycle_margin_seconds"] {
         let bucket = format!("{name}_bucket");
-        assert!(
-            metric(text, &bucket, &["le=\"0.0065\""]).is_some(),
-            "{text}"
-        );
+        assert!(metric(text, &bucket, &["le=\"0.0065\""]).is_some(), "{text}");
     }
     let version = format!("version=\"{}\"", env!("CARGO_PKG_VERSION"));
-    assert_eq!(
-        metric(text, "understudy_build_info", &[&version]),
-        Some(1.0)
-    );
+    assert_eq!(metric(text, "understudy_build_info", &[&version]), Some(1.0));
     let journal = fs::metadata(folder.join("runs/latest/journal.jsonl"));
-    let written = journal
-        .and_then(|journal| journal.modified())
-        .expect("a journal");
-    let written = written
-        .duration_since(std::time::UNIX_EPOCH)
-        .expect("later");
+    let written = journal.and_then(|journal| journal.modified()).expect("a journal");
+    let written = written.duration_since(std::time::UNIX_EPOCH).expect("later");
     for name in ["last_record", "newest_cycle"] {
         let at = metric(text, &format!("understudy_{name}_timestamp_seconds"), &[]);
         let at = at.expect("a time");
         assert!((at - written.as_secs_f64()).abs() < 1.0, "{name}: {at}");
     }
-    let state = |state: &str| {
-        metric(
-            text,
-            "understudy_run_state",
-            &[&format!("state=\"{state}\"")],
-        )
-    };
+    let state =
+        |state: &str| metric(text, "understudy_run_state", &[&format!("state=\"{state}\"")]);
+    assert_eq!((state("finished"), state("running")), (Some(1.0), Some(0.0)));
+    assert_eq!(metric(text, "understudy_records_received", &["member=\"tank-io\""]), Some(1.0));
     assert_eq!(
-        (state("finished"), state("running")),
-        (Some(1.0), Some(0.0))
-    );
-    assert_eq!(
-        metric(text, "understudy_records_received", &["member=\"tank-io\""]),
-        Some(1.0)
-    );
-    assert_eq!(
-        metric(
-            text,
-            "understudy_station_state",
-            &["station=\"tank\"", "state=\"publishing\""]
-        ),
+        metric(text, "understudy_station_state", &["station=\"tank\"", "state=\"publishing\""]),
         Some(1.0)
     );
 }
@@ -153,10 +111,7 @@ fn the_register_map_has_every_signal_once() {
     let named = |name: &str| places.iter().find(|place| place["name"] == name);
     let coil = named("conveyor.motor").expect("an output");
     assert_eq!(coil["area"], "coil");
-    assert_eq!(
-        named("tank.source").expect("a register")["address"],
-        Value::from(96)
-    );
+    assert_eq!(named("tank.source").expect("a register")["address"], Value::from(96));
 }
 
 /// A gateway that serves; it is ended with the test.
@@ -176,21 +131,15 @@ impl Gateway {
             .expect("the binary is built");
         let errors = child.stderr.take().expect("piped");
         let mut line = String::new();
-        BufReader::new(errors)
-            .read_line(&mut line)
-            .expect("it says where it listens");
+        BufReader::new(errors).read_line(&mut line).expect("it says where it listens");
         let address = line.trim().rsplit(' ').next().expect("an address");
-        let address = address
-            .parse()
-            .unwrap_or_else(|error| panic!("{line}: {error}"));
+        let address = address.parse().unwrap_or_else(|error| panic!("{line}: {error}"));
         Self { child, address }
     }
 
     fn connect(&self) -> TcpStream {
         let stream = TcpStream::connect(self.address).expect("it listens");
-        stream
-            .set_read_timeout(Some(Duration::from_secs(60)))
-            .expect("a deadline");
+        stream.set_read_timeout(Some(Duration::from_secs(60))).expect("a deadline");
         stream
     }
 
@@ -221,11 +170,8 @@ fn metrics_are_served_over_http_and_nothing_else_is() {
         stream.read_to_string(&mut answer).expect("it answers");
         answer
     };
-    let get = |path: &str| {
-        ask(&format!(
-            "GET {path} HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n"
-        ))
-    };
+    let get =
+        |path: &str| ask(&format!("GET {path} HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n"));
     // The journal is read beside the server: until its end there is nothing to tell of the present.
     let deadline = std::time::Instant::now() + Duration::from_secs(60);
     let answer = loop {
@@ -261,11 +207,7 @@ fn slow_connections_are_closed_and_others_are_answered() {
     }
     let deadline = std::time::Instant::now() + Duration::from_secs(60);
     while !slow.is_empty() {
-        assert!(
-            std::time::Instant::now() < deadline,
-            "{} connections are open",
-            slow.len()
-        );
+        assert!(std::time::Instant::now() < deadline, "{} connections are open", slow.len());
         slow.retain_mut(|stream| {
             let is_taken = stream.write_all(b"x").is_ok();
             let silent = stream.read(&mut [0]).is_err_and(|error| {
@@ -327,9 +269,7 @@ fn the_process_image_is_read_by_modbus_and_not_written() {
     assert_eq!(modbus(&mut stream, &[4, 0xff, 0xff, 0, 1]), [0x84, 2]);
     assert_eq!(modbus(&mut stream, &[4, 0, 0, 0, 126]), [0x84, 3]);
     let mut other = gateway.connect();
-    other
-        .write_all(b"this is no Modbus at all")
-        .expect("it takes it");
+    other.write_all(b"this is no Modbus at all").expect("it takes it");
     assert_eq!(modbus(&mut stream, &[3, 0, 0, 0, 1]), [3, 2, 0, 1]);
     gateway.stop();
 }
@@ -342,18 +282,13 @@ fn what_is_wrong_is_said() {
         assert_eq!(answer.status, 2, "{what}: {}", answer.errors);
         assert!(answer.errors.contains("U0570"), "{}", answer.errors);
     }
-    assert_eq!(
-        understudy(&["gateway", "zenoh", "--mirror", "1000/s"]).status,
-        2
-    );
+    assert_eq!(understudy(&["gateway", "zenoh", "--mirror", "1000/s"]).status, 2);
 }
 
 /// The metrics of a run whose last cycles are those before the operator's choice.
 fn exposed_while_a_state_is_lost(folder: &Path) -> String {
     let scenario = include_str!("../../examples/press-cell/lost-state.toml");
-    let (before, _) = scenario
-        .split_once("[[step]]\nat = 400")
-        .expect("the operator's choice");
+    let (before, _) = scenario.split_once("[[step]]\nat = 400").expect("the operator's choice");
     let before = before.replace("cycles = 600", "cycles = 390");
     fs::write(folder.join("lost.toml"), before).expect("written");
     let cluster = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/press-cell/cluster.toml");
@@ -369,22 +304,11 @@ fn exposed_while_a_state_is_lost(folder: &Path) -> String {
 fn exposed_with_alarms(folder: &Path) -> String {
     let example = |file: &str| {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-        root.join("examples/heated-tank")
-            .join(file)
-            .display()
-            .to_string()
+        root.join("examples/heated-tank").join(file).display().to_string()
     };
     let (cluster, scenario) = (example("cluster.toml"), example("kill-each.toml"));
-    let arguments = [
-        "simulate",
-        &cluster,
-        "--scenario",
-        &scenario,
-        "--seed",
-        "1",
-        "--out",
-        "alarms",
-    ];
+    let arguments =
+        ["simulate", &cluster, "--scenario", &scenario, "--seed", "1", "--out", "alarms"];
     let run = understudy_in(folder, &arguments);
     assert_eq!(run.status, 0, "{}", run.errors);
     understudy_in(folder, &["gateway", "metrics", "alarms/latest", "--once"]).output
@@ -404,20 +328,15 @@ fn the_dashboard_and_the_page_name_metrics_that_there_are() {
     let folder = finished_run("gateway_dashboard");
     let answer = understudy_in(&folder, &["gateway", "metrics", "runs/latest", "--once"]);
     let samples = answer.output.lines().filter(|line| !line.starts_with('#'));
-    let exposed: std::collections::BTreeSet<&str> = samples
-        .filter_map(|line| line.split(['{', ' ']).next())
-        .collect();
+    let exposed: std::collections::BTreeSet<&str> =
+        samples.filter_map(|line| line.split(['{', ' ']).next()).collect();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     // Some have a sample only while something is wrong, or where alarms are declared.
     let at_times = exposed_while_a_state_is_lost(&folder) + &exposed_with_alarms(&folder);
     let read = |path: &str| fs::read_to_string(root.join(path)).expect("a file");
     let dashboard = read("deployment/monitoring/dashboards/understudy.json");
     let document: Value = serde_json::from_str(&dashboard).expect("JSON");
-    assert!(
-        document["panels"]
-            .as_array()
-            .is_some_and(|panels| panels.len() > 5)
-    );
+    assert!(document["panels"].as_array().is_some_and(|panels| panels.len() > 5));
     for name in metric_names(&dashboard) {
         assert!(exposed.contains(name.as_str()), "{name} is not exposed");
     }
@@ -437,9 +356,7 @@ fn grafanas_own_model_reads_the_dashboard_whole() {
         .arg("deployment/monitoring/dashboards/understudy.json")
         .current_dir(env!("CARGO_MANIFEST_DIR"))
         .output();
-    let missing = read
-        .as_ref()
-        .map_or(true, |read| read.status.code() == Some(77));
+    let missing = read.as_ref().map_or(true, |read| read.status.code() == Some(77));
     if missing {
         skip(format_args!(
             "{python} has no Grafana model: pip install grafana-foundation-sdk, and name it by UNDERSTUDY_PYTHON"

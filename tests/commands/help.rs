@@ -49,11 +49,7 @@ fn every_command_has_an_example() {
     for command in &commands {
         let help = understudy(&[command, "--help"]);
         assert_eq!(help.status, 0, "{command}");
-        assert!(
-            help.output.contains("Example:\n  understudy "),
-            "{command}:\n{}",
-            help.output
-        );
+        assert!(help.output.contains("Example:\n  understudy "), "{command}:\n{}", help.output);
     }
 }
 

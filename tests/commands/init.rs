@@ -36,21 +36,13 @@ fn check_it_runs(folder: &Path, controllers: &[&str]) {
     assert_eq!(answer.status, 0, "{}", answer.shown());
     let summary = &answer.json()["result"]["summary"];
     let remote_ios = summary["remote_ios"].as_array().expect("a list");
-    let names: Vec<&str> = remote_ios
-        .iter()
-        .map(|remote_io| remote_io["name"].as_str().expect("a name"))
-        .collect();
-    let expected: Vec<String> = controllers
-        .iter()
-        .map(|name| format!("{name}-io"))
-        .collect();
+    let names: Vec<&str> =
+        remote_ios.iter().map(|remote_io| remote_io["name"].as_str().expect("a name")).collect();
+    let expected: Vec<String> = controllers.iter().map(|name| format!("{name}-io")).collect();
     assert_eq!(names, expected);
     for remote_io in remote_ios {
         let reconstructed = remote_io["counts"]["reconstructed"].as_u64();
-        assert!(
-            reconstructed.is_some_and(|cycles| cycles > 0),
-            "{remote_io}"
-        );
+        assert!(reconstructed.is_some_and(|cycles| cycles > 0), "{remote_io}");
     }
 }
 
@@ -185,28 +177,17 @@ fn bad_programs_are_all_said_and_nothing_is_written() {
     write("pump.ladder", pump);
     write("again.ladder", pump);
     write("wrong.ladder", &pump.replace("/full", "/ful"));
-    write(
-        "dry.ladder",
-        "program dry\ninput full\nmemory seen\nrung\n    full ( seen )\n",
-    );
-    write(
-        "taken.ladder",
-        &pump.replace("program pump", "program understudy"),
-    );
-    write(
-        "dotted.ladder",
-        &pump.replace("program pump", "program _pump"),
-    );
+    write("dry.ladder", "program dry\ninput full\nmemory seen\nrung\n    full ( seen )\n");
+    write("taken.ladder", &pump.replace("program pump", "program understudy"));
+    write("dotted.ladder", &pump.replace("program pump", "program _pump"));
     write("notes.txt", "buy a pump\n");
     write("cluster.toml", "[cluster]\nname = \"cell\"\n");
     fs::write(folder.join("bytes.st"), [0xff, 0xfe, 0x00]).expect("written");
     let long = format!("program {}", "p".repeat(43));
     write("long.ladder", &pump.replace("program pump", &long));
     let check = |from: &[&str], codes: &[&str]| {
-        let answer = understudy_in(
-            &folder,
-            &[&["init", "cell", "--json", "--from"], from].concat(),
-        );
+        let answer =
+            understudy_in(&folder, &[&["init", "cell", "--json", "--from"], from].concat());
         assert_eq!(answer.status, 2, "{from:?}: {}", answer.shown());
         let document = answer.json();
         let lists = ["diagnostics", "failures"].into_iter();
@@ -229,9 +210,7 @@ fn bad_programs_are_all_said_and_nothing_is_written() {
     check(&["pump.ladder", "again.ladder"], &["U0624"]);
     check(&["taken.ladder"], &["U0624"]);
     check(&["pump.ladder", "pump-io=again.ladder"], &["U0624"]);
-    let many: Vec<String> = (0..65)
-        .map(|number| format!("p{number}=pump.ladder"))
-        .collect();
+    let many: Vec<String> = (0..65).map(|number| format!("p{number}=pump.ladder")).collect();
     let many: Vec<&str> = many.iter().map(String::as_str).collect();
     check(&many, &["U0625"]);
     check(
@@ -240,17 +219,8 @@ fn bad_programs_are_all_said_and_nothing_is_written() {
     );
     let said = init(&folder, &["pump.ladder", "again.ladder"]);
     insta::assert_snapshot!(said.shown());
-    let both = understudy_in(
-        &folder,
-        &[
-            "init",
-            "cell",
-            "--template",
-            "cell",
-            "--from",
-            "pump.ladder",
-        ],
-    );
+    let both =
+        understudy_in(&folder, &["init", "cell", "--template", "cell", "--from", "pump.ladder"]);
     assert!(both.errors.starts_with("error[U0600]"), "{}", both.errors);
 }
 

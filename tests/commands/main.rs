@@ -58,11 +58,7 @@ fn understudy(arguments: &[&str]) -> Answer {
 }
 
 fn understudy_in(folder: &Path, arguments: &[&str]) -> Answer {
-    let Output {
-        status,
-        stdout,
-        stderr,
-    } = Command::new(env!("CARGO_BIN_EXE_understudy"))
+    let Output { status, stdout, stderr } = Command::new(env!("CARGO_BIN_EXE_understudy"))
         .args(arguments)
         .current_dir(folder)
         // Help is as wide as the terminal; here there is none.
@@ -78,9 +74,7 @@ fn understudy_in(folder: &Path, arguments: &[&str]) -> Answer {
 
 /// An empty folder of this test's own.
 fn empty_folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
-        .join("commands")
-        .join(name);
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("commands").join(name);
     if folder.exists() {
         std::fs::remove_dir_all(&folder).expect("an old run's folder goes");
     }

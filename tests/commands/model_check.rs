@@ -9,15 +9,8 @@ use crate::{empty_folder, understudy};
 #[test]
 fn the_press_cell_survives_every_crash_in_a_cycle() {
     let cluster = "examples/press-cell/cluster.toml";
-    let answer = understudy(&[
-        "model-check",
-        cluster,
-        "--cycles",
-        "1",
-        "--kinds",
-        "crash",
-        "--json",
-    ]);
+    let answer =
+        understudy(&["model-check", cluster, "--cycles", "1", "--kinds", "crash", "--json"]);
     assert_eq!(answer.status, 0, "{}", answer.shown());
     let result = &answer.json()["result"];
     assert!(result["states"].as_u64() > Some(100), "{result}");
@@ -50,11 +43,7 @@ fn a_broken_property_is_a_scenario_that_is_replayed() {
         &scenario,
     ]);
     assert_eq!(answer.status, 1, "{}", answer.shown());
-    assert!(
-        answer
-            .output
-            .contains("BROKEN  one lost station costs no cycle")
-    );
+    assert!(answer.output.contains("BROKEN  one lost station costs no cycle"));
     let replayed = understudy(&["simulate", &cluster, "--scenario", &scenario, "--json"]);
     assert_eq!(replayed.status, 1, "{}", replayed.shown());
 }

@@ -26,12 +26,7 @@ fn follow(folder: &Path, command: &[&str], unrun: &[&str]) -> usize {
         }
         let step: Vec<&str> = step.iter().map(String::as_str).collect();
         let next = understudy_in(folder, &step);
-        assert_eq!(
-            next.status,
-            0,
-            "{command:?}, then {step:?}: {}",
-            next.shown()
-        );
+        assert_eq!(next.status, 0, "{command:?}, then {step:?}: {}", next.shown());
     }
     steps.len()
 }
@@ -42,37 +37,19 @@ fn the_next_steps_of_a_command_are_commands_that_run() {
     let lab = &["lab", "campaign"][..];
     assert_eq!(follow(&folder, &["init", "cell"], lab), 2);
     let cluster = "cell/cluster.toml";
-    let simulate = [
-        "simulate",
-        cluster,
-        "--scenario",
-        "cell/kill.toml",
-        "--seed",
-        "1",
-    ];
-    assert_eq!(
-        follow(&folder, &["check", cluster, "cell/kill.toml"], lab),
-        2
-    );
+    let simulate = ["simulate", cluster, "--scenario", "cell/kill.toml", "--seed", "1"];
+    assert_eq!(follow(&folder, &["check", cluster, "cell/kill.toml"], lab), 2);
     assert_eq!(follow(&folder, &["check", cluster], lab), 2);
     assert_eq!(follow(&folder, &["check", "cell/kill.toml"], lab), 1);
     assert_eq!(follow(&folder, &simulate, lab), 2);
     assert_eq!(follow(&folder, &["verify", cluster], lab), 1);
     assert_eq!(follow(&folder, &["resources", cluster], lab), 1);
-    assert_eq!(
-        follow(&folder, &["convert", "cell/tank.ladder", "tank.xml"], lab),
-        1
-    );
-    assert_eq!(
-        follow(&folder, &["parity", cluster, "--output", "p.txt"], lab),
-        1
-    );
+    assert_eq!(follow(&folder, &["convert", "cell/tank.ladder", "tank.xml"], lab), 1);
+    assert_eq!(follow(&folder, &["parity", cluster, "--output", "p.txt"], lab), 1);
     let other = empty_folder("next_ladder");
     fs::copy(folder.join("tank.xml"), other.join("tank.xml")).expect("copied");
     assert_eq!(follow(&other, &["check", "tank.xml"], lab), 2);
-    let campaign = [
-        "campaign", cluster, "--runs", "2", "--seed", "1", "--jobs", "1",
-    ];
+    let campaign = ["campaign", cluster, "--runs", "2", "--seed", "1", "--jobs", "1"];
     assert_eq!(follow(&folder, &campaign, &["model-check"]), 1);
 }
 
@@ -91,11 +68,7 @@ fn what_a_machine_reads_names_no_next_step() {
     ] {
         let answer = understudy_in(&folder, command);
         assert_eq!(answer.status, 0, "{command:?}: {}", answer.shown());
-        assert!(
-            !answer.shown().contains("next:"),
-            "{command:?}: {}",
-            answer.shown()
-        );
+        assert!(!answer.shown().contains("next:"), "{command:?}: {}", answer.shown());
     }
     // A command that did not end well has something else to say.
     fs::write(folder.join("tank.ladder"), "program tank\n/\n").expect("written");

@@ -26,14 +26,7 @@ fn init_writes_a_cluster_that_is_right_and_overwrites_nothing() {
 fn what_init_writes_comes_out_as_its_scenario_expects() {
     let folder = empty_folder("init_simulated");
     assert_eq!(understudy_in(&folder, &["init", "."]).status, 0);
-    let run = [
-        "simulate",
-        "cluster.toml",
-        "--scenario",
-        "kill.toml",
-        "--seed",
-        "1",
-    ];
+    let run = ["simulate", "cluster.toml", "--scenario", "kill.toml", "--seed", "1"];
     let answer = understudy_in(&folder, &run);
     assert_eq!(answer.status, 0, "{}{}", answer.output, answer.errors);
 }
@@ -63,17 +56,8 @@ fn a_ladder_is_drawn() {
     assert!(drawn.output.contains("ram_up"), "{}", drawn.output);
     let svg = understudy(&["draw", "examples/press-cell/press.ladder", "--as", "svg"]);
     assert!(svg.output.starts_with("<svg"), "{}", svg.output);
-    let digraph = understudy(&[
-        "draw",
-        "examples/press-cell/press.ladder",
-        "--as",
-        "digraph",
-    ]);
-    assert!(
-        digraph.output.contains("class=\"digraph\""),
-        "{}",
-        digraph.output
-    );
+    let digraph = understudy(&["draw", "examples/press-cell/press.ladder", "--as", "digraph"]);
+    assert!(digraph.output.contains("class=\"digraph\""), "{}", digraph.output);
 }
 
 /// Structured Text is its own picture, and function blocks where these are asked for, in a picture as in a document of another tool.
@@ -109,32 +93,15 @@ fn programs_of_other_tools_are_ladders() {
         let drawn = understudy(&["draw", &file, "--as", "digraph"]);
         assert!(drawn.output.starts_with("<svg"), "{}", drawn.output);
     }
-    let written = understudy(&[
-        "convert",
-        "examples/press-cell/press.ladder",
-        "--to",
-        "digraph",
-    ]);
-    assert!(
-        written.output.contains("<LadderDiagram name=\"press\""),
-        "{}",
-        written.output
-    );
+    let written = understudy(&["convert", "examples/press-cell/press.ladder", "--to", "digraph"]);
+    assert!(written.output.contains("<LadderDiagram name=\"press\""), "{}", written.output);
 }
 
 #[test]
 fn a_simulation_is_a_function_of_its_seed() {
     let run = |seed: &str| {
         let scenario = "scenarios/lossy.toml";
-        understudy(&[
-            "simulate",
-            PRESS_CELL,
-            "--scenario",
-            scenario,
-            "--seed",
-            seed,
-            "--json",
-        ])
+        understudy(&["simulate", PRESS_CELL, "--scenario", scenario, "--seed", seed, "--json"])
     };
     let (first, again, other) = (run("5"), run("5"), run("6"));
     assert_eq!(first.output, again.output);
@@ -148,37 +115,21 @@ fn a_simulation_is_a_function_of_its_seed() {
 fn a_simulation_that_fails_says_how_to_repeat_it() {
     // The paper's scenario in the other mode: the second failure is masked, which it does not expect.
     let scenario = "scenarios/paper-double-kill.toml";
-    let run = [
-        "simulate",
-        PRESS_CELL,
-        "--scenario",
-        scenario,
-        "--seed",
-        "1",
-    ];
+    let run = ["simulate", PRESS_CELL, "--scenario", scenario, "--seed", "1"];
     let answer = understudy(&run);
     assert_eq!(answer.status, 1);
     assert_snapshot!(answer.shown());
-    assert_eq!(
-        understudy(&[&run[..], &["--mode", "paper"]].concat()).status,
-        0
-    );
+    assert_eq!(understudy(&[&run[..], &["--mode", "paper"]].concat()).status, 0);
 }
 
 #[test]
 fn a_run_directory_is_complete() {
     let folder = empty_folder("run_directory");
     let out = folder.to_str().expect("text");
-    let answer = understudy(&[
-        "simulate", PRESS_CELL, "--cycles", "50", "--seed", "1", "--out", out,
-    ]);
+    let answer =
+        understudy(&["simulate", PRESS_CELL, "--cycles", "50", "--seed", "1", "--out", out]);
     assert_eq!(answer.status, 0, "{}", answer.errors);
-    for name in [
-        "journal.jsonl",
-        "summary.json",
-        "figure10.svg",
-        "report.html",
-    ] {
+    for name in ["journal.jsonl", "summary.json", "figure10.svg", "report.html"] {
         let length = fs::metadata(folder.join("latest").join(name)).map(|file| file.len());
         assert!(length.is_ok_and(|length| length > 1000), "{name}");
     }
@@ -197,23 +148,11 @@ fn nothing_is_started_from_bad_input() {
     ] {
         let folder = empty_folder("bad_input");
         let out = folder.to_str().expect("text");
-        let more: &[&str] = if arguments[0] == "lab" {
-            &["--out", out]
-        } else {
-            &[]
-        };
+        let more: &[&str] = if arguments[0] == "lab" { &["--out", out] } else { &[] };
         let answer = understudy(&[arguments, more].concat());
         assert_eq!(answer.status, 2, "{arguments:?}: {}", answer.errors);
-        assert!(
-            answer.errors.contains("error[U0"),
-            "{arguments:?}: {}",
-            answer.errors
-        );
-        assert_eq!(
-            fs::read_dir(&folder).map(Iterator::count).ok(),
-            Some(0),
-            "{arguments:?}"
-        );
+        assert!(answer.errors.contains("error[U0"), "{arguments:?}: {}", answer.errors);
+        assert_eq!(fs::read_dir(&folder).map(Iterator::count).ok(), Some(0), "{arguments:?}");
     }
 }
 
@@ -227,11 +166,7 @@ fn schemas_are_schemas() {
 
 #[test]
 fn shells_and_manuals_are_served() {
-    assert!(
-        understudy(&["completions", "bash"])
-            .output
-            .contains("_understudy")
-    );
+    assert!(understudy(&["completions", "bash"]).output.contains("_understudy"));
     assert!(understudy(&["man"]).output.contains(".TH understudy"));
     let page = understudy(&["man", "verify"]).output;
     assert!(page.contains(".TH understudy-verify") && page.contains("EXIT STATUS"));
@@ -255,41 +190,17 @@ fn a_file_in_the_wrong_place_is_named_with_the_way_out() {
     let scenario = "scenarios/table-two.toml";
     check(&["simulate", scenario], "U0616", "--scenario");
     check(&["verify", scenario], "U0616", "--scenario");
-    check(
-        &["simulate", cell, "--scenario", cell],
-        "U0616",
-        "a cluster file",
-    );
-    check(
-        &["parity", "examples/press-cell/robot.ladder"],
-        "U0616",
-        "understudy init",
-    );
+    check(&["simulate", cell, "--scenario", cell], "U0616", "a cluster file");
+    check(&["parity", "examples/press-cell/robot.ladder"], "U0616", "understudy init");
     check(&["draw", cell], "U0616", "one of its programs");
     check(&["synth", cell], "U0616", "a model of plants");
     check(&["petri", "bounds", cell], "U0616", "a Petri net");
     check(&["reconfigure", cell], "U0616", "a reconfiguration project");
-    check(
-        &["des", "trim", "examples/vents/vents.ladder"],
-        "U0616",
-        "a TCT automaton",
-    );
-    check(
-        &["convert", "examples/vents/vents.ladder", "vents.pdf"],
-        "U1014",
-        "--to",
-    );
+    check(&["des", "trim", "examples/vents/vents.ladder"], "U0616", "a TCT automaton");
+    check(&["convert", "examples/vents/vents.ladder", "vents.pdf"], "U1014", "--to");
     check(&["simulate", "examples/press-cell"], "U0601", cell);
-    check(
-        &["simulate", "examples/press-cell/clutser.toml"],
-        "U0601",
-        cell,
-    );
-    check(
-        &["simulate", "examples/none/cluster.toml"],
-        "U0601",
-        "cannot be read",
-    );
+    check(&["simulate", "examples/press-cell/clutser.toml"], "U0601", cell);
+    check(&["simulate", "examples/none/cluster.toml"], "U0601", "cannot be read");
 }
 
 #[test]

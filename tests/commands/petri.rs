@@ -18,27 +18,14 @@ fn from_a_net_to_a_proved_ladder() {
     assert_eq!(bounds["result"]["safe"], json!(true));
     let (keeper, ladder) = (file("keeper.toml"), file("cell.ladder"));
     let model = "examples/assembly-cell/model.toml";
-    let made = [
-        "synth", model, "--reduce", "--name", "keeper", "-o", &keeper, "--json",
-    ];
+    let made = ["synth", model, "--reduce", "--name", "keeper", "-o", &keeper, "--json"];
     assert_eq!(understudy(&made).json()["result"]["states"], json!(6));
-    let made = understudy(&[
-        "petri",
-        "ladder",
-        NET,
-        "--supervisor",
-        &keeper,
-        "-o",
-        &ladder,
-        "--json",
-    ]);
+    let made =
+        understudy(&["petri", "ladder", NET, "--supervisor", &keeper, "-o", &ladder, "--json"]);
     assert_eq!(made.json()["result"]["proof"]["never_fired"], json!([]));
     let made = fs::read_to_string(&ladder).expect("a ladder");
     let given = fs::read_to_string("examples/assembly-cell/cell.ladder").expect("a ladder");
-    assert_eq!(
-        made, given,
-        "the ladder in examples/assembly-cell is another one"
-    );
+    assert_eq!(made, given, "the ladder in examples/assembly-cell is another one");
     for form in [
         ["automaton", "-o", "cell.ADS"],
         ["draw", "-o", "cell.svg"],

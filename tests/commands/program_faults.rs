@@ -53,16 +53,8 @@ fn run(name: &str, input: &str, bad: &str, good: &str) -> PathBuf {
     fs::write(folder.join("mixer.st"), PROGRAM).expect("written");
     fs::write(folder.join("cluster.toml"), CLUSTER).expect("written");
     fs::write(folder.join("scenario.toml"), scenario.concat()).expect("written");
-    let arguments = [
-        "simulate",
-        "cluster.toml",
-        "--scenario",
-        "scenario.toml",
-        "--seed",
-        "1",
-        "--out",
-        "runs",
-    ];
+    let arguments =
+        ["simulate", "cluster.toml", "--scenario", "scenario.toml", "--seed", "1", "--out", "runs"];
     let answer = understudy_in(&folder, &arguments);
     assert_eq!(answer.status, 0, "{}", answer.shown());
     folder
@@ -92,52 +84,25 @@ fn check(name: &str, [input, bad, good]: [&str; 3], line: u32, told: &str, cause
 #[test]
 fn a_division_by_zero_is_told_with_its_line() {
     let told = "program fault in mixer: mixer, line 6: division of 2100 by zero";
-    check(
-        "fault_division",
-        ["divisor", "0", "3"],
-        6,
-        told,
-        &["divisor = 0: input"],
-    );
+    check("fault_division", ["divisor", "0", "3"], 6, told, &["divisor = 0: input"]);
 }
 
 #[test]
 fn an_index_out_of_range_is_told_with_its_line() {
     let told = "program fault in mixer: mixer, line 5: index 4 is outside the array, whose last index is 3";
-    check(
-        "fault_index",
-        ["place", "4", "2"],
-        5,
-        told,
-        &["place = 4: input"],
-    );
+    check("fault_index", ["place", "4", "2"], 5, told, &["place = 4: input"]);
 }
 
 #[test]
 fn an_output_that_is_not_finite_is_told_with_the_line_that_assigned_it() {
     let told = "program fault in mixer: output valve is INF, which is not a finite number, assigned in line 5";
-    let causes = [
-        "amounts[1] = 1.0: its initial value",
-        "factor = 3e+38: input",
-    ];
-    check(
-        "fault_infinity",
-        ["factor", "3.0e38", "1.0"],
-        5,
-        told,
-        &causes,
-    );
+    let causes = ["amounts[1] = 1.0: its initial value", "factor = 3e+38: input"];
+    check("fault_infinity", ["factor", "3.0e38", "1.0"], 5, told, &causes);
 }
 
 #[test]
 fn an_exceeded_budget_is_told_with_its_line_and_explained_shortly() {
     let told = "program fault in mixer: mixer, line 8: the loops of one scan exceed the budget of 1000000 operations";
     let causes = ["passes = 2000000000: input", "n = "];
-    check(
-        "fault_budget",
-        ["passes", "2000000000", "1"],
-        8,
-        told,
-        &causes,
-    );
+    check("fault_budget", ["passes", "2000000000", "1"], 8, told, &causes);
 }

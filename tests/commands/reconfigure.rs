@@ -20,19 +20,11 @@ fn the_example_runs_what_is_generated() {
     let folder = empty_folder("reconfigure_all");
     let out = folder.to_str().expect("text");
     let channels = ["--channels", "ps1,Filling_done"];
-    let answer = understudy(
-        &[
-            &["reconfigure", PROJECT, "-o", out, "--json"],
-            &channels[..],
-        ]
-        .concat(),
-    );
+    let answer =
+        understudy(&[&["reconfigure", PROJECT, "-o", out, "--json"], &channels[..]].concat());
     assert_eq!(answer.status, 0, "{}", answer.shown());
     let document = answer.json();
-    assert_eq!(
-        document["result"]["states"].as_array().map(Vec::len),
-        Some(12)
-    );
+    assert_eq!(document["result"]["states"].as_array().map(Vec::len), Some(12));
     assert_eq!(document["result"]["minimum_channels"][0], "ps1");
     for file in [
         "report.md",
@@ -48,15 +40,9 @@ fn the_example_runs_what_is_generated() {
     let generated = fs::read_to_string(folder.join("combined.ladder")).expect("a ladder");
     let diagnosis = fs::read_to_string(folder.join("diagnosis.ladder")).expect("a ladder");
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/filling-line");
-    for (name, generated) in [
-        ("reconfigured.ladder", generated),
-        ("diagnosis.ladder", diagnosis),
-    ] {
+    for (name, generated) in [("reconfigured.ladder", generated), ("diagnosis.ladder", diagnosis)] {
         let kept = fs::read_to_string(examples.join(name)).expect("a ladder");
-        assert!(
-            generated == kept,
-            "examples/filling-line/{name} is another one"
-        );
+        assert!(generated == kept, "examples/filling-line/{name} is another one");
     }
 }
 
@@ -75,11 +61,7 @@ fn the_diagnosed_line_needs_nobody() {
 #[test]
 fn a_wrong_project_writes_nothing() {
     let folder = empty_folder("reconfigure_wrong");
-    fs::write(
-        folder.join("p.toml"),
-        "[project]\nladder = \"absent.ladder\"\n",
-    )
-    .expect("written");
+    fs::write(folder.join("p.toml"), "[project]\nladder = \"absent.ladder\"\n").expect("written");
     let answer = understudy_in(&folder, &["reconfigure", "p.toml", "-o", "out"]);
     assert_eq!(answer.status, 2);
     for code in ["U1203", "U1208"] {

@@ -32,11 +32,7 @@ fn twenty_controllers_beside_what_else_could_be_bought() {
 
 #[test]
 fn the_figures_for_twenty_controllers_stand_at_the_top_and_in_the_result() {
-    let arguments = [
-        &["--controllers", "20", "--mission", "1000h", "--json"],
-        &RATES[..],
-    ]
-    .concat();
+    let arguments = [&["--controllers", "20", "--mission", "1000h", "--json"], &RATES[..]].concat();
     let found = reliability(&arguments).json();
     let check = |name: &str, expected: f64, tolerance: f64| {
         assert_eq!(found[name], found["result"][name], "{name}");
@@ -48,26 +44,15 @@ fn the_figures_for_twenty_controllers_stand_at_the_top_and_in_the_result() {
     check("mttf_paper_hours", 10_897.0, 0.5);
     check("mttf_simplex_hours", 500.0, 1e-9);
     // (20): (2N + 1) / (N (N + 1) lambda) + mu / (N (N + 1) lambda^2), in closed form.
-    check(
-        "mttf_paper_hours",
-        41e4 / 420.0 + 1e8 / (24.0 * 420.0),
-        1e-8,
-    );
+    check("mttf_paper_hours", 41e4 / 420.0 + 1e8 / (24.0 * 420.0), 1e-8);
     check("reliability_simplex", (-2.0_f64).exp(), 1e-13);
     let number = |name: &str| found[name].as_f64().expect(name);
     assert!((number("p0") + number("p1") + number("p2") - 1.0).abs() < 1e-12);
     assert!((number("p0") + number("p1") - number("reliability_paper")).abs() < 1e-12);
     assert!(number("mttf_tmr_hours") > 0.0 && number("reliability_duplex") < 1.0);
-    let spare = [
-        &["--controllers", "20", "--spares", "2", "--json"],
-        &RATES[..],
-    ]
-    .concat();
+    let spare = [&["--controllers", "20", "--spares", "2", "--json"], &RATES[..]].concat();
     let hours = reliability(&spare).json()["mttf_cluster_hours"].as_f64();
-    assert!(
-        hours.is_some_and(|hours| (hours / 3.03e7 - 1.0).abs() < 1e-3),
-        "{hours:?}"
-    );
+    assert!(hours.is_some_and(|hours| (hours / 3.03e7 - 1.0).abs() < 1e-3), "{hours:?}");
 }
 
 #[test]
@@ -105,11 +90,7 @@ fn everything_that_is_wrong_with_the_question_is_said() {
     let unit = reliability(&[&["--controllers", "2", "--coverage", "NaN"], &RATES[..]].concat());
     assert_eq!(unit.status, 2);
     assert!(unit.errors.contains("U0703"), "{}", unit.errors);
-    assert_eq!(
-        reliability(&["--controllers", "2"]).status,
-        2,
-        "rates are asked for"
-    );
+    assert_eq!(reliability(&["--controllers", "2"]).status, 2, "rates are asked for");
 }
 
 #[test]
@@ -139,19 +120,10 @@ fn a_report_has_all_its_files_or_none() {
     assert_eq!(answer.status, 0, "{}", answer.errors);
     let mut names: Vec<String> = fs::read_dir(out)
         .expect("a folder")
-        .map(|entry| {
-            entry
-                .expect("a file")
-                .file_name()
-                .into_string()
-                .expect("text")
-        })
+        .map(|entry| entry.expect("a file").file_name().into_string().expect("text"))
         .collect();
     names.sort();
-    assert_eq!(
-        names,
-        ["reliability.csv", "reliability.html", "reliability.json"]
-    );
+    assert_eq!(names, ["reliability.csv", "reliability.html", "reliability.json"]);
     let page = fs::read_to_string(folder.join("report/reliability.html")).expect("a page");
     assert!(page.contains("press-cell") && page.contains("<svg"));
     // A file stands where the folder should be.
@@ -160,11 +132,7 @@ fn a_report_has_all_its_files_or_none() {
     let taken = taken.to_str().expect("text");
     let refused = reliability(&[&[PRESS_CELL, "--report", taken], &RATES[..]].concat());
     assert_eq!(refused.status, 1);
-    assert!(
-        refused.errors.contains("error[U0602]"),
-        "{}",
-        refused.errors
-    );
+    assert!(refused.errors.contains("error[U0602]"), "{}", refused.errors);
 }
 
 #[test]
@@ -200,39 +168,13 @@ fn a_campaign_that_says_nothing_or_never_ends_is_refused() {
     let check = |arguments: &[&str], code: &str| {
         let answer = understudy(&[&["measure", PRESS_CELL], arguments].concat());
         assert_eq!(answer.status, 2, "{arguments:?}");
-        assert!(
-            answer.errors.contains(code),
-            "{arguments:?}: {}",
-            answer.errors
-        );
+        assert!(answer.errors.contains(code), "{arguments:?}: {}", answer.errors);
     };
-    check(
-        &["--mtbf", "100h", "--mttr", "1h", "--acceleration", "10001"],
-        "U0717",
-    );
-    check(
-        &[
-            "--mtbf",
-            "1000h",
-            "--mttr",
-            "24h",
-            "--cycles-per-mttr",
-            "50",
-        ],
-        "U0717",
-    );
-    check(
-        &["--mtbf", "100h", "--mttr", "1h", "--acceleration", "NaN"],
-        "U0716",
-    );
-    check(
-        &["--mtbf", "100h", "--mttr", "1h", "--acceleration", "-3"],
-        "U0716",
-    );
-    check(
-        &["--mtbf", "100h", "--mttr", "1h", "--cycles-per-mttr", "0"],
-        "U0716",
-    );
+    check(&["--mtbf", "100h", "--mttr", "1h", "--acceleration", "10001"], "U0717");
+    check(&["--mtbf", "1000h", "--mttr", "24h", "--cycles-per-mttr", "50"], "U0717");
+    check(&["--mtbf", "100h", "--mttr", "1h", "--acceleration", "NaN"], "U0716");
+    check(&["--mtbf", "100h", "--mttr", "1h", "--acceleration", "-3"], "U0716");
+    check(&["--mtbf", "100h", "--mttr", "1h", "--cycles-per-mttr", "0"], "U0716");
     check(&["--mtbf", "10000h", "--mttr", "24h"], "U0609");
     check(&["--mtbf", "10000", "--mttr", "x"], "U0705");
 }
@@ -305,10 +247,7 @@ fn boxes_may_differ_and_parts_may_be_shared() {
     assert!(hours(&["--box", "understudies=40000h,24h"]) > alike);
     assert!(hours(&["--shared", "power=200000h"]) < alike);
     let named = |more: &[&str]| reliability(&[&[PRESS_CELL], &RATES[..], more].concat());
-    assert_eq!(
-        named(&["--box", "robot=4000h,48h", "--box", "understudy=1y,1d"]).status,
-        0
-    );
+    assert_eq!(named(&["--box", "robot=4000h,48h", "--box", "understudy=1y,1d"]).status, 0);
     let wrong = named(&[
         "--box",
         "robt=4000h,48h",
@@ -332,11 +271,8 @@ fn the_papers_mode_of_a_cluster_file_is_calculated_as_such() {
     let path = folder.join("cluster.toml");
     let period = "period = \"10ms\"";
     assert!(file.contains(period));
-    fs::write(
-        &path,
-        file.replace(period, &format!("{period}\nmode = \"paper\"")),
-    )
-    .expect("written");
+    fs::write(&path, file.replace(period, &format!("{period}\nmode = \"paper\"")))
+        .expect("written");
     let path = path.to_str().expect("text");
     let found = reliability(&[&[path, "--json"], &RATES[..]].concat()).json();
     let ratio = found["mttf_cluster_hours"].as_f64().expect("hours")

@@ -8,12 +8,7 @@ use crate::understudy;
 #[test]
 fn digests_of_numeric_programs_are_those_of_every_processor() {
     let mut lines = Vec::new();
-    for example in [
-        "heated-tank",
-        "modbus-level",
-        "tennessee-eastman",
-        "two-shuttles",
-    ] {
+    for example in ["heated-tank", "modbus-level", "tennessee-eastman", "two-shuttles"] {
         let folder = format!("{}/examples/{example}", env!("CARGO_MANIFEST_DIR"));
         let files = fs::read_dir(folder).expect("a folder");
         let names = files.map(|file| file.expect("a file").file_name());

@@ -39,11 +39,7 @@ fn properties(text: &str) -> String {
             lines.extend(property(&fields));
             fields.clear();
         } else if let Some((name, value)) = line.split_once(':') {
-            let value = value
-                .trim()
-                .trim_matches('"')
-                .replace("&&", "&")
-                .replace("||", "|");
+            let value = value.trim().trim_matches('"').replace("&&", "&").replace("||", "|");
             fields.push((name.to_owned(), value));
         }
     }
@@ -59,9 +55,7 @@ fn property(fields: &[(String, String)]) -> Option<String> {
         "invariant" => format!("AG ({})", field("expression")?),
         "absence" | "reachability" => format!("AG !({})", field("expression")?),
         "mutual_exclusion" => {
-            let both = field("variables")?
-                .trim_matches(['[', ']'])
-                .replace(", ", " and ");
+            let both = field("variables")?.trim_matches(['[', ']']).replace(", ", " and ");
             format!("never {both}")
         }
         "response" => format!(
@@ -79,40 +73,17 @@ fn verdicts_are_those_of_another_checker_or_explained() {
     let work = empty_folder("verdicts");
     let mut lines = Vec::new();
     for folder in folders() {
-        let name = folder
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
+        let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let read = |file: &str| fs::read_to_string(folder.join(file)).expect("a file that exists");
         let description = read("test.desc");
-        let ladder = folder.join(
-            description
-                .lines()
-                .nth(1)
-                .expect("the name of the ladder")
-                .trim(),
-        );
-        let theirs = if description.contains("FAILED") {
-            "fails"
-        } else {
-            "holds"
-        };
-        fs::write(
-            work.join("their.properties"),
-            properties(&read("props.yaml")),
-        )
-        .expect("written");
+        let ladder =
+            folder.join(description.lines().nth(1).expect("the name of the ladder").trim());
+        let theirs = if description.contains("FAILED") { "fails" } else { "holds" };
+        fs::write(work.join("their.properties"), properties(&read("props.yaml"))).expect("written");
         let ladder = ladder.display().to_string();
         let answer = understudy_in(
             &work,
-            &[
-                "verify",
-                &ladder,
-                "--properties",
-                "their.properties",
-                "--json",
-            ],
+            &["verify", &ladder, "--properties", "their.properties", "--json"],
         );
         if answer.status == 2 {
             let codes = answer.json()["diagnostics"].as_array().map_or(0, Vec::len);
@@ -121,10 +92,8 @@ fn verdicts_are_those_of_another_checker_or_explained() {
             continue;
         }
         let document = answer.json();
-        let proofs = document["result"]["programs"][0]["properties"]
-            .as_array()
-            .expect("a list")
-            .clone();
+        let proofs =
+            document["result"]["programs"][0]["properties"].as_array().expect("a list").clone();
         let all = |verdict: &str| proofs.iter().all(|proof| proof["verdict"] == verdict);
         let any = |verdict: &str| proofs.iter().any(|proof| proof["verdict"] == verdict);
         let ours = if any("fails") {
@@ -134,10 +103,8 @@ fn verdicts_are_those_of_another_checker_or_explained() {
         } else {
             "undecided"
         };
-        let expected = EXPLAINED
-            .iter()
-            .find(|(known, _)| *known == name)
-            .map_or(theirs, |(_, ours)| ours);
+        let expected =
+            EXPLAINED.iter().find(|(known, _)| *known == name).map_or(theirs, |(_, ours)| ours);
         assert_eq!(ours, expected, "{name}: {}", answer.shown());
         lines.push(format!("{name}: {ours}, {} properties", proofs.len()));
     }

@@ -39,15 +39,10 @@ fn a_ladder_alone_and_a_cluster_are_asked_what_all_are_asked() {
 fn every_wrong_line_of_a_file_is_said_and_nothing_is_proved() {
     let folder = empty_folder("verify");
     let file = folder.join("press.properties");
-    fs::write(
-        &file,
-        "AG (move_dwn\nright: AG EF move_down\nnever oops and stop\nfair: AG stop\n",
-    )
-    .expect("written");
+    fs::write(&file, "AG (move_dwn\nright: AG EF move_down\nnever oops and stop\nfair: AG stop\n")
+        .expect("written");
     let answer = understudy(&["verify", PRESS, "--properties", &file.display().to_string()]);
-    let shown = answer
-        .shown()
-        .replace(&folder.display().to_string(), "FOLDER");
+    let shown = answer.shown().replace(&folder.display().to_string(), "FOLDER");
     assert_snapshot!(shown);
 }
 
@@ -60,10 +55,7 @@ fn a_bound_that_is_too_small_leaves_it_to_other_methods() {
         answer.json()["result"]["programs"][0]["properties"][0]["verdict"].clone()
     };
     assert_eq!(check("never move_down and stop"), json!("holds"));
-    assert_eq!(
-        check("AG (move_up -> EF (grip & EF move_left))"),
-        json!("holds")
-    );
+    assert_eq!(check("AG (move_up -> EF (grip & EF move_left))"), json!("holds"));
 }
 
 #[test]
@@ -101,15 +93,8 @@ fn an_edge_that_undoes_itself_is_remarked_on_and_drawn() {
     let answer = understudy(&["verify", &ladder, "--draw", &page, "--json"]);
     assert_eq!(answer.status, 1, "{}", answer.shown());
     let result = &answer.json()["result"];
-    assert_eq!(
-        result["programs"][0]["remarks"][0]["code"],
-        json!("U0445"),
-        "{result}"
-    );
-    assert_eq!(
-        result["programs"][0]["switches"][0]["verdict"],
-        json!("never-on")
-    );
+    assert_eq!(result["programs"][0]["remarks"][0]["code"], json!("U0445"), "{result}");
+    assert_eq!(result["programs"][0]["switches"][0]["verdict"], json!("never-on"));
     let drawn = fs::read_to_string(&page).expect("the page");
     assert!(drawn.contains("light") && drawn.contains("class=\"live\""));
     let both = understudy(&["verify", &ladder, "--draw", &page, "--smv", "scan"]);

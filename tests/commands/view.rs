@@ -17,16 +17,8 @@ fn run(name: &str, seed: &str) -> PathBuf {
         fs::copy(source, folder.join("cell").join(file)).expect("copied");
     }
     let scenario = format!("{root}/scenarios/kill-each.toml");
-    let arguments = [
-        "simulate",
-        "cell/cluster.toml",
-        "--scenario",
-        &scenario,
-        "--seed",
-        seed,
-        "--out",
-        "runs",
-    ];
+    let arguments =
+        ["simulate", "cell/cluster.toml", "--scenario", &scenario, "--seed", seed, "--out", "runs"];
     let answer = understudy_in(&folder, &arguments);
     assert_eq!(answer.status, 0, "{}", answer.shown());
     // The run says itself what it ran.
@@ -45,11 +37,7 @@ fn an_output_is_explained() {
     assert_eq!(json["result"]["because"]["rung"], 1);
     let unknown = understudy_in(&folder, &["why", "griip"]);
     assert_eq!(unknown.status, 2);
-    assert!(
-        unknown.errors.contains("did you mean `grip`?"),
-        "{}",
-        unknown.errors
-    );
+    assert!(unknown.errors.contains("did you mean `grip`?"), "{}", unknown.errors);
 }
 
 #[test]
@@ -73,25 +61,14 @@ fn a_journal_is_listed() {
         "--to",
         "100"
     ]));
-    let ordinary = listed(&[
-        "--member", "press-io", "--event", "applied", "--from", "119", "--to", "121",
-    ]);
+    let ordinary =
+        listed(&["--member", "press-io", "--event", "applied", "--from", "119", "--to", "121"]);
     assert_snapshot!(ordinary);
     // A run that is over is followed to its end.
-    assert_eq!(
-        listed(&["--follow", "--program", "press"]),
-        listed(&["--program", "press"])
-    );
+    assert_eq!(listed(&["--follow", "--program", "press"]), listed(&["--program", "press"]));
     let json = understudy_in(&folder, &["journal", "--to", "3", "--json"]).json();
-    assert!(
-        json["result"]["lines"]
-            .as_array()
-            .is_some_and(|lines| !lines.is_empty())
-    );
-    let wrong = understudy_in(
-        &folder,
-        &["journal", "--member", "robbot", "--event", "flaged"],
-    );
+    assert!(json["result"]["lines"].as_array().is_some_and(|lines| !lines.is_empty()));
+    let wrong = understudy_in(&folder, &["journal", "--member", "robbot", "--event", "flaged"]);
     assert_eq!(wrong.status, 2);
     for hint in ["did you mean `robot`?", "did you mean `flagged`?"] {
         assert!(wrong.errors.contains(hint), "{}", wrong.errors);
@@ -108,11 +85,7 @@ fn a_run_is_shown_at_once() {
     assert_eq!(json["result"]["cycle"], 299);
     let no_terminal = understudy_in(&folder, &["top"]);
     assert_eq!(no_terminal.status, 2);
-    assert!(
-        no_terminal.errors.contains("--once"),
-        "{}",
-        no_terminal.errors
-    );
+    assert!(no_terminal.errors.contains("--once"), "{}", no_terminal.errors);
 }
 
 #[test]
@@ -127,9 +100,7 @@ fn two_runs_are_compared() {
     let first = first.display().to_string();
     let same = understudy_in(&folder, &["diff", &first, "runs/latest"]);
     assert_snapshot!(same.shown());
-    let again = [
-        "simulate", &cluster, "--cycles", "300", "--seed", "1", "--out", "runs",
-    ];
+    let again = ["simulate", &cluster, "--cycles", "300", "--seed", "1", "--out", "runs"];
     assert_eq!(understudy_in(&folder, &again).status, 0);
     assert_eq!(same.status, 0);
     let other = understudy_in(&folder, &["diff", &first, "runs/latest", "--json"]);
@@ -139,9 +110,5 @@ fn two_runs_are_compared() {
     let part = differences.first().expect("one was killed");
     assert_eq!(part["cycle"], 30);
     let images = ["inputs", "outputs"].map(serde_json::Value::from);
-    assert!(
-        differences
-            .iter()
-            .all(|found| !images.contains(&found["what"]))
-    );
+    assert!(differences.iter().all(|found| !images.contains(&found["what"])));
 }

@@ -86,14 +86,8 @@ fn an_alarm_is_acknowledged_and_shelved_from_another_process() {
         (status, code.unwrap_or_default())
     };
     let refused = |code: &str| (1, code.to_owned());
-    assert_eq!(
-        code(operate(&run, "running", &["acknowledge-alarm"])),
-        refused("U0662")
-    );
-    assert_eq!(
-        code(operate(&run, "runnin", &["shelve-alarm"])),
-        refused("U0660")
-    );
+    assert_eq!(code(operate(&run, "running", &["acknowledge-alarm"])), refused("U0662"));
+    assert_eq!(code(operate(&run, "runnin", &["shelve-alarm"])), refused("U0660"));
     let endless = ["shelve-alarm", "--seconds", "86401"];
     assert_eq!(code(operate(&run, "running", &endless)), refused("U0661"));
 
@@ -104,11 +98,7 @@ fn an_alarm_is_acknowledged_and_shelved_from_another_process() {
     assert_eq!(raised["alarms"][0]["name"], "running", "{raised:#}");
     done(&run, "running", &["acknowledge-alarm"]);
     wait_for(&run, "acknowledged");
-    done(
-        &run,
-        "running",
-        &["shelve-alarm", "--seconds", "3600", "--reason", "test"],
-    );
+    done(&run, "running", &["shelve-alarm", "--seconds", "3600", "--reason", "test"]);
     let shelved = wait_for(&run, "shelved");
     let reason = &shelved["process_alarms"][0]["shelved"]["reason"];
     assert_eq!(*reason, "test", "{shelved:#}");
@@ -132,22 +122,9 @@ fn an_alarm_is_acknowledged_and_shelved_from_another_process() {
         .iter()
         .filter_map(|line| line["event"].as_str())
         .filter(|event| {
-            [
-                "alarm-raised",
-                "alarm-over",
-                "acknowledged",
-                "shelved",
-                "unshelved",
-            ]
-            .contains(event)
+            ["alarm-raised", "alarm-over", "acknowledged", "shelved", "unshelved"].contains(event)
         })
         .collect();
-    let expected = [
-        "alarm-raised",
-        "acknowledged",
-        "shelved",
-        "unshelved",
-        "alarm-over",
-    ];
+    let expected = ["alarm-raised", "acknowledged", "shelved", "unshelved", "alarm-over"];
     assert_eq!(events, expected);
 }

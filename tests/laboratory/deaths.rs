@@ -23,11 +23,7 @@ impl Records {
     pub(super) fn of(run: &Path) -> Self {
         let path = run.join("journal.jsonl");
         let journal = File::open(&path).expect("a journal");
-        Self {
-            path,
-            journal: BufReader::new(journal),
-            line: String::new(),
-        }
+        Self { path, journal: BufReader::new(journal), line: String::new() }
     }
 
     /// The next record that is wanted, of those that have not been read.
@@ -137,10 +133,7 @@ fn every_kind_of_member_is_killed_from_outside_and_started_again_by_an_operator(
     assert_eq!(child.wait().expect("it ends").code(), Some(1), "{said}");
     no_orphan(&out);
     let restart = format!("understudy operate {} --name press restart", run.display());
-    let told = run
-        .file_name()
-        .and_then(|name| name.to_str())
-        .expect("text");
+    let told = run.file_name().and_then(|name| name.to_str()).expect("text");
     assert!(
         said.contains("press ended unexpectedly (signal: 9 (SIGKILL))")
             && said.contains(&format!("{told} --name press restart")),
@@ -149,10 +142,7 @@ fn every_kind_of_member_is_killed_from_outside_and_started_again_by_an_operator(
     let summary = fs::read_to_string(run.join("summary.json")).expect("a summary");
     let summary: Value = serde_json::from_str(&summary).expect("JSON");
     let deaths = summary["deaths"].as_array().expect("a list");
-    let names: Vec<&str> = deaths
-        .iter()
-        .filter_map(|death| death["name"].as_str())
-        .collect();
+    let names: Vec<&str> = deaths.iter().filter_map(|death| death["name"].as_str()).collect();
     assert_eq!(names, members);
     assert_eq!(summary["violation_count"], 0);
     let (status, document) = operate(&run, "press", "restart");
@@ -162,9 +152,7 @@ fn every_kind_of_member_is_killed_from_outside_and_started_again_by_an_operator(
 /// Kills the press's controller in a laboratory of 200 cycles; answers with the exit status, the text, and whether it ran again.
 fn killed(name: &str, more: &[&str]) -> (Option<i32>, String, bool) {
     let out = empty_folder(name);
-    let arguments = [
-        "lab", PRESS_CELL, "--link", "udp", "--period", "50ms", "--out",
-    ];
+    let arguments = ["lab", PRESS_CELL, "--link", "udp", "--period", "50ms", "--out"];
     let (mut child, _errors) = running_with(&arguments, &out, more, "synchronised: ");
     let run = fs::canonicalize(out.join("latest")).expect("a run");
     let mut records = Records::of(&run);

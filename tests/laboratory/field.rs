@@ -52,10 +52,7 @@ impl Device {
     fn start_of(example: &str, argument: &str, module: &str, wanted: &str) -> Option<Self> {
         let python = std::env::var("UNDERSTUDY_PYTHON").unwrap_or_else(|_| "python3".into());
         let version = Command::new(&python)
-            .args([
-                "-c",
-                &format!("import {module}; print({module}.__version__)"),
-            ])
+            .args(["-c", &format!("import {module}; print({module}.__version__)")])
             .output();
         let version = version.map_or_else(
             |error| error.to_string(),
@@ -221,10 +218,7 @@ fn level_cluster(out: &Path, connection: &str) -> PathBuf {
     let mut text = text.replace("127.0.0.1:5021", connection);
     if connection.starts_with("rtu:") {
         // A pseudo terminal has no parity bit.
-        text = text.replace(
-            "[remote_io.field]\n",
-            "[remote_io.field]\nparity = \"none\"\n",
-        );
+        text = text.replace("[remote_io.field]\n", "[remote_io.field]\nparity = \"none\"\n");
     }
     fs::write(out.join("cluster.toml"), text).expect("written");
     for file in ["level.st", "tank.st"] {
@@ -290,13 +284,7 @@ fn a_real_in_registers_is_driven_while_its_controller_is_dead() {
                 && (missing.is_empty() || record["missing"] == missing)
         }
     };
-    let at = wait_for_member(
-        &journal,
-        0,
-        "left-io",
-        "driven",
-        own("applied", "direct", ""),
-    );
+    let at = wait_for_member(&journal, 0, "left-io", "driven", own("applied", "direct", ""));
     device.mood("nan");
     let lost = |record: &Value| {
         let said = record["reason"].as_str().unwrap_or_default();
@@ -307,13 +295,7 @@ fn a_real_in_registers_is_driven_while_its_controller_is_dead() {
     let bad = own("applied", "fail-safe", "bad-quality");
     let at = wait_for_member(&journal, at, "left-io", "fail-safe", bad);
     device.mood("well");
-    wait_for_member(
-        &journal,
-        at,
-        "left-io",
-        "driven again",
-        own("applied", "direct", ""),
-    );
+    wait_for_member(&journal, at, "left-io", "driven again", own("applied", "direct", ""));
     signal(child.id(), nix::sys::signal::Signal::SIGINT);
     child.wait().expect("it ends");
     no_orphan(&out);

@@ -60,9 +60,8 @@ impl Drop for Laboratory {
 }
 
 fn laboratory(out: &Path, more: &[&str]) -> (Laboratory, PathBuf) {
-    let arguments = [
-        "lab", CLUSTER, "--link", "udp", "--period", PERIOD, "--cycles", "1000000", "--out",
-    ];
+    let arguments =
+        ["lab", CLUSTER, "--link", "udp", "--period", PERIOD, "--cycles", "1000000", "--out"];
     let more = [&["--allow-commands"], more].concat();
     let (child, errors) = running_with(&arguments, out, &more, "synchronised: ");
     // It says more, and must not wait for a reader.
@@ -109,9 +108,7 @@ impl Gateway {
     fn opcua(run: &Path, folder: &Path) -> Option<Self> {
         let binary = Path::new(env!("CARGO_BIN_EXE_understudy")).with_file_name("understudy-opcua");
         if !binary.exists() {
-            skip(format_args!(
-                "no understudy-opcua: cargo build -p understudy-opcua-gateway"
-            ));
+            skip(format_args!("no understudy-opcua: cargo build -p understudy-opcua-gateway"));
             return None;
         }
         let logins = folder.join("logins");
@@ -291,14 +288,9 @@ fn effects(run: &Path) -> BTreeMap<u64, BTreeSet<String>> {
 
 fn register_of(registers: &Value, name: &str) -> String {
     let places = registers["result"]["registers"].as_array().expect("a list");
-    let place = places
-        .iter()
-        .find(|place| place["name"] == name && place["area"] == "register");
+    let place = places.iter().find(|place| place["name"] == name && place["area"] == "register");
     let place = place.expect("a setpoint");
-    assert_eq!(
-        (&place["writable"], &place["width"]),
-        (&json!(true), &json!(2))
-    );
+    assert_eq!((&place["writable"], &place["width"]), (&json!(true), &json!(2)));
     place["address"].to_string()
 }
 
@@ -337,9 +329,7 @@ fn clients_of_four_kinds_write_while_members_are_killed_and_frames_are_lost() {
         ];
         // Each is read as it writes: one whose output nobody reads waits for its reader.
         let written = clients.into_iter().flatten();
-        let written: Vec<_> = written
-            .map(|client| scope.spawn(|| client.outcomes()))
-            .collect();
+        let written: Vec<_> = written.map(|client| scope.spawn(|| client.outcomes())).collect();
         let mut all = Vec::new();
         for outcomes in written {
             let outcomes = outcomes.join().expect("no panic");
@@ -397,17 +387,12 @@ fn a_flood_of_writes_is_bounded_and_disturbs_no_cycle() {
     let text = run.to_str().expect("text");
     let (_, registers, _) = answer(&["gateway", "registers", text]);
     let places = registers["result"]["registers"].as_array().expect("a list");
-    let coil = places
-        .iter()
-        .find(|place| place["name"] == "left.start" && place["area"] == "coil");
+    let coil = places.iter().find(|place| place["name"] == "left.start" && place["area"] == "coil");
     let coil = coil.expect("a pulse")["address"].as_u64();
     let coil = u16::try_from(coil.expect("an address")).expect("an address");
     let gateway = Gateway::of("modbus", &run);
-    let (left, in_effect, busy) = (
-        AtomicUsize::new(REQUESTS),
-        AtomicUsize::new(0),
-        AtomicUsize::new(0),
-    );
+    let (left, in_effect, busy) =
+        (AtomicUsize::new(REQUESTS), AtomicUsize::new(0), AtomicUsize::new(0));
     let begun = Instant::now();
     std::thread::scope(|scope| {
         for _ in 0..CONNECTIONS {

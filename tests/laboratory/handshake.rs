@@ -61,9 +61,7 @@ rung m2 ( s2 )
 rung m3 ( s3 )
 ";
 
-const OUTPUTS: [&str; 10] = [
-    "alive", "ack", "c0", "c1", "c2", "c3", "s0", "s1", "s2", "s3",
-];
+const OUTPUTS: [&str; 10] = ["alive", "ack", "c0", "c1", "c2", "c3", "s0", "s1", "s2", "s3"];
 
 /// A number that looks like chance and is the same in every run.
 struct Chance(u64);
@@ -71,9 +69,8 @@ struct Chance(u64);
 impl Chance {
     fn below(&mut self, bound: u64) -> u64 {
         let Self(state) = self;
-        *state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        *state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (*state >> 33) % bound
     }
 }
@@ -91,19 +88,13 @@ impl Answer {
             let bits = bits.iter().rev();
             bits.fold(0, |number, bit| 2 * number + u8::from(*bit))
         };
-        Self {
-            count: number(&coils[2..6]),
-            signature: number(&coils[6..10]),
-        }
+        Self { count: number(&coils[2..6]), signature: number(&coils[6..10]) }
     }
 
     fn after(self, bit: bool) -> Self {
         let Self { count, signature } = self;
         let first = (signature >> 3) ^ u8::from(bit);
-        Self {
-            count: (count + 1) % 16,
-            signature: ((signature << 1) | first) & 15,
-        }
+        Self { count: (count + 1) % 16, signature: ((signature << 1) | first) & 15 }
     }
 }
 
@@ -125,10 +116,7 @@ impl Device {
             chance: Chance(seed),
             asking: false,
             bit: false,
-            told: Answer {
-                count: 0,
-                signature: 0,
-            },
+            told: Answer { count: 0, signature: 0 },
             answered: 0,
             wrong: Vec::new(),
         }
@@ -143,19 +131,9 @@ impl Device {
         }
         let said = Answer::of(coils);
         let next = self.told.after(self.bit);
-        let wanted = if self.asking && acknowledged {
-            next
-        } else {
-            self.told
-        };
+        let wanted = if self.asking && acknowledged { next } else { self.told };
         if said != wanted {
-            let Self {
-                answered,
-                asking,
-                bit,
-                told,
-                ..
-            } = self;
+            let Self { answered, asking, bit, told, .. } = self;
             self.wrong.push(format!(
                 "after {answered} answers, asking {asking} with {bit}, acknowledged {acknowledged}: {said:?} follows {told:?}"
             ));
@@ -226,9 +204,8 @@ fn cluster(folder: &Path, ports: &[u16]) -> String {
         fs::write(folder.join(format!("{name}.ladder")), program).expect("written");
         let fail_safe = OUTPUTS.map(|output| format!("{output} = false")).join(", ");
         let coils = OUTPUTS.iter().enumerate();
-        let coils: Vec<String> = coils
-            .map(|(place, output)| format!("{output} = \"coil:{place}\""))
-            .collect();
+        let coils: Vec<String> =
+            coils.map(|(place, output)| format!("{output} = \"coil:{place}\"")).collect();
         let coils = coils.join(", ");
         write!(
             text,
@@ -265,11 +242,8 @@ fn scenario(folder: &Path, cycles: u64) -> String {
     let mut chance = Chance(20_261_122);
     let mut step = |at: u64, action: &str, station: &str, to: Option<&str>| {
         let to = to.map_or(String::new(), |to| format!("to = [\"{to}\"]\n"));
-        write!(
-            text,
-            "\n[[step]]\nat = {at}\naction = \"{action}\"\nstation = \"{station}\"\n{to}"
-        )
-        .expect("a text");
+        write!(text, "\n[[step]]\nat = {at}\naction = \"{action}\"\nstation = \"{station}\"\n{to}")
+            .expect("a text");
     };
     for (number, at) in (10..cycles.saturating_sub(BETWEEN))
         .step_by(usize::try_from(BETWEEN).expect("small"))
@@ -354,16 +328,8 @@ fn devices_that_wait_for_each_answer_see_none_lost_doubled_or_old() {
     let scenario = scenario(&folder, cycles);
     let runs = folder.join("runs");
     let out = runs.to_str().expect("text");
-    let (_, document, errors) = answer(&[
-        "lab",
-        &cluster,
-        "--scenario",
-        &scenario,
-        "--link",
-        "udp",
-        "--out",
-        out,
-    ]);
+    let (_, document, errors) =
+        answer(&["lab", &cluster, "--scenario", &scenario, "--link", "udp", "--out", out]);
     no_orphan(&folder);
     let summary = &document["result"]["summary"];
     assert_eq!(summary["violation_count"], 0, "{document:#}\n{errors}");

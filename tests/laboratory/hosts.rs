@@ -47,11 +47,7 @@ fn nothing_is_wrong_where_nft_loses_frames() {
     }
     let more = ["--hosts", "netns", "--loss", "5%"];
     let summary = check("nft", "scenarios/kill-each.toml", &more);
-    assert!(
-        notes(&summary).contains("nft loses 5 %"),
-        "{}",
-        notes(&summary)
-    );
+    assert!(notes(&summary).contains("nft loses 5 %"), "{}", notes(&summary));
 }
 
 #[test]
@@ -71,11 +67,7 @@ fn nothing_is_wrong_on_links_that_lose_delay_double_reorder_and_change() {
         "1%",
     ];
     let summary = check("impaired", "scenarios/kill-each.toml", &more);
-    assert!(
-        notes(&summary).contains("through the proxy"),
-        "{}",
-        notes(&summary)
-    );
+    assert!(notes(&summary).contains("through the proxy"), "{}", notes(&summary));
 }
 
 /// The network namespaces of a run's processes.
@@ -125,9 +117,7 @@ fn a_killed_laboratory_leaves_no_host() {
     let named = fs::read_dir("/run/netns").into_iter().flatten();
     let named: Vec<_> = named.filter_map(Result::ok).collect();
     assert!(
-        !named
-            .iter()
-            .any(|entry| entry.file_name().to_string_lossy().contains("understudy")),
+        !named.iter().any(|entry| entry.file_name().to_string_lossy().contains("understudy")),
         "{named:?}"
     );
 }

@@ -44,10 +44,7 @@ fn no_orphan(out: &Path) {
     let deadline = Instant::now() + DEADLINE;
     let out = out.to_str().expect("text");
     loop {
-        let left: Vec<String> = processes()
-            .into_iter()
-            .filter(|line| line.contains(out))
-            .collect();
+        let left: Vec<String> = processes().into_iter().filter(|line| line.contains(out)).collect();
         if left.is_empty() {
             return;
         }
@@ -58,9 +55,7 @@ fn no_orphan(out: &Path) {
 
 /// The command lines of this machine's living processes.
 fn processes() -> BTreeSet<String> {
-    let folders = fs::read_dir("/proc")
-        .expect("a Linux")
-        .filter_map(Result::ok);
+    let folders = fs::read_dir("/proc").expect("a Linux").filter_map(Result::ok);
     folders
         .filter_map(|folder| fs::read(folder.path().join("cmdline")).ok())
         .map(|line| String::from_utf8_lossy(&line).replace('\0', " "))
@@ -72,25 +67,14 @@ fn processes() -> BTreeSet<String> {
 fn check(name: &str, scenario: &str, more: &[&str]) -> Value {
     let _one = some_at_a_time();
     let out = empty_folder(name);
-    let arguments = [
-        "lab",
-        PRESS_CELL,
-        "--scenario",
-        scenario,
-        "--link",
-        "udp",
-        "--period",
-        PERIOD,
-    ];
+    let arguments =
+        ["lab", PRESS_CELL, "--scenario", scenario, "--link", "udp", "--period", PERIOD];
     let out_argument = ["--out", out.to_str().expect("text")];
     let (_, document, errors) = answer(&[&arguments[..], &out_argument, more].concat());
     no_orphan(&out);
     let summary = document["result"]["summary"].clone();
     assert_eq!(summary["violation_count"], 0, "{document:#}\n{errors}");
-    assert_eq!(
-        summary["cycles_run"], summary["cycles_asked"],
-        "{document:#}\n{errors}"
-    );
+    assert_eq!(summary["cycles_run"], summary["cycles_asked"], "{document:#}\n{errors}");
     summary
 }
 
@@ -113,9 +97,7 @@ fn assert_met(summary: &Value) {
 }
 
 fn count(summary: &Value, remote_io: usize, source: &str) -> u64 {
-    summary["remote_ios"][remote_io]["counts"][source]
-        .as_u64()
-        .expect("a count")
+    summary["remote_ios"][remote_io]["counts"][source].as_u64().expect("a count")
 }
 
 #[test]
@@ -193,13 +175,7 @@ fn the_demo_at_a_shorter_length() {
     assert_eq!(summary["violation_count"], 0, "{document:#}\n{errors}");
     assert_met(summary);
     assert_eq!(summary["passed"], status == 0, "{document:#}\n{errors}");
-    for name in [
-        "journal.jsonl",
-        "summary.json",
-        "figure10.svg",
-        "report.html",
-        "endpoints.json",
-    ] {
+    for name in ["journal.jsonl", "summary.json", "figure10.svg", "report.html", "endpoints.json"] {
         assert!(out.join("latest").join(name).exists(), "{name}");
     }
 }
@@ -215,9 +191,8 @@ fn running_cluster(
     more: &[&str],
 ) -> (Child, BufReader<std::process::ChildStderr>) {
     let cluster = cluster.to_str().expect("text");
-    let arguments = [
-        "lab", cluster, "--link", "udp", "--period", PERIOD, "--cycles", "100000", "--out",
-    ];
+    let arguments =
+        ["lab", cluster, "--link", "udp", "--period", PERIOD, "--cycles", "100000", "--out"];
     running_with(&arguments, out, more, "synchronised: ")
 }
 
@@ -257,12 +232,7 @@ fn an_interrupted_run_leaves_its_results_and_no_orphan() {
     let (mut child, _errors) = running(&out, &[]);
     signal(child.id(), Signal::SIGINT);
     let mut text = String::new();
-    child
-        .stdout
-        .take()
-        .expect("piped")
-        .read_to_string(&mut text)
-        .expect("text");
+    child.stdout.take().expect("piped").read_to_string(&mut text).expect("text");
     assert_eq!(child.wait().expect("it ends").code(), Some(1));
     assert!(text.contains("interrupted after"), "{text}");
     no_orphan(&out);
@@ -296,20 +266,14 @@ fn a_killed_laboratory_leaves_no_orphan_and_the_next_run_cleans_up() {
 /// The process id that a member of a running laboratory has told in its journal's first record.
 fn process_of(out: &Path, name: &str) -> u32 {
     let out = out.to_str().expect("text");
-    let folders = fs::read_dir("/proc")
-        .expect("a Linux")
-        .filter_map(Result::ok);
+    let folders = fs::read_dir("/proc").expect("a Linux").filter_map(Result::ok);
     let mut found = folders.filter(|folder| {
         let line = fs::read(folder.path().join("cmdline")).unwrap_or_default();
         let line = String::from_utf8_lossy(&line).replace('\0', " ");
         line.contains(out) && line.contains(&format!("--name {name} "))
     });
     let folder = found.next().expect("it runs");
-    folder
-        .file_name()
-        .to_string_lossy()
-        .parse()
-        .expect("a number")
+    folder.file_name().to_string_lossy().parse().expect("a number")
 }
 
 #[test]
@@ -344,10 +308,6 @@ fn a_port_in_use_is_said_plainly_and_everything_is_stopped() {
     assert_eq!(status, 1, "{document:#}");
     let failure = &document["failures"][0];
     assert_eq!(failure["code"], "U0501", "{document:#}");
-    assert!(
-        failure["message"]
-            .as_str()
-            .is_some_and(|text| text.contains(&format!("port {port}")))
-    );
+    assert!(failure["message"].as_str().is_some_and(|text| text.contains(&format!("port {port}"))));
     no_orphan(&out);
 }

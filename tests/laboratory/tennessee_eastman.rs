@@ -43,11 +43,7 @@ impl Equipment {
         let mut line = String::new();
         errors.read_line(&mut line).expect("text");
         let address = line.trim_end().strip_prefix("listening on ");
-        Self {
-            address: address.expect("an address").to_owned(),
-            child,
-            lines: Some(lines),
-        }
+        Self { address: address.expect("an address").to_owned(), child, lines: Some(lines) }
     }
 
     /// Ends it; the lines of its run.

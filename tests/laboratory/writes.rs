@@ -69,10 +69,7 @@ fn press(run: &Path, writer: u16, over: &AtomicBool) -> u32 {
     let (mut number, mut effects) = (1, 0);
     while !over.load(Ordering::SeqCst) {
         let write = Write {
-            id: WriteId {
-                session: 100 + u64::from(writer),
-                number,
-            },
+            id: WriteId { session: 100 + u64::from(writer), number },
             input: writer,
             value: true.into(),
             role: Role::Operator,
@@ -119,9 +116,8 @@ fn each_press_counts_once_while_every_member_is_killed() {
     let effects: Vec<u32> = std::thread::scope(|scope| {
         let run = &run;
         let over = &over;
-        let writers: Vec<_> = (0..WRITERS)
-            .map(|writer| scope.spawn(move || press(run, writer, over)))
-            .collect();
+        let writers: Vec<_> =
+            (0..WRITERS).map(|writer| scope.spawn(move || press(run, writer, over))).collect();
         let commander = Commander::of_run(run.clone());
         let mut records = Records::of(run);
         for (member, name) in MEMBERS.into_iter().chain(MEMBERS) {
@@ -144,9 +140,7 @@ fn each_press_counts_once_while_every_member_is_killed() {
             }
             // Presses count while all are there.
             for _ in 0..2 {
-                records.wait_for("a press", |record| {
-                    is(record, "counter-io", "write-in-effect")
-                });
+                records.wait_for("a press", |record| is(record, "counter-io", "write-in-effect"));
             }
         }
         over.store(true, Ordering::SeqCst);

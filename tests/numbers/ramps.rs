@@ -75,9 +75,7 @@ fn an_output_goes_down_its_ramp_and_the_referee_agrees() {
     let account = simulate(&cluster, &scenario, 1, &mut |record| {
         if let (Some(Member::RemoteIo(ProgramId(1))), Happening::RemoteIo(event)) =
             (record.member, &record.event)
-            && let Event::Applied {
-                outputs, source, ..
-            } = event
+            && let Event::Applied { outputs, source, .. } = event
         {
             let heat = f32::from_bits(heater.get(outputs.words()) as u32);
             driven.push((*source, heat, stage.get(outputs.words())));
@@ -86,9 +84,7 @@ fn an_output_goes_down_its_ramp_and_the_referee_agrees() {
     let account = account.expect("the cluster is synchronised");
     let (summary, _) = Summary::new(account, &scenario, circumstances(), journal.finish());
     assert!(summary.violations.is_empty() && summary.passed);
-    let held = driven
-        .iter()
-        .position(|(source, ..)| *source == Source::Held);
+    let held = driven.iter().position(|(source, ..)| *source == Source::Held);
     let held = held.expect("outputs are held");
     let (_, heat, stage) = driven[held];
     assert!(heat > 10.0 && stage >= 1, "{heat} {stage}");
@@ -107,31 +103,14 @@ fn an_output_goes_down_its_ramp_and_the_referee_agrees() {
 fn check(ramp: &str, code: &str, expected: &str) {
     let loaded = heated_tank(ramp);
     let found = &loaded.reports[0].diagnostics;
-    assert!(
-        found
-            .iter()
-            .any(|it| it.code == code && it.message.contains(expected)),
-        "{found:?}"
-    );
+    assert!(found.iter().any(|it| it.code == code && it.message.contains(expected)), "{found:?}");
 }
 
 #[test]
 fn ramps_that_cannot_be_are_reported() {
-    check(
-        "ramp = { too_hot = 1.0 }",
-        "U0204",
-        "`too_hot` is BOOL: only a number has a ramp",
-    );
-    check(
-        "ramp = { heater = -5.0 }",
-        "U0204",
-        "the ramp of `heater` is not above 0",
-    );
-    check(
-        "ramp = { heater = true }",
-        "U0204",
-        "the ramp of `heater` is not above 0",
-    );
+    check("ramp = { too_hot = 1.0 }", "U0204", "`too_hot` is BOOL: only a number has a ramp");
+    check("ramp = { heater = -5.0 }", "U0204", "the ramp of `heater` is not above 0");
+    check("ramp = { heater = true }", "U0204", "the ramp of `heater` is not above 0");
     check("ramp = { heating = 5.0 }", "U0209", "no output `heating`");
 }
 
@@ -141,13 +120,9 @@ fn members_with_other_ramps_refuse_each_other() {
         let cluster = heated_tank(ramp).cluster.expect("a cluster");
         cluster.agreement().configuration
     };
-    let [none, slow, fast, other] = [
-        "",
-        "ramp = { heater = 5.0 }",
-        "ramp = { heater = 6.0 }",
-        "ramp = { stage = 5.0 }",
-    ]
-    .map(hash);
+    let [none, slow, fast, other] =
+        ["", "ramp = { heater = 5.0 }", "ramp = { heater = 6.0 }", "ramp = { stage = 5.0 }"]
+            .map(hash);
     assert_eq!(none, hash("ramp = {}"));
     assert!(none != slow && slow != fast && slow != other && none != other);
 }

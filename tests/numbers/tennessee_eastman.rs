@@ -34,12 +34,9 @@ fn cluster(mode: &str) -> Cluster {
 fn scenario(cluster: &Cluster, failures: Vec<Fault>) -> Scenario {
     let file = text("kill-each.toml").expect("a scenario");
     let members = Members::of(cluster);
-    let mut scenario = read("kill-each.toml", &file, Some(&members))
-        .scenario
-        .expect("without errors");
-    scenario
-        .steps
-        .retain(|step| !matches!(step.action, Action::Crash | Action::Restart));
+    let mut scenario =
+        read("kill-each.toml", &file, Some(&members)).scenario.expect("without errors");
+    scenario.steps.retain(|step| !matches!(step.action, Action::Crash | Action::Restart));
     assert!(!scenario.steps.is_empty(), "the operator writes a setpoint");
     scenario.steps.extend(failures);
     scenario.steps.sort_by_key(|step| step.at_cycle);
@@ -73,12 +70,7 @@ fn run(cluster: &Cluster, failures: Vec<Fault>) -> (BTreeMap<(ProgramId, Moment)
     let account = simulate(cluster, &scenario, 1, &mut |record| {
         if let (Some(Member::RemoteIo(program)), Happening::RemoteIo(event)) =
             (record.member, &record.event)
-            && let Event::Applied {
-                moment,
-                outputs,
-                source,
-                ..
-            } = event
+            && let Event::Applied { moment, outputs, source, .. } = event
         {
             reconstructed += usize::from(*source == Source::Reconstructed);
             applied.insert((program, *moment), outputs.clone());

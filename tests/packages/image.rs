@@ -34,11 +34,7 @@ pub(crate) fn unpack(file: &Path, layout: &Path, root: PathBuf) -> Image {
         architecture: word(&configuration["architecture"]).to_owned(),
         user: User(user.to_owned(), group.to_owned()),
         folder: word(&settings["WorkingDir"]).to_owned(),
-        command: words
-            .into_iter()
-            .flatten()
-            .map(|part| word(part).to_owned())
-            .collect(),
+        command: words.into_iter().flatten().map(|part| word(part).to_owned()).collect(),
     }
 }
 
@@ -52,19 +48,10 @@ fn json(path: &Path) -> Value {
 
 /// The file that a descriptor names, whose size and digest are as the descriptor says.
 fn blob(layout: &Path, descriptor: &Value) -> PathBuf {
-    let digest = word(&descriptor["digest"])
-        .strip_prefix("sha256:")
-        .expect("SHA-256");
+    let digest = word(&descriptor["digest"]).strip_prefix("sha256:").expect("SHA-256");
     let path = layout.join("blobs/sha256").join(digest);
-    let summed = Command::new("sha256sum")
-        .arg(&path)
-        .output()
-        .expect("coreutils");
-    assert!(
-        summed.stdout.starts_with(digest.as_bytes()),
-        "{}",
-        path.display()
-    );
+    let summed = Command::new("sha256sum").arg(&path).output().expect("coreutils");
+    assert!(summed.stdout.starts_with(digest.as_bytes()), "{}", path.display());
     let size = fs::metadata(&path).expect("it is there").len();
     assert_eq!(descriptor["size"], size, "{}", path.display());
     path
@@ -72,12 +59,7 @@ fn blob(layout: &Path, descriptor: &Value) -> PathBuf {
 
 fn extract(archive: &Path, folder: &Path) {
     let status = Command::new("tar")
-        .args([
-            "--extract",
-            "--numeric-owner",
-            "--same-permissions",
-            "--file",
-        ])
+        .args(["--extract", "--numeric-owner", "--same-permissions", "--file"])
         .arg(archive)
         .arg("--directory")
         .arg(folder)

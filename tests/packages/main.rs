@@ -63,17 +63,11 @@ fn every_file_of_a_release_has_its_sum() {
         .status();
     assert!(status.expect("coreutils").success());
     let text = fs::read_to_string(&sums).expect("text");
-    let listed: Vec<&str> = text
-        .lines()
-        .filter_map(|line| line.split("  ").nth(1))
-        .collect();
+    let listed: Vec<&str> = text.lines().filter_map(|line| line.split("  ").nth(1)).collect();
     for entry in fs::read_dir(folder).expect("a folder") {
         let name = entry.expect("an entry").file_name();
         let name = name.to_str().expect("text");
-        assert!(
-            name == "SHA256SUMS" || listed.contains(&name),
-            "{name} has no sum"
-        );
+        assert!(name == "SHA256SUMS" || listed.contains(&name), "{name} has no sum");
     }
 }
 
@@ -109,11 +103,7 @@ fn the_wheel_installs_and_runs_the_demo() {
     root.run(&[pip, "check"]);
     let opcua = root.run(&["/opt/understudy/bin/understudy-opcua", "--version"]);
     assert_eq!(opcua.trim(), format!("understudy-opcua {VERSION}"));
-    root.demo(
-        &User::ordinary(),
-        "/tmp",
-        &["/opt/understudy/bin/understudy", "demo"],
-    );
+    root.demo(&User::ordinary(), "/tmp", &["/opt/understudy/bin/understudy", "demo"]);
     root.run(&[pip, "uninstall", "--yes", "understudy"]);
     assert!(!root.path("opt/understudy/bin/understudy").exists());
 }
@@ -137,13 +127,9 @@ fn the_debian_package_installs_runs_the_demo_and_goes() {
     let fields: Vec<&str> = user.trim().split(':').collect();
     assert_eq!(fields[6], "/usr/sbin/nologin", "{user}");
     for kind in ["node", "remote-io", "plant"] {
-        let path = root.path(&format!(
-            "usr/lib/systemd/system/understudy-{kind}@.service"
-        ));
+        let path = root.path(&format!("usr/lib/systemd/system/understudy-{kind}@.service"));
         let unit = fs::read_to_string(path).expect("the unit is installed");
-        let called = unit
-            .lines()
-            .find_map(|line| line.strip_prefix("ExecStart=/"));
+        let called = unit.lines().find_map(|line| line.strip_prefix("ExecStart=/"));
         let binary = called.and_then(|called| called.split(' ').next());
         assert!(root.path(binary.expect("a command")).is_file(), "{unit}");
         assert!(unit.contains("\nLimitNOFILE="), "{unit}");
@@ -153,11 +139,7 @@ fn the_debian_package_installs_runs_the_demo_and_goes() {
         ("/var/lib/understudy/keys", "700 understudy"),
         ("/var/log/understudy", "700 understudy"),
     ] {
-        assert_eq!(
-            root.run(&["stat", "--format=%a %U", folder]).trim(),
-            mode,
-            "{folder}"
-        );
+        assert_eq!(root.run(&["stat", "--format=%a %U", folder]).trim(), mode, "{folder}");
     }
     let understudy = User(fields[2].to_owned(), fields[3].to_owned());
     root.demo(&understudy, "/var/log/understudy", &["understudy", "demo"]);
@@ -166,10 +148,7 @@ fn the_debian_package_installs_runs_the_demo_and_goes() {
     root.run(&["dpkg", "--purge", "understudy"]);
     assert!(!root.path("usr/bin/understudy").exists());
     assert!(!root.path("var/log/understudy").exists());
-    assert!(
-        root.path("var/lib/understudy/keys/robot").exists(),
-        "keys stay"
-    );
+    assert!(root.path("var/lib/understudy/keys/robot").exists(), "keys stay");
 }
 
 #[test]

@@ -52,11 +52,7 @@ impl Root {
         let root = Self::empty(name)?;
         let made = Command::new("mmdebstrap")
             .args(["--quiet", "--mode=root", "--variant=minbase"])
-            .args(
-                packages
-                    .iter()
-                    .map(|package| format!("--include={package}")),
-            )
+            .args(packages.iter().map(|package| format!("--include={package}")))
             .arg(SUITE)
             .arg(&root.0)
             .stdin(Stdio::null())

@@ -47,9 +47,7 @@ fn journal(runs: &Path) -> Vec<Value> {
 /// An alarm that nobody has seen.
 fn unseen(state: &Value) -> Option<u64> {
     let alarms = state["alarms"].as_array()?;
-    let unseen = alarms
-        .iter()
-        .find(|alarm| alarm["acknowledged"].is_null())?;
+    let unseen = alarms.iter().find(|alarm| alarm["acknowledged"].is_null())?;
     unseen["id"].as_u64()
 }
 
@@ -67,15 +65,7 @@ fn acknowledge(page: &Page, alarm: u64) {
 fn a_laboratory_of_another_process_is_looked_at_and_commanded() {
     let _turn = one_at_a_time();
     let runs = empty_folder("attach-laboratory");
-    let nothing = [
-        "watch",
-        CELL,
-        "--attach",
-        "--address",
-        "127.0.0.1:0",
-        "--out",
-        text(&runs),
-    ];
+    let nothing = ["watch", CELL, "--attach", "--address", "127.0.0.1:0", "--out", text(&runs)];
     let (status, document, _) = answer(&nothing);
     assert_eq!(status, 2, "{document:#}");
     assert_eq!(document["failures"][0]["code"], "U0614");
@@ -95,9 +85,7 @@ fn a_laboratory_of_another_process_is_looked_at_and_commanded() {
     assert_eq!(kill("robot"), (409, "U0551".to_owned()));
     assert_eq!(kill("understudy"), (200, String::new()));
     first.wait_for("another alarm", |state| {
-        state["alarms"]
-            .as_array()
-            .is_some_and(|alarms| alarms.len() > 1)
+        state["alarms"].as_array().is_some_and(|alarms| alarms.len() > 1)
     });
     // Seen at the one page, it is seen at the other.
     let alarm = unseen(&forced).expect("an alarm");
@@ -124,11 +112,7 @@ fn a_laboratory_of_another_process_is_looked_at_and_commanded() {
     let (_, document, _) = answer(&list);
     let lines = document["result"]["lines"].as_array().expect("lines");
     assert_eq!(lines.len(), 2, "{document:#}");
-    assert!(
-        lines[0]["text"]
-            .as_str()
-            .is_some_and(|text| text.contains("anna has acknowledged"))
-    );
+    assert!(lines[0]["text"].as_str().is_some_and(|text| text.contains("anna has acknowledged")));
 }
 
 /// Every member of the press cell as a process with an address and keys of its own.
@@ -162,11 +146,7 @@ fn deployed(folder: &Path) -> Deployed {
         Running::start(&[&member[..], &["--no-real-time"]].concat())
     };
     let members = members.into_iter().map(start).collect();
-    Deployed {
-        cluster,
-        keys,
-        _members: members,
-    }
+    Deployed { cluster, keys, _members: members }
 }
 
 #[test]
@@ -180,15 +160,7 @@ fn members_elsewhere_are_looked_at_with_an_operators_keys() {
 
     let top = |keys: &Path, cluster: &str| {
         let runs = text(&runs);
-        answer(&[
-            "top",
-            cluster,
-            "--once",
-            "--keys",
-            text(keys),
-            "--out",
-            runs,
-        ])
+        answer(&["top", cluster, "--once", "--keys", text(keys), "--out", runs])
     };
     // They are up when one of them takes a call; before that the command says who does not.
     let started = std::time::Instant::now();
@@ -202,11 +174,7 @@ fn members_elsewhere_are_looked_at_with_an_operators_keys() {
         assert!(started.elapsed() < DEADLINE, "{document:#}");
     }
 
-    let elsewhere = page(
-        cluster,
-        &runs,
-        &["--keys", text(&operator), "--allow-commands"],
-    );
+    let elsewhere = page(cluster, &runs, &["--keys", text(&operator), "--allow-commands"]);
     synchronised(&elsewhere);
     // The program is followed from a state that a station has told.
     elsewhere.wait_for("power flow", |_| {
@@ -221,22 +189,16 @@ fn members_elsewhere_are_looked_at_with_an_operators_keys() {
     let force =
         json!({ "command": "force", "signal": { "output": 0 }, "value": true, "seconds": 3600 });
     assert_eq!(give(&elsewhere, "robot-io", &force), (200, String::new()));
-    elsewhere.wait_for("a forced output", |state| {
-        state["programs"][0]["forced"][0]["owner"] == "anna"
-    });
+    elsewhere
+        .wait_for("a forced output", |state| state["programs"][0]["forced"][0]["owner"] == "anna");
     let unforce = json!({ "command": "unforce", "signal": { "output": 0 } });
     assert_eq!(give(&elsewhere, "robot-io", &unforce), (200, String::new()));
-    elsewhere.wait_for("a free output", |state| {
-        state["programs"][0]["forced"] == json!([])
-    });
+    elsewhere.wait_for("a free output", |state| state["programs"][0]["forced"] == json!([]));
     assert_eq!(elsewhere.end(), 0);
     let events = journal(&runs);
     let commanded = events.iter().filter(|event| event["event"] == "commanded");
     assert_eq!(commanded.count(), 3);
-    assert_eq!(
-        events.last().map(|event| &event["event"]),
-        Some(&json!("finished"))
-    );
+    assert_eq!(events.last().map(|event| &event["event"]), Some(&json!("finished")));
 
     // Keys of another authority, and the file of another cluster.
     let strange = folder.join("strange");

@@ -65,9 +65,7 @@ fn text(value: &Value) -> String {
 #[test]
 fn a_browser_sees_a_kill_and_asks_why() {
     let cluster = "examples/press-cell/cluster.toml";
-    drive("browser", cluster, "browser.mjs", |page| {
-        vec![page.id().to_string()]
-    });
+    drive("browser", cluster, "browser.mjs", |page| vec![page.id().to_string()]);
 }
 
 #[test]

@@ -42,11 +42,7 @@ fn started_of(name: &str, watched: &[&str], stations: &[&str]) -> (Page, std::pa
 pub(crate) fn give(page: &Page, name: &str, command: &Value) -> (u16, String) {
     let body = json!({ "member": name, "command": command, "owner": "anna", "reason": "a test" });
     let answer = page.post("/api/command", &body.to_string());
-    let code = if answer.status == 200 {
-        String::new()
-    } else {
-        answer.code()
-    };
+    let code = if answer.status == 200 { String::new() } else { answer.code() };
     (answer.status, code)
 }
 
@@ -91,9 +87,8 @@ fn check_suspended((page, runs): (Page, std::path::PathBuf)) {
     let run = fs::canonicalize(runs.join("latest")).expect("a run");
     assert_eq!(page.end(), 0);
     let journal = fs::read_to_string(run.join("journal.jsonl")).expect("a journal");
-    let records = journal
-        .lines()
-        .map(|line| serde_json::from_str::<Value>(line).expect("a record"));
+    let records =
+        journal.lines().map(|line| serde_json::from_str::<Value>(line).expect("a record"));
     let within = |record: &Value| {
         let at = record["at_ns"].as_u64().expect("a time");
         (from..to).contains(&at) && record["event"]["event"] == "applied"
@@ -104,9 +99,7 @@ fn check_suspended((page, runs): (Page, std::path::PathBuf)) {
         .collect();
     // Of both remote I/Os; a busy machine may skip some deadlines.
     assert!(sources.len() as i64 > cycles, "{}", sources.len());
-    let not_true = sources
-        .iter()
-        .filter(|source| ["held", "fail-safe"].contains(&source.as_str()));
+    let not_true = sources.iter().filter(|source| ["held", "fail-safe"].contains(&source.as_str()));
     assert!(not_true.count() <= TOLERATED_CYCLES, "{sources:?}");
 }
 
@@ -140,10 +133,7 @@ fn the_page_shows_what_is_killed_from_outside_and_starts_it_again() {
         });
     }
     let alarms = page.get("/api/events").json().to_string();
-    assert!(
-        alarms.contains("robot ended unexpectedly"),
-        "{alarms:.2000}"
-    );
+    assert!(alarms.contains("robot ended unexpectedly"), "{alarms:.2000}");
     assert_eq!(page.end(), 0);
 }
 
@@ -163,95 +153,58 @@ fn every_command_is_done_or_refused_and_is_in_the_journal() {
     assert_eq!(give(&page, "robot", &simple("kill")), refused("U0551"));
     assert_eq!(give(&page, "robot", &simple("restart")), done);
     assert_eq!(give(&page, "robot", &simple("restart")), refused("U0552"));
-    page.wait_for("its return", |state| {
-        member(state, "robot")["state"] == "publishing"
-    });
+    page.wait_for("its return", |state| member(state, "robot")["state"] == "publishing");
 
     assert_eq!(give(&page, "press", &simple("continue")), refused("U0553"));
     assert_eq!(give(&page, "press", &simple("stop")), done);
-    page.wait_for("its silence", |state| {
-        member(state, "press")["state"] == "suspended"
-    });
+    page.wait_for("its silence", |state| member(state, "press")["state"] == "suspended");
     assert_eq!(give(&page, "press", &simple("continue")), done);
-    page.wait_for("its return", |state| {
-        member(state, "press")["state"] == "publishing"
-    });
+    page.wait_for("its return", |state| member(state, "press")["state"] == "publishing");
 
     assert_eq!(give(&page, "press", &simple("isolate")), done);
     page.wait_for("a reconstructed press", |state| {
         state["programs"][1]["source"] == "reconstructed"
     });
     assert_eq!(give(&page, "press", &simple("rejoin")), done);
-    page.wait_for("its return", |state| {
-        member(state, "press")["state"] == "publishing"
-    });
+    page.wait_for("its return", |state| member(state, "press")["state"] == "publishing");
 
     assert_eq!(give(&page, "robot", &simple("release")), refused("U0554"));
-    assert_eq!(
-        give(&page, "nobody", &simple("kill")),
-        (404, "U0681".to_owned())
-    );
+    assert_eq!(give(&page, "nobody", &simple("kill")), (404, "U0681".to_owned()));
     let force = |signal: Value, seconds: u32| json!({ "command": "force", "signal": signal, "value": true, "seconds": seconds });
-    assert_eq!(
-        give(&page, "robot-io", &force(json!({ "input": 900 }), 5)),
-        refused("U0556")
-    );
-    assert_eq!(
-        give(&page, "robot-io", &force(json!({ "output": 0 }), 0)),
-        refused("U0556")
-    );
-    assert_eq!(
-        give(&page, "robot-io", &force(json!({ "output": 0 }), 3600)),
-        done
-    );
-    page.wait_for("a forced output", |state| {
-        state["programs"][0]["forced"][0]["owner"] == "anna"
-    });
+    assert_eq!(give(&page, "robot-io", &force(json!({ "input": 900 }), 5)), refused("U0556"));
+    assert_eq!(give(&page, "robot-io", &force(json!({ "output": 0 }), 0)), refused("U0556"));
+    assert_eq!(give(&page, "robot-io", &force(json!({ "output": 0 }), 3600)), done);
+    page.wait_for("a forced output", |state| state["programs"][0]["forced"][0]["owner"] == "anna");
     let unforce = json!({ "command": "unforce", "signal": { "output": 0 } });
     assert_eq!(give(&page, "robot-io", &unforce), done);
     page.wait_for("a free output", |state| {
-        state["programs"][0]["forced"]
-            .as_array()
-            .is_some_and(Vec::is_empty)
+        state["programs"][0]["forced"].as_array().is_some_and(Vec::is_empty)
     });
 
     let run = fs::canonicalize(runs.join("latest")).expect("a run");
     assert_eq!(page.end(), 0);
     let journal = fs::read_to_string(run.join("journal.jsonl")).expect("a journal");
-    let records = journal
-        .lines()
-        .map(|line| serde_json::from_str::<Value>(line).expect("a record"));
+    let records =
+        journal.lines().map(|line| serde_json::from_str::<Value>(line).expect("a record"));
     let commanded: Vec<Value> = records
         .map(|record| record["event"].clone())
         .filter(|event| event["event"] == "commanded")
         .collect();
     assert_eq!(commanded.len(), 14, "{commanded:?}");
-    assert!(
-        commanded
-            .iter()
-            .all(|event| event["owner"] == "anna" && event["reason"] == "a test")
-    );
-    let refused = commanded
-        .iter()
-        .filter(|event| event["refused"].is_string());
+    assert!(commanded.iter().all(|event| event["owner"] == "anna" && event["reason"] == "a test"));
+    let refused = commanded.iter().filter(|event| event["refused"].is_string());
     assert_eq!(refused.count(), 6);
     let summary = fs::read_to_string(run.join("summary.json")).expect("a summary");
     let summary: Value = serde_json::from_str(&summary).expect("JSON");
     let wrong = |remote_io: &Value| remote_io["counts"]["wrong"] == 0;
-    assert!(
-        summary["remote_ios"]
-            .as_array()
-            .is_some_and(|all| all.iter().all(wrong))
-    );
+    assert!(summary["remote_ios"].as_array().is_some_and(|all| all.iter().all(wrong)));
 }
 
 /// Waits until the page counts cycles from the origin of the run: before, they have other numbers.
 fn origin_is_known(page: &Page) {
     page.wait_for("the origin", |_| {
         let found = page.get("/api/events?find=origin").json();
-        found["events"]
-            .as_array()
-            .is_some_and(|all| !all.is_empty())
+        found["events"].as_array().is_some_and(|all| !all.is_empty())
     });
     let shown = page.wait_for("a state", |_| true);
     page.wait_for("a newer state", |state| state["cycle"] != shown["cycle"]);
@@ -300,9 +253,7 @@ fn a_write_is_answered_with_its_cycle_or_a_code() {
         assert_eq!(found.status, 200, "{answer}: {:.300}", found.body);
         found.json()["programs"][0]["input_values"][place("speed")].as_f64()
     };
-    page.wait_for("the cycle of the write", |state| {
-        state["cycle"].as_i64() >= Some(cycle)
-    });
+    page.wait_for("the cycle of the write", |state| state["cycle"].as_i64() >= Some(cycle));
     assert_eq!(at(cycle), Some(180.0));
     assert_ne!(at(cycle - 1), Some(180.0));
     page.wait_for("valid signals", |state| {
@@ -310,10 +261,7 @@ fn a_write_is_answered_with_its_cycle_or_a_code() {
         signals.is_some_and(|all| all.len() == 2 && all.iter().all(|one| one["valid"] == true))
     });
     let events = page.get("/api/events?find=speed").json().to_string();
-    assert!(
-        events.contains("anna writes 180.0 mm/s to input speed: a test"),
-        "{events:.2000}"
-    );
+    assert!(events.contains("anna writes 180.0 mm/s to input speed: a test"), "{events:.2000}");
     assert!(events.contains("speed = 180.0 mm/s of anna is in effect"));
     assert!(events.contains("anna commands write speed = 180.0 mm/s of left-io"));
     assert_eq!(page.end(), 0);

@@ -18,63 +18,35 @@ fn a_finished_run_answers_every_question() {
     assert_eq!(member(&down, "robot")["state"], "killed");
     assert_eq!(down["programs"][0]["source"], "reconstructed");
     assert_eq!(down["programs"][0]["word_of"], "understudy");
-    assert_eq!(
-        down["redundancy"]["level"], "some",
-        "{}",
-        down["redundancy"]
-    );
+    assert_eq!(down["redundancy"]["level"], "some", "{}", down["redundancy"]);
     let before = page.get("/api/state?cycle=20").json();
     assert_eq!(member(&before, "robot")["state"], "publishing");
     assert_eq!(before["programs"][0]["source"], "direct");
-    assert_eq!(
-        before["redundancy"]["level"], "all",
-        "{}",
-        before["redundancy"]
-    );
+    assert_eq!(before["redundancy"]["level"], "all", "{}", before["redundancy"]);
     let after = page.get("/api/state?cycle=280").json();
     assert_eq!(member(&after, "robot")["state"], "publishing");
 
     let picture = page.get("/api/ladder/0?cycle=100").json();
     let svg = picture["svg"].as_str().expect("a picture");
     assert!(svg.starts_with("<svg") && svg.contains("class=\"live\""));
-    assert!(
-        picture["words"]
-            .as_str()
-            .expect("words")
-            .contains("cycle 100")
-    );
+    assert!(picture["words"].as_str().expect("words").contains("cycle 100"));
     let addresses = page.get("/api/ladder/0?names=addresses&find=%25QX").json();
-    assert!(
-        addresses["svg"]
-            .as_str()
-            .expect("a picture")
-            .contains("%QX")
-    );
+    assert!(addresses["svg"].as_str().expect("a picture").contains("%QX"));
     let nothing = page.get("/api/ladder/0?find=nothing-has-this-name").json();
     assert!(nothing["words"].as_str().expect("words").contains("0 of"));
 
     let cross = page.get("/api/cross-reference/1").json();
-    assert!(
-        cross["signals"]
-            .as_array()
-            .is_some_and(|lines| !lines.is_empty())
-    );
+    assert!(cross["signals"].as_array().is_some_and(|lines| !lines.is_empty()));
 
     let why = page.get("/api/why/0/0?cycle=100").json();
     assert_eq!(why["source"], "reconstructed");
     assert_eq!(why["reconstructed"]["proved"], true);
 
-    let trends = page
-        .get("/api/trends?signals=0.output.0,1.input.1&from=0&to=290")
-        .json();
+    let trends = page.get("/api/trends?signals=0.output.0,1.input.1&from=0&to=290").json();
     assert_eq!(trends["signals"].as_array().map(Vec::len), Some(2));
     let sources = trends["sources"][0]["runs"].as_array().expect("runs");
     assert!(sources.iter().any(|run| run[2] == "reconstructed"));
-    assert!(
-        trends["faults"]
-            .as_array()
-            .is_some_and(|faults| faults.len() >= 2)
-    );
+    assert!(trends["faults"].as_array().is_some_and(|faults| faults.len() >= 2));
 
     // Memory, as the scan of the cycle left it; in a trend the same.
     let signals = page.get("/api/signals").json();
@@ -86,16 +58,13 @@ fn a_finished_run_answers_every_question() {
         (&memory["id"], &memory["kind"], &memory["type"]),
         (&"0.state.holding".into(), &"memory".into(), &"BOOL".into())
     );
-    let trend = page
-        .get("/api/trends?signals=0.state.holding,0.input.0&from=40&to=290")
-        .json();
+    let trend = page.get("/api/trends?signals=0.state.holding,0.input.0&from=40&to=290").json();
     let runs = trend["signals"][0]["runs"].as_array().expect("runs");
     assert!(runs.len() > 2, "it takes and leaves parts: {runs:?}");
     for run in runs {
         let at = |cycle: i64| {
-            let values = page.get(&format!(
-                "/api/values?signals=1.output.0,0.state.holding&cycle={cycle}"
-            ));
+            let values =
+                page.get(&format!("/api/values?signals=1.output.0,0.state.holding&cycle={cycle}"));
             u64::from(values.json()["values"][1] == true)
         };
         let (cycle, value) = (run[0].as_i64().expect("a cycle"), &run[1]);
@@ -118,19 +87,9 @@ fn a_finished_run_answers_every_question() {
     );
 
     let events = page.get("/api/events?find=killed").json();
-    assert!(
-        events["events"]
-            .as_array()
-            .is_some_and(|events| !events.is_empty())
-    );
+    assert!(events["events"].as_array().is_some_and(|events| !events.is_empty()));
 
-    for path in [
-        "/",
-        "/page.js",
-        "/page.css",
-        "/vendor/uPlot.iife.min.js",
-        "/icon.svg",
-    ] {
+    for path in ["/", "/page.js", "/page.css", "/vendor/uPlot.iife.min.js", "/icon.svg"] {
         let asset = page.get(path);
         assert_eq!(asset.status, 200, "{path}");
         assert!(asset.head.contains("content-security-policy"), "{path}");
@@ -171,26 +130,18 @@ fn a_lost_state_is_told_for_each_cycle() {
     assert!(chosen["lost"].is_null(), "{chosen:#}");
     assert_eq!(page.end(), 0);
     // The same from the other end: what systems are told.
-    let metrics = understudy(&["gateway", "metrics", "--once"])
-        .arg(&run)
-        .output();
+    let metrics = understudy(&["gateway", "metrics", "--once"]).arg(&run).output();
     let text = String::from_utf8(metrics.expect("the binary is built").stdout).expect("text");
     let of_robot = |name: &str| {
         let of_robot = |line: &&str| {
             line.starts_with(&format!("{name}{{")) && line.contains("program=\"robot\"")
         };
-        text.lines()
-            .find(of_robot)
-            .and_then(|line| line.rsplit(' ').next())
+        text.lines().find(of_robot).and_then(|line| line.rsplit(' ').next())
     };
     assert_eq!(of_robot("understudy_protected"), Some("0"), "{text}");
     assert_eq!(of_robot("understudy_unprotected_since_cycle"), Some("100"));
     assert_eq!(of_robot("understudy_lacking"), Some("1"));
-    assert_eq!(
-        of_robot("understudy_state_lost"),
-        Some("0"),
-        "it was chosen"
-    );
+    assert_eq!(of_robot("understudy_state_lost"), Some("0"), "it was chosen");
     assert_eq!(of_robot("understudy_state_losses_total"), Some("1"));
     assert_eq!(of_robot("understudy_protection_losses_total"), Some("1"));
 }
@@ -221,11 +172,7 @@ fn bad_questions_get_clear_answers_and_stop_nothing() {
         ("/api/trends", 400, "U0682"),
         ("/api/trends?from=10&to=0", 400, "U0682"),
         ("/api/trends?from=0&to=9000000000000000000", 400, "U0682"),
-        (
-            "/api/trends?from=-9223372036854775808&to=9223372036854775807",
-            400,
-            "U0682",
-        ),
+        ("/api/trends?from=-9223372036854775808&to=9223372036854775807", 400, "U0682"),
         ("/api/trends?signals=0.nothing.0&from=0&to=9", 404, "U0681"),
         ("/api/trends?signals=0.output.99&from=0&to=9", 404, "U0681"),
         ("/api/events?limit=-1", 400, "U0682"),
@@ -268,10 +215,7 @@ fn bad_questions_get_clear_answers_and_stop_nothing() {
         assert_eq!((answer.status, answer.code().as_str()), (403, "U0685"));
     }
     let many = "0.input.0,".repeat(201);
-    assert_eq!(
-        page.get(&format!("/api/values?signals={many}")).code(),
-        "U0682"
-    );
+    assert_eq!(page.get(&format!("/api/values?signals={many}")).code(), "U0682");
     let behind = page.get("/api/ladder/0?page=77").json();
     assert_eq!(behind["rungs"]["page"], 0, "{behind:.300}");
     let unread = page.get(&format!("/api/events?find={long}"));
@@ -284,18 +228,8 @@ fn bad_questions_get_clear_answers_and_stop_nothing() {
         ("/api/command", "{", 400, "U0682"),
         ("/api/command", "[]", 400, "U0682"),
         ("/api/command", r#"{"member":"robot"}"#, 400, "U0682"),
-        (
-            "/api/alarms/77/acknowledge",
-            r#"{"owner":"anna"}"#,
-            404,
-            "U0681",
-        ),
-        (
-            "/api/alarms/77/acknowledge",
-            r#"{"owner":"\n"}"#,
-            400,
-            "U0682",
-        ),
+        ("/api/alarms/77/acknowledge", r#"{"owner":"anna"}"#, 404, "U0681"),
+        ("/api/alarms/77/acknowledge", r#"{"owner":"\n"}"#, 400, "U0682"),
         ("/api/login", r#"{"token":"x"}"#, 400, "U0682"),
         ("/api/logout", "{}", 400, "U0682"),
         ("/api/state", "{}", 405, "U0682"),
@@ -325,24 +259,13 @@ fn other_pages_cannot_ask() {
     };
     assert_eq!(of_host(&page.address), 200);
     assert_eq!(of_host("localhost:1"), 200);
-    assert_eq!(
-        of_host("evil.example"),
-        403,
-        "a name that now means this machine"
-    );
+    assert_eq!(of_host("evil.example"), 403, "a name that now means this machine");
     let body = r#"{"owner":"anna"}"#;
-    let post = |lines: &str| {
-        page.post_with("/api/alarms/77/acknowledge", lines, body)
-            .code()
-    };
+    let post = |lines: &str| page.post_with("/api/alarms/77/acknowledge", lines, body).code();
     assert_eq!(post("Origin: https://evil.example\r\n"), "U0685");
     assert_eq!(post("Origin: null\r\n"), "U0685");
     assert_eq!(post(""), "U0685");
-    assert_eq!(
-        post("X-Understudy: 1\r\n"),
-        "U0681",
-        "a program that means this"
-    );
+    assert_eq!(post("X-Understudy: 1\r\n"), "U0681", "a program that means this");
     let form = page.request(&format!(
         "POST /api/command HTTP/1.1\r\nHost: {0}\r\nOrigin: http://{0}\r\nContent-Type: text/plain\r\nContent-Length: 2\r\nConnection: close\r\n\r\n{{}}",
         page.address
@@ -361,8 +284,7 @@ fn a_page_for_other_machines_asks_who_may_log_in() {
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert!(said.contains("U0674"), "{said}");
-    let nothing = understudy(&["watch", "nothing-lies-here"])
-        .output()
-        .expect("the binary is built");
+    let nothing =
+        understudy(&["watch", "nothing-lies-here"]).output().expect("the binary is built");
     assert_eq!(nothing.status.code(), Some(2));
 }

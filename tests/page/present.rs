@@ -69,9 +69,7 @@ impl Reader {
     fn registers(&self, count: u8) -> Result<Vec<u16>, u8> {
         let mut stream = TcpStream::connect(&self.address).expect("it listens");
         stream.set_read_timeout(Some(DEADLINE)).expect("a timeout");
-        stream
-            .write_all(&[0, 7, 0, 0, 0, 6, 1, 4, 0, 0, 0, count])
-            .expect("sent");
+        stream.write_all(&[0, 7, 0, 0, 0, 6, 1, 4, 0, 0, 0, count]).expect("sent");
         let mut head = [0; 9];
         stream.read_exact(&mut head).expect("an answer");
         if head[7] != 4 {
@@ -80,9 +78,7 @@ impl Reader {
         let mut bytes = vec![0; 2 * usize::from(count)];
         stream.read_exact(&mut bytes).expect("all of it");
         let words = bytes.chunks_exact(2);
-        Ok(words
-            .map(|word| u16::from_be_bytes([word[0], word[1]]))
-            .collect())
+        Ok(words.map(|word| u16::from_be_bytes([word[0], word[1]])).collect())
     }
 }
 
@@ -142,11 +138,7 @@ fn of_one_segment(journal: &Path) -> String {
         file.read_to_string(&mut own).expect("text");
         fs::remove_file(segment).expect("it is ours");
         // One header is enough.
-        let header = if text.is_empty() {
-            0
-        } else {
-            own.find('\n').expect("lines") + 1
-        };
+        let header = if text.is_empty() { 0 } else { own.find('\n').expect("lines") + 1 };
         text += &own[header..];
     }
     text
@@ -190,12 +182,7 @@ fn the_page_shows_no_past() {
         let answer: serde_json::Value = serde_json::from_str(&body).expect("JSON");
         if status == 503 {
             assert_eq!(answer["error"]["code"], "U0688");
-            for path in [
-                "/api/events",
-                "/api/ladder/0",
-                "/api/why/0/0",
-                "/api/state?cycle=1",
-            ] {
+            for path in ["/api/events", "/api/ladder/0", "/api/why/0/0", "/api/state?cycle=1"] {
                 // It may have caught up between the two questions.
                 assert!([503, 200].contains(&reader.get(path).0), "{path}");
             }
@@ -214,34 +201,26 @@ fn the_page_shows_no_past() {
 
 #[test]
 fn metrics_tell_no_past() {
-    check(
-        "present-metrics",
-        &["gateway", "metrics"],
-        "--listen",
-        |reader| {
-            let (status, body) = reader.get("/metrics");
-            if status == 503 {
-                assert!(body.starts_with("U0688: reading the journal: "), "{body}");
-                return None;
-            }
-            assert_eq!(status, 200, "{body}");
-            let killed = body.lines().find(|line| {
-                let names = ["understudy_station_state{", "\"robot\"", "\"killed\""];
-                names.iter().all(|name| line.contains(name))
-            });
-            let dead = killed.is_some_and(|line| line.ends_with(" 1"));
-            Some((metric(&body, "understudy_cycle{").expect("a cycle"), dead))
-        },
-    );
+    check("present-metrics", &["gateway", "metrics"], "--listen", |reader| {
+        let (status, body) = reader.get("/metrics");
+        if status == 503 {
+            assert!(body.starts_with("U0688: reading the journal: "), "{body}");
+            return None;
+        }
+        assert_eq!(status, 200, "{body}");
+        let killed = body.lines().find(|line| {
+            let names = ["understudy_station_state{", "\"robot\"", "\"killed\""];
+            names.iter().all(|name| line.contains(name))
+        });
+        let dead = killed.is_some_and(|line| line.ends_with(" 1"));
+        Some((metric(&body, "understudy_cycle{").expect("a cycle"), dead))
+    });
 }
 
 #[test]
 fn modbus_tells_no_past() {
-    check(
-        "present-modbus",
-        &["gateway", "modbus"],
-        "--listen",
-        |reader| match reader.registers(OF_RUN) {
+    check("present-modbus", &["gateway", "modbus"], "--listen", |reader| {
+        match reader.registers(OF_RUN) {
             // Without the robot no further failure would be masked.
             Ok(words) => {
                 let cycle = i64::from(words[2]) << 16 | i64::from(words[3]);
@@ -251,8 +230,8 @@ fn modbus_tells_no_past() {
                 assert_eq!(exception, 6, "server device busy");
                 None
             }
-        },
-    );
+        }
+    });
 }
 
 /// A live run, some of whose records are there; the newest is an hour old.
@@ -265,9 +244,7 @@ fn old_run(name: &str) -> PathBuf {
     fs::write(&journal, &text[..cut]).expect("written");
     let journal = OpenOptions::new().append(true).open(journal);
     let long_ago = std::time::SystemTime::now() - Duration::from_secs(3600);
-    journal
-        .and_then(|journal| journal.set_modified(long_ago))
-        .expect("it is ours");
+    journal.and_then(|journal| journal.set_modified(long_ago)).expect("it is ours");
     run
 }
 
@@ -298,9 +275,5 @@ fn a_viewer_is_told_how_old_the_newest_record_is() {
     command.arg(&run);
     let page = Page::start(command);
     let state = page.wait_for("a state", |state| state["cycle"].is_i64());
-    assert!(
-        state["age_ms"].as_u64() >= Some(3_600_000),
-        "{}",
-        state["age_ms"]
-    );
+    assert!(state["age_ms"].as_u64() >= Some(3_600_000), "{}", state["age_ms"]);
 }

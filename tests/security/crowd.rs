@@ -101,9 +101,7 @@ impl Device {
 
     pub(crate) fn wait_for_answers(&self, more: u64) {
         let from = self.answered.load(Ordering::Relaxed);
-        until("answers to the device", || {
-            self.answered.load(Ordering::Relaxed) >= from + more
-        });
+        until("answers to the device", || self.answered.load(Ordering::Relaxed) >= from + more);
     }
 }
 
@@ -255,9 +253,7 @@ fn connections_of_strangers_take_no_plant_out_of_service() {
     let goes_and_returns = || {
         let lost = count(&journal, "field-lost");
         device.is_there.store(false, Ordering::Relaxed);
-        until("the loss of the device", || {
-            count(&journal, "field-lost") > lost
-        });
+        until("the loss of the device", || count(&journal, "field-lost") > lost);
         device.is_there.store(true, Ordering::Relaxed);
     };
     while !crowd.is_finished() {
@@ -272,18 +268,13 @@ fn connections_of_strangers_take_no_plant_out_of_service() {
     device.wait_for_answers(20);
     until("an operator beside the strangers", || operate() == 0);
     most = most.max(descriptors(process));
-    assert!(
-        most < DESCRIPTORS / 2,
-        "{before} descriptors without strangers, {most} with them"
-    );
+    assert!(most < DESCRIPTORS / 2, "{before} descriptors without strangers, {most} with them");
 
     // No station is left, and the device was away: its outputs become fail-safe all the same.
     drop(stations);
     goes_and_returns();
     let written = device.fail_safe.load(Ordering::Relaxed);
-    until("fail-safe outputs", || {
-        device.fail_safe.load(Ordering::Relaxed) > written
-    });
+    until("fail-safe outputs", || device.fail_safe.load(Ordering::Relaxed) > written);
 
     drop(kept);
     let gone = Instant::now();

@@ -9,11 +9,7 @@ use super::{answer, codes};
 #[test]
 fn units_call_commands_as_they_are() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("deployment");
-    for (kind, name) in [
-        ("node", "robot"),
-        ("remote-io", "robot-io"),
-        ("plant", "arm"),
-    ] {
+    for (kind, name) in [("node", "robot"), ("remote-io", "robot-io"), ("plant", "arm")] {
         let path = folder.join(format!("understudy-{kind}@.service"));
         let unit = fs::read_to_string(&path).expect("there is one for each kind");
         let value = |key: &str| {

@@ -38,29 +38,14 @@ impl Plant {
         let start = |command: &str, name: &str| {
             let own = format!("{}/members/{name}", text(&keys));
             let journal = folder.join(format!("{name}.jsonl"));
-            let common = [
-                "--link",
-                "udp",
-                "--no-real-time",
-                "--journal",
-                text(&journal),
-            ];
+            let common = ["--link", "udp", "--no-real-time", "--journal", text(&journal)];
             let member = [command, &cluster, "--name", name, "--keys", &own];
             Running::start(&[&member[..], &common].concat())
         };
-        let members = [
-            start("node", "valve"),
-            start("node", "understudy"),
-            start("remote-io", "valve-io"),
-        ];
+        let members =
+            [start("node", "valve"), start("node", "understudy"), start("remote-io", "valve-io")];
         device.wait_for_answers(20);
-        Self {
-            folder,
-            cluster,
-            addresses,
-            device,
-            _members: members,
-        }
+        Self { folder, cluster, addresses, device, _members: members }
     }
 
     fn journal(&self, name: &str) -> std::path::PathBuf {
@@ -72,9 +57,7 @@ impl Plant {
         let text_of_cluster = fs::read_to_string(&self.cluster).expect("it is ours");
         let image = self.folder.join("image");
         let keys = self.folder.join("keys/members/valve");
-        let copied = Command::new("cp")
-            .args(["-a", text(&keys), text(&image)])
-            .status();
+        let copied = Command::new("cp").args(["-a", text(&keys), text(&image)]).status();
         assert!(copied.expect("a cp").success());
         let changed = text_of_cluster.replace(change[0], change[1]);
         let cluster = self.folder.join("image.toml");
@@ -125,9 +108,7 @@ fn an_old_image_of_another_configuration_shuts_nobody_out() {
     let image = plant.copy_of_the_controller(["period = \"20ms\"", "period = \"30ms\""]);
     let remote_io = plant.journal("valve-io");
     for journal in [&remote_io, &plant.journal("understudy")] {
-        until("the refusal of the image", || {
-            is_said(journal, "\"event\":\"refused\"")
-        });
+        until("the refusal of the image", || is_said(journal, "\"event\":\"refused\""));
     }
     plant.device.wait_for_answers(50);
     for refused in ["replayed", "of-another-life"] {
@@ -151,9 +132,7 @@ fn two_processes_of_one_controller_are_named_and_the_controller_is_heard_again()
     until("a new life", || count(&controller, "new-life") > 0);
     plant.device.wait_for_answers(20);
     drop(image);
-    until("the end of the alarm", || {
-        count(&remote_io, "duplicate-gone") > 0
-    });
+    until("the end of the alarm", || count(&remote_io, "duplicate-gone") > 0);
     plant.device.wait_for_answers(20);
     assert_eq!(count(&remote_io, "state-lost"), 0);
 }
@@ -183,8 +162,6 @@ fn a_second_remote_io_on_one_device_is_an_alarm() {
     ]);
     until("the alarm", || count(&remote_io, "field-contested") > 0);
     drop(second);
-    until("the end of the alarm", || {
-        count(&remote_io, "field-uncontested") > 0
-    });
+    until("the end of the alarm", || count(&remote_io, "field-uncontested") > 0);
     plant.device.wait_for_answers(20);
 }

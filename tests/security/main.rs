@@ -23,8 +23,5 @@ use shared::{DEADLINE, answer, empty_folder, one_at_a_time, some_at_a_time, unde
 
 fn codes(document: &Value) -> Vec<&str> {
     let failures = document["failures"].as_array().expect("a list");
-    failures
-        .iter()
-        .filter_map(|failure| failure["code"].as_str())
-        .collect()
+    failures.iter().filter_map(|failure| failure["code"].as_str()).collect()
 }

@@ -30,27 +30,12 @@ fn an_operator_is_answered_until_revoked_and_nobody_else_is() {
     let (cluster, keys) = (text(&cluster), text(&keys));
     let (status, made, _) = answer(&["keys", "init", cluster, "--folder", keys]);
     assert_eq!(status, 0, "{made:#}");
-    let second = [
-        "keys",
-        "issue",
-        cluster,
-        "--operator",
-        "guest",
-        "--folder",
-        keys,
-    ];
+    let second = ["keys", "issue", cluster, "--operator", "guest", "--folder", keys];
     assert_eq!(answer(&second).0, 0);
     let of = |name: &str| format!("{keys}/members/{name}");
     let common = ["--link", "udp", "--no-real-time"];
     let robot_io = of("robot-io");
-    let start = [
-        "remote-io",
-        cluster,
-        "--name",
-        "robot-io",
-        "--keys",
-        &robot_io,
-    ];
+    let start = ["remote-io", cluster, "--name", "robot-io", "--keys", &robot_io];
     let mut running = Running::start(&[&start[..], &common].concat());
     let operate = |keys: &str, what: &[&str]| {
         let call = ["operate", cluster, "--name", "robot-io", "--keys", keys];
@@ -72,13 +57,11 @@ fn an_operator_is_answered_until_revoked_and_nobody_else_is() {
     assert!(canonical.contains("cluster press-cell"), "{canonical}");
     assert_eq!(operate(&operator, &["release"]).0, 0);
 
-    let lines = understudy(&[
-        "operate", cluster, "--name", "robot-io", "--keys", &operator,
-    ])
-    .args(["journal", "--lines", "3"])
-    .stderr(Stdio::inherit())
-    .output()
-    .expect("the binary is built");
+    let lines = understudy(&["operate", cluster, "--name", "robot-io", "--keys", &operator])
+        .args(["journal", "--lines", "3"])
+        .stderr(Stdio::inherit())
+        .output()
+        .expect("the binary is built");
     assert!(lines.status.success());
     assert_eq!(String::from_utf8_lossy(&lines.stdout).lines().count(), 3);
 
@@ -86,10 +69,7 @@ fn an_operator_is_answered_until_revoked_and_nobody_else_is() {
     let refused = operate(&of("robot"), &["stop"]);
     assert_eq!((refused.0, codes(&refused.1)), (2, vec!["U0910"]));
     let theirs = folder.join("theirs");
-    assert_eq!(
-        answer(&["keys", "init", cluster, "--folder", text(&theirs)]).0,
-        0
-    );
+    assert_eq!(answer(&["keys", "init", cluster, "--folder", text(&theirs)]).0, 0);
     let stranger = theirs.join("members/engineer");
     let refused = operate(text(&stranger), &["stop"]);
     assert_eq!((refused.0, codes(&refused.1)), (1, vec!["U0509"]));
@@ -112,10 +92,7 @@ fn an_operator_is_answered_until_revoked_and_nobody_else_is() {
     // Where the answer is lost, the member ends all the same.
     while running.0.try_wait().expect("it is ours").is_none() {
         operate(&operator, &["stop"]);
-        assert!(
-            started.elapsed() < DEADLINE,
-            "the operator is answered no more"
-        );
+        assert!(started.elapsed() < DEADLINE, "the operator is answered no more");
     }
 }
 
@@ -167,9 +144,7 @@ fn signs_of_life_come_from_a_cycle_that_runs() {
     let cluster = addressed_cell(&folder);
     let path = std::env::temp_dir().join(format!("understudy-{}.notify", std::process::id()));
     let socket = UnixDatagram::bind(&path).expect("nobody else has it");
-    socket
-        .set_read_timeout(Some(DEADLINE))
-        .expect("it is not zero");
+    socket.set_read_timeout(Some(DEADLINE)).expect("it is not zero");
     let member = ["node", text(&cluster), "--name", "robot", "--link", "udp"];
     let member = understudy(&[&member[..], &["--security", "off", "--no-real-time"]].concat())
         .env("NOTIFY_SOCKET", &path)
@@ -193,10 +168,7 @@ fn signs_of_life_come_from_a_cycle_that_runs() {
 
 fn copy(from: &Path, to: &Path) {
     use std::os::unix::fs::DirBuilderExt;
-    std::fs::DirBuilder::new()
-        .mode(0o700)
-        .create(to)
-        .expect("a folder");
+    std::fs::DirBuilder::new().mode(0o700).create(to).expect("a folder");
     for entry in std::fs::read_dir(from).expect("it is ours") {
         let path = entry.expect("it is ours").path();
         let name = path.file_name().expect("a file");
@@ -218,68 +190,37 @@ fn doctor_names_what_is_wrong_with_its_remedy() {
     assert_eq!(status, 0, "{machine:#}");
     for check in ["clock", "scheduler", "memory", "configuration"] {
         let findings = machine["result"]["findings"].as_array().expect("a list");
-        assert!(
-            findings.iter().any(|finding| finding["check"] == check),
-            "{machine:#}"
-        );
+        assert!(findings.iter().any(|finding| finding["check"] == check), "{machine:#}");
     }
     // Without a terminal the commands are shown, and none is run.
     let (status, fixed, _) = answer(&["doctor", cluster, "--fix"]);
     assert_eq!(status, 0, "{fixed:#}");
     let findings = fixed["result"]["findings"].as_array().expect("a list");
-    let with_command = findings
-        .iter()
-        .filter(|finding| finding["repair"].is_object());
-    let repairs = fixed["result"]["fixed"]["repairs"]
-        .as_array()
-        .expect("a list");
+    let with_command = findings.iter().filter(|finding| finding["repair"].is_object());
+    let repairs = fixed["result"]["fixed"]["repairs"].as_array().expect("a list");
     assert_eq!(repairs.len(), with_command.count(), "{fixed:#}");
-    assert!(
-        repairs
-            .iter()
-            .all(|done| done["outcome"]["outcome"] == "shown"),
-        "{fixed:#}"
-    );
+    assert!(repairs.iter().all(|done| done["outcome"]["outcome"] == "shown"), "{fixed:#}");
     let (status, refused, _) = answer(&["doctor", cluster, "--yes"]);
-    assert_eq!(
-        (status, codes(&refused)),
-        (2, vec!["U0600"]),
-        "--yes is of --fix"
-    );
+    assert_eq!((status, codes(&refused)), (2, vec!["U0600"]), "--yes is of --fix");
 
     let of = |name: &str| format!("{keys}/members/{name}");
-    let robot = [
-        "doctor", cluster, "--name", "robot", "--link", "udp", "--listen", "20",
-    ];
+    let robot = ["doctor", cluster, "--name", "robot", "--link", "udp", "--listen", "20"];
     let (status, without, _) = answer(&robot);
     assert_eq!(status, 1);
     assert_eq!(doctor(&without, "keys", "bad").len(), 1, "{without:#}");
 
-    assert_eq!(
-        answer(&["keys", "init", cluster, "--folder", keys, "--days", "9"]).0,
-        0
-    );
+    assert_eq!(answer(&["keys", "init", cluster, "--folder", keys, "--days", "9"]).0, 0);
     let own = of("robot");
     let with_keys = [&robot[..], &["--keys", &own]].concat();
     let (status, alone, _) = answer(&with_keys);
     assert_eq!(status, 0, "{alone:#}");
-    assert_eq!(
-        doctor(&alone, "keys", "warning").len(),
-        1,
-        "they hold for nine days: {alone:#}"
-    );
+    assert_eq!(doctor(&alone, "keys", "warning").len(), 1, "they hold for nine days: {alone:#}");
     assert_eq!(doctor(&alone, "ports", "good").len(), 2, "{alone:#}");
-    assert_eq!(
-        doctor(&alone, "peer", "warning").len(),
-        4,
-        "nobody runs: {alone:#}"
-    );
+    assert_eq!(doctor(&alone, "peer", "warning").len(), 4, "nobody runs: {alone:#}");
 
     // One that speaks in every cycle, also when nobody else is there.
     let press = of("press");
-    let start = [
-        "node", cluster, "--name", "press", "--link", "udp", "--keys", &press,
-    ];
+    let start = ["node", cluster, "--name", "press", "--link", "udp", "--keys", &press];
     let _running = Running::start(&[&start[..], &["--no-real-time"]].concat());
     let started = Instant::now();
     loop {
@@ -290,13 +231,7 @@ fn doctor_names_what_is_wrong_with_its_remedy() {
         }
         assert!(started.elapsed() < DEADLINE, "{document:#}");
     }
-    let here = [
-        "doctor", cluster, "--name", "press", "--link", "udp", "--keys", &press,
-    ];
+    let here = ["doctor", cluster, "--name", "press", "--link", "udp", "--keys", &press];
     let (_, document, _) = answer(&here);
-    assert_eq!(
-        doctor(&document, "ports", "warning").len(),
-        2,
-        "it runs here: {document:#}"
-    );
+    assert_eq!(doctor(&document, "ports", "warning").len(), 2, "it runs here: {document:#}");
 }

@@ -37,10 +37,7 @@ fn offers(heard: &[u8], kept: &[Vec<u8>]) -> Vec<Vec<u8>> {
         header: Header {
             cluster: ClusterHash::of(b"press-cell"),
             configuration: ConfigurationHash(1),
-            moment: Moment {
-                epoch: Epoch(u64::MAX),
-                cycle: Cycle(1),
-            },
+            moment: Moment { epoch: Epoch(u64::MAX), cycle: Cycle(1) },
             sender,
             alone: false,
         },
@@ -116,10 +113,7 @@ fn a_stranger_moves_nothing_and_the_journal_names_what_he_did() {
     let scenario = folder.join("stranger.toml");
     fs::write(&scenario, SCENARIO).expect("it is ours");
     let addresses = addresses(&cluster);
-    let (dead, others) = (
-        addresses["understudy"],
-        ["robot", "press", "robot-io", "press-io"],
-    );
+    let (dead, others) = (addresses["understudy"], ["robot", "press", "robot-io", "press-io"]);
     let mut targets = others.map(|name| addresses[name]).to_vec();
     let file = cluster.clone();
     let done = Arc::new(AtomicBool::new(false));
@@ -183,10 +177,7 @@ fn a_stranger_moves_nothing_and_the_journal_names_what_he_did() {
     let said = stranger.join().expect("no panic");
     let summary = &document["result"]["summary"];
     assert_eq!(summary["violation_count"], 0, "{document:#}");
-    assert_eq!(
-        summary["cycles_run"], summary["cycles_asked"],
-        "{document:#}"
-    );
+    assert_eq!(summary["cycles_run"], summary["cycles_asked"], "{document:#}");
     assert!(said > 1000, "the stranger said {said} datagrams");
 
     let directory = document["result"]["directory"].as_str().expect("a path");
@@ -200,9 +191,8 @@ fn a_stranger_moves_nothing_and_the_journal_names_what_he_did() {
         let kinds = named.entry(record["name"].to_string()).or_default();
         kinds.insert(kind.to_owned());
     }
-    let all: BTreeSet<String> = ["foreign", "forged", "no-frame", "replayed", "unsealed"]
-        .map(str::to_owned)
-        .into();
+    let all: BTreeSet<String> =
+        ["foreign", "forged", "no-frame", "replayed", "unsealed"].map(str::to_owned).into();
     for name in ["\"robot\"", "\"press\"", "\"robot-io\"", "\"press-io\""] {
         assert_eq!(named.get(name), Some(&all), "{name} names something else");
     }
@@ -214,9 +204,7 @@ fn a_stranger_moves_nothing_and_the_journal_names_what_he_did() {
 fn is_bound(address: SocketAddr) -> bool {
     let place = format!("0100007F:{:04X}", address.port());
     let sockets = fs::read_to_string("/proc/net/udp").expect("a Linux");
-    sockets
-        .lines()
-        .any(|line| line.split_whitespace().nth(1) == Some(place.as_str()))
+    sockets.lines().any(|line| line.split_whitespace().nth(1) == Some(place.as_str()))
 }
 
 /// Where each member listens, as its cluster file says.

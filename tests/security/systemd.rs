@@ -52,11 +52,7 @@ impl Machine {
             .stderr(fs::File::create(folder.join("boot.log")).expect("it is ours"))
             .spawn()
             .expect("there is a shell");
-        let mut machine = Self {
-            outer,
-            first: 0,
-            groups,
-        };
+        let mut machine = Self { outer, first: 0, groups };
         let started = Instant::now();
         while started.elapsed() < DEADLINE {
             if machine.outer.try_wait().expect("it is ours").is_some() {
@@ -92,9 +88,7 @@ impl Machine {
         let asked = "-pMainPID,ActiveState,SubState,Result,ExecMainStatus,NRestarts";
         let said = self.says(&["show", asked, unit]);
         let pairs = said.lines().filter_map(|line| line.split_once('='));
-        pairs
-            .map(|(name, value)| (name.to_owned(), value.to_owned()))
-            .collect()
+        pairs.map(|(name, value)| (name.to_owned(), value.to_owned())).collect()
     }
 
     /// Waits until the properties of a unit are such.
@@ -124,10 +118,7 @@ impl Machine {
 
     /// Waits until a line of a member's journal that came after `from` bytes has this in it.
     fn wait_for_line(&self, member: &str, from: usize, part: &str) {
-        let path = format!(
-            "/proc/{}/root/var/log/understudy/{member}.jsonl",
-            self.first
-        );
+        let path = format!("/proc/{}/root/var/log/understudy/{member}.jsonl", self.first);
         let started = Instant::now();
         while !fs::read(&path).is_ok_and(|journal| {
             String::from_utf8_lossy(journal.get(from..).unwrap_or_default()).contains(part)
@@ -138,10 +129,7 @@ impl Machine {
     }
 
     fn journal_bytes(&self, member: &str) -> usize {
-        let path = format!(
-            "/proc/{}/root/var/log/understudy/{member}.jsonl",
-            self.first
-        );
+        let path = format!("/proc/{}/root/var/log/understudy/{member}.jsonl", self.first);
         fs::read(path).map_or(0, |journal| journal.len())
     }
 }
@@ -219,10 +207,7 @@ fn systemd_starts_watches_and_restarts_the_members() {
     for name in ["CapPrm:", "CapEff:", "CapBnd:"] {
         assert_eq!(value(name), "0000000000800000", "{name}");
     }
-    assert_eq!(
-        (value("NoNewPrivs:"), value("Seccomp:")),
-        ("1".into(), "2".into())
-    );
+    assert_eq!((value("NoNewPrivs:"), value("Seccomp:")), ("1".into(), "2".into()));
 
     // One that stands still is found by the watchdog; until it is back, its outputs are restored.
     let before = machine.journal_bytes("robot-io");
@@ -245,10 +230,7 @@ fn systemd_starts_watches_and_restarts_the_members() {
         if now != process {
             (process, since) = (now, Instant::now());
         }
-        assert!(
-            started.elapsed() < DEADLINE,
-            "the plant starts again and again"
-        );
+        assert!(started.elapsed() < DEADLINE, "the plant starts again and again");
         sleep(Duration::from_millis(50));
     }
 
@@ -261,12 +243,7 @@ fn systemd_starts_watches_and_restarts_the_members() {
         found["SubState"] == "failed" && found["ExecMainStatus"] == "2"
     });
     machine.run(&["mv", "/etc/understudy/away", ladder]);
-    assert!(
-        machine
-            .run(&["systemctl", "start", UNITS[0]])
-            .status
-            .success()
-    );
+    assert!(machine.run(&["systemctl", "start", UNITS[0]]).status.success());
 
     let stopped = machine.run(&[&["systemctl", "stop"], &UNITS[..]].concat());
     assert!(stopped.status.success(), "{stopped:?}");

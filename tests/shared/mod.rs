@@ -30,9 +30,7 @@ pub(crate) fn some_at_a_time() -> RwLockReadGuard<'static, ()> {
 
 /// An empty folder of a test's own.
 pub(crate) fn empty_folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
-        .join(env!("CARGO_CRATE_NAME"))
-        .join(name);
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(env!("CARGO_CRATE_NAME")).join(name);
     if folder.exists() {
         fs::remove_dir_all(&folder).expect("an old run's folder goes");
     }
@@ -43,24 +41,15 @@ pub(crate) fn empty_folder(name: &str) -> PathBuf {
 /// The built binary, in the project's folder.
 pub(crate) fn understudy(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_understudy"));
-    command
-        .args(arguments)
-        .current_dir(env!("CARGO_MANIFEST_DIR"));
+    command.args(arguments).current_dir(env!("CARGO_MANIFEST_DIR"));
     command
 }
 
 /// Runs to the end: the exit status, the answer, and what was said on standard error.
 pub(crate) fn answer(arguments: &[&str]) -> (i32, Value, String) {
-    let output = understudy(arguments)
-        .arg("--json")
-        .output()
-        .expect("the binary is built");
+    let output = understudy(arguments).arg("--json").output().expect("the binary is built");
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     let document = serde_json::from_slice(&output.stdout)
         .unwrap_or_else(|error| panic!("{error}: {errors:.2000}"));
-    (
-        output.status.code().expect("an exit status"),
-        document,
-        errors,
-    )
+    (output.status.code().expect("an exit status"), document, errors)
 }

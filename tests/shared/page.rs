@@ -37,10 +37,7 @@ impl Answer {
 
     /// Of a problem.
     pub(crate) fn code(&self) -> String {
-        self.json()["error"]["code"]
-            .as_str()
-            .unwrap_or_default()
-            .to_owned()
+        self.json()["error"]["code"].as_str().unwrap_or_default().to_owned()
     }
 }
 
@@ -67,11 +64,7 @@ impl Page {
         };
         // It says more, and must not wait for a reader.
         std::thread::spawn(move || std::io::copy(&mut errors, &mut std::io::sink()));
-        Self {
-            process,
-            address,
-            said,
-        }
+        Self { process, address, said }
     }
 
     pub(crate) fn of_run(run: &Path) -> Self {
@@ -101,9 +94,7 @@ impl Page {
 
     pub(crate) fn get(&self, path: &str) -> Answer {
         let host = &self.address;
-        self.request(&format!(
-            "GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n"
-        ))
+        self.request(&format!("GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n"))
     }
 
     pub(crate) fn post(&self, path: &str, body: &str) -> Answer {
@@ -139,10 +130,7 @@ impl Page {
                 }
             }
             let last = last.to_string();
-            assert!(
-                started.elapsed() < DEADLINE,
-                "{what} did not come: {last:.2000}"
-            );
+            assert!(started.elapsed() < DEADLINE, "{what} did not come: {last:.2000}");
         }
         panic!("the page ended before {what} came");
     }
@@ -178,8 +166,5 @@ impl Drop for Page {
 
 pub(crate) fn member<'a>(state: &'a Value, name: &str) -> &'a Value {
     let members = state["members"].as_array().expect("members");
-    members
-        .iter()
-        .find(|member| member["name"] == name)
-        .unwrap_or_else(|| panic!("no {name}"))
+    members.iter().find(|member| member["name"] == name).unwrap_or_else(|| panic!("no {name}"))
 }

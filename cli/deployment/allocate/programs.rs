@@ -53,10 +53,7 @@ impl Programs {
         let mut ladders = Vec::new();
         let mut clusters = Vec::new();
         for path in paths {
-            let read = if path
-                .extension()
-                .is_some_and(|extension| extension == "toml")
-            {
+            let read = if path.extension().is_some_and(|extension| extension == "toml") {
                 files::cluster(path, Overrides::default()).map(|(cluster, found)| {
                     reports.extend(found);
                     clusters.push(cluster);
@@ -78,11 +75,7 @@ impl Programs {
         }
         let several = clusters.len() + usize::from(!ladders.is_empty()) > 1;
         let prefix = |name: &str| {
-            if several {
-                format!("{name}/")
-            } else {
-                String::new()
-            }
+            if several { format!("{name}/") } else { String::new() }
         };
         let mut groups = Vec::new();
         if !ladders.is_empty() {
@@ -111,14 +104,9 @@ impl Programs {
 
 fn ladder(path: &Path, period: Duration) -> Result<(Member, Report), Answer> {
     let (program, report) = files::ladder(path)?;
-    let circuit = program
-        .lower(period)
-        .map_err(|error| Answer::failed(Status::BadInput, "U0436", error))?;
-    let member = Member {
-        name: program.name.to_string(),
-        ladder: program,
-        circuit,
-    };
+    let circuit =
+        program.lower(period).map_err(|error| Answer::failed(Status::BadInput, "U0436", error))?;
+    let member = Member { name: program.name.to_string(), ladder: program, circuit };
     Ok((member, report))
 }
 

@@ -31,10 +31,7 @@ pub(super) fn asked(files: &[(String, PathBuf)], programs: &Programs) -> Result<
     let mut asked = Asked::new();
     for (name, path) in files {
         if !names.contains(name) {
-            let message = format!(
-                "there is no program `{name}`; there are {}",
-                names.join(", ")
-            );
+            let message = format!("there is no program `{name}`; there are {}", names.join(", "));
             return Err(Answer::failed(Status::BadInput, "U1134", message));
         }
         let text = files::text(path)?;
@@ -84,10 +81,7 @@ fn verification(
     patience: &Patience<'_>,
 ) -> Result<Verification, Answer> {
     let go_on = |work| patience.goes_on(work);
-    let bounds = Bounds {
-        go_on: &go_on,
-        ..Bounds::default()
-    };
+    let bounds = Bounds { go_on: &go_on, ..Bounds::default() };
     let mut conclusion = Conclusion::new(subject.circuit(), &subject.switches(bounds));
     for (report, properties) in asked {
         let resolve = |property| {
@@ -130,11 +124,8 @@ pub(super) fn group(
     understudies: u8,
     patience: &Patience<'_>,
 ) -> Result<Wanted, Answer> {
-    let circuits: Vec<Circuit> = group
-        .members
-        .iter()
-        .map(|member| member.circuit.clone())
-        .collect();
+    let circuits: Vec<Circuit> =
+        group.members.iter().map(|member| member.circuit.clone()).collect();
     let parity = match &group.parity {
         Some(parity) => parity.clone(),
         None => generate(&circuits).map_err(|error| {
@@ -157,9 +148,9 @@ pub(super) fn group(
             names.map(|found| group.name(&found.name)).collect()
         }
         None if understudies == 1 => vec![group.name("understudy")],
-        None => (1..=understudies)
-            .map(|number| group.name(&format!("understudy-{number}")))
-            .collect(),
+        None => {
+            (1..=understudies).map(|number| group.name(&format!("understudy-{number}"))).collect()
+        }
     };
     Ok(Wanted {
         members,

@@ -54,11 +54,7 @@ enum Consent {
 
 /// Command line for this process, or for the user with sudo.
 pub(super) fn shown(repair: &Repair) -> String {
-    if may_repair() {
-        repair.command.clone()
-    } else {
-        repair.with_sudo()
-    }
+    if may_repair() { repair.command.clone() } else { repair.with_sudo() }
 }
 
 /// Shows all commands, runs the permitted ones and checks again.
@@ -96,20 +92,13 @@ pub(super) fn fix(
         })
         .collect();
     let ran = repairs.iter().any(|done| done.outcome == Outcome::Ran);
-    Fixed {
-        not_repairable: not_repairable(findings),
-        again: ran.then(look_again),
-        repairs,
-    }
+    Fixed { not_repairable: not_repairable(findings), again: ran.then(look_again), repairs }
 }
 
 /// Distinct commands, in the order of the findings.
 fn to_do(findings: &[Finding]) -> Vec<&Repair> {
     let mut repairs: Vec<&Repair> = Vec::new();
-    for repair in findings
-        .iter()
-        .filter_map(|finding| finding.repair.as_ref())
-    {
+    for repair in findings.iter().filter_map(|finding| finding.repair.as_ref()) {
         if !repairs.contains(&repair) {
             repairs.push(repair);
         }
@@ -118,23 +107,15 @@ fn to_do(findings: &[Finding]) -> Vec<&Repair> {
 }
 
 fn not_repairable(findings: &[Finding]) -> Vec<String> {
-    let troubles = findings
-        .iter()
-        .filter(|finding| finding.health != Health::Good);
+    let troubles = findings.iter().filter(|finding| finding.health != Health::Good);
     let without = troubles.filter(|finding| finding.repair.is_none());
-    without
-        .map(|finding| format!("{}: {}", finding.check, finding.found))
-        .collect()
+    without.map(|finding| format!("{}: {}", finding.check, finding.found)).collect()
 }
 
 fn asked(repair: &Repair) -> Consent {
     let mut errors = io::stderr();
     // A prompt that cannot be written counts as refused.
-    let _ = write!(
-        errors,
-        "{}\n  ({})\nRun it? [y/N] ",
-        repair.command, repair.effect
-    );
+    let _ = write!(errors, "{}\n  ({})\nRun it? [y/N] ", repair.command, repair.effect);
     let _ = errors.flush();
     let mut line = String::new();
     let read = io::stdin().read_line(&mut line);
@@ -148,9 +129,7 @@ fn run(command: &str) -> Outcome {
     let output = match Command::new("sh").args(["-c", command]).output() {
         Ok(output) => output,
         Err(error) => {
-            return Outcome::Failed {
-                reason: error.to_string(),
-            };
+            return Outcome::Failed { reason: error.to_string() };
         }
     };
     if output.status.success() {
@@ -214,22 +193,15 @@ mod tests {
     use super::*;
 
     fn finding(check: &'static str, command: Option<&str>) -> Finding {
-        let repair = command.map(|command| Repair {
-            command: command.to_owned(),
-            effect: "at once",
-        });
-        Finding {
-            repair,
-            ..Finding::trouble(check, Health::Warning, "slow", "make it fast")
-        }
+        let repair =
+            command.map(|command| Repair { command: command.to_owned(), effect: "at once" });
+        Finding { repair, ..Finding::trouble(check, Health::Warning, "slow", "make it fast") }
     }
 
     #[test]
     fn a_command_says_itself_whether_it_worked() {
         assert_eq!(run("true"), Outcome::Ran);
-        let failed = |reason: &str| Outcome::Failed {
-            reason: reason.to_owned(),
-        };
+        let failed = |reason: &str| Outcome::Failed { reason: reason.to_owned() };
         assert_eq!(run("echo first >&2; echo last >&2; exit 3"), failed("last"));
         assert_eq!(run("exit 3"), failed("exit status: 3"));
     }

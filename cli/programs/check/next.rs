@@ -17,9 +17,9 @@ pub(super) fn after_check(answer: Answer, given: &[(Kind, &Path)]) -> Answer {
         (Some(cluster), Some(scenario)) => answer
             .and_next(&[&"simulate", &cluster, &"--scenario", &scenario])
             .and_next(&[&"lab", &cluster, &"--scenario", &scenario]),
-        (Some(cluster), None) => answer
-            .and_next(&[&"simulate", &cluster])
-            .and_next(&[&"lab", &cluster]),
+        (Some(cluster), None) => {
+            answer.and_next(&[&"simulate", &cluster]).and_next(&[&"lab", &cluster])
+        }
         (None, Some(scenario)) => {
             let cluster = scenario.with_file_name("cluster.toml");
             if cluster.exists() {

@@ -23,9 +23,7 @@ pub(super) struct Looking {
 
 impl Looking {
     pub(super) fn new(budget: Duration) -> Self {
-        Self {
-            end: Instant::now() + budget,
-        }
+        Self { end: Instant::now() + budget }
     }
 
     /// Reports suspicious rungs of the program; true if the time limit ended the search.
@@ -40,11 +38,7 @@ impl Looking {
         if Instant::now() >= self.end {
             return has_rungs;
         }
-        let bounds = Bounds {
-            states: STATES,
-            go_on: &go_on,
-            ..Bounds::default()
-        };
+        let bounds = Bounds { states: STATES, go_on: &go_on, ..Bounds::default() };
         // A check without a period ignores programs that cannot be lowered with the default one.
         let remarks = Subject::new(program, period)
             .and_then(|subject| subject.remarks(program, period, bounds));
@@ -63,9 +57,8 @@ impl Looking {
             return false;
         };
         let controllers = cluster.controllers().iter();
-        let members: Vec<Circuit> = controllers
-            .filter_map(|controller| controller.circuit().cloned())
-            .collect();
+        let members: Vec<Circuit> =
+            controllers.filter_map(|controller| controller.circuit().cloned()).collect();
         let go_on = |_: Work| Instant::now() < self.end;
         match prove_parity_while(&members, parity.circuit(), NODES, &go_on) {
             Ok(_) => false,

@@ -37,10 +37,7 @@ pub(super) fn run(folder: &Path, arguments: &[PathBuf]) -> Result<Answer, Answer
     if found.is_wrong() {
         return Err(found.refusal());
     }
-    let texts = texts.into_iter().map(|(name, text)| NewFile {
-        name,
-        bytes: text.into_bytes(),
-    });
+    let texts = texts.into_iter().map(|(name, text)| NewFile { name, bytes: text.into_bytes() });
     // A program that is already in the folder is used in place.
     let copies = found.copies.into_iter().filter(|copy| {
         let place = fs::canonicalize(folder.join(&copy.file.name));
@@ -64,14 +61,10 @@ impl<'a> Source<'a> {
     fn new(argument: &'a Path) -> Self {
         let split = argument.to_str().and_then(|text| text.split_once('='));
         match split {
-            Some((name, file)) if !argument.exists() && !name.contains('/') => Self {
-                name: Some(name),
-                path: file.into(),
-            },
-            _ => Self {
-                name: None,
-                path: argument.to_owned(),
-            },
+            Some((name, file)) if !argument.exists() && !name.contains('/') => {
+                Self { name: Some(name), path: file.into() }
+            }
+            _ => Self { name: None, path: argument.to_owned() },
         }
     }
 
@@ -118,24 +111,14 @@ impl Found {
             }
         };
         let name = path.display().to_string();
-        let mut report = Report {
-            name: name.clone(),
-            text,
-            diagnostics: Vec::new(),
-        };
+        let mut report = Report { name: name.clone(), text, diagnostics: Vec::new() };
         match Format::of(&name, &report.text) {
             None => report.diagnostics.push(unknown_form(&report.text)),
             Some(format) => {
                 let readings = read_all(format, &name, &report.text);
                 let is_only = readings.len() == 1;
                 for reading in readings {
-                    self.add(
-                        source,
-                        format,
-                        reading,
-                        is_only.then_some(&bytes),
-                        &mut report,
-                    );
+                    self.add(source, format, reading, is_only.then_some(&bytes), &mut report);
                 }
             }
         }
@@ -158,11 +141,7 @@ impl Found {
         let unit = program.name.to_string();
         // Digraphs are unnamed.
         let own = match format {
-            Format::Digraph => source
-                .path
-                .file_stem()
-                .unwrap_or_default()
-                .to_string_lossy(),
+            Format::Digraph => source.path.file_stem().unwrap_or_default().to_string_lossy(),
             _ => unit.as_str().into(),
         };
         let name = source.controller(&own, only.is_some());
@@ -192,10 +171,7 @@ impl Found {
         self.sources.push(source.path.clone());
         self.copies.push(Copied {
             source: source.path.clone(),
-            file: NewFile {
-                name: file.clone(),
-                bytes,
-            },
+            file: NewFile { name: file.clone(), bytes },
         });
         self.programs.push(DraftProgram {
             name,
@@ -280,10 +256,7 @@ impl Found {
     }
 
     fn fail(&mut self, code: &str, message: String) {
-        self.failures.push(Failure {
-            code: code.to_owned(),
-            message,
-        });
+        self.failures.push(Failure { code: code.to_owned(), message });
     }
 
     fn is_wrong(&self) -> bool {
@@ -311,16 +284,8 @@ fn cluster_name(folder: &Path) -> String {
     let absolute = std::path::absolute(folder).unwrap_or_default();
     let name = absolute.file_name().unwrap_or_default().to_string_lossy();
     let legal = |letter: char| {
-        if letter.is_ascii_alphanumeric() || letter == '_' {
-            letter
-        } else {
-            '-'
-        }
+        if letter.is_ascii_alphanumeric() || letter == '_' { letter } else { '-' }
     };
     let name: String = name.chars().map(legal).take(MAXIMUM_PROGRAM_NAME).collect();
-    if is_name(&name) {
-        name
-    } else {
-        "cluster".to_owned()
-    }
+    if is_name(&name) { name } else { "cluster".to_owned() }
 }

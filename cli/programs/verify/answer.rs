@@ -164,9 +164,7 @@ impl ProgramAnswer {
         Self {
             name: circuit.name().to_owned(),
             registers: circuit.registers().len(),
-            switches: switches
-                .map(|(signal, finding)| switch(circuit, signal, &finding))
-                .collect(),
+            switches: switches.map(|(signal, finding)| switch(circuit, signal, &finding)).collect(),
             remarks: remarked.collect(),
             undecided_remarks: remarks.undecided,
             properties: Vec::new(),
@@ -175,36 +173,24 @@ impl ProgramAnswer {
 
     /// All counterexamples and witnesses with their titles.
     pub(super) fn runs(&self) -> Vec<Shown<'_>> {
-        let switches = self
-            .switches
-            .iter()
-            .map(|switch| (&switch.message, switch.verdict, &switch.scans));
+        let switches =
+            self.switches.iter().map(|switch| (&switch.message, switch.verdict, &switch.scans));
         let properties = self
             .properties
             .iter()
             .map(|finding| (&finding.property, finding.verdict, &finding.scans));
-        let remarks = self
-            .remarks
-            .iter()
-            .map(|remark| (&remark.message, "remark", &remark.scans));
+        let remarks = self.remarks.iter().map(|remark| (&remark.message, "remark", &remark.scans));
         let shown = switches.chain(remarks).chain(properties);
         let shown = shown.filter_map(|(title, verdict, scans)| {
             let trace = &scans.as_ref()?.trace;
-            Some(Shown {
-                title,
-                verdict: word(verdict),
-                trace,
-            })
+            Some(Shown { title, verdict: word(verdict), trace })
         });
         shown.collect()
     }
 
     fn proved(&self) -> bool {
         let free = self.switches.iter().all(|switch| switch.verdict == "free");
-        free && self
-            .properties
-            .iter()
-            .all(|finding| finding.verdict == "holds")
+        free && self.properties.iter().all(|finding| finding.verdict == "holds")
     }
 
     fn text(&self) -> String {
@@ -214,13 +200,7 @@ impl ProgramAnswer {
             push_table(&mut text, switch.scans.as_ref());
         }
         for remark in &self.remarks {
-            let _ = writeln!(
-                text,
-                "  {:<9} {} {}",
-                word("remark"),
-                remark.code,
-                remark.message
-            );
+            let _ = writeln!(text, "  {:<9} {} {}", word("remark"), remark.code, remark.message);
             push_table(&mut text, remark.scans.as_ref());
         }
         if self.undecided_remarks > 0 {
@@ -233,12 +213,7 @@ impl ProgramAnswer {
         for finding in &self.properties {
             let name = finding.name.as_ref().map(|name| format!("{name}: "));
             let name = name.unwrap_or_default();
-            let _ = write!(
-                text,
-                "  {:<9} {name}{}",
-                word(finding.verdict),
-                finding.property
-            );
+            let _ = write!(text, "  {:<9} {name}{}", word(finding.verdict), finding.property);
             if finding.formula != finding.property {
                 let _ = write!(text, "   [{}]", finding.formula);
             }
@@ -326,11 +301,9 @@ fn switch(circuit: &Circuit, signal: Signal, finding: &OutputFinding) -> Switch 
         Lamp::Off => off,
     };
     let (verdict, message, scans) = match finding {
-        OutputFinding::Free => (
-            "free",
-            format!("{output} can always be switched on and off again"),
-            None,
-        ),
+        OutputFinding::Free => {
+            ("free", format!("{output} can always be switched on and off again"), None)
+        }
         OutputFinding::Never(which) => (
             lamp(*which, "never-on", "never-off"),
             format!("{output} is never {}", lamp(*which, "on", "off")),
@@ -346,12 +319,7 @@ fn switch(circuit: &Circuit, signal: Signal, finding: &OutputFinding) -> Switch 
         ),
         OutputFinding::Undecided(message) => ("undecided", format!("{output}: {message}"), None),
     };
-    Switch {
-        output,
-        verdict,
-        message,
-        scans,
-    }
+    Switch { output, verdict, message, scans }
 }
 
 pub(super) fn of_programs(

@@ -40,16 +40,13 @@ pub(super) fn of_program(
         asked.properties.extend(standard_property(&model, STANDARD));
     }
     let go_on = |work| patience.goes_on(work);
-    let proved = prove(
-        &model,
-        &program.name,
-        asked,
-        bounds(arguments, &go_on),
-        patience,
-    );
-    Ok(answer::of_programs(vec![proved], None, None)
-        .with_used(vec![report])
-        .and_next(&[&"init", &"cell", &"--from", &arguments.file]))
+    let proved = prove(&model, &program.name, asked, bounds(arguments, &go_on), patience);
+    Ok(answer::of_programs(vec![proved], None, None).with_used(vec![report]).and_next(&[
+        &"init",
+        &"cell",
+        &"--from",
+        &arguments.file,
+    ]))
 }
 
 /// Proves the standard property of a program of a cluster.
@@ -124,10 +121,7 @@ fn members(cluster: &Cluster) -> Vec<Member<'_>> {
         let points = controller.interface.inputs.iter();
         let points = points.filter(|point| point.name != Program::RESET);
         let sources = points.map(|point| {
-            let source = remote_io
-                .inputs
-                .iter()
-                .find(|input| input.name == point.name);
+            let source = remote_io.inputs.iter().find(|input| input.name == point.name);
             match source.map(|input| &input.kind) {
                 Some(InputSourceKind::Operator(declaration)) => {
                     Source::Any(declaration.limits().map(|(low, high)| low..=high))
@@ -144,11 +138,7 @@ fn members(cluster: &Cluster) -> Vec<Member<'_>> {
                 },
             }
         });
-        Member {
-            name: controller.name.clone(),
-            code,
-            sources: sources.collect(),
-        }
+        Member { name: controller.name.clone(), code, sources: sources.collect() }
     });
     members.collect()
 }

@@ -25,11 +25,7 @@ impl Catalogue {
                 None => reports.push(loaded.report),
             }
         }
-        if reports.is_empty() {
-            Ok(catalogue)
-        } else {
-            Err(reports)
-        }
+        if reports.is_empty() { Ok(catalogue) } else { Err(reports) }
     }
 
     fn merge(&mut self, part: &Self) {

@@ -116,9 +116,7 @@ impl Placed {
     /// Number of candidates with this verdict.
     pub fn count(&self, verdict: Verdict) -> usize {
         let candidates = self.candidates.iter();
-        candidates
-            .filter(|found| found.fit.verdict == verdict)
-            .count()
+        candidates.filter(|found| found.fit.verdict == verdict).count()
     }
 }
 
@@ -259,11 +257,7 @@ pub fn allocate(
         let loads = loads.filter_map(|&item| box_type.loads[item].as_ref());
         BoxOnPlan {
             controller: types[packed.box_type].0.clone(),
-            items: packed
-                .items
-                .iter()
-                .map(|&item| items[item].name.clone())
-                .collect(),
+            items: packed.items.iter().map(|&item| items[item].name.clone()).collect(),
             taken: taken(loads),
         }
     });
@@ -283,12 +277,7 @@ pub fn allocate(
             candidates,
         }
     });
-    Ok(Allocation {
-        items: placed.collect(),
-        boxes,
-        best: packing.best,
-        remarks,
-    })
+    Ok(Allocation { items: placed.collect(), boxes, best: packing.best, remarks })
 }
 
 /// Whether one failure must not take both.
@@ -304,11 +293,8 @@ fn apart(left: &Item, right: &Item, share_members: bool) -> bool {
 fn taken<'a>(loads: impl Iterator<Item = &'a BTreeMap<Dimension, crate::fit::Load>>) -> Vec<Taken> {
     let mut sums: BTreeMap<Dimension, Taken> = BTreeMap::new();
     for (&dimension, load) in loads.flatten() {
-        let entry = sums.entry(dimension).or_insert(Taken {
-            dimension,
-            takes: 0,
-            usable: load.usable,
-        });
+        let entry =
+            sums.entry(dimension).or_insert(Taken { dimension, takes: 0, usable: load.usable });
         entry.takes += load.takes;
     }
     sums.into_values().collect()
@@ -320,9 +306,7 @@ fn why(item: &Item, candidates: &[Candidate], may_be_placed: bool) -> String {
         return format!("not recommended: {}", item.verification.message());
     }
     let count = |verdict| {
-        let of_it = candidates
-            .iter()
-            .filter(|found| found.fit.verdict == verdict);
+        let of_it = candidates.iter().filter(|found| found.fit.verdict == verdict);
         of_it.count()
     };
     match (count(Verdict::Fits), count(Verdict::Unknown)) {

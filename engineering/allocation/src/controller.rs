@@ -161,10 +161,7 @@ impl Catalogue {
     pub fn like(&self, name: &str) -> Vec<String> {
         let wanted = name.to_lowercase();
         let part = |model: &str| model.to_lowercase().contains(&wanted);
-        let models = || {
-            self.controllers()
-                .map(|controller| controller.model.as_str())
-        };
+        let models = || self.controllers().map(|controller| controller.model.as_str());
         let mut found: Vec<&str> = models().filter(|model| part(model)).collect();
         found.sort_unstable();
         let others = spelling::alike(name, models().filter(|model| !part(model)));

@@ -53,10 +53,7 @@ fn field(text: &str, at: usize, wrong: &mut Vec<Diagnostic>) -> (Field, usize) {
             let help = "quote the whole field and double the quotes in it";
             wrong.push(Diagnostic::error("U1101", message, span).with_help(help));
         }
-        let field = Field {
-            text: plain.trim().to_owned(),
-            span: at..end,
-        };
+        let field = Field { text: plain.trim().to_owned(), span: at..end };
         return (field, end);
     }
     let mut content = String::new();
@@ -65,10 +62,7 @@ fn field(text: &str, at: usize, wrong: &mut Vec<Diagnostic>) -> (Field, usize) {
         let Some(quote) = text[from..].find('"').map(|quote| from + quote) else {
             let message = "missing closing quote in this field";
             wrong.push(Diagnostic::error("U1101", message, at..at + 1));
-            let field = Field {
-                text: content,
-                span: at..text.len(),
-            };
+            let field = Field { text: content, span: at..text.len() };
             return (field, text.len());
         };
         content.push_str(&text[from..quote]);
@@ -82,10 +76,7 @@ fn field(text: &str, at: usize, wrong: &mut Vec<Diagnostic>) -> (Field, usize) {
             let message = "text after the closing quote of this field";
             wrong.push(Diagnostic::error("U1101", message, quote + 1..end));
         }
-        let field = Field {
-            text: content,
-            span: at..end,
-        };
+        let field = Field { text: content, span: at..end };
         return (field, end);
     }
 }
@@ -141,9 +132,6 @@ mod tests {
     fn what_is_written_is_read_again() {
         let fields = ["", "a", " b ", "c,d", "e\"f", "g\nh", "\"", "ü"];
         let (found, wrong) = texts(&line(&fields));
-        assert_eq!(
-            (found, wrong),
-            (vec![fields.map(str::to_owned).to_vec()], 0)
-        );
+        assert_eq!((found, wrong), (vec![fields.map(str::to_owned).to_vec()], 0));
     }
 }

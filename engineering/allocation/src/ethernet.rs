@@ -40,22 +40,13 @@ mod tests {
         let check = |ports: &str, expected| assert_eq!(ethernet(ports), expected, "{ports}");
         check("1x PROFINET", Ethernet::Present);
         check("2x Ethernet (1 IP)", Ethernet::Present);
-        check(
-            "RS-232/485 combo; 10/100 Ethernet; RS-232",
-            Ethernet::Present,
-        );
+        check("RS-232/485 combo; 10/100 Ethernet; RS-232", Ethernet::Present);
         check("Ethernet: Yes; WiFi: No", Ethernet::Present);
-        check(
-            "Ethernet: Yes; WiFi: Yes - on the Opta WiFi model",
-            Ethernet::Present,
-        );
+        check("Ethernet: Yes; WiFi: Yes - on the Opta WiFi model", Ethernet::Present);
         check("Ethernet: No; WiFi: Yes", Ethernet::Absent);
         check("1x RS-485 (PPI)", Ethernet::Absent);
         check("RS-232/485", Ethernet::Absent);
-        check(
-            "Ethernet: Yes with Ethernet module; WiFi: No",
-            Ethernet::Undecided,
-        );
+        check("Ethernet: Yes with Ethernet module; WiFi: No", Ethernet::Undecided);
         check("1 built-in, up to 5", Ethernet::Undecided);
     }
 }

@@ -58,9 +58,7 @@ impl Quantity {
             (_, None) => (text, 0),
         };
         let scale = if self == Self::Price { 100 } else { 1 };
-        let value = digits_of(whole)?
-            .checked_mul(scale)?
-            .checked_add(hundredths)?;
+        let value = digits_of(whole)?.checked_mul(scale)?.checked_add(hundredths)?;
         (value <= self.most()).then_some(value)
     }
 

@@ -45,11 +45,7 @@ pub fn read(name: &str, text: &str) -> Loaded {
     wrong.sort_by_key(|diagnostic| diagnostic.span.start);
     Loaded {
         catalogue: (!has_errors(&wrong)).then_some(catalogue),
-        report: Report {
-            name: name.to_owned(),
-            text: text.to_owned(),
-            diagnostics: wrong,
-        },
+        report: Report { name: name.to_owned(), text: text.to_owned(), diagnostics: wrong },
     }
 }
 
@@ -62,16 +58,8 @@ fn read_records(text: &str, wrong: &mut Vec<Diagnostic>) -> Catalogue {
         return Catalogue::default();
     };
     let is_long = header.iter().any(|field| field.text == "figure");
-    let known: &[&str] = if is_long {
-        &long::HEADER
-    } else {
-        &wide::HEADER
-    };
-    let required: &[&str] = if is_long {
-        &long::REQUIRED
-    } else {
-        &wide::REQUIRED
-    };
+    let known: &[&str] = if is_long { &long::HEADER } else { &wide::HEADER };
+    let required: &[&str] = if is_long { &long::REQUIRED } else { &wide::REQUIRED };
     let before = wrong.len();
     let columns = Columns::of(header, known, required, wrong);
     let is_missing = |name: &&str| !columns.places.contains_key(*name);
@@ -83,21 +71,14 @@ fn read_records(text: &str, wrong: &mut Vec<Diagnostic>) -> Catalogue {
         if row.len() == header.len() {
             return Some(columns.row(row));
         }
-        let message = format!(
-            "this line has {} fields, and the header {}",
-            row.len(),
-            header.len()
-        );
+        let message =
+            format!("this line has {} fields, and the header {}", row.len(), header.len());
         let help = "quote fields that contain a comma";
         wrong.push(Diagnostic::error("U1102", message, whole(row)).with_help(help));
         None
     });
     let rows: Vec<Row> = rows.collect();
-    if is_long {
-        long::catalogue(&rows, wrong)
-    } else {
-        wide::catalogue(&rows, wrong)
-    }
+    if is_long { long::catalogue(&rows, wrong) } else { wide::catalogue(&rows, wrong) }
 }
 
 /// A catalogue as a file, a figure a line.
@@ -148,9 +129,7 @@ impl Columns {
     fn row<'a>(&self, fields: &'a [Field]) -> Row<'a> {
         let places = self.places.iter();
         Row {
-            fields: places
-                .map(|(&name, &place)| (name, &fields[place]))
-                .collect(),
+            fields: places.map(|(&name, &place)| (name, &fields[place])).collect(),
             span: whole(fields),
         }
     }
@@ -165,9 +144,7 @@ struct Row<'a> {
 impl Row<'_> {
     /// The text of a column; empty where the file has no such column.
     fn text(&self, column: &str) -> &str {
-        self.fields
-            .get(column)
-            .map_or("", |field| field.text.as_str())
+        self.fields.get(column).map_or("", |field| field.text.as_str())
     }
 
     /// The place of a column; the line where the file has no such column.

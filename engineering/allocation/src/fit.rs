@@ -116,52 +116,24 @@ impl Fit {
 
     /// The findings with this verdict.
     pub fn with(&self, verdict: Verdict) -> impl Iterator<Item = &Finding> {
-        self.findings
-            .iter()
-            .filter(move |finding| finding.verdict == verdict)
+        self.findings.iter().filter(move |finding| finding.verdict == verdict)
     }
 }
 
 /// Compares a controller with a need.
 pub fn fit(controller: &Controller, family: Option<&Family>, need: &Need, terms: &Terms) -> Fit {
     let mut judge = Judge::new(controller, family, terms);
-    judge.points(
-        Quantity::DigitalInputs,
-        need.inputs,
-        Dimension::DigitalInputs,
-    );
-    judge.points(
-        Quantity::DigitalOutputs,
-        need.outputs,
-        Dimension::DigitalOutputs,
-    );
-    judge.points(
-        Quantity::AnalogIn,
-        need.analog_inputs,
-        Dimension::AnalogInputs,
-    );
-    judge.points(
-        Quantity::AnalogOut,
-        need.analog_outputs,
-        Dimension::AnalogOutputs,
-    );
+    judge.points(Quantity::DigitalInputs, need.inputs, Dimension::DigitalInputs);
+    judge.points(Quantity::DigitalOutputs, need.outputs, Dimension::DigitalOutputs);
+    judge.points(Quantity::AnalogIn, need.analog_inputs, Dimension::AnalogInputs);
+    judge.points(Quantity::AnalogOut, need.analog_outputs, Dimension::AnalogOutputs);
     let mut scan_ns = None;
     if let Some(program) = &need.program {
         let by_memory = terms.of_family(family, FamilyQuantity::TimersByMemory);
         let by_memory = by_memory.filter(|figure| figure.value > 0);
         let by_memory = by_memory.as_ref().map(|figure| figure.source.as_str());
-        judge.count(
-            Quantity::Timers,
-            program.timers,
-            Dimension::Timers,
-            by_memory,
-        );
-        judge.count(
-            Quantity::Counters,
-            program.counters,
-            Dimension::Counters,
-            by_memory,
-        );
+        judge.count(Quantity::Timers, program.timers, Dimension::Timers, by_memory);
+        judge.count(Quantity::Counters, program.counters, Dimension::Counters, by_memory);
         match memory(program, family, terms) {
             Memory::Apart { program, data } => {
                 let capacity = Quantity::ProgramMemoryBytes;
@@ -190,26 +162,17 @@ pub fn fit(controller: &Controller, family: Option<&Family>, need: &Need, terms:
             asked::judge(&mut judge, requirement, need);
         }
     }
-    let Judge {
-        findings, loads, ..
-    } = judge;
+    let Judge { findings, loads, .. } = judge;
     let verdicts = findings.iter().map(|finding| finding.verdict);
-    Fit {
-        verdict: verdicts.max().unwrap_or(Verdict::Fits),
-        findings,
-        scan_ns,
-        loads,
-    }
+    Fit { verdict: verdicts.max().unwrap_or(Verdict::Fits), findings, scan_ns, loads }
 }
 
 fn memory_of(judge: &mut Judge<'_>, capacity: Quantity, dimension: Dimension, bytes: &Bytes) {
     match bytes {
         Bytes::Known { bytes: 0, .. } => {}
-        Bytes::Known {
-            bytes,
-            fixed,
-            sources,
-        } => judge.memory(capacity, dimension, *bytes, *fixed, sources),
+        Bytes::Known { bytes, fixed, sources } => {
+            judge.memory(capacity, dimension, *bytes, *fixed, sources)
+        }
         Bytes::Unknown { missing, units } => {
             let missing: Vec<String> = missing.iter().map(FamilyQuantity::to_string).collect();
             judge.memory_unknown(capacity, &missing.join(", "), *units);
@@ -220,10 +183,7 @@ fn memory_of(judge: &mut Judge<'_>, capacity: Quantity, dimension: Dimension, by
 fn network(judge: &mut Judge<'_>) {
     let controller = judge.controller;
     let Some(figure) = controller.texts.get(&Statement::CommPorts) else {
-        judge.unknown(
-            "ethernet",
-            "needs an Ethernet port; its ports are unknown".into(),
-        );
+        judge.unknown("ethernet", "needs an Ethernet port; its ports are unknown".into());
         return;
     };
     let sources = vec![figure.source.clone()];

@@ -130,10 +130,7 @@ struct Writer {
 
 impl Writer {
     fn put(&mut self, operator: Operator, operand: impl Into<String>) {
-        self.list.push(Instruction {
-            operator,
-            operand: operand.into(),
-        });
+        self.list.push(Instruction { operator, operand: operand.into() });
     }
 
     fn temporary(&mut self) -> String {
@@ -259,10 +256,7 @@ impl Writer {
         if power == Power::Rail {
             self.put(Operator::Load, "TRUE");
         }
-        self.put(
-            Operator::Store,
-            format!("{name}.{}", block.kind.wire_input()),
-        );
+        self.put(Operator::Store, format!("{name}.{}", block.kind.wire_input()));
         for feed in &block.pins {
             self.series(&feed.network, Power::Rail);
             self.put(Operator::Store, format!("{name}.{}", feed.pin));

@@ -17,16 +17,9 @@ use crate::resources::Resources;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Bytes {
     /// Known number of bytes with its sources; `fixed` of them are taken once, whatever the number of programs.
-    Known {
-        bytes: u64,
-        fixed: u64,
-        sources: Vec<String>,
-    },
+    Known { bytes: u64, fixed: u64, sources: Vec<String> },
     /// These figures of the family are missing; the first counts for `units` of the program.
-    Unknown {
-        missing: Vec<FamilyQuantity>,
-        units: u64,
-    },
+    Unknown { missing: Vec<FamilyQuantity>, units: u64 },
 }
 
 /// Memory of a program.
@@ -40,10 +33,8 @@ pub(crate) enum Memory {
 
 pub(crate) fn memory(program: &Resources, family: Option<&Family>, terms: &Terms) -> Memory {
     let figure = |quantity| terms.of_family(family, quantity);
-    let rule = (
-        figure(FamilyQuantity::MemoryBytesBase),
-        figure(FamilyQuantity::MemoryBytesPerPoint),
-    );
+    let rule =
+        (figure(FamilyQuantity::MemoryBytesBase), figure(FamilyQuantity::MemoryBytesPerPoint));
     // What is known of each instruction is nearer to the truth than a rule of thumb.
     let by_instruction = figure(FamilyQuantity::ProgramBytesPerInstruction);
     if let ((Some(base), Some(per_point)), None) = (rule, by_instruction) {
@@ -88,21 +79,14 @@ pub(crate) fn memory(program: &Resources, family: Option<&Family>, terms: &Terms
         }
         if missing.is_empty() {
             let fixed = 0;
-            Bytes::Known {
-                bytes,
-                fixed,
-                sources,
-            }
+            Bytes::Known { bytes, fixed, sources }
         } else {
             Bytes::Unknown { missing, units }
         }
     };
     Memory::Apart {
         program: sum([
-            (
-                program.instructions,
-                FamilyQuantity::ProgramBytesPerInstruction,
-            ),
+            (program.instructions, FamilyQuantity::ProgramBytesPerInstruction),
             (program.timers, FamilyQuantity::ProgramBytesPerTimer),
             (program.counters, FamilyQuantity::ProgramBytesPerCounter),
         ]),

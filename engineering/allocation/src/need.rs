@@ -62,10 +62,7 @@ impl Terms {
         let known = family.and_then(|family| family.numbers.get(&quantity));
         let assumed = self.assumptions.get(&quantity);
         known.cloned().or_else(|| {
-            assumed.map(|&value| Figure {
-                value,
-                source: format!("assumed: {quantity} = {value}"),
-            })
+            assumed.map(|&value| Figure { value, source: format!("assumed: {quantity} = {value}") })
         })
     }
 }

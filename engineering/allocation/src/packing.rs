@@ -85,11 +85,7 @@ pub fn pack(
     }));
     check(items, types, &boxes, apart)?;
     let placed = |item: &usize| boxes.iter().any(|packed| packed.items.contains(item));
-    Ok(Packing {
-        left_over: (0..items).filter(|item| !placed(item)).collect(),
-        boxes,
-        best,
-    })
+    Ok(Packing { left_over: (0..items).filter(|item| !placed(item)).collect(), boxes, best })
 }
 
 /// Controllers for the items that share none and need no limited stock, and all other items.
@@ -104,14 +100,12 @@ fn settled(
         let usable: Vec<usize> = usable.collect();
         let alone = (0..items).all(|other| other == item || apart(item, other));
         let scarce = usable.iter().any(|&one| types[one].stock.is_some());
-        let cheapest = usable
-            .iter()
-            .min_by(|&&left, &&right| types[left].cost.total_cmp(&types[right].cost));
+        let cheapest =
+            usable.iter().min_by(|&&left, &&right| types[left].cost.total_cmp(&types[right].cost));
         match cheapest {
-            Some(&box_type) if alone && !scarce => boxes.push(PackedBox {
-                box_type,
-                items: vec![item],
-            }),
+            Some(&box_type) if alone && !scarce => {
+                boxes.push(PackedBox { box_type, items: vec![item] })
+            }
             _ => rest.push(item),
         }
     }
@@ -134,11 +128,7 @@ fn pack_rest(
     if unknowns(items, types, &chosen) > MAXIMUM_UNKNOWNS {
         return (simple, false);
     }
-    let first = if all {
-        simple.clone()
-    } else {
-        greedy::pack(items, types, &chosen, apart)
-    };
+    let first = if all { simple.clone() } else { greedy::pack(items, types, &chosen, apart) };
     match program::solve(items, types, &chosen, &first, apart) {
         Some((boxes, proved)) if !is_better(items, types, &simple, &boxes) => {
             (boxes, proved && all)
@@ -160,9 +150,7 @@ fn is_better(items: usize, types: &[BoxType], one: &[PackedBox], other: &[Packed
 }
 
 fn usable_items(items: usize, box_type: &BoxType) -> Vec<usize> {
-    (0..items)
-        .filter(|&item| box_type.loads[item].is_some())
-        .collect()
+    (0..items).filter(|&item| box_type.loads[item].is_some()).collect()
 }
 
 /// Types that are not worse than another in every respect.
@@ -174,24 +162,20 @@ fn undominated(
     let beats = |better: usize, worse: usize| {
         let (left, right) = (&types[better], &types[worse]);
         let usable = usable_items(items, right);
-        let alone = usable.iter().all(|&item| {
-            usable
-                .iter()
-                .all(|&other| item == other || apart(item, other))
-        });
+        let alone = usable
+            .iter()
+            .all(|&item| usable.iter().all(|&other| item == other || apart(item, other)));
         let cheaper = left.cost < right.cost || left.cost == right.cost && better < worse;
         cheaper
             && left.stock.is_none()
-            && usable
-                .iter()
-                .all(|&item| match (&left.loads[item], &right.loads[item]) {
-                    (Some(_), Some(_)) if alone => true,
-                    (Some(left), Some(right)) => left.iter().all(|(dimension, load)| {
-                        let other = right.get(dimension).copied();
-                        other.is_some_and(|other| takes_no_more(*load, other)) || load.takes == 0
-                    }),
-                    _ => false,
-                })
+            && usable.iter().all(|&item| match (&left.loads[item], &right.loads[item]) {
+                (Some(_), Some(_)) if alone => true,
+                (Some(left), Some(right)) => left.iter().all(|(dimension, load)| {
+                    let other = right.get(dimension).copied();
+                    other.is_some_and(|other| takes_no_more(*load, other)) || load.takes == 0
+                }),
+                _ => false,
+            })
     };
     let all = 0..types.len();
     all.clone()
@@ -213,9 +197,7 @@ fn within_bound(items: usize, types: &[BoxType], useful: &[usize]) -> (Vec<usize
     let mut chosen: Vec<usize> = (0..items)
         .filter_map(|item| {
             let mut usable = by_cost.iter();
-            usable
-                .find(|&&found| types[found].loads[item].is_some())
-                .copied()
+            usable.find(|&&found| types[found].loads[item].is_some()).copied()
         })
         .collect();
     chosen.sort_unstable();
@@ -268,17 +250,11 @@ fn check(
                 let sum = sums.entry(dimension).or_insert((0, load.usable));
                 sum.0 += u128::from(load.takes);
             }
-            if packed.items[index + 1..]
-                .iter()
-                .any(|&other| apart(item, other))
-            {
+            if packed.items[index + 1..].iter().any(|&other| apart(item, other)) {
                 return broken("puts on one box what must be apart");
             }
         }
-        if sums
-            .values()
-            .any(|(sum, usable)| *sum > u128::from(*usable))
-        {
+        if sums.values().any(|(sum, usable)| *sum > u128::from(*usable)) {
             return broken("overfills a box");
         }
     }

@@ -84,10 +84,7 @@ impl Group {
 
     /// An understudy is every member at once: it has passed when all of them have.
     fn verification(&self) -> Verification {
-        let failed = self
-            .members
-            .iter()
-            .find(|member| !member.verification.has_passed());
+        let failed = self.members.iter().find(|member| !member.verification.has_passed());
         match (&self.parity, failed) {
             (Verification::Passed(_), Some(member)) => {
                 let message = member.verification.message();

@@ -60,21 +60,15 @@ pub fn html(
         let number = numbers.get(&source).copied().unwrap_or_default();
         Value::from_safe_string(format!("<a href=\"#source-{number}\">{number}</a>"))
     });
-    environment
-        .add_template("report.html", TEMPLATE)
-        .map_err(refused)?;
+    environment.add_template("report.html", TEMPLATE).map_err(refused)?;
     let template = environment.get_template("report.html").map_err(refused)?;
     let requirements = terms.requirements.iter();
     let requirements: Vec<String> = requirements.map(|asked| asked.text.clone()).collect();
     let assumptions = terms.assumptions.iter();
-    let assumptions: Vec<String> = assumptions
-        .map(|(quantity, value)| format!("{quantity} = {value}"))
-        .collect();
-    let chosen: Vec<Option<usize>> = allocation
-        .items
-        .iter()
-        .map(|item| box_of(allocation, item))
-        .collect();
+    let assumptions: Vec<String> =
+        assumptions.map(|(quantity, value)| format!("{quantity} = {value}")).collect();
+    let chosen: Vec<Option<usize>> =
+        allocation.items.iter().map(|item| box_of(allocation, item)).collect();
     template
         .render(context! {
             plan => Value::from(Serde(allocation)),
@@ -235,11 +229,8 @@ fn push_item(text: &mut String, item: &Placed, shown: usize) {
         );
     }
     if item.inputs + item.outputs > 0 {
-        let _ = write!(
-            text,
-            "; {} inputs and {} outputs are wired to it",
-            item.inputs, item.outputs
-        );
+        let _ =
+            write!(text, "; {} inputs and {} outputs are wired to it", item.inputs, item.outputs);
     }
     text.push('\n');
     if item.program.is_some() {
@@ -247,9 +238,8 @@ fn push_item(text: &mut String, item: &Placed, shown: usize) {
     }
     for verdict in [Verdict::Fits, Verdict::Unknown, Verdict::DoesNotFit] {
         let candidates = item.candidates.iter();
-        let of_it: Vec<&Candidate> = candidates
-            .filter(|found| found.fit.verdict == verdict)
-            .collect();
+        let of_it: Vec<&Candidate> =
+            candidates.filter(|found| found.fit.verdict == verdict).collect();
         if of_it.is_empty() {
             continue;
         }
@@ -258,11 +248,7 @@ fn push_item(text: &mut String, item: &Placed, shown: usize) {
             push_candidate(text, candidate);
         }
         if of_it.len() > shown {
-            let _ = writeln!(
-                text,
-                "    and {} more (--all shows them)",
-                of_it.len() - shown
-            );
+            let _ = writeln!(text, "    and {} more (--all shows them)", of_it.len() - shown);
         }
     }
     text.push('\n');
@@ -282,13 +268,7 @@ fn push_candidate(text: &mut String, candidate: &Candidate) {
         let messages: Vec<String> = candidate
             .fit
             .with(verdict)
-            .map(|finding| {
-                format!(
-                    "{}: {}",
-                    finding.criterion.replace('_', " "),
-                    finding.message
-                )
-            })
+            .map(|finding| format!("{}: {}", finding.criterion.replace('_', " "), finding.message))
             .collect();
         let _ = write!(text, "; {}", messages.join("; "));
     }
@@ -296,12 +276,7 @@ fn push_candidate(text: &mut String, candidate: &Candidate) {
 }
 
 fn push_box(text: &mut String, number: usize, taken: &BoxOnPlan) {
-    let _ = write!(
-        text,
-        "box {number}: {} for {}",
-        taken.controller,
-        taken.items.join(", ")
-    );
+    let _ = write!(text, "box {number}: {} for {}", taken.controller, taken.items.join(", "));
     for part in &taken.taken {
         let percent = percent(part.takes as f64 / part.usable.max(1) as f64);
         let name = dimension_words(part.dimension);

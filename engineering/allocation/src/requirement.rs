@@ -79,10 +79,7 @@ impl Requirement {
     /// # Errors
     /// An unknown role or name, an invalid number, or a comparison that the name does not support.
     pub fn parse(text: &str) -> Result<Self, RequirementError> {
-        let wrong = |reason: String| RequirementError {
-            text: text.to_owned(),
-            reason,
-        };
+        let wrong = |reason: String| RequirementError { text: text.to_owned(), reason };
         let (role, rest) = match text.split_once(':') {
             // A blank belongs to a name (`vendor=A: B`), a role has none.
             Some((role, rest)) if !role.contains(['=', '~', ' ', '<', '>']) => {
@@ -95,11 +92,7 @@ impl Requirement {
             }
             _ => (None, text),
         };
-        Ok(Self {
-            role,
-            asked: asked(rest.trim()).map_err(wrong)?,
-            text: text.to_owned(),
-        })
+        Ok(Self { role, asked: asked(rest.trim()).map_err(wrong)?, text: text.to_owned() })
     }
 
     /// Whether it applies to controllers of this role.
@@ -172,22 +165,11 @@ fn number(quantity: Quantity, sign: &str, value: &str) -> Result<Asked, String> 
         "=" => Bound::Exactly,
         _ => return Err(format!("{quantity} is compared by >=, <= or =")),
     };
-    let is_memory = matches!(
-        quantity,
-        Quantity::ProgramMemoryBytes | Quantity::DataMemoryBytes
-    );
-    let units = [
-        ("KiB", 1 << 10),
-        ("MiB", 1 << 20),
-        ("KB", 1000),
-        ("MB", 1_000_000),
-    ];
-    let unit = units
-        .into_iter()
-        .find(|(unit, _)| is_memory && value.ends_with(unit));
-    let (digits, scale) = unit.map_or((value, 1), |(unit, scale)| {
-        (value[..value.len() - unit.len()].trim_end(), scale)
-    });
+    let is_memory = matches!(quantity, Quantity::ProgramMemoryBytes | Quantity::DataMemoryBytes);
+    let units = [("KiB", 1 << 10), ("MiB", 1 << 20), ("KB", 1000), ("MB", 1_000_000)];
+    let unit = units.into_iter().find(|(unit, _)| is_memory && value.ends_with(unit));
+    let (digits, scale) = unit
+        .map_or((value, 1), |(unit, scale)| (value[..value.len() - unit.len()].trim_end(), scale));
     let number = quantity.parse(digits);
     let number = number.and_then(|number| number.checked_mul(scale));
     let number = number.filter(|number| *number <= quantity.most());
@@ -219,31 +201,15 @@ mod tests {
         let number = Asked::Number;
         let inputs = Quantity::DigitalInputs;
         check("inputs>=24", None, number(inputs, Bound::AtLeast, 24));
-        check(
-            "digital-inputs = 8",
-            None,
-            number(inputs, Bound::Exactly, 8),
-        );
+        check("digital-inputs = 8", None, number(inputs, Bound::Exactly, 8));
         let memory = number(Quantity::ProgramMemoryBytes, Bound::AtLeast, 64 << 10);
-        check(
-            "understudy:program-memory>=64KiB",
-            Some(Role::Understudy),
-            memory,
-        );
-        check(
-            "price<=99.5",
-            None,
-            number(Quantity::Price, Bound::AtMost, 9950),
-        );
+        check("understudy:program-memory>=64KiB", Some(Role::Understudy), memory);
+        check("price<=99.5", None, number(Quantity::Price, Bound::AtMost, 9950));
         check("remote-io:ethernet", Some(Role::RemoteIo), Asked::Ethernet);
         let languages = Asked::Contains(Statement::Languages, "ladder".into());
         check("languages~Ladder", None, languages);
         check("vendor=A: B", None, Asked::Vendor("A: B".into()));
-        check(
-            "scan_time<=10ms",
-            None,
-            Asked::ScanTime(Duration::from_millis(10)),
-        );
+        check("scan_time<=10ms", None, Asked::ScanTime(Duration::from_millis(10)));
     }
 
     #[test]

@@ -78,10 +78,7 @@ impl Resources {
         match element {
             Element::Contact(contact) => {
                 self.contacts += 1;
-                let is_input = program
-                    .inputs
-                    .iter()
-                    .any(|input| input.name == contact.operand);
+                let is_input = program.inputs.iter().any(|input| input.name == contact.operand);
                 self.input_contacts += u64::from(is_input);
                 let is_edge = matches!(contact.kind, ContactKind::Rising | ContactKind::Falling);
                 self.data_bits += u64::from(is_edge);
@@ -137,9 +134,8 @@ impl Resources {
 
     /// The counts of each program, the same for all; analog channels only where a program has some.
     pub fn table(programs: &[Self]) -> Vec<Vec<(&'static str, u64)>> {
-        let has_analog = programs
-            .iter()
-            .any(|program| program.analog_inputs + program.analog_outputs > 0);
+        let has_analog =
+            programs.iter().any(|program| program.analog_inputs + program.analog_outputs > 0);
         let rows = programs.iter().map(|program| {
             let mut rows = program.rows().to_vec();
             rows.retain(|(what, _)| has_analog || !what.starts_with("analog"));

@@ -26,23 +26,14 @@ fn filling_line() {
         Ok(text.to_owned())
     };
     let text = include_str!("../../../examples/filling-line/reconfiguration.toml");
-    let project = project::read("p", text, &mut { open })
-        .project
-        .expect("it is right");
+    let project = project::read("p", text, &mut { open }).project.expect("it is right");
     assert!(analyse(&project).is_ok());
 }
 
 /// A ring of `states` states: in state k output k mod `channels` makes input k mod `channels` change.
 fn ring(states: usize, channels: usize) -> (Controller, Relation) {
-    let names = |letter: &str| {
-        (0..channels)
-            .map(|number| format!("{letter}{number}"))
-            .collect()
-    };
-    let signals = Signals {
-        inputs: names("i"),
-        outputs: names("o"),
-    };
+    let names = |letter: &str| (0..channels).map(|number| format!("{letter}{number}")).collect();
+    let signals = Signals { inputs: names("i"), outputs: names("o") };
     let mut inputs = vec![false; channels];
     let mut all = Vec::new();
     for state in 0..states {
@@ -104,10 +95,8 @@ fn long_program() -> (Program, Program) {
     }
     for station in 0..STATIONS {
         let next = (station + 1) % STATIONS;
-        let _ = writeln!(
-            ladder,
-            "rung\n  step{station} s{station} (S step{next}) (R step{station})"
-        );
+        let _ =
+            writeln!(ladder, "rung\n  step{station} s{station} (S step{next}) (R step{station})");
         let _ = writeln!(ladder, "rung\n  step{station} /s{station} ( m{station}.0 )");
         for place in 1..28 {
             let _ = writeln!(
@@ -120,15 +109,9 @@ fn long_program() -> (Program, Program) {
             ladder,
             "rung\n  m{station}.27 {{TON t{station} 50ms}}\nrung\n  t{station}.Q step{station} ( y{station} )"
         );
-        let _ = writeln!(
-            plant,
-            "rung\n  y{station} {{TON d{station} 100ms}} ( s{station} )"
-        );
+        let _ = writeln!(plant, "rung\n  y{station} {{TON d{station} 100ms}} ( s{station} )");
     }
-    (
-        parse(&ladder).into_result().expect("right").0,
-        parse(&plant).into_result().expect("right").0,
-    )
+    (parse(&ladder).into_result().expect("right").0, parse(&plant).into_result().expect("right").0)
 }
 
 /// 2,000 rungs and 64 inputs, explored as far as the plant goes.
@@ -137,11 +120,7 @@ fn a_ladder_of_two_thousand_rungs() {
     let (ladder, plant) = long_program();
     assert!(ladder.rungs.len() >= 1984);
     let period = Duration::from_millis(10);
-    let memory: Vec<String> = ladder
-        .memory
-        .iter()
-        .map(|signal| signal.name.to_string())
-        .collect();
+    let memory: Vec<String> = ladder.memory.iter().map(|signal| signal.name.to_string()).collect();
     let explored = explore(
         &ladder.lower(period).expect("a circuit"),
         &plant.lower(period).expect("a circuit"),

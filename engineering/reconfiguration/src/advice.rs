@@ -40,9 +40,7 @@ pub struct ChannelAdvice {
 impl Outcome {
     /// For each channel of the question.
     pub fn advice(&self) -> Vec<ChannelAdvice> {
-        (0..self.question.channels.len())
-            .map(|bit| self.advice_on(bit))
-            .collect()
+        (0..self.question.channels.len()).map(|bit| self.advice_on(bit)).collect()
     }
 
     fn advice_on(&self, bit: usize) -> ChannelAdvice {
@@ -80,18 +78,12 @@ impl Outcome {
     fn effect(&self, state: usize, after: usize, bit: usize) -> Effect {
         let signals = &self.controller.signals;
         let names = |events: &BTreeSet<Event>| {
-            events
-                .iter()
-                .map(|&event| signals.event_name(event))
-                .collect()
+            events.iter().map(|&event| signals.event_name(event)).collect()
         };
         let found = &self.mega.states[after];
         let repaired = [Some(false), Some(true)]
             .map(|value| self.mega.follow(after, &Label::Repair(bit, value)));
-        let comes_back = repaired
-            .into_iter()
-            .flatten()
-            .all(|place| !self.mega.dangling[place]);
+        let comes_back = repaired.into_iter().flatten().all(|place| !self.mega.dangling[place]);
         let own = self
             .controller
             .moves(state)
@@ -105,10 +97,7 @@ impl Outcome {
                 .iter()
                 .map(|&member| Controller::number(member as usize))
                 .collect(),
-            outputs: found
-                .command
-                .as_ref()
-                .map(|command| command.outputs.to_string()),
+            outputs: found.command.as_ref().map(|command| command.outputs.to_string()),
             stopped: found
                 .command
                 .as_ref()
@@ -124,15 +113,9 @@ impl Outcome {
     /// The fewest channels that have to work for full control: a failure of all the others together stops nothing, as far as so
     /// many at once were asked about.
     pub fn minimum_channels(&self) -> Vec<String> {
-        let commands = self
-            .mega
-            .states
-            .iter()
-            .filter(|state| state.command.is_some());
-        let mut harmful: Vec<u64> = commands
-            .map(|state| state.failed)
-            .filter(|&failed| failed != 0)
-            .collect();
+        let commands = self.mega.states.iter().filter(|state| state.command.is_some());
+        let mut harmful: Vec<u64> =
+            commands.map(|state| state.failed).filter(|&failed| failed != 0).collect();
         harmful.sort_unstable_by_key(|failed| (failed.count_ones(), *failed));
         harmful.dedup();
         let mut needed = 0_u64;

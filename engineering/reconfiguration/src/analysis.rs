@@ -127,13 +127,7 @@ impl Failure {
 /// # Errors
 /// What made it impossible, with the states, events and rows that show it.
 pub fn analyse(project: &Project) -> Result<Outcome, Failure> {
-    let Known {
-        controller,
-        joint_states,
-        unseen_inputs,
-        missed,
-        timing,
-    } = automaton(project)?;
+    let Known { controller, joint_states, unseen_inputs, missed, timing } = automaton(project)?;
     let (relation, idle) = RelationEntry::compile(&project.relation, &controller);
     let question = Question {
         channels: project.channels.clone(),
@@ -146,20 +140,9 @@ pub fn analyse(project: &Project) -> Result<Outcome, Failure> {
         .map_err(|unbuilt| not_built(unbuilt, &controller, &question))?;
     let lost_outputs = MegaController::outputs_for_any(&controller, &relation, &question)
         .map_err(|none| not_built(Unbuilt::NoCommand(vec![none]), &controller, &question))?;
-    let combined = combine(
-        &project.ladder,
-        &controller,
-        &mega,
-        &question,
-        &lost_outputs,
-    )
-    .map_err(Failure::TooLong)?;
-    let sets = |place: usize| {
-        (
-            mega.states[place].members.clone(),
-            mega.states[place].failed,
-        )
-    };
+    let combined = combine(&project.ladder, &controller, &mega, &question, &lost_outputs)
+        .map_err(Failure::TooLong)?;
+    let sets = |place: usize| (mega.states[place].members.clone(), mega.states[place].failed);
     let proof = prove(&Claim {
         controller: &controller,
         relation: &relation,
@@ -217,15 +200,9 @@ struct Known {
 fn automaton(project: &Project) -> Result<Known, Failure> {
     let ladder = &project.ladder;
     let names = |signals: &[understudy_ladder::Signal]| -> Vec<String> {
-        signals
-            .iter()
-            .map(|signal| signal.name.to_string())
-            .collect()
+        signals.iter().map(|signal| signal.name.to_string()).collect()
     };
-    let signals = Signals {
-        inputs: names(&ladder.inputs),
-        outputs: names(&ladder.outputs),
-    };
+    let signals = Signals { inputs: names(&ladder.inputs), outputs: names(&ladder.outputs) };
     let mut runs = Vec::new();
     for (name, text) in &project.records {
         runs.extend(record::read(name, text, &signals)?);
@@ -248,18 +225,10 @@ fn automaton(project: &Project) -> Result<Known, Failure> {
         let lowered = program.lower(project.period);
         lowered.map_err(|error| Failure::NoCircuit(error.to_string()))
     };
-    let explored = explore(
-        &lower(ladder)?,
-        &lower(plant)?,
-        &names(&ladder.memory),
-        Bounds::default(),
-    );
-    let Explored {
-        controller,
-        joint_states,
-        unseen_inputs,
-        timing,
-    } = explored.map_err(not_explored)?;
+    let explored =
+        explore(&lower(ladder)?, &lower(plant)?, &names(&ladder.memory), Bounds::default());
+    let Explored { controller, joint_states, unseen_inputs, timing } =
+        explored.map_err(not_explored)?;
     let missed = recorded.map(|recorded| record::missed(&recorded, &controller));
     Ok(Known {
         controller,
@@ -272,36 +241,24 @@ fn automaton(project: &Project) -> Result<Known, Failure> {
 
 fn not_explored(why: Unexplored) -> Failure {
     match why {
-        Unexplored::TooFree(names) => Failure::TooFree {
-            count: names.len(),
-            names: names.join(", "),
-        },
-        Unexplored::TooLarge(limit) => Failure::TooLarge {
-            what: "ladder and plant together",
-            limit,
-        },
+        Unexplored::TooFree(names) => {
+            Failure::TooFree { count: names.len(), names: names.join(", ") }
+        }
+        Unexplored::TooLarge(limit) => {
+            Failure::TooLarge { what: "ladder and plant together", limit }
+        }
         Unexplored::Deadlock { state, way } => Failure::Deadlock {
             state,
-            way: if way.is_empty() {
-                "the first scan".into()
-            } else {
-                way.join(" ")
-            },
+            way: if way.is_empty() { "the first scan".into() } else { way.join(" ") },
         },
     }
 }
 
 fn not_built(why: Unbuilt, controller: &Controller, question: &Question) -> Failure {
     match why {
-        Unbuilt::TooLarge(limit) => Failure::TooLarge {
-            what: "the mega-controller",
-            limit,
-        },
+        Unbuilt::TooLarge(limit) => Failure::TooLarge { what: "the mega-controller", limit },
         Unbuilt::NoCommand(without) => Failure::NoCommand(
-            without
-                .iter()
-                .map(|none| describe_conflict(none, controller, question))
-                .collect(),
+            without.iter().map(|none| describe_conflict(none, controller, question)).collect(),
         ),
     }
 }
@@ -321,21 +278,13 @@ fn describe_conflict(none: &NoCommand, controller: &Controller, question: &Quest
         return format!("the solver failed in {}: {message}", members.join(" "));
     }
     let row = |posed: &Posed| {
-        let rows: Vec<String> = posed
-            .demand
-            .rows
-            .iter()
-            .map(|row| format!("[{}]", row.text()))
-            .collect();
+        let rows: Vec<String> =
+            posed.demand.rows.iter().map(|row| format!("[{}]", row.text())).collect();
         format!(
             "\n  in {} {} must {}happen: {}",
             controller.state_name(posed.state),
             controller.signals.event_name(posed.event),
-            if posed.demand.enable {
-                "be able to "
-            } else {
-                "not "
-            },
+            if posed.demand.enable { "be able to " } else { "not " },
             rows.join(" or ")
         )
     };
@@ -343,11 +292,7 @@ fn describe_conflict(none: &NoCommand, controller: &Controller, question: &Quest
     format!(
         "no outputs are safe in all of {} (failed: {}); these rows of ({}) contradict each other:{rows}",
         members.join(" "),
-        if failed.is_empty() {
-            "none".to_owned()
-        } else {
-            failed.join(" ")
-        },
+        if failed.is_empty() { "none".to_owned() } else { failed.join(" ") },
         controller.signals.outputs.join(" ")
     )
 }

@@ -89,10 +89,7 @@ pub fn solve(demands: &[Demand], weights: &[f64]) -> Result<Bits, Unsolved> {
 /// One program; `None` where it is infeasible.
 fn minimise(demands: &[Demand], weights: &[f64]) -> Result<Option<Bits>, Unsolved> {
     let mut variables = ProblemVariables::new();
-    let outputs: Vec<_> = weights
-        .iter()
-        .map(|_| variables.add(variable().binary()))
-        .collect();
+    let outputs: Vec<_> = weights.iter().map(|_| variables.add(variable().binary())).collect();
     let held: Vec<Vec<_>> = demands
         .iter()
         .map(|demand| {
@@ -166,11 +163,7 @@ fn conflict(demands: &[Demand], outputs: usize) -> Result<Vec<usize>, Unsolved> 
     let weights = vec![1.0; outputs];
     let mut kept: Vec<usize> = (0..demands.len()).collect();
     for place in (0..demands.len()).rev() {
-        let tried: Vec<usize> = kept
-            .iter()
-            .copied()
-            .filter(|&other| other != place)
-            .collect();
+        let tried: Vec<usize> = kept.iter().copied().filter(|&other| other != place).collect();
         let rest: Vec<Demand> = tried.iter().map(|&other| demands[other].clone()).collect();
         if minimise(&rest, &weights)?.is_none() {
             kept = tried;

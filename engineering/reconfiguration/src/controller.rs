@@ -76,13 +76,7 @@ impl Controller {
             }
         }
         let moves = moves.into_iter().map(|set| set.into_iter().collect());
-        Self {
-            signals,
-            memory,
-            moves: moves.collect(),
-            states,
-            omega_before,
-        }
+        Self { signals, memory, moves: moves.collect(), states, omega_before }
     }
 
     /// X.
@@ -130,11 +124,8 @@ impl Controller {
             return marked;
         }
         // A state lies in a cycle that nothing leaves when all that it reaches can reach it.
-        let forward: Vec<Vec<usize>> = self
-            .moves
-            .iter()
-            .map(|moves| moves.iter().map(|step| step.target).collect())
-            .collect();
+        let forward: Vec<Vec<usize>> =
+            self.moves.iter().map(|moves| moves.iter().map(|step| step.target).collect()).collect();
         let mut marked = vec![None; self.states.len()];
         for state in 0..self.states.len() {
             if marked[state].is_some() {
@@ -142,10 +133,7 @@ impl Controller {
             }
             let after = reach(&forward, [state]);
             let before = reach(&backward, [state]);
-            let is_final = after
-                .iter()
-                .zip(&before)
-                .all(|(after, before)| !after || *before);
+            let is_final = after.iter().zip(&before).all(|(after, before)| !after || *before);
             for (place, mark) in marked.iter_mut().enumerate() {
                 if after[place] && before[place] {
                     *mark = Some(is_final);
@@ -169,9 +157,7 @@ impl Controller {
 
     /// The states from which nothing follows.
     pub fn deadlocks(&self) -> Vec<usize> {
-        (0..self.states.len())
-            .filter(|&state| self.moves[state].is_empty())
-            .collect()
+        (0..self.states.len()).filter(|&state| self.moves[state].is_empty()).collect()
     }
 
     /// The events of a shortest way from x0 to `state`.

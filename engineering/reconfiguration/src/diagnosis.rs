@@ -89,11 +89,7 @@ struct Writer<'a> {
 
 fn contact(name: &Name, value: bool) -> Element {
     Element::Contact(Contact {
-        kind: if value {
-            ContactKind::NormallyOpen
-        } else {
-            ContactKind::NormallyClosed
-        },
+        kind: if value { ContactKind::NormallyOpen } else { ContactKind::NormallyClosed },
         operand: name.clone(),
     })
 }
@@ -115,18 +111,11 @@ fn any(mut branches: Vec<Vec<Element>>) -> Vec<Element> {
 }
 
 fn coil(kind: CoilKind, target: &Name) -> Coil {
-    Coil {
-        kind,
-        target: target.clone(),
-    }
+    Coil { kind, target: target.clone() }
 }
 
 fn block(name: Name, kind: BlockKind) -> Element {
-    Element::Block(Block {
-        name,
-        kind,
-        pins: Vec::new(),
-    })
+    Element::Block(Block { name, kind, pins: Vec::new() })
 }
 
 impl<'a> Writer<'a> {
@@ -150,11 +139,7 @@ impl<'a> Writer<'a> {
             ],
             ..Program::default()
         };
-        let mut writer = Self {
-            ground,
-            program,
-            rows,
-        };
+        let mut writer = Self { ground, program, rows };
         writer.declare();
         writer
     }
@@ -165,10 +150,7 @@ impl<'a> Writer<'a> {
             description: (!text.is_empty()).then(|| text.to_owned()),
             ..Signal::new(name)
         };
-        let memory = |name: Name, text: &str| Signal {
-            initial: Some(false),
-            ..input(name, text)
-        };
+        let memory = |name: Name, text: &str| Signal { initial: Some(false), ..input(name, text) };
         let channels = self.channels();
         let inputs = signals.inputs.iter();
         let mut declared: Vec<Signal> = inputs
@@ -183,100 +165,47 @@ impl<'a> Writer<'a> {
         let mut outputs = Vec::new();
         let mut bits = Vec::new();
         for channel in &channels {
-            declared.push(input(
-                of(channel, "failed"),
-                "channel fault reported by the device",
-            ));
-            declared.push(input(
-                of(channel, "recalled"),
-                "channel had failed before the restart",
-            ));
-            outputs.push(memory(
-                of(channel, "diagnosed"),
-                "channel diagnosed as failed",
-            ));
-            outputs.push(memory(
-                of(channel, "unsteady"),
-                "changed value not yet accepted",
-            ));
-            bits.push(memory(
-                of(channel, "out"),
-                "channel failed, by device or diagnosis",
-            ));
+            declared.push(input(of(channel, "failed"), "channel fault reported by the device"));
+            declared.push(input(of(channel, "recalled"), "channel had failed before the restart"));
+            outputs.push(memory(of(channel, "diagnosed"), "channel diagnosed as failed"));
+            outputs.push(memory(of(channel, "unsteady"), "changed value not yet accepted"));
+            bits.push(memory(of(channel, "out"), "channel failed, by device or diagnosis"));
             bits.push(memory(of(channel, "last"), "value in the previous scan"));
-            bits.push(memory(
-                of(channel, "moves"),
-                "value changed since the previous scan",
-            ));
+            bits.push(memory(of(channel, "moves"), "value changed since the previous scan"));
             bits.push(memory(of(channel, "seen"), "last accepted value"));
-            bits.push(memory(
-                of(channel, "differs"),
-                "value differs from the accepted one",
-            ));
+            bits.push(memory(of(channel, "differs"), "value differs from the accepted one"));
             bits.push(memory(of(channel, "accepted"), "changed value is stable"));
-            bits.push(memory(
-                of(channel, "waits"),
-                "changed value is not yet stable",
-            ));
-            bits.push(memory(
-                of(channel, "gone"),
-                "changed value has gone before it was stable",
-            ));
+            bits.push(memory(of(channel, "waits"), "changed value is not yet stable"));
+            bits.push(memory(of(channel, "gone"), "changed value has gone before it was stable"));
             bits.push(memory(
                 of(channel, "explains"),
                 "a failure of this channel would explain the inputs",
             ));
-            bits.push(memory(
-                of(channel, "accused"),
-                "channel fault detected in this scan",
-            ));
-            bits.push(memory(
-                of(channel, "moved"),
-                "value has changed since the diagnosis",
-            ));
-            bits.push(memory(
-                of(channel, "fits"),
-                "value is possible in the model",
-            ));
+            bits.push(memory(of(channel, "accused"), "channel fault detected in this scan"));
+            bits.push(memory(of(channel, "moved"), "value has changed since the diagnosis"));
+            bits.push(memory(of(channel, "fits"), "value is possible in the model"));
             bits.push(memory(
                 of(channel, "spent"),
                 "too many repairs: the operator must release the channel",
             ));
-            bits.push(memory(
-                of(channel, "mended"),
-                "channel repaired in this scan",
-            ));
+            bits.push(memory(of(channel, "mended"), "channel repaired in this scan"));
         }
         for name in self.unwatched() {
             bits.push(memory(of(&name, "last"), "value in the previous scan"));
         }
-        declared.push(input(
-            Name::from("diagnosis.driven"),
-            "outputs are neither held nor fail-safe",
-        ));
-        declared.push(input(
-            Name::from("diagnosis.release"),
-            "release by the operator",
-        ));
+        declared
+            .push(input(Name::from("diagnosis.driven"), "outputs are neither held nor fail-safe"));
+        declared.push(input(Name::from("diagnosis.release"), "release by the operator"));
         for (name, text) in [
             ("diagnosis.started", "a previous scan exists"),
             ("diagnosis.out", "at least one channel has failed"),
             ("diagnosis.change", "an accepted input value has changed"),
-            (
-                "diagnosis.possible",
-                "at least one state of the model explains the inputs",
-            ),
+            ("diagnosis.possible", "at least one state of the model explains the inputs"),
             ("diagnosis.anywhere", "the state of the plant is unknown"),
-            (
-                "diagnosis.lost",
-                "no state of the model explained the previous scan",
-            ),
+            ("diagnosis.lost", "no state of the model explained the previous scan"),
             ("diagnosis.one", "at least one state is possible"),
             ("diagnosis.two", "at least two states are possible"),
-            (
-                "diagnosis.tracked",
-                "the possible states follow from the previous scan",
-            ),
+            ("diagnosis.tracked", "the possible states follow from the previous scan"),
             (
                 "diagnosis.followed",
                 "exactly one state was possible, and the outputs were those of this state",

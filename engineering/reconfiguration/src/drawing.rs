@@ -28,13 +28,8 @@ impl Outcome {
                 (state, step.target, name, controllable)
             })
         });
-        let names = (0..controller.states().len()).map(|place| {
-            format!(
-                "{} {}",
-                Controller::number(place),
-                controller.state_name(place)
-            )
-        });
+        let names = (0..controller.states().len())
+            .map(|place| format!("{} {}", Controller::number(place), controller.state_name(place)));
         drawn("S", names.collect(), controller.marked(), edges.collect())
     }
 
@@ -43,32 +38,22 @@ impl Outcome {
     /// # Errors
     /// It has more transitions than numbers.
     pub fn drawn_mega_controller(&self) -> Result<Automaton, AutomatonError> {
-        let edges = self
-            .mega
-            .edges
-            .iter()
-            .enumerate()
-            .flat_map(|(source, edges)| {
-                edges.iter().map(move |(label, target)| {
-                    (
-                        source,
-                        *target,
-                        self.label(label),
-                        matches!(label, Label::Seen(events) if !events.is_empty()),
-                    )
-                })
-            });
+        let edges = self.mega.edges.iter().enumerate().flat_map(|(source, edges)| {
+            edges.iter().map(move |(label, target)| {
+                (
+                    source,
+                    *target,
+                    self.label(label),
+                    matches!(label, Label::Seen(events) if !events.is_empty()),
+                )
+            })
+        });
         let states = &self.mega.states;
         let names = states.iter().map(|state| match &state.command {
             None => self.describe(state),
             Some(command) => format!("{}: {}", self.describe(state), command.outputs),
         });
-        let marked = self
-            .mega
-            .dangling
-            .iter()
-            .map(|dangling| !dangling)
-            .collect();
+        let marked = self.mega.dangling.iter().map(|dangling| !dangling).collect();
         drawn("Theta", names.collect(), marked, edges.collect())
     }
 }
@@ -88,12 +73,10 @@ fn drawn(
         while !taken.insert((source, text.clone())) {
             text.push('\'');
         }
-        let place = *places
-            .entry((text.clone(), controllable))
-            .or_insert_with(|| {
-                labels.push((text, controllable));
-                labels.len() - 1
-            });
+        let place = *places.entry((text.clone(), controllable)).or_insert_with(|| {
+            labels.push((text, controllable));
+            labels.len() - 1
+        });
         let number = 2 * place as u32 + u32::from(controllable);
         transitions.push(Transition {
             source: State::new(source as u32),
@@ -101,12 +84,9 @@ fn drawn(
             target: State::new(target as u32),
         });
     }
-    let events = labels
-        .into_iter()
-        .enumerate()
-        .map(|(place, (name, controllable))| Named {
-            label: Number::new(2 * place as u32 + u32::from(controllable)),
-            name,
-        });
+    let events = labels.into_iter().enumerate().map(|(place, (name, controllable))| Named {
+        label: Number::new(2 * place as u32 + u32::from(controllable)),
+        name,
+    });
     Automaton::new(name, events, marked, transitions)?.with_state_names(names)
 }

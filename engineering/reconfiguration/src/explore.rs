@@ -24,9 +24,7 @@ pub struct Bounds {
 
 impl Default for Bounds {
     fn default() -> Self {
-        Self {
-            maximum_states: 3_000_000,
-        }
+        Self { maximum_states: 3_000_000 }
     }
 }
 
@@ -80,9 +78,8 @@ pub fn explore(
 ) -> Result<Explored, Unexplored> {
     let wiring = Wiring::new(ladder, plant)?;
     let registers = ladder.registers();
-    let remembered: Vec<usize> = (0..registers.len())
-        .filter(|&place| memory.contains(&registers[place].name))
-        .collect();
+    let remembered: Vec<usize> =
+        (0..registers.len()).filter(|&place| memory.contains(&registers[place].name)).collect();
     let mut walk = Walk {
         ladder: Scan::new(ladder),
         plant: Scan::new(plant),
@@ -99,9 +96,7 @@ pub fn explore(
     let mut next = 0;
     while next < walk.nodes.len() {
         let (vector, after, successors) = walk.step(next);
-        remembers.push(Bits(
-            remembered.iter().map(|&place| bit(&after, place)).collect(),
-        ));
+        remembers.push(Bits(remembered.iter().map(|&place| bit(&after, place)).collect()));
         seen.push(vector);
         for successor in successors {
             edges.push((next as u32, successor as u32));
@@ -121,15 +116,9 @@ pub fn explore(
         .collect();
     let signals = Signals {
         inputs: ladder.inputs().to_vec(),
-        outputs: ladder
-            .outputs()
-            .iter()
-            .map(|output| output.name.clone())
-            .collect(),
+        outputs: ladder.outputs().iter().map(|output| output.name.clone()).collect(),
     };
-    let names = remembered
-        .iter()
-        .map(|&place| registers[place].name.clone());
+    let names = remembered.iter().map(|&place| registers[place].name.clone());
     let (controller, state_of) =
         quotient(signals, names.collect(), &seen, &hidden, &remembers, &edges);
     if let Some(&state) = controller.deadlocks().first() {
@@ -165,39 +154,22 @@ struct Wiring {
 
 impl Wiring {
     fn new(ladder: &Circuit, plant: &Circuit) -> Result<Self, Unexplored> {
-        let shown = |name: &String| {
-            plant
-                .outputs()
-                .iter()
-                .position(|output| output.name == *name)
-        };
-        let driven = |name: &String| {
-            ladder
-                .outputs()
-                .iter()
-                .position(|output| output.name == *name)
-        };
+        let shown = |name: &String| plant.outputs().iter().position(|output| output.name == *name);
+        let driven =
+            |name: &String| ladder.outputs().iter().position(|output| output.name == *name);
         let actuators: Vec<Option<usize>> = plant.inputs().iter().map(driven).collect();
-        let free: Vec<usize> = (0..actuators.len())
-            .filter(|&place| actuators[place].is_none())
-            .collect();
+        let free: Vec<usize> =
+            (0..actuators.len()).filter(|&place| actuators[place].is_none()).collect();
         if free.len() > MAXIMUM_FREE_INPUTS {
             let names = free.iter().map(|&place| plant.inputs()[place].clone());
             return Err(Unexplored::TooFree(names.collect()));
         }
-        Ok(Self {
-            sensors: ladder.inputs().iter().map(shown).collect(),
-            actuators,
-            free,
-        })
+        Ok(Self { sensors: ladder.inputs().iter().map(shown).collect(), actuators, free })
     }
 
     fn unseen(&self, ladder: &Circuit) -> Vec<String> {
         let pairs = ladder.inputs().iter().zip(&self.sensors);
-        pairs
-            .filter(|(_, sensor)| sensor.is_none())
-            .map(|(name, _)| name.clone())
-            .collect()
+        pairs.filter(|(_, sensor)| sensor.is_none()).map(|(name, _)| name.clone()).collect()
     }
 }
 
@@ -216,8 +188,7 @@ impl Walk {
         let mut outputs = vec![0; self.plant.output_count().div_ceil(64)];
         let inputs = vec![0; self.plant.input_count().div_ceil(64)];
         let mut state = self.plant.initial().to_vec();
-        self.plant
-            .step(&mut self.scratch, &mut state, &inputs, &mut outputs);
+        self.plant.step(&mut self.scratch, &mut state, &inputs, &mut outputs);
         Joint {
             ladder: self.ladder.initial().into(),
             plant: self.plant.initial().into(),
@@ -246,8 +217,7 @@ impl Walk {
         let joint = self.nodes[place].clone();
         let mut ladder = joint.ladder.to_vec();
         let mut outputs = vec![0; self.ladder.output_count().div_ceil(64)];
-        self.ladder
-            .step(&mut self.scratch, &mut ladder, &joint.shown, &mut outputs);
+        self.ladder.step(&mut self.scratch, &mut ladder, &joint.shown, &mut outputs);
         let actuators = self.wiring.actuators.iter();
         let driven = actuators.map(|actuator| actuator.is_some_and(|place| bit(&outputs, place)));
         let mut inputs: Vec<bool> = driven.collect();
@@ -259,14 +229,10 @@ impl Walk {
             let inputs = pack(inputs.iter().copied());
             let mut plant = joint.plant.to_vec();
             let mut shows = vec![0; self.plant.output_count().div_ceil(64)];
-            self.plant
-                .step(&mut self.scratch, &mut plant, &inputs, &mut shows);
+            self.plant.step(&mut self.scratch, &mut plant, &inputs, &mut shows);
             let shown = self.shown(&shows);
-            let next = self.number(Joint {
-                ladder: ladder.clone().into(),
-                plant: plant.into(),
-                shown,
-            });
+            let next =
+                self.number(Joint { ladder: ladder.clone().into(), plant: plant.into(), shown });
             if !successors.contains(&next) {
                 successors.push(next);
             }

@@ -184,10 +184,7 @@ impl MegaController {
     /// Where `label` leads from `state`.
     pub fn follow(&self, state: usize, label: &Label) -> Option<usize> {
         let edges = self.edges[state].iter();
-        edges
-            .clone()
-            .find(|(known, _)| known == label)
-            .map(|(_, target)| *target)
+        edges.clone().find(|(known, _)| known == label).map(|(_, target)| *target)
     }
 
     /// Φ̃(y, e) for an event of Σ, step 2.
@@ -210,9 +207,7 @@ impl MegaController {
 /// The channels of `failed` as places among the inputs.
 pub fn failed_channels(channels: &[usize], failed: u64) -> impl Iterator<Item = usize> + '_ {
     let places = channels.iter().enumerate();
-    places
-        .filter(move |(bit, _)| failed >> bit & 1 == 1)
-        .map(|(_, &input)| input)
+    places.filter(move |(bit, _)| failed >> bit & 1 == 1).map(|(_, &input)| input)
 }
 
 struct Builder<'a> {
@@ -228,11 +223,7 @@ struct Builder<'a> {
 impl Builder<'_> {
     fn is_unseen(&self, failed: u64, event: Event) -> bool {
         event.channel().is_some_and(|input| {
-            let bit = self
-                .question
-                .channels
-                .iter()
-                .position(|&known| known == input);
+            let bit = self.question.channels.iter().position(|&known| known == input);
             bit.is_some_and(|bit| failed >> bit & 1 == 1)
         })
     }
@@ -252,9 +243,7 @@ impl Builder<'_> {
                 let mut seen = step.events.clone();
                 seen.retain(|&event| !self.is_unseen(state.failed, event));
                 let is_let = |&event: &Event| {
-                    self.ground
-                        .relation
-                        .allows(member as usize, event, &command.outputs)
+                    self.ground.relation.allows(member as usize, event, &command.outputs)
                 };
                 let is_this = match self.question.analysis {
                     Analysis::Section2 => events.iter().all(|event| seen.contains(event)),
@@ -280,11 +269,7 @@ impl Builder<'_> {
 
     fn settle(&mut self, seed: Vec<u32>, failed: u64) -> Option<usize> {
         let channels: Vec<usize> = failed_channels(&self.question.channels, failed).collect();
-        let unseen = |event: &Event| {
-            event
-                .channel()
-                .is_some_and(|input| channels.contains(&input))
-        };
+        let unseen = |event: &Event| event.channel().is_some_and(|input| channels.contains(&input));
         let settled = match self.question.analysis {
             Analysis::Section2 => {
                 let any = |step: &Move| step.events.iter().any(unseen);
@@ -316,11 +301,7 @@ impl Builder<'_> {
             return Some(place);
         }
         let place = self.states.len();
-        self.states.push(MegaState {
-            members: key.0.clone(),
-            failed,
-            command,
-        });
+        self.states.push(MegaState { members: key.0.clone(), failed, command });
         self.edges.push(Vec::new());
         self.places.insert(key, place);
         Some(place)
@@ -328,9 +309,7 @@ impl Builder<'_> {
 
     fn expand(&mut self, place: usize) {
         let mut successors: Vec<(Label, Vec<u32>, u64)> = self.seen(place);
-        let MegaState {
-            members, failed, ..
-        } = self.states[place].clone();
+        let MegaState { members, failed, .. } = self.states[place].clone();
         for bit in 0..self.question.channels.len() {
             if failed >> bit & 1 == 1 {
                 self.repair(&members, failed, bit, &mut successors);
@@ -349,11 +328,7 @@ impl Builder<'_> {
 
     /// Step 3.
     fn seen(&self, place: usize) -> Vec<(Label, Vec<u32>, u64)> {
-        let MegaState {
-            members,
-            failed,
-            command,
-        } = &self.states[place];
+        let MegaState { members, failed, command } = &self.states[place];
         let mut successors: Vec<(Label, Vec<u32>, u64)> = Vec::new();
         let mut add = |label: Label, target: usize| {
             let target = target as u32;

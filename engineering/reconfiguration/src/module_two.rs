@@ -69,11 +69,7 @@ pub fn combine(
     lost_outputs: &Bits,
 ) -> Result<Combined, usize> {
     let mut writer = Writer::new(module_one, controller, mega, question);
-    let edges: usize = writer
-        .latched
-        .keys()
-        .map(|&place| mega.edges[place].len())
-        .sum();
+    let edges: usize = writer.latched.keys().map(|&place| mega.edges[place].len()).sum();
     if edges > MAXIMUM_RUNGS {
         return Err(edges);
     }
@@ -90,21 +86,12 @@ pub fn combine(
     if rungs > MAXIMUM_RUNGS {
         return Err(rungs);
     }
-    let Writer {
-        program,
-        names,
-        latched,
-        at,
-        ..
-    } = writer;
+    let Writer { program, names, latched, at, .. } = writer;
     Ok(Combined {
         program,
         first_rung,
         correspondence: Correspondence {
-            latches: latched
-                .into_iter()
-                .map(|(place, name)| (name, place))
-                .collect(),
+            latches: latched.into_iter().map(|(place, name)| (name, place)).collect(),
             at: at.into_iter().map(|(state, name)| (name, state)).collect(),
             lost: names.lost,
             failed: names.failed,
@@ -136,11 +123,7 @@ struct Writer<'a> {
 
 fn contact(name: &str, value: bool) -> Element {
     Element::Contact(Contact {
-        kind: if value {
-            ContactKind::NormallyOpen
-        } else {
-            ContactKind::NormallyClosed
-        },
+        kind: if value { ContactKind::NormallyOpen } else { ContactKind::NormallyClosed },
         operand: Name::from(name),
     })
 }
@@ -163,10 +146,7 @@ fn any(mut branches: Vec<Vec<Element>>) -> Option<Vec<Element>> {
 }
 
 fn coil(kind: CoilKind, target: &Name) -> Coil {
-    Coil {
-        kind,
-        target: target.clone(),
-    }
+    Coil { kind, target: target.clone() }
 }
 
 impl<'a> Writer<'a> {
@@ -181,12 +161,7 @@ impl<'a> Writer<'a> {
             .iter()
             .chain(module_one.writable())
             .map(|signal| signal.name.to_string())
-            .chain(
-                module_one
-                    .blocks()
-                    .iter()
-                    .map(|block| block.name.to_string()),
-            )
+            .chain(module_one.blocks().iter().map(|block| block.name.to_string()))
             .collect();
         let mut fresh = |wanted: String| {
             let mut name = wanted.clone();
@@ -199,13 +174,8 @@ impl<'a> Writer<'a> {
         };
         let channel = |bit: usize| &controller.signals.inputs[question.channels[bit]];
         let bits = 0..question.channels.len();
-        let failed = bits
-            .clone()
-            .map(|bit| fresh(format!("{}.failed", channel(bit))))
-            .collect();
-        let was = bits
-            .map(|bit| fresh(format!("{}.was", channel(bit))))
-            .collect();
+        let failed = bits.clone().map(|bit| fresh(format!("{}.failed", channel(bit)))).collect();
+        let was = bits.map(|bit| fresh(format!("{}.was", channel(bit)))).collect();
         let names = Names {
             failed,
             was,
@@ -217,23 +187,14 @@ impl<'a> Writer<'a> {
             release: fresh("module_2.release".into()),
         };
         let latched = latched(mega);
-        let latched = latched
-            .into_iter()
-            .map(|place| (place, fresh(format!("u.{place}"))));
+        let latched = latched.into_iter().map(|place| (place, fresh(format!("u.{place}"))));
         let latched: BTreeMap<usize, Name> = latched.collect();
         let at = decodable(controller)
             .into_iter()
             .map(|state| (state, fresh(format!("x.{}", Controller::number(state)))))
             .collect();
-        let mut writer = Self {
-            controller,
-            mega,
-            question,
-            program: module_one.clone(),
-            names,
-            latched,
-            at,
-        };
+        let mut writer =
+            Self { controller, mega, question, program: module_one.clone(), names, latched, at };
         writer.declare();
         writer
     }
@@ -263,10 +224,7 @@ impl<'a> Writer<'a> {
             memory(&names.known, "the ladder is in a state of the model".into()),
         ];
         for (bit, name) in names.was.iter().enumerate() {
-            declared.push(memory(
-                name,
-                format!("{} in the previous scan", names.failed[bit]),
-            ));
+            declared.push(memory(name, format!("{} in the previous scan", names.failed[bit])));
         }
         for (&state, name) in &self.at {
             declared.push(memory(name, self.controller.state_name(state)));
@@ -321,8 +279,7 @@ impl<'a> Writer<'a> {
             rungs.push((network, name.clone()));
         }
         for (network, name) in rungs {
-            self.program
-                .push_rung(network, vec![coil(CoilKind::Plain, &name)]);
+            self.program.push_rung(network, vec![coil(CoilKind::Plain, &name)]);
         }
         let states = self.at.values().map(|name| vec![on(name)]).collect();
         if let Some(network) = any(states) {
@@ -334,9 +291,7 @@ impl<'a> Writer<'a> {
             );
         }
         let pairs = self.names.failed.iter().zip(&self.names.was);
-        let newly = pairs
-            .map(|(failed, was)| vec![on(failed), off(was)])
-            .collect();
+        let newly = pairs.map(|(failed, was)| vec![on(failed), off(was)]).collect();
         if let Some(network) = any(newly) {
             let fresh = coil(CoilKind::Plain, &self.names.fresh);
             self.program.push_titled(
@@ -352,10 +307,8 @@ impl<'a> Writer<'a> {
 fn latched(mega: &MegaController) -> BTreeSet<usize> {
     let mut found = BTreeSet::new();
     let commands = mega.states.iter().enumerate();
-    let mut stack: Vec<usize> = commands
-        .filter(|(_, state)| state.command.is_some())
-        .map(|(place, _)| place)
-        .collect();
+    let mut stack: Vec<usize> =
+        commands.filter(|(_, state)| state.command.is_some()).map(|(place, _)| place).collect();
     while let Some(place) = stack.pop() {
         if found.insert(place) {
             stack.extend(mega.edges[place].iter().map(|(_, target)| *target));
@@ -368,10 +321,7 @@ fn latched(mega: &MegaController) -> BTreeSet<usize> {
 fn decodable(controller: &Controller) -> Vec<usize> {
     let mut by_vector: BTreeMap<(&Bits, &Bits), Vec<usize>> = BTreeMap::new();
     for (place, state) in controller.states().iter().enumerate() {
-        by_vector
-            .entry((&state.inputs, &state.outputs))
-            .or_default()
-            .push(place);
+        by_vector.entry((&state.inputs, &state.outputs)).or_default().push(place);
     }
     let mut found = Vec::new();
     for siblings in by_vector.values() {
@@ -393,9 +343,7 @@ fn decodable(controller: &Controller) -> Vec<usize> {
 
 /// The sets of one to `most` of `channels` channels, as bits.
 fn patterns(channels: usize, most: usize) -> Vec<u64> {
-    (1..=most.min(channels))
-        .flat_map(|count| exactly(channels, count))
-        .collect()
+    (1..=most.min(channels)).flat_map(|count| exactly(channels, count)).collect()
 }
 
 /// The sets of `count` of `channels` channels, as bits.

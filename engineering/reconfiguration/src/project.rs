@@ -89,12 +89,8 @@ impl Project {
     /// # Errors
     /// Says which of the names is no input.
     pub fn choose(&mut self, names: &[String]) -> Result<(), String> {
-        let inputs: Vec<&str> = self
-            .ladder
-            .inputs
-            .iter()
-            .map(|signal| signal.name.as_str())
-            .collect();
+        let inputs: Vec<&str> =
+            self.ladder.inputs.iter().map(|signal| signal.name.as_str()).collect();
         let mut places = Vec::new();
         for name in names {
             match inputs.iter().position(|input| input == name) {
@@ -102,11 +98,7 @@ impl Project {
                 Some(place) => places.push(place),
                 None => {
                     let found = unknown("input", name, 0..0, &inputs);
-                    return Err(format!(
-                        "{}; {}",
-                        found.message,
-                        found.help.unwrap_or_default()
-                    ));
+                    return Err(format!("{}; {}", found.message, found.help.unwrap_or_default()));
                 }
             }
         }
@@ -137,25 +129,14 @@ pub fn read(
     text: &str,
     open: &mut dyn FnMut(&str) -> Result<String, String>,
 ) -> Loaded {
-    let mut reader = Reader {
-        open,
-        diagnostics: Vec::new(),
-        ladders: Vec::new(),
-    };
+    let mut reader = Reader { open, diagnostics: Vec::new(), ladders: Vec::new() };
     let project = reader.read(text);
     let mut diagnostics = reader.diagnostics;
     diagnostics.sort_by_key(|diagnostic| diagnostic.span.start);
-    let mut reports = vec![Report {
-        name: name.to_owned(),
-        text: text.to_owned(),
-        diagnostics,
-    }];
+    let mut reports = vec![Report { name: name.to_owned(), text: text.to_owned(), diagnostics }];
     reports.extend(reader.ladders);
     let wrong = reports.iter().any(Report::has_errors);
-    Loaded {
-        project: project.filter(|_| !wrong),
-        reports,
-    }
+    Loaded { project: project.filter(|_| !wrong), reports }
 }
 
 struct Reader<'o> {
@@ -167,19 +148,13 @@ struct Reader<'o> {
 impl Reader<'_> {
     fn read(&mut self, text: &str) -> Option<Project> {
         if text.len() > MAXIMUM_TEXT_BYTES {
-            let message = format!(
-                "the file has {} bytes; at most {MAXIMUM_TEXT_BYTES}",
-                text.len()
-            );
-            self.diagnostics
-                .push(Diagnostic::error("U1207", message, 0..0));
+            let message =
+                format!("the file has {} bytes; at most {MAXIMUM_TEXT_BYTES}", text.len());
+            self.diagnostics.push(Diagnostic::error("U1207", message, 0..0));
             return None;
         }
         let root = understudy_text::tables::parse(text, &CODES, &mut self.diagnostics)?;
-        let table = Placed {
-            value: root.get_ref(),
-            span: root.span(),
-        };
+        let table = Placed { value: root.get_ref(), span: root.span() };
         let found = &mut self.diagnostics;
         let mut top = Fields::new("the file", table, &CODES);
         top.require(&["project"], found);
@@ -189,12 +164,9 @@ impl Reader<'_> {
         top.finish(found);
         let mut fields = project?;
         fields.require(&["ladder"], found);
-        let ladder = fields
-            .text("ladder", &mut self.diagnostics)
-            .and_then(|name| self.ladder(&name));
-        let plant = fields
-            .text("plant", &mut self.diagnostics)
-            .and_then(|name| self.ladder(&name));
+        let ladder =
+            fields.text("ladder", &mut self.diagnostics).and_then(|name| self.ladder(&name));
+        let plant = fields.text("plant", &mut self.diagnostics).and_then(|name| self.ladder(&name));
         let records = fields.texts("records", &mut self.diagnostics);
         let mut read_records = Vec::new();
         for record in &records {
@@ -229,22 +201,13 @@ impl Reader<'_> {
         {
             let message =
                 "[diagnosis] needs a `plant`: records do not say how long a state may last";
-            self.diagnostics
-                .push(Diagnostic::error("U1203", message, diagnosis.span()));
+            self.diagnostics.push(Diagnostic::error("U1203", message, diagnosis.span()));
         }
         let patience =
             diagnosis.map(|diagnosis| patience(diagnosis, period, &mut self.diagnostics));
         let ladder = ladder?;
-        let inputs: Vec<&str> = ladder
-            .inputs
-            .iter()
-            .map(|signal| signal.name.as_str())
-            .collect();
-        let outputs: Vec<&str> = ladder
-            .outputs
-            .iter()
-            .map(|signal| signal.name.as_str())
-            .collect();
+        let inputs: Vec<&str> = ladder.inputs.iter().map(|signal| signal.name.as_str()).collect();
+        let outputs: Vec<&str> = ladder.outputs.iter().map(|signal| signal.name.as_str()).collect();
         let chosen = if all_channels {
             (0..inputs.len().min(64)).collect()
         } else {
@@ -262,11 +225,7 @@ impl Reader<'_> {
             period,
             simultaneous: simultaneous.min(chosen.len()),
             channels: chosen,
-            analysis: if analysis == 1 {
-                Analysis::Prompt
-            } else {
-                Analysis::Late
-            },
+            analysis: if analysis == 1 { Analysis::Prompt } else { Analysis::Late },
             objective,
             relation,
             patience,
@@ -322,8 +281,7 @@ impl Reader<'_> {
         let mut weights = vec![1.0; outputs.len()];
         for (Placed { value: name, span }, weight) in entries {
             let Some(place) = outputs.iter().position(|output| *output == name) else {
-                self.diagnostics
-                    .push(unknown("output", name, span, outputs));
+                self.diagnostics.push(unknown("output", name, span, outputs));
                 continue;
             };
             if let Some(weight) = weight.number(WEIGHTS, &mut self.diagnostics) {

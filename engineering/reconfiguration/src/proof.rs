@@ -213,11 +213,7 @@ pub fn prove(claim: &Claim<'_>) -> Result<Proof, NotProved> {
 impl Prover<'_> {
     fn run(&mut self) -> Result<Proof, NotProved> {
         // Before the first scan nothing has happened.
-        let mut pending = vec![Happening {
-            parent: ORIGIN,
-            state: 0,
-            failed: 0,
-        }];
+        let mut pending = vec![Happening { parent: ORIGIN, state: 0, failed: 0 }];
         let mut next = 0;
         while !pending.is_empty() {
             let batch = pending.len().min(LANES);
@@ -246,11 +242,7 @@ impl Prover<'_> {
     /// What may happen before the scan that follows a node.
     fn happenings(&self, parent: u32, found: &mut Vec<Happening>) {
         let (claim, world) = (self.claim, self.world(parent));
-        let happening = |state, failed| Happening {
-            parent,
-            state,
-            failed,
-        };
+        let happening = |state, failed| Happening { parent, state, failed };
         let mut statuses = vec![world.failed];
         for bit in 0..claim.channels.len() {
             let other = world.failed ^ (1 << bit);
@@ -323,33 +315,21 @@ impl Prover<'_> {
         run: Run,
     ) -> Result<(), NotProved> {
         self.proof.scans += 1;
-        let Happening {
-            parent,
-            state,
-            failed,
-        } = happening;
+        let Happening { parent, state, failed } = happening;
         let seen = run.signals;
         let registers: Box<[u64]> = run.state.into();
         let before = self.world(parent);
         let (was_single, was_alone) = (before.is_single, before.alone.clone());
         let is_on = |place: usize| bit(&seen, place);
         let outputs = Bits(unpack(&seen, self.width));
-        let mut world = World {
-            registers,
-            alone: None,
-            state,
-            failed,
-            shown,
-            outputs,
-            is_single: was_single,
-        };
+        let mut world =
+            World { registers, alone: None, state, failed, shown, outputs, is_single: was_single };
         if failed == 0
             && let Some(mut registers) = was_alone
         {
             let mut own = vec![0; self.alone.output_count().div_ceil(64)];
             let inputs = pack(world.shown.iter().copied());
-            self.alone
-                .step(&mut self.scratch, &mut registers, &inputs, &mut own);
+            self.alone.step(&mut self.scratch, &mut registers, &inputs, &mut own);
             let own = Bits(unpack(&own, self.width));
             if own != world.outputs {
                 let what = format!(
@@ -360,15 +340,10 @@ impl Prover<'_> {
             }
             world.alone = Some(registers);
         }
-        let latched: Vec<usize> = (0..self.latches.len())
-            .filter(|&number| is_on(self.latches[number].0))
-            .collect();
-        let at: Vec<u32> = self
-            .at
-            .iter()
-            .filter(|(place, _)| is_on(*place))
-            .map(|(_, state)| *state)
-            .collect();
+        let latched: Vec<usize> =
+            (0..self.latches.len()).filter(|&number| is_on(self.latches[number].0)).collect();
+        let at: Vec<u32> =
+            self.at.iter().filter(|(place, _)| is_on(*place)).map(|(_, state)| *state).collect();
         let lost = is_on(self.lost);
         let inside = match self.judge(&mut world, &latched, &at, lost) {
             Ok(inside) => inside,
@@ -400,11 +375,7 @@ impl Prover<'_> {
                 Controller::number(world.state as usize),
                 Bits(world.shown.to_vec()),
                 world.outputs,
-                if failed.is_empty() {
-                    "-".to_owned()
-                } else {
-                    failed.join(" ")
-                }
+                if failed.is_empty() { "-".to_owned() } else { failed.join(" ") }
             )
         };
         let mut trace = vec![line(world)];

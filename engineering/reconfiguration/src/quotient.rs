@@ -43,10 +43,8 @@ pub(crate) fn quotient(
     let blocks = loop {
         let blocks = blocks(&vector_of, hidden, &finesse);
         let mut grew = false;
-        let split: BTreeSet<usize> = conflicts(nodes, edges, &blocks)
-            .into_iter()
-            .map(|node| vector_of[node])
-            .collect();
+        let split: BTreeSet<usize> =
+            conflicts(nodes, edges, &blocks).into_iter().map(|node| vector_of[node]).collect();
         for vector in split {
             if finesse[vector] < depth {
                 finesse[vector] += 1;
@@ -79,10 +77,8 @@ pub(crate) fn quotient(
         }
     }
     let states: Vec<State> = states.into_iter().flatten().collect();
-    let pairs: FxHashSet<(usize, usize)> = edges
-        .iter()
-        .map(|&(from, to)| (blocks[from as usize], blocks[to as usize]))
-        .collect();
+    let pairs: FxHashSet<(usize, usize)> =
+        edges.iter().map(|&(from, to)| (blocks[from as usize], blocks[to as usize])).collect();
     let controller = Controller::new(signals, memory_names, states, pairs);
     (controller, blocks)
 }
@@ -94,9 +90,7 @@ fn blocks(vector_of: &[usize], hidden: &[Hidden], finesse: &[usize]) -> Vec<usiz
         .iter()
         .enumerate()
         .map(|(node, &vector)| {
-            let key: &[u64] = hidden
-                .get(node)
-                .map_or(&[], |hidden| &hidden[..finesse[vector]]);
+            let key: &[u64] = hidden.get(node).map_or(&[], |hidden| &hidden[..finesse[vector]]);
             let next = numbers.len();
             *numbers.entry((vector, key)).or_insert(next)
         })

@@ -99,11 +99,7 @@ pub fn read(file: &str, text: &str, signals: &Signals) -> Result<Vec<Run>, Recor
 }
 
 fn unreadable(file: &str, line: usize, reason: impl Into<String>) -> RecordError {
-    RecordError::Unreadable {
-        file: file.to_owned(),
-        line: line + 1,
-        reason: reason.into(),
-    }
+    RecordError::Unreadable { file: file.to_owned(), line: line + 1, reason: reason.into() }
 }
 
 fn read_csv(file: &str, text: &str, signals: &Signals) -> Result<Vec<Run>, RecordError> {
@@ -116,16 +112,8 @@ fn read_csv(file: &str, text: &str, signals: &Signals) -> Result<Vec<Run>, Recor
         let place = names.iter().position(|known| known == name);
         place.ok_or_else(|| unreadable(file, 0, format!("there is no column `{name}`")))
     };
-    let inputs = signals
-        .inputs
-        .iter()
-        .map(column)
-        .collect::<Result<Vec<_>, _>>()?;
-    let outputs = signals
-        .outputs
-        .iter()
-        .map(column)
-        .collect::<Result<Vec<_>, _>>()?;
+    let inputs = signals.inputs.iter().map(column).collect::<Result<Vec<_>, _>>()?;
+    let outputs = signals.outputs.iter().map(column).collect::<Result<Vec<_>, _>>()?;
     let run_column = names.iter().position(|name| *name == "run");
     let mut runs: Vec<Run> = Vec::new();
     let mut present: Option<String> = None;
@@ -135,11 +123,7 @@ fn read_csv(file: &str, text: &str, signals: &Signals) -> Result<Vec<Run>, Recor
             continue;
         }
         if number > MAXIMUM_SCANS {
-            return Err(unreadable(
-                file,
-                number,
-                format!("more than {MAXIMUM_SCANS} scans"),
-            ));
+            return Err(unreadable(file, number, format!("more than {MAXIMUM_SCANS} scans")));
         }
         let cells: Vec<&str> = line.split(',').map(str::trim).collect();
         let bits = |columns: &[usize]| {
@@ -150,22 +134,11 @@ fn read_csv(file: &str, text: &str, signals: &Signals) -> Result<Vec<Run>, Recor
                     let reason = format!("`{}` is {other:?}, not 0 or 1", names[column]);
                     Err(unreadable(file, number, reason))
                 }
-                None => Err(unreadable(
-                    file,
-                    number,
-                    format!("`{}` is missing", names[column]),
-                )),
+                None => Err(unreadable(file, number, format!("`{}` is missing", names[column]))),
             };
-            columns
-                .iter()
-                .map(bit)
-                .collect::<Result<Vec<_>, _>>()
-                .map(Bits)
+            columns.iter().map(bit).collect::<Result<Vec<_>, _>>().map(Bits)
         };
-        let label = run_column
-            .and_then(|column| cells.get(column))
-            .copied()
-            .unwrap_or("");
+        let label = run_column.and_then(|column| cells.get(column)).copied().unwrap_or("");
         if present.as_deref() != Some(label) {
             runs.push(Vec::new());
             present = Some(label.to_owned());
@@ -257,10 +230,7 @@ pub fn learn(
                 history.rotate_right(1);
                 history[0] = hash(before);
             }
-            nodes.push(Seen {
-                inputs: scan.0.clone(),
-                outputs: scan.1.clone(),
-            });
+            nodes.push(Seen { inputs: scan.0.clone(), outputs: scan.1.clone() });
             hidden.push(history.clone());
             last = Some(scan);
         }
@@ -335,16 +305,9 @@ pub fn missed(record: &Controller, whole: &Controller) -> Missed {
         let found = &controller.states()[state];
         (found.inputs.clone(), found.outputs.clone())
     };
-    let states: Vec<_> = (0..record.states().len())
-        .map(|state| vector(record, state))
-        .collect();
+    let states: Vec<_> = (0..record.states().len()).map(|state| vector(record, state)).collect();
     let moves: Vec<_> = (0..states.len())
-        .flat_map(|state| {
-            record
-                .moves(state)
-                .iter()
-                .map(move |step| (state, step.target))
-        })
+        .flat_map(|state| record.moves(state).iter().map(move |step| (state, step.target)))
         .map(|(from, to)| (states[from].clone(), states[to].clone()))
         .collect();
     let mut missed = Missed::default();
@@ -356,9 +319,7 @@ pub fn missed(record: &Controller, whole: &Controller) -> Missed {
         for step in whole.moves(state) {
             let there = vector(whole, step.target);
             if here != there && !moves.contains(&(here.clone(), there)) {
-                missed
-                    .moves
-                    .push((whole.state_name(state), whole.state_name(step.target)));
+                missed.moves.push((whole.state_name(state), whole.state_name(step.target)));
             }
         }
     }

@@ -17,9 +17,7 @@ impl Row {
     /// Whether outputs satisfy it.
     pub fn holds(&self, outputs: &Bits) -> bool {
         let pairs = self.0.iter().zip(&outputs.0);
-        pairs
-            .into_iter()
-            .all(|(wanted, is)| wanted.is_none_or(|wanted| wanted == *is))
+        pairs.into_iter().all(|(wanted, is)| wanted.is_none_or(|wanted| wanted == *is))
     }
 
     /// `1 dc 0`, as the paper writes it.
@@ -42,9 +40,7 @@ pub struct Relation {
 impl Relation {
     /// Without any row, for a controller of `states` states.
     pub fn new(states: usize) -> Self {
-        Self {
-            tables: vec![BTreeMap::new(); states],
-        }
+        Self { tables: vec![BTreeMap::new(); states] }
     }
 
     /// Sets Λ_e(x); no row makes e uncontrollable at x.

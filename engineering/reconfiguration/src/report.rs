@@ -28,12 +28,8 @@ impl Outcome {
         let rule = |columns: usize| format!("|{}\n", "---|".repeat(columns));
         text.push_str(&rule(signals.outputs.len() + 2));
         for (place, state) in controller.states().iter().enumerate() {
-            let bits: Vec<&str> = state
-                .outputs
-                .0
-                .iter()
-                .map(|&bit| if bit { "1" } else { "0" })
-                .collect();
+            let bits: Vec<&str> =
+                state.outputs.0.iter().map(|&bit| if bit { "1" } else { "0" }).collect();
             let _ = writeln!(
                 text,
                 "| {} | {} | {} |",
@@ -49,23 +45,12 @@ impl Outcome {
         );
         for event in signals.events() {
             for (rows, states) in self.rows_of(event) {
-                let _ = writeln!(
-                    text,
-                    "| {} | {rows} | {states} |",
-                    signals.event_name(event)
-                );
+                let _ = writeln!(text, "| {} | {rows} | {states} |", signals.event_name(event));
             }
         }
         let events: Vec<Event> = signals.events().collect();
-        let names: Vec<String> = events
-            .iter()
-            .map(|&event| signals.event_name(event))
-            .collect();
-        let _ = write!(
-            text,
-            "\n## On events, Φ\n\n| no. | state | {} |\n",
-            names.join(" | ")
-        );
+        let names: Vec<String> = events.iter().map(|&event| signals.event_name(event)).collect();
+        let _ = write!(text, "\n## On events, Φ\n\n| no. | state | {} |\n", names.join(" | "));
         text.push_str(&rule(names.len() + 2));
         for place in 0..controller.states().len() {
             let row: Vec<&str> = events
@@ -94,11 +79,7 @@ impl Outcome {
                 .iter()
                 .map(|row| format!("[{}]", row.text()))
                 .collect();
-            let rows = if rows.is_empty() {
-                "none".to_owned()
-            } else {
-                rows.join(" or ")
-            };
+            let rows = if rows.is_empty() { "none".to_owned() } else { rows.join(" or ") };
             let number = Controller::number(state).to_string();
             match found.iter_mut().find(|(known, _)| *known == rows) {
                 Some((_, states)) => states.push(number),
@@ -106,27 +87,16 @@ impl Outcome {
             }
         }
         let all = |states: Vec<String>| {
-            if states.len() == count {
-                "all".to_owned()
-            } else {
-                states.join(" ")
-            }
+            if states.len() == count { "all".to_owned() } else { states.join(" ") }
         };
-        found
-            .into_iter()
-            .map(|(rows, states)| (rows, all(states)))
-            .collect()
+        found.into_iter().map(|(rows, states)| (rows, all(states))).collect()
     }
 
     /// The combined states with their demands on the outputs, and the solution.
     pub fn programs(&self) -> String {
         let signals = &self.controller.signals;
-        let combined: Vec<&MegaState> = self
-            .mega
-            .states
-            .iter()
-            .filter(|state| state.command.is_some())
-            .collect();
+        let combined: Vec<&MegaState> =
+            self.mega.states.iter().filter(|state| state.command.is_some()).collect();
         let mut text = format!(
             "# Output commands\n\n{} states of the mega-controller need a command of their own; {} different programs were solved. Outputs: ({}).\n",
             combined.len(),
@@ -145,26 +115,15 @@ impl Outcome {
             let _ = write!(text, "\n## {}\n\n", self.describe(state));
             let channels: Vec<usize> =
                 failed_channels(&self.question.channels, state.failed).collect();
-            let is_unseen = |event: &Event| {
-                event
-                    .channel()
-                    .is_some_and(|input| channels.contains(&input))
-            };
+            let is_unseen =
+                |event: &Event| event.channel().is_some_and(|input| channels.contains(&input));
             let unseen = |step: &Move| !step.events.is_empty() && step.events.iter().all(is_unseen);
             let members = state.members.iter().copied().collect();
             let blocked = ground.blocked(&members, &unseen);
             for posed in ground.posed(&state.members, &blocked) {
-                let rows: Vec<String> = posed
-                    .demand
-                    .rows
-                    .iter()
-                    .map(|row| format!("[{}]", row.text()))
-                    .collect();
-                let demand = if posed.demand.enable {
-                    "Σ y ≥ 1 (5)"
-                } else {
-                    "Σ y = 0 (4)"
-                };
+                let rows: Vec<String> =
+                    posed.demand.rows.iter().map(|row| format!("[{}]", row.text())).collect();
+                let demand = if posed.demand.enable { "Σ y ≥ 1 (5)" } else { "Σ y = 0 (4)" };
                 let _ = writeln!(
                     text,
                     "- state {}, {}: {} over {}",
@@ -233,11 +192,7 @@ impl Outcome {
             self.question.simultaneous,
             self.question.channels.len(),
             self.mega.states.len(),
-            self.mega
-                .states
-                .iter()
-                .filter(|state| state.command.is_some())
-                .count(),
+            self.mega.states.iter().filter(|state| state.command.is_some()).count(),
             self.combined.program.rungs.len() - self.combined.first_rung,
             self.proof.states,
             self.proof.scans
@@ -253,10 +208,8 @@ impl Outcome {
             if states.is_empty() && moves.is_empty() {
                 text.push_str("The records have seen every state and every move.\n\n");
             } else {
-                let moves: Vec<String> = moves
-                    .iter()
-                    .map(|(from, to)| format!("{from} → {to}"))
-                    .collect();
+                let moves: Vec<String> =
+                    moves.iter().map(|(from, to)| format!("{from} → {to}")).collect();
                 let _ = writeln!(
                     text,
                     "The records have missed {} states ({}) and {} moves ({}).\n",
@@ -267,12 +220,7 @@ impl Outcome {
                 );
             }
         }
-        let dangling = self
-            .mega
-            .dangling
-            .iter()
-            .filter(|dangling| **dangling)
-            .count();
+        let dangling = self.mega.dangling.iter().filter(|dangling| **dangling).count();
         if dangling > 0 {
             let trimming = self.mega.trim(controller, &self.relation);
             let _ = writeln!(
@@ -286,11 +234,7 @@ impl Outcome {
         let _ = writeln!(
             text,
             "Full control needs: {}.\n",
-            if minimum.is_empty() {
-                "no channel".to_owned()
-            } else {
-                minimum.join(", ")
-            }
+            if minimum.is_empty() { "no channel".to_owned() } else { minimum.join(", ") }
         );
         text.push_str("| no. | state | outputs on |\n|---|---|---|\n");
         for (place, state) in controller.states().iter().enumerate() {
@@ -306,18 +250,10 @@ impl Outcome {
             let _ = writeln!(text, "\n## {} fails", advice.channel);
             for effect in &advice.effects {
                 let list = |numbers: &[usize]| {
-                    numbers
-                        .iter()
-                        .map(usize::to_string)
-                        .collect::<Vec<_>>()
-                        .join(" ")
+                    numbers.iter().map(usize::to_string).collect::<Vec<_>>().join(" ")
                 };
                 let words = |names: &[String]| {
-                    if names.is_empty() {
-                        "nothing".to_owned()
-                    } else {
-                        names.join(", ")
-                    }
+                    if names.is_empty() { "nothing".to_owned() } else { names.join(", ") }
                 };
                 let _ = write!(text, "\n- in {}: ", list(&effect.states));
                 let Some(outputs) = &effect.outputs else {
@@ -354,11 +290,7 @@ impl Outcome {
             .filter(|(_, on)| **on)
             .map(|(name, _)| name.as_str())
             .collect();
-        if names.is_empty() {
-            "none".to_owned()
-        } else {
-            names.join(", ")
-        }
+        if names.is_empty() { "none".to_owned() } else { names.join(", ") }
     }
 
     /// Everything, for machines.

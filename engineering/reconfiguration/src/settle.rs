@@ -56,10 +56,8 @@ impl<'a> Ground<'a> {
     ) -> Self {
         let table = |state: usize| {
             let defined = controller.moves(state).iter().flat_map(|step| &step.events);
-            let events: BTreeSet<Event> = defined
-                .copied()
-                .chain(relation.controllable(state))
-                .collect();
+            let events: BTreeSet<Event> =
+                defined.copied().chain(relation.controllable(state)).collect();
             let value = |event| (event, feedback(controller, relation, state, event));
             events.into_iter().map(value).collect()
         };
@@ -83,9 +81,7 @@ impl<'a> Ground<'a> {
     }
 
     fn is_preventable(&self, state: u32, step: &Move) -> bool {
-        step.events
-            .iter()
-            .all(|&event| !self.relation.rows(state as usize, event).is_empty())
+        step.events.iter().all(|&event| !self.relation.rows(state as usize, event).is_empty())
     }
 
     /// All that `members` reach by moves that `follow` picks, these included.
@@ -130,9 +126,8 @@ impl<'a> Ground<'a> {
         failed: u64,
         unseen: &dyn Fn(&Move) -> bool,
     ) -> Result<(Vec<u32>, Option<Command>), NoCommand> {
-        let members = self.closure(seed, |state, step| {
-            unseen(step) && !self.is_preventable(state, step)
-        });
+        let members =
+            self.closure(seed, |state, step| unseen(step) && !self.is_preventable(state, step));
         let blocked = self.blocked(&members, unseen);
         if members.len() == 1 && blocked.is_empty() {
             return Ok((members.into_iter().collect(), None));
@@ -152,9 +147,8 @@ impl<'a> Ground<'a> {
 
     /// What Φ1 and `blocked` ask of the outputs.
     pub(crate) fn posed(&self, members: &[u32], blocked: &BTreeSet<(u32, Event)>) -> Vec<Posed> {
-        let controllable = members
-            .iter()
-            .flat_map(|&state| self.relation.controllable(state as usize));
+        let controllable =
+            members.iter().flat_map(|&state| self.relation.controllable(state as usize));
         let events: BTreeSet<Event> = controllable.collect();
         let mut posed = Vec::new();
         for event in events {
@@ -171,11 +165,7 @@ impl<'a> Ground<'a> {
                     joint == Feedback::Enabled
                 };
                 let rows = rows.clone();
-                posed.push(Posed {
-                    state: state as usize,
-                    event,
-                    demand: Demand { rows, enable },
-                });
+                posed.push(Posed { state: state as usize, event, demand: Demand { rows, enable } });
             }
         }
         posed
@@ -235,11 +225,7 @@ impl<'a> Ground<'a> {
         let mut stopped = BTreeSet::new();
         let mut going = BTreeSet::new();
         for &state in members {
-            for event in self
-                .controller
-                .moves(state as usize)
-                .iter()
-                .flat_map(|step| &step.events)
+            for event in self.controller.moves(state as usize).iter().flat_map(|step| &step.events)
             {
                 if self.relation.allows(state as usize, *event, &outputs) {
                     going.insert(*event);
@@ -248,12 +234,7 @@ impl<'a> Ground<'a> {
                 }
             }
         }
-        Ok(Command {
-            outputs,
-            stopped,
-            going,
-            given_up,
-        })
+        Ok(Command { outputs, stopped, going, given_up })
     }
 
     fn weights(&self, members: &[u32]) -> Vec<f64> {
@@ -265,11 +246,7 @@ impl<'a> Ground<'a> {
                 .map(|output| {
                     let states = self.controller.states();
                     let votes = members.iter().map(|&state| {
-                        if states[state as usize].outputs.0[output] {
-                            -1.0
-                        } else {
-                            1.0
-                        }
+                        if states[state as usize].outputs.0[output] { -1.0 } else { 1.0 }
                     });
                     votes.sum()
                 })
@@ -280,19 +257,10 @@ impl<'a> Ground<'a> {
 
 fn no_command(members: &[u32], failed: u64, posed: &[Posed], unsolved: Unsolved) -> NoCommand {
     let (conflict, solver) = match unsolved {
-        Unsolved::Conflict(places) => (
-            places
-                .into_iter()
-                .map(|place| posed[place].clone())
-                .collect(),
-            None,
-        ),
+        Unsolved::Conflict(places) => {
+            (places.into_iter().map(|place| posed[place].clone()).collect(), None)
+        }
         Unsolved::Solver(message) => (Vec::new(), Some(message)),
     };
-    NoCommand {
-        members: members.to_vec(),
-        failed,
-        conflict,
-        solver,
-    }
+    NoCommand { members: members.to_vec(), failed, conflict, solver }
 }

@@ -21,10 +21,7 @@ impl Bits {
             '1' => Some(true),
             _ => None,
         };
-        text.chars()
-            .map(bit)
-            .collect::<Option<Vec<bool>>>()
-            .map(Self)
+        text.chars().map(bit).collect::<Option<Vec<bool>>>().map(Self)
     }
 }
 
@@ -59,11 +56,7 @@ impl Event {
 
     /// The change of `input` to `value`.
     pub fn change(input: usize, value: bool) -> Self {
-        if value {
-            Self::Rises(input)
-        } else {
-            Self::Falls(input)
-        }
+        if value { Self::Rises(input) } else { Self::Falls(input) }
     }
 }
 

@@ -39,9 +39,7 @@ fn longest_stay(states: usize, state_of: &[usize], edges: &[(u32, u32)]) -> Vec<
     }
     let mut stay = vec![1_u32; state_of.len()];
     let mut done = vec![false; state_of.len()];
-    let mut ready: Vec<usize> = (0..state_of.len())
-        .filter(|&node| before[node] == 0)
-        .collect();
+    let mut ready: Vec<usize> = (0..state_of.len()).filter(|&node| before[node] == 0).collect();
     while let Some(node) = ready.pop() {
         done[node] = true;
         for &target in &next[node] {

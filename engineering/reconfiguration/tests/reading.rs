@@ -28,15 +28,8 @@ fn findings(text: &str) -> String {
     for report in &loaded.reports {
         for found in &report.diagnostics {
             let at = report.line_and_column(found.span.start);
-            let help = found
-                .help
-                .as_deref()
-                .map_or(String::new(), |help| format!(" ({help})"));
-            let _ = writeln!(
-                said,
-                "{}:{at} {} {}{help}",
-                report.name, found.code, found.message
-            );
+            let help = found.help.as_deref().map_or(String::new(), |help| format!(" ({help})"));
+            let _ = writeln!(said, "{}:{at} {} {}{help}", report.name, found.code, found.message);
         }
     }
     said
@@ -84,9 +77,7 @@ events = 1
 #[test]
 fn a_plant_that_stands_still_is_said_with_the_way_there() {
     let text = PROJECT.replace("\"plant.ladder\"", "\"still.ladder\"");
-    let project = project::read("p", &text, &mut open)
-        .project
-        .expect("it is right");
+    let project = project::read("p", &text, &mut open).project.expect("it is right");
     let failure = analyse(&project).err().expect("a standstill");
     assert_eq!(failure.code(), "U1221");
     assert!(failure.to_string().contains("00000_0000"), "{failure}");
@@ -98,24 +89,16 @@ fn states_without_a_safe_command_are_shown_with_their_rows() {
     let text = format!(
         "{PROJECT}\n[[relation]]\nevents = [\"ps1+\"]\nrows = [\"Motor\"]\n\n[[relation]]\nevents = [\"ps2+\"]\nrows = [\"/Motor\"]\n"
     );
-    let project = project::read("p", &text, &mut open)
-        .project
-        .expect("it is right");
+    let project = project::read("p", &text, &mut open).project.expect("it is right");
     let failure = analyse(&project).err().expect("no command");
     assert_eq!(failure.code(), "U1231");
     let text = failure.to_string();
-    assert!(
-        text.contains("ps1+") && text.contains("[0 dc dc dc]"),
-        "{text}"
-    );
+    assert!(text.contains("ps1+") && text.contains("[0 dc dc dc]"), "{text}");
 }
 
 fn signals() -> Signals {
     let names = |text: &str| text.split(' ').map(str::to_owned).collect();
-    Signals {
-        inputs: names("a"),
-        outputs: names("y"),
-    }
+    Signals { inputs: names("a"), outputs: names("y") }
 }
 
 /// y follows a, until a has come twice.
@@ -158,35 +141,21 @@ fn a_complete_record_agrees_with_the_exploration_and_a_short_one_says_what_it_mi
     // The plant and the ladder, scan by scan, as an engineer would record them.
     let mut own = understudy_ladder::Interpreter::new(&ladder, period).expect("it runs");
     let mut world = understudy_ladder::Interpreter::new(&plant, period).expect("it runs");
-    let inputs: Vec<&str> = ladder
-        .inputs
-        .iter()
-        .map(|signal| signal.name.as_str())
-        .collect();
-    let outputs: Vec<&str> = ladder
-        .outputs
-        .iter()
-        .map(|signal| signal.name.as_str())
-        .collect();
+    let inputs: Vec<&str> = ladder.inputs.iter().map(|signal| signal.name.as_str()).collect();
+    let outputs: Vec<&str> = ladder.outputs.iter().map(|signal| signal.name.as_str()).collect();
     let mut shown = vec![false; inputs.len()];
     let mut table = format!("{},{}\n", inputs.join(","), outputs.join(","));
     let mut short = String::new();
     for scan in 0..300 {
         let driven = own.scan(&shown);
-        let row: Vec<&str> = shown
-            .iter()
-            .chain(&driven)
-            .map(|&bit| if bit { "1" } else { "0" })
-            .collect();
+        let row: Vec<&str> =
+            shown.iter().chain(&driven).map(|&bit| if bit { "1" } else { "0" }).collect();
         let _ = writeln!(table, "{}", row.join(","));
         if scan == 60 {
             short = table.clone();
         }
         world.scan(&driven);
-        shown = inputs
-            .iter()
-            .map(|name| world.value(name).unwrap_or(false))
-            .collect();
+        shown = inputs.iter().map(|name| world.value(name).unwrap_or(false)).collect();
     }
     let check = |records: &str| {
         let text = PROJECT
@@ -197,30 +166,19 @@ fn a_complete_record_agrees_with_the_exploration_and_a_short_one_says_what_it_mi
             name => open(name),
         });
         let outcome = analyse(&project.project.expect("it is right"));
-        outcome
-            .unwrap_or_else(|failure| panic!("{failure}"))
-            .missed
-            .expect("there are records")
+        outcome.unwrap_or_else(|failure| panic!("{failure}")).missed.expect("there are records")
     };
     assert_eq!(check(&table), Missed::default());
     let Missed { states, moves } = check(&short);
-    assert!(
-        !states.is_empty() && moves.len() > states.len(),
-        "{states:?} {moves:?}"
-    );
+    assert!(!states.is_empty() && moves.len() > states.len(), "{states:?} {moves:?}");
     // A record does not say how long a state may last, which a diagnosis has to know.
-    let (rest, _) = PROJECT
-        .split_once("[diagnosis]")
-        .expect("the example asks for one");
+    let (rest, _) = PROJECT.split_once("[diagnosis]").expect("the example asks for one");
     let without = PROJECT.replace("plant = \"plant.ladder\"", "records = [\"r.csv\"]");
     let refused = project::read("p", &without, &mut |name| match name {
         "r.csv" => Ok(table.clone()),
         name => open(name),
     });
-    let codes = refused.reports[0]
-        .diagnostics
-        .iter()
-        .map(|found| found.code);
+    let codes = refused.reports[0].diagnostics.iter().map(|found| found.code);
     assert_eq!(codes.collect::<Vec<_>>(), ["U1203"]);
     // Without a plant the record is all there is, and it comes to the same.
     let text = rest

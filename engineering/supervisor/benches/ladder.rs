@@ -22,13 +22,8 @@ fn large(states: u32) -> Automaton {
             target: State::new((source + stride) % states),
         })
     });
-    Automaton::new(
-        "large",
-        [],
-        vec![true; states as usize],
-        transitions.collect(),
-    )
-    .expect("deterministic")
+    Automaton::new("large", [], vec![true; states as usize], transitions.collect())
+        .expect("deterministic")
 }
 
 #[divan::bench(args = [1_000, 10_000], sample_count = 3)]
@@ -53,15 +48,9 @@ fn proof_of_a_large_one(bencher: Bencher, states: u32) {
 /// Proof of the ladder of `modules`.
 fn proof(bencher: Bencher, name: &str, modules: &Modules, mode: Mode) {
     let map = InputOutputMap::direct(name, &modules.alphabet());
-    let Conversion {
-        program,
-        correspondence,
-        ..
-    } = convert(modules, &map, mode).expect("the map fits");
-    let settings = ProofSettings {
-        mode,
-        ..ProofSettings::default()
-    };
+    let Conversion { program, correspondence, .. } =
+        convert(modules, &map, mode).expect("the map fits");
+    let settings = ProofSettings { mode, ..ProofSettings::default() };
     bencher.bench_local(|| {
         let verdict = prove(&program, modules, &map, &correspondence, settings);
         match verdict.expect("a verdict") {
@@ -80,9 +69,6 @@ fn agv(name: &str) -> Automaton {
 fn proof_of_the_agv(bencher: Bencher, mode: Mode) {
     let supervisors = [agv("_SIMSUP")];
     let plants = ["AGV1", "AGV2", "AGV3", "AGV4", "AGV5"].map(agv);
-    let modules = Modules {
-        supervisors: &supervisors,
-        plants: &plants,
-    };
+    let modules = Modules { supervisors: &supervisors, plants: &plants };
     proof(bencher, "agv", &modules, mode);
 }

@@ -34,17 +34,10 @@ fn references(automata: &[Automaton]) -> Vec<&Automaton> {
 fn product_states(bencher: Bencher<'_, '_>, (machines, capacity): (u32, u32)) {
     let (plants, buffers) = line(machines, capacity);
     let all: Vec<&Automaton> = plants.iter().chain(&buffers).collect();
-    let bounds = Bounds {
-        memory_bytes: 8_000_000_000,
-    };
+    let bounds = Bounds { memory_bytes: 8_000_000_000 };
     let states = 2_usize.pow(machines) * (capacity as usize + 1).pow(machines - 1);
     bencher.counter(ItemsCount::new(states)).bench_local(|| {
-        assert_eq!(
-            sync(black_box(&all), bounds)
-                .expect("it fits")
-                .state_count(),
-            states
-        )
+        assert_eq!(sync(black_box(&all), bounds).expect("it fits").state_count(), states)
     });
 }
 
@@ -91,10 +84,7 @@ fn symbolic_lines(bencher: Bencher<'_, '_>, (machines, capacity): (u32, u32)) {
         let bounds = SymbolicBounds::default();
         let made = synthesise_symbolically(&references(&plants), &references(&buffers), bounds);
         let states = made.expect("it fits").state_count();
-        assert_eq!(
-            states,
-            Some(2 * (2 * u128::from(capacity) + 1).pow(machines - 1))
-        );
+        assert_eq!(states, Some(2 * (2 * u128::from(capacity) + 1).pow(machines - 1)));
     });
 }
 
@@ -132,11 +122,7 @@ fn supreduce_of_random_plants(bencher: Bencher<'_, '_>, (states, events): (u32, 
             if random.random_ratio(1, 3) {
                 let target = State::new(random.random_range(0..states));
                 let is_allowed = !label.is_controllable() || random.random_ratio(9, 10);
-                let transition = Transition {
-                    source,
-                    label,
-                    target,
-                };
+                let transition = Transition { source, label, target };
                 transitions.push((transition, is_allowed));
             }
         }
@@ -148,10 +134,7 @@ fn supreduce_of_random_plants(bencher: Bencher<'_, '_>, (states, events): (u32, 
     let all = transitions.iter().map(|(transition, _)| *transition);
     let plant = automaton("plant", all.collect());
     let allowed = transitions.iter().filter(|(_, is_allowed)| *is_allowed);
-    let supervisor = automaton(
-        "supervisor",
-        allowed.map(|(transition, _)| *transition).collect(),
-    );
+    let supervisor = automaton("supervisor", allowed.map(|(transition, _)| *transition).collect());
     bencher.bench_local(|| supreduce(&plant, &supervisor, Bounds::default()));
 }
 

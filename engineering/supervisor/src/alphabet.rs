@@ -45,10 +45,7 @@ pub struct Event {
 impl Event {
     /// An event that is called by its number.
     pub fn unnamed(label: Label) -> Self {
-        Self {
-            label,
-            name: label.to_string(),
-        }
+        Self { label, name: label.to_string() }
     }
 }
 

@@ -146,9 +146,7 @@ impl Automaton {
             return Err(AutomatonError::TooLarge { count, limit });
         }
         let states = marked.len();
-        let ends = transitions
-            .iter()
-            .flat_map(|transition| [transition.source, transition.target]);
+        let ends = transitions.iter().flat_map(|transition| [transition.source, transition.target]);
         if let Some(state) = ends.into_iter().find(|state| state.index() >= states) {
             return Err(AutomatonError::NoSuchState { state, states });
         }
@@ -165,10 +163,7 @@ impl Automaton {
                 second: pair[1].target,
             });
         }
-        let mut used: Vec<Label> = transitions
-            .iter()
-            .map(|transition| transition.label)
-            .collect();
+        let mut used: Vec<Label> = transitions.iter().map(|transition| transition.label).collect();
         used.sort_unstable();
         used.dedup();
         let used = used.into_iter().map(Event::unnamed);
@@ -182,21 +177,12 @@ impl Automaton {
             let (here, later) = rest.split_at(leaving);
             edges.extend(here.iter().filter_map(|transition| {
                 let event = alphabet.place(transition.label)?;
-                Some(Edge {
-                    event,
-                    target: transition.target,
-                })
+                Some(Edge { event, target: transition.target })
             }));
             first.push(edges.len() as u32);
             rest = later;
         }
-        Ok(Self::from_parts(
-            name.into(),
-            alphabet,
-            marked,
-            first,
-            edges,
-        ))
+        Ok(Self::from_parts(name.into(), alphabet, marked, first, edges))
     }
 
     /// TCT's EMPTY: no state, and the alphabet of what was asked for.
@@ -214,14 +200,7 @@ impl Automaton {
     ) -> Self {
         debug_assert_eq!(first.len(), marked.len() + 1);
         debug_assert_eq!(first.last().copied(), Some(edges.len() as u32));
-        Self {
-            name,
-            alphabet,
-            marked,
-            first,
-            edges,
-            state_names: None,
-        }
+        Self { name, alphabet, marked, first, edges, state_names: None }
     }
 
     /// The caller knows that there is a name for each state.
@@ -263,10 +242,9 @@ impl Automaton {
     pub fn with_event_names(mut self, names: &Alphabet) -> Self {
         let renamed = self.alphabet.events().iter().map(|event| Event {
             label: event.label,
-            name: names.place(event.label).map_or_else(
-                || event.name.clone(),
-                |place| names.event(place).name.clone(),
-            ),
+            name: names
+                .place(event.label)
+                .map_or_else(|| event.name.clone(), |place| names.event(place).name.clone()),
         });
         self.alphabet = Alphabet::new(renamed);
         self
@@ -367,10 +345,7 @@ impl Automaton {
             used[edge.event as usize] = true;
         }
         let labels = self.alphabet.labels().zip(used);
-        labels
-            .filter(|(_, used)| !used)
-            .map(|(label, _)| label)
-            .collect()
+        labels.filter(|(_, used)| !used).map(|(label, _)| label).collect()
     }
 
     /// The names of its states, where they have names.
@@ -380,10 +355,7 @@ impl Automaton {
 
     /// The name of `state`, or its number.
     pub fn state_name(&self, state: State) -> Cow<'_, str> {
-        match self
-            .state_names()
-            .and_then(|names| names.get(state.index()))
-        {
+        match self.state_names().and_then(|names| names.get(state.index())) {
             Some(name) => Cow::Borrowed(name),
             None => Cow::Owned(state.to_string()),
         }

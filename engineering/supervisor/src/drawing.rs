@@ -43,9 +43,7 @@ fn arrows(automaton: &Automaton) -> BTreeMap<(State, State, bool), String> {
     let mut arrows: BTreeMap<_, String> = BTreeMap::new();
     for transition in automaton.transitions() {
         let controllable = transition.label.is_controllable();
-        let names = arrows
-            .entry((transition.source, transition.target, controllable))
-            .or_default();
+        let names = arrows.entry((transition.source, transition.target, controllable)).or_default();
         if !names.is_empty() {
             names.push_str(", ");
         }
@@ -62,21 +60,14 @@ pub fn draw_dot(automaton: &Automaton) -> String {
         text.push_str("    start [shape=point]; start -> 0;\n");
     }
     for state in automaton.states() {
-        let shape = if automaton.is_marked(state) {
-            "doublecircle"
-        } else {
-            "circle"
-        };
+        let shape = if automaton.is_marked(state) { "doublecircle" } else { "circle" };
         let name = quoted(&automaton.state_name(state));
         let _ = writeln!(text, "    {state} [shape={shape}, label={name}];");
     }
     for ((source, target, controllable), names) in arrows(automaton) {
         let style = if controllable { "solid" } else { "dashed" };
         let names = quoted(&names);
-        let _ = writeln!(
-            text,
-            "    {source} -> {target} [style={style}, label={names}];"
-        );
+        let _ = writeln!(text, "    {source} -> {target} [style={style}, label={names}];");
     }
     text.push_str("}\n");
     text
@@ -90,15 +81,10 @@ pub fn draw_automaton_svg(automaton: &Automaton) -> Result<String, TooLargeToDra
     let arrows = arrows(automaton);
     let (states, count) = (automaton.state_count(), arrows.len());
     if states > MAXIMUM_DRAWN || count > MAXIMUM_DRAWN {
-        return Err(TooLargeToDraw {
-            states,
-            arrows: count,
-        });
+        return Err(TooLargeToDraw { states, arrows: count });
     }
-    let names: Vec<String> = automaton
-        .states()
-        .map(|state| automaton.state_name(state).into_owned())
-        .collect();
+    let names: Vec<String> =
+        automaton.states().map(|state| automaton.state_name(state).into_owned()).collect();
     let shapes: Vec<(f64, f64)> = names
         .iter()
         .map(|name| {
@@ -129,10 +115,7 @@ pub fn draw_automaton_svg(automaton: &Automaton) -> Result<String, TooLargeToDra
     for (number, ((source, target, controllable), label)) in arrows.keys().zip(&labels).enumerate()
     {
         let (from, to) = (source.index(), target.index());
-        let style = Style {
-            dashed: !controllable,
-            ..Style::default()
-        };
+        let style = Style { dashed: !controllable, ..Style::default() };
         let place = layout.nodes[from];
         if from == to {
             let rise = LOOP + loops[from];
@@ -142,11 +125,8 @@ pub fn draw_automaton_svg(automaton: &Automaton) -> Result<String, TooLargeToDra
         }
         let goal = layout.nodes[to];
         let shape = |state: usize| Shape::Ellipse(shapes[state].0, shapes[state].1);
-        let others = [
-            (target, source, true),
-            (target, source, false),
-            (source, target, !controllable),
-        ];
+        let others =
+            [(target, source, true), (target, source, false), (source, target, !controllable)];
         let alone = others
             .iter()
             .all(|&(one, other, controllable)| !arrows.contains_key(&(*one, *other, controllable)));
@@ -155,29 +135,16 @@ pub fn draw_automaton_svg(automaton: &Automaton) -> Result<String, TooLargeToDra
         if bends.is_empty() && (!alone || is_beside) {
             let bend = if is_beside { 60.0 } else { 34.0 };
             let lane = if *controllable { 1.0 } else { 2.0 };
-            let lane = if arrows.contains_key(&(*source, *target, !controllable)) {
-                lane
-            } else {
-                1.0
-            };
+            let lane =
+                if arrows.contains_key(&(*source, *target, !controllable)) { lane } else { 1.0 };
             bends.push(aside(place, goal, bend * lane));
         }
-        picture.arrow(
-            (place, shape(from)),
-            &bends,
-            (goal, shape(to)),
-            style,
-            label,
-        );
+        picture.arrow((place, shape(from)), &bends, (goal, shape(to)), style, label);
     }
     for state in automaton.states() {
         let place = layout.nodes[state.index()];
         let (rx, ry) = shapes[state.index()];
-        let fill = if state == State::INITIAL {
-            "lightblue"
-        } else {
-            "white"
-        };
+        let fill = if state == State::INITIAL { "lightblue" } else { "white" };
         picture.shape(place, Shape::Ellipse(rx, ry), fill);
         if automaton.is_marked(state) {
             picture.shape(place, Shape::Ellipse(rx - 4.0, ry - 4.0), fill);

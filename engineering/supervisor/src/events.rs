@@ -51,11 +51,8 @@ impl Events {
         for (key, value) in entries {
             declared.extend(Declared::read(form, key, value, format, &mut taken));
         }
-        let mut events = Self {
-            alphabet: Alphabet::default(),
-            labels: HashMap::new(),
-            signals: Vec::new(),
-        };
+        let mut events =
+            Self { alphabet: Alphabet::default(), labels: HashMap::new(), signals: Vec::new() };
         let mut named = Vec::new();
         for event in others.events() {
             events.labels.insert(event.name.clone(), event.label);
@@ -85,10 +82,7 @@ impl Events {
                 when: event.when,
             }));
             events.labels.insert(event.name.clone(), label);
-            named.push(Event {
-                label,
-                name: event.name,
-            });
+            named.push(Event { label, name: event.name });
         }
         events.alphabet = Alphabet::new(named.into_iter().chain(others.events().iter().cloned()));
         events
@@ -151,8 +145,7 @@ impl Declared {
             } else if let Some(first) = taken.insert(number, value.span()) {
                 let message = format!("label {number} stands for two events");
                 let diagnostic = Diagnostic::error("U0827", message, value.span());
-                form.diagnostics
-                    .push(diagnostic.with_related(first, "the other one"));
+                form.diagnostics.push(diagnostic.with_related(first, "the other one"));
             }
         }
         Some(Self {

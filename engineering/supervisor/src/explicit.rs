@@ -22,9 +22,7 @@ pub struct Bounds {
 impl Default for Bounds {
     /// 2 GB: some 25 million states with four transitions each.
     fn default() -> Self {
-        Self {
-            memory_bytes: 2_000_000_000,
-        }
+        Self { memory_bytes: 2_000_000_000 }
     }
 }
 

@@ -22,19 +22,11 @@ pub struct Finding {
 
 impl Finding {
     fn error(code: &'static str, message: String) -> Self {
-        Self {
-            code,
-            severity: Severity::Error,
-            message,
-        }
+        Self { code, severity: Severity::Error, message }
     }
 
     fn warning(code: &'static str, message: String) -> Self {
-        Self {
-            code,
-            severity: Severity::Warning,
-            message,
-        }
+        Self { code, severity: Severity::Warning, message }
     }
 }
 
@@ -44,10 +36,7 @@ pub fn model_findings(model: &Model) -> Vec<Finding> {
     let unknown = unknown.map(|(number, label)| {
         let specification = model.specifications[number].name();
         let event = model.alphabet.name(label);
-        let known = model
-            .plants
-            .iter()
-            .flat_map(|plant| plant.alphabet().labels());
+        let known = model.plants.iter().flat_map(|plant| plant.alphabet().labels());
         let known: Vec<String> = known.map(|label| model.alphabet.name(label)).collect();
         let help = spelling::question(&event, known.iter().map(String::as_str));
         let help = help.map_or_else(String::new, |help| format!("; {help}"));
@@ -79,10 +68,8 @@ pub fn synthesis_findings(model: &Model, result: &Supcon) -> Vec<Finding> {
     match (&result.explanation, &result.violation) {
         (Some(explanation), _) => findings.push(empty_finding(model, explanation)),
         (None, Some(violation)) => {
-            let message = format!(
-                "{}; the supervisor keeps away from there",
-                violated(model, violation)
-            );
+            let message =
+                format!("{}; the supervisor keeps away from there", violated(model, violation));
             findings.push(Finding::warning("U0840", message));
         }
         (None, None) => {}
@@ -110,11 +97,7 @@ pub fn modular_findings(model: &Model, result: &ModularSupervisor) -> Vec<Findin
     for local in &result.local {
         // A local result counts plants and specifications from 0; the model knows them by other numbers.
         let part = Model {
-            plants: local
-                .plants
-                .iter()
-                .map(|&plant| model.plants[plant].clone())
-                .collect(),
+            plants: local.plants.iter().map(|&plant| model.plants[plant].clone()).collect(),
             specifications: local
                 .specification
                 .map(|number| model.specifications[number].clone())

@@ -41,22 +41,16 @@ pub(crate) fn read<'t, T>(
     codes: &'static Codes,
     read: impl FnOnce(&mut Form<'t>, &DeTable<'t>) -> T,
 ) -> (Option<T>, Vec<Diagnostic>) {
-    let mut form = Form {
-        text,
-        codes,
-        diagnostics: Vec::new(),
-    };
+    let mut form = Form { text, codes, diagnostics: Vec::new() };
     let root = understudy_text::tables::parse(text, codes, &mut form.diagnostics);
     let result = root.map(|root| read(&mut form, root.get_ref()));
-    form.diagnostics
-        .sort_by_key(|diagnostic| diagnostic.span.start);
+    form.diagnostics.sort_by_key(|diagnostic| diagnostic.span.start);
     (result, form.diagnostics)
 }
 
 impl<'t> Form<'t> {
     pub(crate) fn error(&mut self, code: &'static str, message: impl Into<String>, place: Place) {
-        self.diagnostics
-            .push(Diagnostic::error(code, message, place));
+        self.diagnostics.push(Diagnostic::error(code, message, place));
     }
 
     /// An error with the known name that is nearest, or with `else_help`.
@@ -244,9 +238,5 @@ pub(crate) fn quoted(word: &str) -> String {
 /// A key as TOML writes it.
 pub(crate) fn key(word: &str) -> String {
     let is_bare = |letter: char| letter.is_ascii_alphanumeric() || letter == '_' || letter == '-';
-    if !word.is_empty() && word.chars().all(is_bare) {
-        word.to_owned()
-    } else {
-        quoted(word)
-    }
+    if !word.is_empty() && word.chars().all(is_bare) { word.to_owned() } else { quoted(word) }
 }

@@ -34,10 +34,8 @@ pub(crate) static MODEL: Table = Table {
 };
 
 /// An event of a net.
-pub(crate) static EVENT: Table = Table {
-    what: "an event",
-    keys: &[key("controllable", Kind::Flag), key("label", LABEL)],
-};
+pub(crate) static EVENT: Table =
+    Table { what: "an event", keys: &[key("controllable", Kind::Flag), key("label", LABEL)] };
 
 /// An event of a model, which may be bound to a signal.
 pub(crate) static SIGNAL_EVENT: Table = Table {
@@ -63,10 +61,8 @@ pub(crate) static AUTOMATON: Table = Table {
     ],
 };
 
-pub(crate) static NET_PLANT: Table = Table {
-    what: "a plant that is a net",
-    keys: &[required("net", Kind::Text)],
-};
+pub(crate) static NET_PLANT: Table =
+    Table { what: "a plant that is a net", keys: &[required("net", Kind::Text)] };
 
 pub(crate) static NET_FILE: Table = Table {
     what: "a net",
@@ -140,10 +136,7 @@ pub(crate) static SWITCH: Table = Table {
 
 pub(crate) static POSITION: Table = Table {
     what: "a position",
-    keys: &[
-        required("event", Kind::Text),
-        required("signal", Kind::Text),
-    ],
+    keys: &[required("event", Kind::Text), required("signal", Kind::Text)],
 };
 
 pub(crate) static PULSE: Table = Table {
@@ -167,8 +160,5 @@ pub(crate) static TIMER: Table = Table {
 
 pub(crate) static REQUEST: Table = Table {
     what: "a request",
-    keys: &[
-        required("event", Kind::Text),
-        required("signal", Kind::Text),
-    ],
+    keys: &[required("event", Kind::Text), required("signal", Kind::Text)],
 };

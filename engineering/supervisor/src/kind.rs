@@ -48,10 +48,7 @@ mod tests {
         check(model, Some(FileKind::Model));
         let map = include_str!("../../../examples/motivating-example/map.toml");
         check(map, Some(FileKind::SignalMap));
-        check(
-            include_str!("../../../examples/press-cell/cluster.toml"),
-            None,
-        );
+        check(include_str!("../../../examples/press-cell/cluster.toml"), None);
         check("title = \"Kill\"\ncycles = 10\n", None);
         check("", None);
     }

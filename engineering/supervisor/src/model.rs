@@ -77,10 +77,7 @@ impl Signal {
     /// The same, not read from a text.
     #[must_use]
     pub fn without_place(self) -> Self {
-        Self {
-            signal: Name::from(self.signal.as_str()),
-            ..self
-        }
+        Self { signal: Name::from(self.signal.as_str()), ..self }
     }
 }
 
@@ -97,10 +94,7 @@ impl Model {
 
     /// A sequence of events by their names.
     pub fn word(&self, word: &[Label]) -> String {
-        let names: Vec<String> = word
-            .iter()
-            .map(|&label| self.alphabet.name(label))
-            .collect();
+        let names: Vec<String> = word.iter().map(|&label| self.alphabet.name(label)).collect();
         names.join(" ")
     }
 }

@@ -54,9 +54,7 @@ pub fn synthesise_modularly(
 ) -> Result<ModularSupervisor, TooLarge> {
     let groups = groups(plants);
     let share = |group: &[usize], specification: &Automaton| {
-        group
-            .iter()
-            .any(|&plant| share_events(plants[plant], specification))
+        group.iter().any(|&plant| share_events(plants[plant], specification))
     };
     let mut local = Vec::new();
     for (number, specification) in specifications.iter().enumerate() {
@@ -70,10 +68,7 @@ pub fn synthesise_modularly(
         });
     }
     for group in &groups {
-        if !specifications
-            .iter()
-            .any(|specification| share(group, specification))
-        {
+        if !specifications.iter().any(|specification| share(group, specification)) {
             let automata: Vec<&Automaton> = group.iter().map(|&plant| plants[plant]).collect();
             local.push(LocalSupervisor {
                 specification: None,
@@ -100,20 +95,15 @@ fn together(supervisors: &[&Automaton], bounds: Bounds) -> Together {
 }
 
 fn share_events(left: &Automaton, right: &Automaton) -> bool {
-    left.alphabet()
-        .labels()
-        .any(|label| right.alphabet().contains(label))
+    left.alphabet().labels().any(|label| right.alphabet().contains(label))
 }
 
 /// Plants that share events, directly or through others, are one group.
 fn groups(plants: &[&Automaton]) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (number, plant) in plants.iter().enumerate() {
-        let concerns = |group: &Vec<usize>| {
-            group
-                .iter()
-                .any(|&other| share_events(plants[other], plant))
-        };
+        let concerns =
+            |group: &Vec<usize>| group.iter().any(|&other| share_events(plants[other], plant));
         let (joined, apart): (Vec<_>, Vec<_>) = groups.into_iter().partition(concerns);
         let mut group: Vec<usize> = joined.into_iter().flatten().collect();
         group.push(number);

@@ -55,8 +55,6 @@ impl TooComplex {
 
     fn of(error: &BddError, bounds: SymbolicBounds) -> Self {
         debug_assert!(matches!(error, BddError::TooManyNodes { .. }));
-        Self {
-            nodes: bounds.nodes,
-        }
+        Self { nodes: bounds.nodes }
     }
 }

@@ -25,9 +25,7 @@ pub fn unknown_events(plants: &[&Automaton], specifications: &[&Automaton]) -> V
     numbered
         .flat_map(|(number, specification)| {
             let labels = specification.alphabet().labels();
-            labels
-                .filter(|&label| !known.contains(label))
-                .map(move |label| (number, label))
+            labels.filter(|&label| !known.contains(label)).map(move |label| (number, label))
         })
         .collect()
 }

@@ -39,24 +39,12 @@ fn cell() -> Cell {
     let reduced = supreduce(&plant, &made, Bounds::default()).expect("small");
     let reduced = reduced.with_name("keeper");
     let ladder = to_ladder(&net, std::slice::from_ref(&reduced), 1_000).expect("a ladder");
-    Cell {
-        net,
-        plant,
-        specifications: model.specifications,
-        reduced,
-        ladder,
-    }
+    Cell { net, plant, specifications: model.specifications, reduced, ladder }
 }
 
 fn verdict(cell: &Cell) -> HybridVerdict {
     let supervisors = std::slice::from_ref(&cell.reduced);
-    prove_hybrid(
-        &cell.net,
-        supervisors,
-        &cell.ladder,
-        ProofSettings::default(),
-    )
-    .expect("a verdict")
+    prove_hybrid(&cell.net, supervisors, &cell.ladder, ProofSettings::default()).expect("a verdict")
 }
 
 #[test]
@@ -121,9 +109,7 @@ fn what_is_missing_from_the_ladder_is_found() {
 fn an_uncontrollable_supervisor_is_found() {
     let mut cell = cell();
     let steps = cell.reduced.transitions();
-    let kept: Vec<_> = steps
-        .filter(|step| step.label != Label::new(DONE))
-        .collect();
+    let kept: Vec<_> = steps.filter(|step| step.label != Label::new(DONE)).collect();
     let marked = cell.reduced.states().map(|_| true).collect();
     let events = cell.reduced.alphabet().events().to_vec();
     cell.reduced = Automaton::new("keeper", events, marked, kept).expect("deterministic");
@@ -132,10 +118,7 @@ fn an_uncontrollable_supervisor_is_found() {
     let HybridVerdict::Refuted(found) = verdict(&cell) else {
         panic!("it is proved");
     };
-    assert!(matches!(
-        found.deviation,
-        HybridDeviation::Uncontrollable { .. }
-    ));
+    assert!(matches!(found.deviation, HybridDeviation::Uncontrollable { .. }));
     insta::assert_snapshot!(found.to_string(), @r#"
 scan 1: events pick feed, outputs robot_runs feeder_runs, in robot_busy feeder_busy assembler_idle keeper:0
 scan 2: events placed fed pick assemble, outputs robot_runs assembler_runs, in robot_busy feeder_idle assembler_busy keeper:0
@@ -149,10 +132,8 @@ keeper would have to forbid done, and cannot
 fn the_ladder_is_that_of_the_example() {
     let cell = cell();
     let data = condat(&cell.plant, &cell.reduced, Bounds::default()).expect("small");
-    let avalanche: Vec<u32> = avalanche_events(&cell.reduced)
-        .iter()
-        .map(|label| label.number())
-        .collect();
+    let avalanche: Vec<u32> =
+        avalanche_events(&cell.reduced).iter().map(|label| label.number()).collect();
     insta::assert_snapshot!(format!(
         "plant {} states; reduced supervisor {} states, {} transitions, {} states with disablement; avalanche {avalanche:?}",
         cell.plant.state_count(),
@@ -174,13 +155,7 @@ fn the_ladder_is_that_of_the_example() {
 /// the specifications, the supervisor's bits are where its automaton is, and the cell goes on.
 #[test]
 fn the_ladder_keeps_the_specifications_and_goes_on() {
-    let Cell {
-        net,
-        specifications,
-        reduced,
-        ladder,
-        ..
-    } = cell();
+    let Cell { net, specifications, reduced, ladder, .. } = cell();
     let mut run = Interpreter::new(&ladder.program, Duration::from_millis(10)).expect("a ladder");
     let mut marking = net.initial();
     let mut keeper = State::INITIAL;
@@ -189,26 +164,20 @@ fn the_ladder_keeps_the_specifications_and_goes_on() {
     let mut seed = 1_u32;
     for _ in 0..20_000 {
         seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        let inputs: Vec<bool> = (0..ladder.program.inputs.len())
-            .map(|bit| seed >> (16 + bit) & 1 == 1)
-            .collect();
+        let inputs: Vec<bool> =
+            (0..ladder.program.inputs.len()).map(|bit| seed >> (16 + bit) & 1 == 1).collect();
         run.scan(&inputs);
         for (step, bit) in net.transitions().iter().zip(&ladder.fires) {
             if run.value(bit) != Some(true) {
                 continue;
             }
-            marking = net
-                .fire(&marking, step)
-                .expect("the net can fire what fires");
+            marking = net.fire(&marking, step).expect("the net can fire what fires");
             let label = step.label.expect("every transition is an event");
-            keeper = reduced
-                .step(keeper, label)
-                .expect("the supervisor allows what fires");
+            keeper = reduced.step(keeper, label).expect("the supervisor allows what fires");
             for (store, specification) in stores.iter_mut().zip(&specifications) {
                 if specification.alphabet().contains(label) {
-                    *store = specification
-                        .step(*store, label)
-                        .expect("no store runs over or empty");
+                    *store =
+                        specification.step(*store, label).expect("no store runs over or empty");
                 }
             }
             assembled += u32::from(label == Label::new(DONE));
@@ -229,10 +198,8 @@ fn findings_come_before_the_ladder() {
     let cell = cell();
     let supervisors = std::slice::from_ref(&cell.reduced);
     let found = hybrid_findings(&cell.net, supervisors, 1_000).expect("bounded");
-    let said: Vec<String> = found
-        .iter()
-        .map(|finding| format!("{} {}", finding.code(), finding.message))
-        .collect();
+    let said: Vec<String> =
+        found.iter().map(|finding| format!("{} {}", finding.code(), finding.message)).collect();
     insta::assert_snapshot!(said.join("\n"), @r#"
 U0885 a PLC that generates every command at once never comes to rest in a marked state from 30 of 30 states on, such as 0
 U0886 in `keeper` `placed` stands on successive transitions; its bit is reset by the rung that uses it

@@ -12,10 +12,7 @@ fn synthesised(text: &str) -> (Model, Automaton) {
     let model = read.model.expect("a model");
     let made = synthesise(&model.plants(), &model.specifications(), Bounds::default())
         .expect("small enough");
-    assert!(
-        made.is_as_specified(),
-        "the specifications are supervisors by themselves"
-    );
+    assert!(made.is_as_specified(), "the specifications are supervisors by themselves");
     (model, made.supervisor)
 }
 
@@ -42,10 +39,7 @@ fn map(text: &str) -> InputOutputMap {
 fn check(text: &str, map_text: &str, ladder: &str, thesis: &str) -> String {
     let (model, counts) = counts(text, thesis);
     let map = map(map_text);
-    let modules = Modules {
-        supervisors: &model.specifications,
-        plants: &model.plants,
-    };
+    let modules = Modules { supervisors: &model.specifications, plants: &model.plants };
     let conversion =
         convert(&modules, &map, Mode::Automatic).unwrap_or_else(|wrong| panic!("{wrong:?}"));
     let verdict = prove(
@@ -59,15 +53,9 @@ fn check(text: &str, map_text: &str, ladder: &str, thesis: &str) -> String {
         Verdict::Proved(proof) => proof,
         Verdict::Refuted(counterexample) => panic!("{counterexample}"),
     };
-    assert_eq!(
-        print(&conversion.program),
-        ladder,
-        "the ladder in examples/boiler is another one"
-    );
+    assert_eq!(print(&conversion.program), ladder, "the ladder in examples/boiler is another one");
     let found = findings(&modules).expect("small");
-    let messages = found
-        .iter()
-        .map(|finding| format!("{} {}", finding.code(), finding.message));
+    let messages = found.iter().map(|finding| format!("{} {}", finding.code(), finding.message));
     format!(
         "{counts}\n{} rungs, proved over {} states\n{}",
         conversion.program.rungs.len(),
@@ -101,10 +89,7 @@ fn the_main_supervisor_becomes_a_ladder_that_keeps_it() {
 /// Its ladder is proved where the command line makes it again.
 #[test]
 fn the_complete_supervisor_is_the_meet_of_its_specifications() {
-    let (_, counts) = counts(
-        include_str!("../../../examples/boiler/complete.toml"),
-        "57, 196",
-    );
+    let (_, counts) = counts(include_str!("../../../examples/boiler/complete.toml"), "57, 196");
     insta::assert_snapshot!(counts, @"
     thesis: 57, 196
     here: 1116, 7391; after minstate 592, 3843
@@ -128,14 +113,10 @@ fn always(text: &str, rules: &[&str]) {
         let (while_so, needed) = rule.split_once(": ").expect("a rule");
         let is = |state, side: &str| {
             let (name, states) = side.split_once(' ').expect("a part and its states");
-            states
-                .split(' ')
-                .any(|wanted| wanted == part(&model, names, state, name))
+            states.split(' ').any(|wanted| wanted == part(&model, names, state, name))
         };
-        let concerned: Vec<State> = supervisor
-            .states()
-            .filter(|&state| is(state, while_so))
-            .collect();
+        let concerned: Vec<State> =
+            supervisor.states().filter(|&state| is(state, while_so)).collect();
         assert!(!concerned.is_empty(), "{rule}: it is never so");
         for state in concerned {
             assert!(is(state, needed), "{rule}: {}", names[state.index()]);
@@ -173,10 +154,8 @@ fn an_emergency_closes_everything_in_a_bounded_number_of_commands() {
     let (model, supervisor) = synthesised(text);
     let names = supervisor.state_names().expect("names of the product");
     let stage = |state| part(&model, names, state, "stage");
-    let mut states: Vec<State> = supervisor
-        .states()
-        .filter(|&state| stage(state) == "danger")
-        .collect();
+    let mut states: Vec<State> =
+        supervisor.states().filter(|&state| stage(state) == "danger").collect();
     let mut commands = 0;
     while !states.is_empty() {
         commands += 1;
@@ -197,8 +176,5 @@ fn an_emergency_closes_everything_in_a_bounded_number_of_commands() {
         states.sort_unstable();
         states.dedup();
     }
-    assert_eq!(
-        commands, 8,
-        "at most, with the shut-down and burner management"
-    );
+    assert_eq!(commands, 8, "at most, with the shut-down and burner management");
 }

@@ -11,17 +11,12 @@ use understudy_supervisor::proof::{FindingKind, Proof, ProofSettings, Verdict, f
 const MODELS: [&str; 4] = ["small_factory", "transfer_line", "guideway", "dining5"];
 
 fn numbers(labels: &[Label]) -> Vec<u64> {
-    labels
-        .iter()
-        .map(|label| u64::from(label.number()))
-        .collect()
+    labels.iter().map(|label| u64::from(label.number())).collect()
 }
 
 fn expected_numbers(value: &serde_json::Value) -> Vec<u64> {
     let list = value.as_array().expect("a list");
-    list.iter()
-        .map(|number| number.as_u64().expect("a number"))
-        .collect()
+    list.iter().map(|number| number.as_u64().expect("a number")).collect()
 }
 
 #[test]
@@ -29,24 +24,13 @@ fn avalanche_events_are_those_of_the_reference() {
     for name in OF_PAPERS {
         let expected = json("avalanche", &format!("{name}.expected.json"));
         let found = avalanche_events(&automaton("avalanche", name));
-        assert_eq!(
-            numbers(&found),
-            expected_numbers(&expected["avalanche_events"]),
-            "{name}"
-        );
+        assert_eq!(numbers(&found), expected_numbers(&expected["avalanche_events"]), "{name}");
     }
     for model in MODELS.into_iter().chain(["agv", "line4_3"]) {
         let expected = json(model, "expected.json");
-        for (name, key) in [
-            ("_SUPER", "avalanche_super"),
-            ("_SIMSUP", "avalanche_reduced"),
-        ] {
+        for (name, key) in [("_SUPER", "avalanche_super"), ("_SIMSUP", "avalanche_reduced")] {
             let found = avalanche_events(&automaton(model, name));
-            assert_eq!(
-                numbers(&found),
-                expected_numbers(&expected[key]),
-                "{model} {name}"
-            );
+            assert_eq!(numbers(&found), expected_numbers(&expected[key]), "{model} {name}");
         }
     }
 }
@@ -57,18 +41,11 @@ fn findings_are_those_of_the_reference() {
         let expected = json(model, "expected.json");
         let supervisors = [automaton(model, "_SUPER")];
         let plants = Model::read(model).plants;
-        let modules = Modules {
-            supervisors: &supervisors,
-            plants: &plants,
-        };
+        let modules = Modules { supervisors: &supervisors, plants: &plants };
         let found = findings(&modules).expect("small enough");
         let has = |kind| found.iter().any(|finding| finding.kind == kind);
         assert!(!has(FindingKind::Controllability), "{model}");
-        assert_eq!(
-            !has(FindingKind::Blocking),
-            expected["nonblocking"],
-            "{model}"
-        );
+        assert_eq!(!has(FindingKind::Blocking), expected["nonblocking"], "{model}");
         assert_eq!(!has(FindingKind::Choice), expected["confluent"], "{model}");
         assert_eq!(
             !has(FindingKind::BlockingUnderControl),
@@ -76,11 +53,7 @@ fn findings_are_those_of_the_reference() {
             "{model}"
         );
         let longest_run_of_commands = &expected["bounded_response_unc_ctrl"][1];
-        assert_eq!(
-            has(FindingKind::Response),
-            longest_run_of_commands.is_null(),
-            "{model}"
-        );
+        assert_eq!(has(FindingKind::Response), longest_run_of_commands.is_null(), "{model}");
     }
 }
 
@@ -89,23 +62,11 @@ fn proved(modules: &Modules, mode: Mode) -> Proof {
     let conversion = convert(modules, &map, mode).expect("a direct map fits");
     let errors = check(&conversion.program);
     assert!(!understudy_text::has_errors(&errors), "{errors:?}");
-    let settings = ProofSettings {
-        mode,
-        ..ProofSettings::default()
-    };
-    match prove(
-        &conversion.program,
-        modules,
-        &map,
-        &conversion.correspondence,
-        settings,
-    ) {
+    let settings = ProofSettings { mode, ..ProofSettings::default() };
+    match prove(&conversion.program, modules, &map, &conversion.correspondence, settings) {
         Ok(Verdict::Proved(proof)) => proof,
         Ok(Verdict::Refuted(counterexample)) => {
-            panic!(
-                "{}\n{counterexample}",
-                understudy_ladder::print(&conversion.program)
-            )
+            panic!("{}\n{counterexample}", understudy_ladder::print(&conversion.program))
         }
         Err(error) => panic!("{error}"),
     }
@@ -138,15 +99,8 @@ fn ladders_of_reduced_supervisors_with_their_plants_are_proved() {
     for model in MODELS {
         let supervisors = [automaton(model, "_SIMSUP")];
         let plants = Model::read(model).plants;
-        let modules = Modules {
-            supervisors: &supervisors,
-            plants: &plants,
-        };
+        let modules = Modules { supervisors: &supervisors, plants: &plants };
         let proof = proved(&modules, Mode::Requested);
-        assert_eq!(
-            proof.joint_states,
-            automaton(model, "_SUPER").state_count(),
-            "{model}"
-        );
+        assert_eq!(proof.joint_states, automaton(model, "_SUPER").state_count(), "{model}");
     }
 }

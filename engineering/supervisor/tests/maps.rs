@@ -5,17 +5,10 @@ use understudy_supervisor::{Automaton, read_ads, read_model};
 use understudy_text::{Diagnostic, Report};
 
 fn shown(text: &str, diagnostics: Vec<Diagnostic>) -> String {
-    let report = Report {
-        name: String::new(),
-        text: text.to_owned(),
-        diagnostics,
-    };
+    let report = Report { name: String::new(), text: text.to_owned(), diagnostics };
     let lines = report.diagnostics.iter().map(|found| {
         let place = report.line_and_column(found.span.start);
-        let help = found
-            .help
-            .as_deref()
-            .map_or(String::new(), |help| format!(" ({help})"));
+        let help = found.help.as_deref().map_or(String::new(), |help| format!(" ({help})"));
         format!("{place} {} {}{help}", found.code, found.message)
     });
     lines.collect::<Vec<_>>().join("\n")
@@ -137,9 +130,7 @@ fn addresses_stand_in_the_ladder() {
         "{text}\n[addresses]\nx0 = \"%IX0.0\"\nx_c_hi = \"%QX1.7\"\nx_a = \"%I0.1\"\nrequest_c_hi = \"%IX2\"\n"
     );
     let map = read_map(&located).map.expect("a map");
-    let program = convert(&modules, &map, Mode::Requested)
-        .expect("it fits")
-        .program;
+    let program = convert(&modules, &map, Mode::Requested).expect("it fits").program;
     let signals = program.inputs.iter().chain(&program.outputs);
     let located = signals.filter_map(|signal| {
         let address = signal.address.as_ref()?;
@@ -181,9 +172,7 @@ transitions = ["up start down", "down done done", "done stop off", "off lifted u
 /// What a map does not say about an event, the model does.
 #[test]
 fn signals_of_a_model_are_a_map() {
-    let model = read_model(MODEL, |_| Err(String::new()))
-        .model
-        .expect("a model");
+    let model = read_model(MODEL, |_| Err(String::new())).model.expect("a model");
     let modules = Modules::supervisor(&model.supervisors[0]);
     let program = |map: &InputOutputMap| {
         let made = convert(&modules, map, Mode::Automatic).expect("it fits");
@@ -191,11 +180,7 @@ fn signals_of_a_model_are_a_map() {
         let shown = signals.map(|signal| {
             let address = signal.address.as_ref().map(ToString::to_string);
             let description = signal.description.as_deref().unwrap_or_default();
-            format!(
-                "{} {} {description}",
-                signal.name,
-                address.unwrap_or_default()
-            )
+            format!("{} {} {description}", signal.name, address.unwrap_or_default())
         });
         shown.collect::<Vec<_>>().join("\n")
     };

@@ -8,13 +8,9 @@ use understudy_supervisor::proof::{Deviation, ProofSettings, Verdict, prove};
 use understudy_supervisor::{Automaton, read_ads};
 
 fn example() -> (Automaton, InputOutputMap) {
-    let automaton = read_ads(include_str!(
-        "../../../examples/motivating-example/supervisor.ADS"
-    ));
+    let automaton = read_ads(include_str!("../../../examples/motivating-example/supervisor.ADS"));
     assert_eq!(automaton.diagnostics, []);
-    let map = read_map(include_str!(
-        "../../../examples/motivating-example/map.toml"
-    ));
+    let map = read_map(include_str!("../../../examples/motivating-example/map.toml"));
     assert_eq!(map.diagnostics, []);
     let map = map.map.expect("a map without findings");
     let automaton = automaton.automaton.expect("an automaton without findings");
@@ -34,19 +30,9 @@ fn rows(mode: Mode) -> String {
 
 fn verdict(program: &Program, conversion: &Conversion, mode: Mode) -> Verdict {
     let (automaton, map) = example();
-    let settings = ProofSettings {
-        mode,
-        ..ProofSettings::default()
-    };
+    let settings = ProofSettings { mode, ..ProofSettings::default() };
     let modules = Modules::supervisor(&automaton);
-    prove(
-        program,
-        &modules,
-        &map,
-        &conversion.correspondence,
-        settings,
-    )
-    .expect("a verdict")
+    prove(program, &modules, &map, &conversion.correspondence, settings).expect("a verdict")
 }
 
 #[test]
@@ -69,23 +55,14 @@ fn the_ladder_is_one_without_warnings() {
     for mode in [Mode::Automatic, Mode::Manual, Mode::Requested] {
         let program = conversion(mode).program;
         assert_eq!(check(&program), []);
-        assert_eq!(
-            parse(&print(&program))
-                .into_result()
-                .map(|(again, _)| again),
-            Ok(program)
-        );
+        assert_eq!(parse(&print(&program)).into_result().map(|(again, _)| again), Ok(program));
     }
 }
 
 /// Where the PLC acts by itself it never rests in the states 2, 6 and 8, which its next command leaves in the same scan.
 #[test]
 fn every_mode_is_proved() {
-    for (mode, states) in [
-        (Mode::Automatic, 7),
-        (Mode::Manual, 8),
-        (Mode::Requested, 10),
-    ] {
+    for (mode, states) in [(Mode::Automatic, 7), (Mode::Manual, 8), (Mode::Requested, 10)] {
         let conversion = conversion(mode);
         match verdict(&conversion.program, &conversion, mode) {
             Verdict::Proved(proof) => {
@@ -105,16 +82,11 @@ fn the_rungs_of_the_thesis_run_away() {
     let conversion = conversion(Mode::Automatic);
     let mut program = conversion.program.clone();
     for rung in &mut program.rungs {
-        rung.network
-            .retain(|element| !format!("{element:?}").contains("commanded"));
+        rung.network.retain(|element| !format!("{element:?}").contains("commanded"));
     }
     program.rungs.sort_by_key(|rung| {
         let title = rung.title.clone().unwrap_or_default();
-        title
-            .split(':')
-            .next()
-            .and_then(|number| number.parse().ok())
-            .unwrap_or(0_u32)
+        title.split(':').next().and_then(|number| number.parse().ok()).unwrap_or(0_u32)
     });
     let Verdict::Refuted(counterexample) = verdict(&program, &conversion, Mode::Automatic) else {
         panic!("proved");

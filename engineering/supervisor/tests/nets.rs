@@ -5,11 +5,7 @@ use understudy_supervisor::petri::{ReadNet, draw_net_dot, draw_net_svg, read_net
 use understudy_text::{Diagnostic, Report};
 
 fn shown(text: &str, diagnostics: Vec<Diagnostic>) -> String {
-    let report = Report {
-        name: String::new(),
-        text: text.to_owned(),
-        diagnostics,
-    };
+    let report = Report { name: String::new(), text: text.to_owned(), diagnostics };
     let lines = report.diagnostics.iter().map(|found| {
         let place = report.line_and_column(found.span.start);
         let help = found.help.as_deref();
@@ -165,13 +161,8 @@ digraph "store" {
     // The page, a bar for each transition, and a circle for each place.
     assert_eq!(picture.matches("<rect").count(), 3);
     assert_eq!(picture.matches("<ellipse").count(), 2);
-    for text in [
-        ">held ≤ 3<",
-        ">/ bell once<",
-        ">after 1s500ms<",
-        ">●●●<",
-        "url(#circle)",
-    ] {
+    for text in [">held ≤ 3<", ">/ bell once<", ">after 1s500ms<", ">●●●<", "url(#circle)"]
+    {
         assert!(picture.contains(text), "{text}\n{picture}");
     }
 }

@@ -15,18 +15,11 @@ use understudy_supervisor::proof::{HybridVerdict, ProofSettings, prove_hybrid};
 use understudy_supervisor::{Alphabet, Automaton, Bounds, Event, Label, State, Transition};
 
 fn place(name: &str, initial: u32) -> Place {
-    Place {
-        name: name.into(),
-        initial,
-        ..Place::default()
-    }
+    Place { name: name.into(), initial, ..Place::default() }
 }
 
 fn arcs(places: &[(usize, u32)]) -> Vec<Arc> {
-    places
-        .iter()
-        .map(|&(place, weight)| Arc { place, weight })
-        .collect()
+    places.iter().map(|&(place, weight)| Arc { place, weight }).collect()
 }
 
 fn transition(name: &str, takes: &[(usize, u32)], gives: &[(usize, u32)]) -> NetTransition {
@@ -56,27 +49,14 @@ fn bounds_are_found_or_the_run_that_shows_there_is_none() {
             run: vec!["take".into(), "more".into()],
         }
     );
-    let many = Net::new(
-        "pool",
-        places,
-        vec![transition("take", &[(0, 1)], &[(1, 1)]), back],
-    )
-    .unwrap();
-    assert_eq!(
-        many.explore(2).unwrap_err(),
-        ExplorationError::TooLarge { limit: 2 }
-    );
+    let many =
+        Net::new("pool", places, vec![transition("take", &[(0, 1)], &[(1, 1)]), back]).unwrap();
+    assert_eq!(many.explore(2).unwrap_err(), ExplorationError::TooLarge { limit: 2 });
 }
 
 #[test]
 fn everything_wrong_with_a_net_is_said_at_once() {
-    let places = vec![
-        place("a", 2),
-        Place {
-            capacity: Some(1),
-            ..place("a", 2)
-        },
-    ];
+    let places = vec![place("a", 2), Place { capacity: Some(1), ..place("a", 2) }];
     let transitions = vec![transition("t", &[(5, 1)], &[(0, 0)])];
     let errors = Net::new("wrong", places, transitions).unwrap_err();
     let messages: Vec<String> = errors.iter().map(ToString::to_string).collect();
@@ -112,19 +92,13 @@ fn reductions_take_away_what_has_no_part_in_control() {
         reductions,
         [
             Reduction::ParallelPlace("working".into()),
-            Reduction::Series {
-                transition: "prepare".into(),
-                place: "prepared".into()
-            },
+            Reduction::Series { transition: "prepare".into(), place: "prepared".into() },
             Reduction::ImpliedPlace("power".into()),
         ]
     );
     assert_eq!(reduced.places().len(), 2);
     let automaton = reduced.explore(10).unwrap().automaton().unwrap();
-    assert_eq!(
-        (automaton.state_count(), automaton.transition_count()),
-        (2, 2)
-    );
+    assert_eq!((automaton.state_count(), automaton.transition_count()), (2, 2));
 }
 
 fn condition() -> impl Strategy<Value = Condition> {
@@ -140,11 +114,8 @@ fn condition() -> impl Strategy<Value = Condition> {
 }
 
 fn random_arcs(most: usize, heaviest: u32) -> impl Strategy<Value = Vec<Arc>> {
-    proptest::collection::btree_map(0..4_usize, 1..=heaviest, 0..=most).prop_map(|arcs| {
-        arcs.into_iter()
-            .map(|(place, weight)| Arc { place, weight })
-            .collect()
-    })
+    proptest::collection::btree_map(0..4_usize, 1..=heaviest, 0..=most)
+        .prop_map(|arcs| arcs.into_iter().map(|(place, weight)| Arc { place, weight }).collect())
 }
 
 fn net(heaviest: u32) -> impl Strategy<Value = Net> {
@@ -155,14 +126,12 @@ fn net(heaviest: u32) -> impl Strategy<Value = Net> {
             _ => Vec::new(),
         })
     };
-    let place = move |index: usize| {
-        (0..3_u32, 2..4_u32, action(index)).prop_map(move |(initial, capacity, actions)| Place {
-            name: format!("p{index}"),
-            initial,
-            capacity: Some(capacity),
-            actions,
-        })
-    };
+    let place =
+        move |index: usize| {
+            (0..3_u32, 2..4_u32, action(index)).prop_map(move |(initial, capacity, actions)| {
+                Place { name: format!("p{index}"), initial, capacity: Some(capacity), actions }
+            })
+        };
     let places = (place(0), place(1), place(2), place(3));
     let step = (
         random_arcs(2, heaviest),
@@ -212,20 +181,14 @@ fn holds(condition: &Condition, last: &[bool], now: &[bool]) -> bool {
 fn follow(net: &Net, samples: &[[bool; 3]]) -> Result<(), TestCaseError> {
     let ladder = to_ladder(net, &[], 10_000).expect("a bounded net");
     let mut run = Interpreter::new(&ladder.program, Duration::from_millis(10)).expect("a ladder");
-    let names: Vec<String> = ladder
-        .program
-        .inputs
-        .iter()
-        .map(|signal| signal.name.to_string())
-        .collect();
+    let names: Vec<String> =
+        ladder.program.inputs.iter().map(|signal| signal.name.to_string()).collect();
     let mut marking = net.initial();
     let mut last = [false; 3];
     let mut counted: HashSet<usize> = HashSet::new();
     for (scan, now) in samples.iter().enumerate() {
-        let inputs: Vec<bool> = names
-            .iter()
-            .map(|name| now[name[1..].parse::<usize>().expect("a number")])
-            .collect();
+        let inputs: Vec<bool> =
+            names.iter().map(|name| now[name[1..].parse::<usize>().expect("a number")]).collect();
         run.scan(&inputs);
         let mut come: HashSet<usize> = HashSet::new();
         let mut moved: HashSet<usize> = HashSet::new();
@@ -233,20 +196,9 @@ fn follow(net: &Net, samples: &[[bool; 3]]) -> Result<(), TestCaseError> {
         for (transition, bit) in net.transitions().iter().zip(&ladder.fires) {
             let allowed = net.fire(&marking, transition);
             let condition = holds(&transition.condition, &last, now);
-            let touched = || {
-                transition
-                    .takes
-                    .iter()
-                    .chain(&transition.gives)
-                    .map(|arc| arc.place)
-            };
-            let read = || {
-                transition
-                    .inhibitors
-                    .iter()
-                    .chain(&transition.enablers)
-                    .map(|arc| arc.place)
-            };
+            let touched = || transition.takes.iter().chain(&transition.gives).map(|arc| arc.place);
+            let read =
+                || transition.inhibitors.iter().chain(&transition.enablers).map(|arc| arc.place);
             if run.value(bit).expect("a bit") {
                 let next = allowed.filter(|_| condition);
                 prop_assert!(
@@ -299,11 +251,7 @@ fn follow(net: &Net, samples: &[[bool; 3]]) -> Result<(), TestCaseError> {
 }
 
 fn settings() -> ProptestConfig {
-    ProptestConfig {
-        cases: 256,
-        failure_persistence: None,
-        ..ProptestConfig::default()
-    }
+    ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() }
 }
 
 proptest! {
@@ -361,10 +309,7 @@ fn supervised(net: Net, delayed: &[bool], targets: &[Option<u32>]) -> (Net, Auto
     for (number, transition) in transitions.iter_mut().enumerate() {
         transition.label = Some(Label::new(2 * number as u32 + 1));
         let waits = Some(Duration::from_millis(20)).filter(|_| delayed[number]);
-        let late = NetTransition {
-            delay: waits,
-            ..transition.clone()
-        };
+        let late = NetTransition { delay: waits, ..transition.clone() };
         // A condition on an edge takes no delay.
         if Net::new("one", net.places().to_vec(), vec![late.clone()]).is_ok() {
             *transition = late;
@@ -374,11 +319,7 @@ fn supervised(net: Net, delayed: &[bool], targets: &[Option<u32>]) -> (Net, Auto
     let events: Vec<Event> = labels.map(Event::unnamed).collect();
     let steps = (0..3).flat_map(|state| events.iter().map(move |event| (state, event.label)));
     let steps = steps.zip(targets).filter_map(|((source, label), target)| {
-        Some(Transition {
-            source: State::new(source),
-            label,
-            target: State::new((*target)?),
-        })
+        Some(Transition { source: State::new(source), label, target: State::new((*target)?) })
     });
     let supervisor = Automaton::new("keeper", events.clone(), vec![true; 3], steps.collect());
     let net = Net::new(net.name(), net.places().to_vec(), transitions).expect("a net");
@@ -417,12 +358,7 @@ fn a_delay_holds_its_token() {
     moves.condition = Condition::Signal(Name::from("u0"), When::High);
     moves.delay = Some(Duration::from_millis(30));
     let back = transition("back", &[(1, 1)], &[(0, 1)]);
-    let net = Net::new(
-        "delay",
-        vec![place("p1", 1), place("p2", 0)],
-        vec![moves, back],
-    )
-    .unwrap();
+    let net = Net::new("delay", vec![place("p1", 1), place("p2", 0)], vec![moves, back]).unwrap();
     let ladder = to_ladder(&net, &[], 100).unwrap();
     let mut run = Interpreter::new(&ladder.program, Duration::from_millis(10)).unwrap();
     let mut scans = String::new();

@@ -43,18 +43,10 @@ fn map(whens: [When; 3], start: bool, modules: &Modules) -> InputOutputMap {
         })
         .collect();
     inputs.retain(|input| is_known(&input.event));
-    let position = Position {
-        event: Name::from("3"),
-        signal: Name::from("y3"),
-    };
-    let mut switch = Switch {
-        off: Some(Name::from("1")),
-        positions: vec![position],
-        memory: false,
-    };
-    switch
-        .positions
-        .retain(|position| is_known(&position.event));
+    let position = Position { event: Name::from("3"), signal: Name::from("y3") };
+    let mut switch =
+        Switch { off: Some(Name::from("1")), positions: vec![position], memory: false };
+    switch.positions.retain(|position| is_known(&position.event));
     switch.off = switch.off.filter(is_known);
     let pulse = |event: &Name| Pulse {
         event: event.clone(),
@@ -109,27 +101,13 @@ fn verdict(
     mode: Mode,
     simultaneous: usize,
 ) -> Verdict {
-    let settings = ProofSettings {
-        mode,
-        simultaneous,
-        ..ProofSettings::default()
-    };
-    prove(
-        &conversion.program,
-        modules,
-        map,
-        &conversion.correspondence,
-        settings,
-    )
-    .expect("a verdict")
+    let settings = ProofSettings { mode, simultaneous, ..ProofSettings::default() };
+    prove(&conversion.program, modules, map, &conversion.correspondence, settings)
+        .expect("a verdict")
 }
 
 fn settings() -> ProptestConfig {
-    ProptestConfig {
-        cases: 96,
-        failure_persistence: None,
-        ..ProptestConfig::default()
-    }
+    ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() }
 }
 
 proptest! {

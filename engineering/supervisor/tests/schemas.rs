@@ -59,22 +59,10 @@ fn check(schema: &schemars::Schema, text: &str) {
 
 #[test]
 fn what_is_right_fits() {
-    check(
-        &net_schema(),
-        include_str!("../../../examples/assembly-cell/net.toml"),
-    );
-    check(
-        &model_schema(),
-        include_str!("../../../examples/assembly-cell/model.toml"),
-    );
-    check(
-        &model_schema(),
-        include_str!("../../../examples/small-factory/model.toml"),
-    );
-    check(
-        &map_schema(),
-        include_str!("../../../examples/motivating-example/map.toml"),
-    );
+    check(&net_schema(), include_str!("../../../examples/assembly-cell/net.toml"));
+    check(&model_schema(), include_str!("../../../examples/assembly-cell/model.toml"));
+    check(&model_schema(), include_str!("../../../examples/small-factory/model.toml"));
+    check(&map_schema(), include_str!("../../../examples/motivating-example/map.toml"));
 }
 
 /// A file with every key of a schema, of the right type; the reader may find fault with the words, and not with a key.
@@ -85,9 +73,8 @@ fn full(schema: &Value) -> Value {
     match schema["type"].as_str() {
         Some("object") => {
             let properties = schema["properties"].as_object().into_iter().flatten();
-            let mut table: serde_json::Map<String, Value> = properties
-                .map(|(key, value)| (key.clone(), full(value)))
-                .collect();
+            let mut table: serde_json::Map<String, Value> =
+                properties.map(|(key, value)| (key.clone(), full(value))).collect();
             if schema["additionalProperties"].is_object() {
                 table.insert("a".to_owned(), full(&schema["additionalProperties"]));
             }
@@ -106,10 +93,8 @@ fn every_key_of_a_schema_is_one_of_the_reader() {
         let value: toml::Value = serde_json::from_value(full(schema.as_value())).expect("TOML");
         toml::to_string(&value).expect("TOML")
     };
-    let found = [
-        read_net(&text(&net_schema())).diagnostics,
-        read_map(&text(&map_schema())).diagnostics,
-    ];
+    let found =
+        [read_net(&text(&net_schema())).diagnostics, read_map(&text(&map_schema())).diagnostics];
     for found in found.iter().flatten() {
         assert!(!["U0862", "U0864"].contains(&found.code), "{found:?}");
     }

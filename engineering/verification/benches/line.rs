@@ -68,15 +68,9 @@ fn painting() {
     let subject = Subject::new(&program, Duration::from_millis(10)).expect("a right program");
     let found = read(properties);
     let formulas = found.properties.iter();
-    let formulas: Vec<_> = formulas
-        .map(|property| subject.resolve(property).expect("known signals"))
-        .collect();
-    let answers = subject.check(
-        &formulas[..1],
-        Vec::new(),
-        Bounds::default(),
-        &mut |_, _| {},
-    );
+    let formulas: Vec<_> =
+        formulas.map(|property| subject.resolve(property).expect("known signals")).collect();
+    let answers = subject.check(&formulas[..1], Vec::new(), Bounds::default(), &mut |_, _| {});
     let proved = matches!(answers[0], Answer::Holds(_));
     println!(
         "painting system, {} state bits, specification proved: {proved}, {:.4} s   NuSMV 2.6 0.01 s",
@@ -86,9 +80,7 @@ fn painting() {
 }
 
 fn main() {
-    let folder = std::env::args()
-        .skip(1)
-        .find(|argument| !argument.starts_with("--"));
+    let folder = std::env::args().skip(1).find(|argument| !argument.starts_with("--"));
     painting();
     println!("stations  state bits  properties  proved       time   NuSMV 2.6");
     for (stations, peer_seconds) in LINES {
@@ -96,15 +88,12 @@ fn main() {
         let subject = Subject::new(&program, Duration::from_millis(10)).expect("a right program");
         let found = read(&properties(stations));
         let formulas = found.properties.iter();
-        let formulas: Vec<_> = formulas
-            .map(|property| subject.resolve(property).expect("known signals"))
-            .collect();
+        let formulas: Vec<_> =
+            formulas.map(|property| subject.resolve(property).expect("known signals")).collect();
         let begin = Instant::now();
         let answers = subject.check(&formulas, Vec::new(), Bounds::default(), &mut |_, _| {});
         let taken = begin.elapsed();
-        let proved = answers
-            .iter()
-            .filter(|answer| matches!(answer, Answer::Holds(_)));
+        let proved = answers.iter().filter(|answer| matches!(answer, Answer::Holds(_)));
         println!(
             "{stations:>8}  {:>10}  {:>10}  {:>6}  {:>7.3} s  {peer_seconds:>7.2} s",
             subject.circuit().registers().len(),

@@ -110,9 +110,7 @@ fn evaluations(
 ) -> Result<Vec<Evaluation>, LowerError> {
     let mut interpreter = Interpreter::new(program, period)?;
     let scans = trace.scans.iter();
-    Ok(scans
-        .map(|scan| interpreter.scan_observed(&scan.inputs))
-        .collect())
+    Ok(scans.map(|scan| interpreter.scan_observed(&scan.inputs)).collect())
 }
 
 /// The rungs on which signals depend, now and later, by what they write and read; by their place.

@@ -44,11 +44,7 @@ pub struct Depth<'g> {
 impl Depth<'_> {
     /// Up to k scans, however long it takes.
     pub fn of(scans: u32) -> Self {
-        Self {
-            scans,
-            steps: u64::MAX,
-            go_on: ALWAYS,
-        }
+        Self { scans, steps: u64::MAX, go_on: ALWAYS }
     }
 }
 
@@ -64,11 +60,7 @@ pub fn prove_always(
         return None;
     }
     let cone = Cone::of(circuit, [invariant]);
-    let patience = Patience {
-        go_on: depth.go_on,
-        scans: 0,
-        steps: Cell::new(depth.steps),
-    };
+    let patience = Patience { go_on: depth.go_on, scans: 0, steps: Cell::new(depth.steps) };
     let mut base = Unrolling::new(circuit, &cone, true, patience.clone());
     let mut step = Unrolling::new(circuit, &cone, false, patience);
     for scans in 0..=depth.scans {

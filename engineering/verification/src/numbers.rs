@@ -128,20 +128,14 @@ impl System {
         let limits = match range {
             Some(range) => (position(*range.start()), position(*range.end())),
             None => match of {
-                Elementary::Real => (
-                    position(f32::MIN.to_bits().into()),
-                    position(f32::MAX.to_bits().into()),
-                ),
+                Elementary::Real => {
+                    (position(f32::MIN.to_bits().into()), position(f32::MAX.to_bits().into()))
+                }
                 Elementary::Lreal => (position(f64::MIN.to_bits()), position(f64::MAX.to_bits())),
                 _ => execute::range(of),
             },
         };
-        self.inputs.push(Input {
-            name,
-            of,
-            term,
-            limits,
-        });
+        self.inputs.push(Input { name, of, term, limits });
         term
     }
 
@@ -149,13 +143,7 @@ impl System {
     fn cell(&mut self, name: String, of: Elementary, initial: u64) -> u32 {
         let number = self.cells.len() as u32;
         let term = self.terms.variable(of, Variable::Cell(number));
-        self.cells.push(Cell {
-            name,
-            of,
-            initial: initial & of.mask(),
-            term,
-            next: term,
-        });
+        self.cells.push(Cell { name, of, initial: initial & of.mask(), term, next: term });
         number
     }
 
@@ -167,8 +155,7 @@ impl System {
     }
 
     fn describe(&self, term: Term) -> String {
-        self.terms
-            .describe(term, &|variable| self.name_of(variable))
+        self.terms.describe(term, &|variable| self.name_of(variable))
     }
 }
 
@@ -183,11 +170,7 @@ impl Model {
     fn of(system: System) -> Result<Self, Unsupported> {
         let abstraction = Abstraction::new(&system)?;
         let subject = Subject::of(abstraction.circuit.clone());
-        Ok(Self {
-            system,
-            abstraction,
-            subject,
-        })
+        Ok(Self { system, abstraction, subject })
     }
 
     /// The circuit that stands for the programs.
@@ -211,13 +194,9 @@ impl Model {
         bounds: Bounds<'_>,
         answered: &mut dyn FnMut(),
     ) -> Vec<Answer> {
-        let answers = self
-            .subject
-            .check(properties, fair.to_vec(), bounds, &mut |_, _| answered());
+        let answers = self.subject.check(properties, fair.to_vec(), bounds, &mut |_, _| answered());
         let pairs = properties.iter().zip(answers);
-        pairs
-            .map(|(property, answer)| self.concrete(property, fair, answer, bounds))
-            .collect()
+        pairs.map(|(property, answer)| self.concrete(property, fair, answer, bounds)).collect()
     }
 
     fn concrete(
@@ -228,10 +207,7 @@ impl Model {
         bounds: Bounds<'_>,
     ) -> Answer {
         let cone = Cone::of(self.circuit(), fair.iter().chain([property]));
-        let is_exact = cone
-            .variables
-            .iter()
-            .all(|variable| self.is_exact(*variable));
+        let is_exact = cone.variables.iter().all(|variable| self.is_exact(*variable));
         let replay = Replay::new(&self.system, &self.abstraction, bounds.go_on);
         match answer {
             CircuitAnswer::Holds(None) if is_exact || is_of_all_runs(property) => {
@@ -282,10 +258,9 @@ impl Model {
         };
         match self.abstraction.meanings[input as usize] {
             Meaning::Bit(..) => true,
-            Meaning::Boundary(term, _) => matches!(
-                self.system.terms.node(term),
-                term::Node::Variable(Variable::Input(_))
-            ),
+            Meaning::Boundary(term, _) => {
+                matches!(self.system.terms.node(term), term::Node::Variable(Variable::Input(_)))
+            }
             Meaning::NotANumber(_) | Meaning::Less(..) | Meaning::Equal(..) | Meaning::Free(..) => {
                 false
             }

@@ -173,18 +173,14 @@ pub fn prove_parity_while(
         for (register, &place) in member.registers().iter().zip(registers) {
             let copy = &generated.registers()[place as usize];
             if copy.initial != register.initial {
-                return Err(Refutation::Initial {
-                    name: copy.name.clone(),
-                    found: copy.initial,
-                });
+                return Err(Refutation::Initial { name: copy.name.clone(), found: copy.initial });
             }
         }
     }
     let order = members.iter().enumerate().flat_map(|(number, member)| {
         let places = &places;
         let read = depth_first_order(member.graph(), &member.roots());
-        read.into_iter()
-            .map(move |variable| places.place(number, variable))
+        read.into_iter().map(move |variable| places.place(number, variable))
     });
     // The generated circuit may depend, wrongly, on what no member reads.
     let stray = depth_first_order(generated.graph(), &generated.roots());
@@ -197,9 +193,7 @@ pub fn prove_parity_while(
             .zip(members)
             .map(|(number, member)| {
                 let places = &places;
-                diagrams.builder(member.graph(), move |variable| {
-                    places.place(number, variable)
-                })
+                diagrams.builder(member.graph(), move |variable| places.place(number, variable))
             })
             .collect(),
         go_on,
@@ -220,10 +214,7 @@ pub fn prove_parity_while(
             .collect();
         comparison.compare(Place::Output(output.name.clone()), output.value, &terms)?;
     }
-    Ok(Proof {
-        registers: generated.registers().len(),
-        outputs: generated.outputs().len(),
-    })
+    Ok(Proof { registers: generated.registers().len(), outputs: generated.outputs().len() })
 }
 
 /// Where each member's signals are among those of the generated circuit, by member and by place.
@@ -241,12 +232,7 @@ impl Places {
             registers.map(|register| register.name.clone()).collect()
         };
         let widest = members.iter().map(|member| member.outputs().len()).max();
-        check_count(
-            generated,
-            "outputs",
-            generated.outputs().len(),
-            widest.unwrap_or(0),
-        )?;
+        check_count(generated, "outputs", generated.outputs().len(), widest.unwrap_or(0))?;
         Ok(Self {
             inputs: find(members, generated, "input", inputs.collect(), |member| {
                 member.inputs().to_vec()
@@ -278,12 +264,7 @@ fn check_count(
     if found == expected {
         return Ok(());
     }
-    Err(Refutation::Count {
-        kind,
-        found,
-        expected,
-        circuit: generated.name().to_owned(),
-    })
+    Err(Refutation::Count { kind, found, expected, circuit: generated.name().to_owned() })
 }
 
 /// For each member, where its signals are in `there`; each place is used once, and all are.
@@ -316,11 +297,7 @@ fn find(
         found.push(own);
     }
     let expected = used.iter().filter(|used| **used).count();
-    let kinds = if kind == "input" {
-        "inputs"
-    } else {
-        "registers"
-    };
+    let kinds = if kind == "input" { "inputs" } else { "registers" };
     check_count(generated, kinds, there.len(), expected)?;
     Ok(found)
 }
@@ -351,11 +328,7 @@ impl Comparison<'_> {
         let named = difference
             .into_iter()
             .map(|(variable, value)| (self.generated.variable_name(variable).to_owned(), value));
-        Err(Refutation::Function {
-            place,
-            found,
-            counterexample: Assignment(named.collect()),
-        })
+        Err(Refutation::Function { place, found, counterexample: Assignment(named.collect()) })
     }
 
     fn difference(

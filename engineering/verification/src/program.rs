@@ -44,12 +44,7 @@ pub struct Bounds<'a> {
 
 impl Default for Bounds<'_> {
     fn default() -> Self {
-        Self {
-            nodes: Diagrams::DEFAULT_LIMIT,
-            states: 1 << 26,
-            scans: 20,
-            go_on: ALWAYS,
-        }
+        Self { nodes: Diagrams::DEFAULT_LIMIT, states: 1 << 26, scans: 20, go_on: ALWAYS }
     }
 }
 
@@ -88,11 +83,7 @@ impl Subject {
 
     /// A circuit as it is; all its outputs are the program's own.
     pub(crate) fn of(circuit: Circuit) -> Self {
-        Self {
-            outputs: circuit.outputs().len(),
-            circuit,
-            listed: OnceCell::new(),
-        }
+        Self { outputs: circuit.outputs().len(), circuit, listed: OnceCell::new() }
     }
 
     /// What is proved about: the program's outputs come first, then its memory and pins.
@@ -110,23 +101,15 @@ impl Subject {
     /// # Errors
     /// Every name that is not a signal of the program (U0435).
     pub fn resolve(&self, property: &Property) -> Result<Resolved, Vec<Diagnostic>> {
-        resolve(&property.formula, &self.circuit).map_err(|unknown| {
-            unknown
-                .into_iter()
-                .map(|named| self.unknown(named))
-                .collect()
-        })
+        resolve(&property.formula, &self.circuit)
+            .map_err(|unknown| unknown.into_iter().map(|named| self.unknown(named)).collect())
     }
 
     fn unknown(&self, named: &Named) -> Diagnostic {
         let outputs = self.circuit.outputs().iter().map(|output| &output.name);
         let names = outputs.chain(self.circuit.inputs()).map(String::as_str);
         let help = suggestion(&named.name, names);
-        let message = format!(
-            "`{}` is not a signal of `{}`",
-            named.name,
-            self.circuit.name()
-        );
+        let message = format!("`{}` is not a signal of `{}`", named.name, self.circuit.name());
         Diagnostic::error("U0435", message, named.span.clone()).with_help(help)
     }
 

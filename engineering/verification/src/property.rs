@@ -176,21 +176,10 @@ impl<S: fmt::Display> fmt::Display for Formula<S> {
                 write!(formatter, "{}G {}", path.letter(), Operand(inner))
             }
             Self::Until(path, left, right) => {
-                write!(
-                    formatter,
-                    "{}[{} U {}]",
-                    path.letter(),
-                    Operand(left),
-                    Operand(right)
-                )
+                write!(formatter, "{}[{} U {}]", path.letter(), Operand(left), Operand(right))
             }
             Self::Within(path, scans, inner) => {
-                write!(
-                    formatter,
-                    "{}BF 0..{scans} {}",
-                    path.letter(),
-                    Operand(inner)
-                )
+                write!(formatter, "{}BF 0..{scans} {}", path.letter(), Operand(inner))
             }
         }
     }
@@ -200,15 +189,8 @@ struct Operand<'a, S>(&'a Formula<S>);
 
 impl<S: fmt::Display> fmt::Display for Operand<'_, S> {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let single = matches!(
-            self.0,
-            Formula::Constant(_) | Formula::Signal(_) | Formula::Not(_)
-        );
-        if single {
-            write!(formatter, "{}", self.0)
-        } else {
-            write!(formatter, "({})", self.0)
-        }
+        let single = matches!(self.0, Formula::Constant(_) | Formula::Signal(_) | Formula::Not(_));
+        if single { write!(formatter, "{}", self.0) } else { write!(formatter, "({})", self.0) }
     }
 }
 

@@ -19,17 +19,12 @@ pub use rungs::of_rungs;
 /// `circuit` as one module, with `properties` as specifications and `fair` as conditions of fairness.
 pub fn of_circuit(circuit: &Circuit, properties: &[Resolved], fair: &[Resolved]) -> String {
     let mut namer = Namer::default();
-    let inputs: Vec<String> = circuit
-        .inputs()
-        .iter()
-        .map(|name| namer.name(name))
-        .collect();
+    let inputs: Vec<String> = circuit.inputs().iter().map(|name| namer.name(name)).collect();
     let outputs = circuit.outputs().iter();
     let outputs: Vec<String> = outputs.map(|output| namer.name(&output.name)).collect();
     let registers = circuit.registers().iter();
-    let registers: Vec<String> = registers
-        .map(|register| namer.name(&format!("{}_before", register.name)))
-        .collect();
+    let registers: Vec<String> =
+        registers.map(|register| namer.name(&format!("{}_before", register.name))).collect();
     let mut text = format!(
         "-- {}: one step is one scan; NAME_before is the value before it\nMODULE main\n",
         circuit.name()
@@ -98,10 +93,8 @@ impl Shared {
                 }
             }
         }
-        let mut shared = Self {
-            texts: vec![String::new(); graph.operations().len()],
-            defined: Vec::new(),
-        };
+        let mut shared =
+            Self { texts: vec![String::new(); graph.operations().len()], defined: Vec::new() };
         for (place, &operation) in graph.operations().iter().enumerate() {
             if !reached[place] {
                 continue;
@@ -118,10 +111,8 @@ impl Shared {
                 Operation::Or(left, right) => format!("({} | {})", of(left), of(right)),
                 Operation::Xor(left, right) => format!("({} xor {})", of(left), of(right)),
             };
-            let two = matches!(
-                operation,
-                Operation::And(..) | Operation::Or(..) | Operation::Xor(..)
-            );
+            let two =
+                matches!(operation, Operation::And(..) | Operation::Or(..) | Operation::Xor(..));
             shared.texts[place] = if two && uses[place] > 1 {
                 let name = namer.name(&format!("shared_{}", shared.defined.len() + 1));
                 shared.defined.push((name.clone(), text));

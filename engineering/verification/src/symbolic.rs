@@ -50,21 +50,14 @@ pub fn resolve<'f>(
     let resolved = formula.map(&|named: &Named| signal(&named.name, circuit));
     resolved.ok_or_else(|| {
         let names = formula.signals().into_iter();
-        names
-            .filter(|named| signal(&named.name, circuit).is_none())
-            .collect()
+        names.filter(|named| signal(&named.name, circuit).is_none()).collect()
     })
 }
 
 fn signal(name: &str, circuit: &Circuit) -> Option<Signal> {
-    let output = circuit
-        .outputs()
-        .iter()
-        .position(|output| output.name == name);
+    let output = circuit.outputs().iter().position(|output| output.name == name);
     let input = || circuit.inputs().iter().position(|input| input == name);
-    output
-        .map(Signal::Output)
-        .or_else(|| input().map(Signal::Input))
+    output.map(Signal::Output).or_else(|| input().map(Signal::Input))
 }
 
 /// What came of one property.
@@ -127,10 +120,7 @@ impl<'c> Checker<'c> {
     /// The same, in the order of the circuit: what needs another one is soon too large.
     #[must_use]
     pub fn in_fixed_order(self) -> Self {
-        Self {
-            reorders: false,
-            ..self
-        }
+        Self { reorders: false, ..self }
     }
 
     /// The same, but after this number of steps a search goes through many scans at once where only timers count. Verdicts are the same; runs
@@ -171,11 +161,7 @@ impl<'c> Checker<'c> {
         let (nodes, reorders) = (self.nodes, self.reorders);
         let diagrams = |order| {
             let diagrams = Diagrams::new(order, nodes);
-            if reorders {
-                diagrams.reordered_by_need()
-            } else {
-                diagrams
-            }
+            if reorders { diagrams.reordered_by_need() } else { diagrams }
         };
         let (cone, fair) = (cone.clone(), &self.fair);
         model::Model::new(self.circuit, cone, fair, diagrams, self.single, self.go_on)

@@ -52,11 +52,7 @@ pub(crate) fn parts(trace: &Trace) -> Vec<Part> {
 pub fn scan_table(circuit: &Circuit, trace: &Trace) -> String {
     let mut text = String::new();
     let names = trace.signals.iter().map(|signal| signal.name(circuit));
-    let margin = names
-        .map(|name| name.chars().count())
-        .max()
-        .unwrap_or(0)
-        .max(4);
+    let margin = names.map(|name| name.chars().count()).max().unwrap_or(0).max(4);
     let column = trace.scans.len().saturating_sub(1).to_string().len() + 1;
     for parts in parts(trace).chunks(WIDTH) {
         let mut line = format!("{:<margin$}", "scan");
@@ -87,10 +83,7 @@ pub fn scan_table(circuit: &Circuit, trace: &Trace) -> String {
     }
     if let Some(again) = trace.again_from {
         let last = trace.scans.len() - 1;
-        let _ = writeln!(
-            text,
-            "after scan {last} the run repeats from scan {again} indefinitely"
-        );
+        let _ = writeln!(text, "after scan {last} the run repeats from scan {again} indefinitely");
     }
     text
 }
@@ -104,10 +97,7 @@ mod tests {
         let mut builder = understudy_logic::CircuitBuilder::new("one");
         builder.input("a");
         let circuit = builder.finish().expect("a right circuit");
-        let scan = |&value: &u8| ScanRow {
-            inputs: vec![value == 1],
-            outputs: Vec::new(),
-        };
+        let scan = |&value: &u8| ScanRow { inputs: vec![value == 1], outputs: Vec::new() };
         let trace = Trace {
             signals: vec![Signal::Input(0)],
             scans: values.iter().map(scan).collect(),

@@ -13,9 +13,7 @@ use understudy_verification::{Proof, Refutation, prove_parity, prove_parity_with
 
 fn named(recipes: &[Recipe]) -> Vec<Circuit> {
     let numbered = recipes.iter().enumerate();
-    numbered
-        .map(|(number, recipe)| circuit(&format!("p{number}"), recipe))
-        .collect()
+    numbered.map(|(number, recipe)| circuit(&format!("p{number}"), recipe)).collect()
 }
 
 /// `circuit` with its registers' initial values and all roots changed by `change`, told which root it is.
@@ -25,11 +23,8 @@ fn changed(
     change: impl Fn(&mut CircuitBuilder, usize, Expression) -> Expression,
 ) -> Circuit {
     let mut builder = CircuitBuilder::new("changed");
-    let inputs: Vec<Expression> = circuit
-        .inputs()
-        .iter()
-        .map(|name| builder.input(name.clone()))
-        .collect();
+    let inputs: Vec<Expression> =
+        circuit.inputs().iter().map(|name| builder.input(name.clone())).collect();
     let registers: Vec<_> = circuit
         .registers()
         .iter()
@@ -40,12 +35,10 @@ fn changed(
         })
         .collect();
     let roots = circuit.roots();
-    let copies = builder
-        .graph()
-        .import(circuit.graph(), &roots, |_, variable| match variable {
-            Variable::Input(index) => inputs[index as usize],
-            Variable::Register(index) => registers[index as usize].1,
-        });
+    let copies = builder.graph().import(circuit.graph(), &roots, |_, variable| match variable {
+        Variable::Input(index) => inputs[index as usize],
+        Variable::Register(index) => registers[index as usize].1,
+    });
     let mut made = Vec::new();
     for (place, copy) in copies.into_iter().enumerate() {
         made.push(change(&mut builder, place, copy));
@@ -188,11 +181,7 @@ fn refutations_name_what_is_wrong() {
         "U0422: two members both have `lamp.button`, so no circuit can hold a copy of each",
     );
     let alone = generate(&members[1..]).expect("one name").into_circuit();
-    check(
-        &members,
-        &alone,
-        "U0420: the input `valve.open` is missing in `understudy`",
-    );
+    check(&members, &alone, "U0420: the input `valve.open` is missing in `understudy`");
     check(
         &members[1..],
         &generated,
@@ -205,9 +194,8 @@ fn refutations_name_what_is_wrong() {
 fn what_is_too_large_is_said() {
     let mut builder = CircuitBuilder::new("multiplexer");
     let select: Vec<Expression> = (0..9).map(|bit| builder.input(format!("s{bit}"))).collect();
-    let mut layer: Vec<Expression> = (0..512)
-        .map(|line| builder.input(format!("d{line}")))
-        .collect();
+    let mut layer: Vec<Expression> =
+        (0..512).map(|line| builder.input(format!("d{line}"))).collect();
     for bit in select {
         layer = layer
             .chunks(2)
@@ -231,12 +219,10 @@ fn a_large_cluster_is_proved() {
     let program = |number: u32| {
         let mut builder = CircuitBuilder::new(format!("p{number}"));
         let rungs = 100;
-        let inputs: Vec<Expression> = (0..rungs)
-            .map(|rung| builder.input(format!("u{rung}")))
-            .collect();
-        let registers: Vec<_> = (0..rungs)
-            .map(|rung| builder.register(format!("x{rung}"), rung % 3 == 0))
-            .collect();
+        let inputs: Vec<Expression> =
+            (0..rungs).map(|rung| builder.input(format!("u{rung}"))).collect();
+        let registers: Vec<_> =
+            (0..rungs).map(|rung| builder.register(format!("x{rung}"), rung % 3 == 0)).collect();
         for rung in 0..rungs {
             let (start, stop) = (inputs[rung], inputs[(rung * 7 + 3) % rungs]);
             let (own, other) = (registers[rung].1, registers[(rung + 1) % rungs].1);
@@ -252,15 +238,7 @@ fn a_large_cluster_is_proved() {
         builder.finish().expect("names are numbered")
     };
     let members: Vec<Circuit> = (0..32).map(program).collect();
-    let generated = generate(&members)
-        .expect("names are numbered")
-        .into_circuit();
+    let generated = generate(&members).expect("names are numbered").into_circuit();
     let proof = prove_parity_within(&members, &generated, Diagrams::DEFAULT_LIMIT);
-    assert_eq!(
-        proof,
-        Ok(Proof {
-            registers: 3_200,
-            outputs: 100
-        })
-    );
+    assert_eq!(proof, Ok(Proof { registers: 3_200, outputs: 100 }));
 }

@@ -25,10 +25,7 @@ fn files(folder: &Path) -> Vec<Vec<u8>> {
     };
     let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
     paths.sort();
-    paths
-        .iter()
-        .filter_map(|path| fs::read(path).ok())
-        .collect()
+    paths.iter().filter_map(|path| fs::read(path).ok()).collect()
 }
 
 /// Replays, reads and changes; `seeds` are files of the project, relative to its root. Where libFuzzer leads, it does all of that.
@@ -50,17 +47,13 @@ pub(crate) fn attack(target: &str, seeds: &[&str], read: impl Fn(&[u8]) + RefUnw
         seed.truncate(MAXIMUM_BYTES);
         read(seed);
     }
-    let time = std::env::var("FUZZ_SECONDS")
-        .ok()
-        .and_then(|text| text.parse().ok());
+    let time = std::env::var("FUZZ_SECONDS").ok().and_then(|text| text.parse().ok());
     let run = bolero::check!().with_type::<(u16, Vec<Change>, Vec<u8>)>();
     let run = match time {
-        Some(seconds) => run
-            .with_iterations(usize::MAX)
-            .with_test_time(Duration::from_secs(seconds)),
-        None => run
-            .with_iterations(TRIES)
-            .with_test_time(Duration::from_secs(600)),
+        Some(seconds) => {
+            run.with_iterations(usize::MAX).with_test_time(Duration::from_secs(seconds))
+        }
+        None => run.with_iterations(TRIES).with_test_time(Duration::from_secs(600)),
     };
     run.for_each(|(seed, changes, bytes)| {
         let mut input = corpus[usize::from(*seed) % corpus.len()].clone();
@@ -125,10 +118,8 @@ fn apply(input: &mut Vec<u8>, (what, at, first, second): Change, bytes: &[u8], c
         }
         7 => {
             // A line again.
-            let start = input[..at]
-                .iter()
-                .rposition(|byte| *byte == b'\n')
-                .map_or(0, |place| place + 1);
+            let start =
+                input[..at].iter().rposition(|byte| *byte == b'\n').map_or(0, |place| place + 1);
             let stop = input[at..]
                 .iter()
                 .position(|byte| *byte == b'\n')

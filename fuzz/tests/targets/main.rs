@@ -34,10 +34,7 @@ fn ladder() {
         };
         // What is right is the same after it was printed, and becomes a circuit.
         let again = parse(&print(&program));
-        assert_eq!(
-            again.into_result().map(|(again, _)| print(&again)),
-            Ok(print(&program))
-        );
+        assert_eq!(again.into_result().map(|(again, _)| print(&again)), Ok(print(&program)));
         let _ = program.lower(Duration::from_millis(10));
     });
 }
@@ -77,11 +74,7 @@ fn cluster() {
 
 #[test]
 fn scenario() {
-    let seeds = [
-        "scenarios/kill-each.toml",
-        "scenarios/lossy.toml",
-        "scenarios/table-two.toml",
-    ];
+    let seeds = ["scenarios/kill-each.toml", "scenarios/lossy.toml", "scenarios/table-two.toml"];
     attack("scenario", &seeds, |bytes| {
         let text = text(bytes);
         let _ = understudy_scenarios::looks_like_a_scenario(&text);
@@ -91,10 +84,7 @@ fn scenario() {
 
 #[test]
 fn ads() {
-    let seeds = [
-        "examples/motivating-example/supervisor.ADS",
-        "examples/avalanche/TEST.ADS",
-    ];
+    let seeds = ["examples/motivating-example/supervisor.ADS", "examples/avalanche/TEST.ADS"];
     attack("ads", &seeds, |bytes| {
         let _ = understudy_supervisor::read_ads(&text(bytes));
     });
@@ -102,10 +92,7 @@ fn ads() {
 
 #[test]
 fn model() {
-    let seeds = [
-        "examples/small-factory/model.toml",
-        "examples/boiler/pilot.toml",
-    ];
+    let seeds = ["examples/small-factory/model.toml", "examples/boiler/pilot.toml"];
     attack("model", &seeds, |bytes| {
         let _ = understudy_supervisor::read_model(&text(bytes), |_| Err("absent".to_owned()));
     });
@@ -113,10 +100,7 @@ fn model() {
 
 #[test]
 fn map() {
-    let seeds = [
-        "examples/motivating-example/map.toml",
-        "examples/boiler/main-map.toml",
-    ];
+    let seeds = ["examples/motivating-example/map.toml", "examples/boiler/main-map.toml"];
     attack("map", &seeds, |bytes| {
         let _ = understudy_supervisor::ladder::read_map(&text(bytes));
     });
@@ -141,10 +125,7 @@ fn reconfiguration() {
 #[test]
 fn record_of_scans() {
     let names = |text: &str| text.split(' ').map(str::to_owned).collect();
-    let signals = Signals {
-        inputs: names("a b"),
-        outputs: names("y"),
-    };
+    let signals = Signals { inputs: names("a b"), outputs: names("y") };
     attack("record", &[], |bytes| {
         let _ = record::read("record.csv", &text(bytes), &signals);
     });
@@ -154,20 +135,15 @@ fn record_of_scans() {
 fn nesting_has_a_bound() {
     let deep = MAXIMUM_NESTING * 40;
     for open in ["[ ", "[ a | ", "{SR l R="] {
-        let text = format!(
-            "program p\ninput a\noutput y\nrung\n    {} ( y )\n",
-            open.repeat(deep)
-        );
+        let text = format!("program p\ninput a\noutput y\nrung\n    {} ( y )\n", open.repeat(deep));
         assert!(parse(&text).into_result().is_err());
     }
 }
 
 #[test]
 fn catalogue() {
-    let seeds = [
-        "engineering/allocation/data/controllers.csv",
-        "engineering/allocation/data/families.csv",
-    ];
+    let seeds =
+        ["engineering/allocation/data/controllers.csv", "engineering/allocation/data/families.csv"];
     attack("catalogue", &seeds, |bytes| {
         let Some(catalogue) = file::read("fuzz", &text(bytes)).catalogue else {
             return;

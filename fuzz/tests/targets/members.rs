@@ -41,11 +41,7 @@ fn frame() {
 #[test]
 fn sealed() {
     let secret = ClusterSecret::new([7; 32]);
-    let title = |member| Title {
-        cluster: "cell",
-        member,
-        generation: 1,
-    };
+    let title = |member| Title { cluster: "cell", member, generation: 1 };
     let (zero, one) = (Member::Station(StationId(0)), Member::Station(StationId(1)));
     attack("frame", &[], move |payload| {
         let key = || secret.frame_key(title("zero"));
@@ -105,9 +101,7 @@ fn register_of_keys() {
 /// What a line of standard input or a page may ask of a remote I/O.
 #[test]
 fn force() {
-    let settings = press_cell(Mode::Full)
-        .remote_io_settings(ProgramId(0))
-        .expect("the robot's");
+    let settings = press_cell(Mode::Full).remote_io_settings(ProgramId(0)).expect("the robot's");
     attack("force", &[], |bytes| {
         let mut remote_io = RemoteIo::new(Time(0), settings.clone());
         for line in bytes.split(|&byte| byte == b'\n').take(16) {

@@ -44,19 +44,15 @@ fn digraph() {
         is_sound(&program);
         // What is right is the same after it was written.
         let written = digraph::write(&program);
-        let again = digraph::read(&written)
-            .program
-            .map(|again| digraph::write(&again));
+        let again = digraph::read(&written).program.map(|again| digraph::write(&again));
         assert_eq!(again, Some(written));
     });
 }
 
 #[test]
 fn ldmicro() {
-    let seeds = [
-        "examples/other-tools/light.ld",
-        "programs/interchange/tests/ldmicro/full-of-errors.ld",
-    ];
+    let seeds =
+        ["examples/other-tools/light.ld", "programs/interchange/tests/ldmicro/full-of-errors.ld"];
     attack("ldmicro", &seeds, |bytes| {
         let reading = ldmicro::read("program", &text(bytes));
         reading.program.iter().for_each(is_sound);

@@ -12,10 +12,8 @@ fn text(bytes: &[u8]) -> String {
 
 #[test]
 fn properties() {
-    let seeds = [
-        "examples/vents/vents.properties",
-        "examples/painting-system/painting-system.properties",
-    ];
+    let seeds =
+        ["examples/vents/vents.properties", "examples/painting-system/painting-system.properties"];
     attack("properties", &seeds, |bytes| {
         let text = text(bytes);
         let found = read(&text);

@@ -129,26 +129,16 @@ pub fn compare(cluster: &Cluster, plan: &ComparisonPlan) -> Result<Comparison, C
         own.schedule.understudies(),
         plan.copies,
     )?;
-    let agreement = Arc::new(Agreement {
-        schedule,
-        ..Agreement::clone(own)
-    });
+    let agreement = Arc::new(Agreement { schedule, ..Agreement::clone(own) });
     let standby = |misses| Redundancy::HotStandby { misses };
     let pairs = [standby(1), standby(3), standby(5), Redundancy::ActiveActive];
     let mut contenders = vec![of_cluster(cluster, &agreement, plan)?];
     contenders.extend(pairs.map(|redundancy| of_pairs(cluster, &agreement, plan, redundancy)));
-    Ok(Comparison {
-        plan: *plan,
-        contenders,
-        real: Vec::new(),
-    })
+    Ok(Comparison { plan: *plan, contenders, real: Vec::new() })
 }
 
 fn lossy(loss: f64) -> Network {
-    Network {
-        loss,
-        ..Network::default()
-    }
+    Network { loss, ..Network::default() }
 }
 
 fn share(part: u64, whole: u64) -> f64 {
@@ -171,10 +161,7 @@ fn of_cluster(
         simulation.run(plan.cycles, PATIENCE_CYCLES, &mut |_, _, _, _| {})?;
         let (lost, deadlines) = lost(&simulation);
         wrong += simulation.violations().len() as u64;
-        lost_share.push(LostShare {
-            loss,
-            lost: share(lost, deadlines),
-        });
+        lost_share.push(LostShare { loss, lost: share(lost, deadlines) });
     }
     let mut simulation = Simulation::new(parts, Network::default(), plan.seed);
     simulation.run(0, PATIENCE_CYCLES, &mut |_, _, _, _| {})?;
@@ -233,12 +220,7 @@ fn cluster_failures(
         let phase = random.random();
         let repaired = at_cycle + REPAIR_AFTER;
         for (at_cycle, action) in [(at_cycle, Action::Crash), (repaired, Action::Restart)] {
-            simulation.schedule(Fault {
-                at_cycle,
-                phase,
-                member,
-                action,
-            });
+            simulation.schedule(Fault { at_cycle, phase, member, action });
         }
         let (before, _) = lost(&simulation);
         let end = FAILURE_EVERY * (failure + 1);
@@ -311,10 +293,7 @@ fn of_pairs(
             .into_iter()
             .map(|loss| {
                 let account = at(loss);
-                LostShare {
-                    loss,
-                    lost: share(account.lost, account.deadlines),
-                }
+                LostShare { loss, lost: share(account.lost, account.deadlines) }
             })
             .collect(),
     }
@@ -379,11 +358,7 @@ impl fmt::Display for Comparison {
         }
         for contender in &self.contenders {
             if let Some(wrong) = contender.wrong {
-                writeln!(
-                    formatter,
-                    "\n{}: {wrong} wrong outputs in all of it",
-                    contender.name
-                )?;
+                writeln!(formatter, "\n{}: {wrong} wrong outputs in all of it", contender.name)?;
             }
         }
         if !self.real.is_empty() {
@@ -398,9 +373,7 @@ impl fmt::Display for Comparison {
                 run.lost,
                 run.lost_by_stall,
                 run.wrong,
-                run.failure
-                    .as_deref()
-                    .map_or(String::new(), |why| format!("; {why}"))
+                run.failure.as_deref().map_or(String::new(), |why| format!("; {why}"))
             )?;
         }
         Ok(())

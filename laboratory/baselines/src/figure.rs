@@ -74,17 +74,12 @@ fn draw(
             .map(|point| (percent(point.loss), percent(point.lost).max(FLOOR)))
             .collect();
         chart
-            .draw_series(LineSeries::new(
-                points.iter().copied(),
-                colour.stroke_width(width),
-            ))?
+            .draw_series(LineSeries::new(points.iter().copied(), colour.stroke_width(width)))?
             .label(&contender.name)
             .legend(move |(x, y)| {
                 PathElement::new([(x, y), (x + 22, y)], colour.stroke_width(width))
             });
-        let dots = points
-            .iter()
-            .map(|&point| Circle::new(point, 3, colour.filled()));
+        let dots = points.iter().map(|&point| Circle::new(point, 3, colour.filled()));
         chart.draw_series(dots)?;
     }
     chart

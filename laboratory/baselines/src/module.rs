@@ -63,10 +63,7 @@ impl Module {
         self.began = now;
         self.decided = false;
         self.driven.clear();
-        let moment = Moment {
-            epoch: Epoch(0),
-            cycle: Cycle(self.cycle),
-        };
+        let moment = Moment { epoch: Epoch(0), cycle: Cycle(self.cycle) };
         let lineage = Lineage::genesis(ProgramHash::default(), moment);
         let frame = Arc::new(Frame {
             header: Header {
@@ -99,15 +96,9 @@ impl Module {
         if let Some((_, outputs)) = self.driven.first() {
             self.outputs.clone_from(outputs);
         }
-        let differ = self
-            .driven
-            .iter()
-            .any(|(_, outputs)| *outputs != self.outputs);
+        let differ = self.driven.iter().any(|(_, outputs)| *outputs != self.outputs);
         self.outbox.push_back(Output::Drive(self.outputs.clone()));
-        self.outbox.push_back(Output::Report(Deadline {
-            drivers: self.driven.len(),
-            differ,
-        }));
+        self.outbox.push_back(Output::Report(Deadline { drivers: self.driven.len(), differ }));
     }
 }
 

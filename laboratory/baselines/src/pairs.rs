@@ -84,11 +84,8 @@ impl Pairs {
         seed: u64,
     ) -> Self {
         let now = Time::default();
-        let scans: Vec<Arc<Executable>> = cluster
-            .programs()
-            .iter()
-            .map(|program| Arc::new(program.executable.clone()))
-            .collect();
+        let scans: Vec<Arc<Executable>> =
+            cluster.programs().iter().map(|program| Arc::new(program.executable.clone())).collect();
         let mut pairs = Self {
             redundancy,
             agreement: Arc::clone(agreement),
@@ -106,13 +103,8 @@ impl Pairs {
         for (index, place) in cluster.plants().iter().enumerate() {
             let program = ProgramId(index as u8);
             let scan = &pairs.scans[index];
-            let mut module = Module::new(
-                now,
-                program,
-                agreement,
-                scan.input_count(),
-                scan.output_count(),
-            );
+            let mut module =
+                Module::new(now, program, agreement, scan.input_count(), scan.output_count());
             let plant = place.as_ref().map(|place| place.plant.clone());
             let shown = plant.as_ref().map(Plant::field);
             if let Some(field) = &shown {
@@ -272,20 +264,11 @@ impl Pairs {
             let field = self.cells[feeder.index()].shown.as_ref();
             field.map_or(0, |field| field.handed_over)
         });
-        let Cell {
-            module,
-            plant,
-            shown,
-            taken,
-            ..
-        } = &mut self.cells[cell];
+        let Cell { module, plant, shown, taken, .. } = &mut self.cells[cell];
         if let Some(plant) = plant {
             let field = plant.step(outputs, handed_over - *taken);
             *taken = handed_over;
-            module.handle_input(
-                self.now,
-                Input::RemoteIo(RemoteIoInput::Field(&field.sensors)),
-            );
+            module.handle_input(self.now, Input::RemoteIo(RemoteIoInput::Field(&field.sensors)));
             *shown = Some(field);
         }
     }

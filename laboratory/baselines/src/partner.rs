@@ -93,11 +93,7 @@ impl Partner {
     /// A box of a pair that is just switched on: the first one drives.
     pub(crate) fn first(now: Time, settings: Settings) -> Self {
         let drives = settings.rank == 0 || settings.redundancy == Redundancy::ActiveActive;
-        let standing = if drives {
-            Standing::Active
-        } else {
-            Standing::Standby
-        };
+        let standing = if drives { Standing::Active } else { Standing::Standby };
         Self::new(now, settings, standing)
     }
 
@@ -162,12 +158,7 @@ impl Partner {
         }
         let scan = &self.settings.scan;
         let mut outputs = Image::zero(scan.output_count());
-        scan.step(
-            &mut self.scratch,
-            self.state.words_mut(),
-            inputs.words(),
-            outputs.words_mut(),
-        );
+        scan.step(&mut self.scratch, self.state.words_mut(), inputs.words(), outputs.words_mut());
         self.done = true;
         self.stepped = self.cycle;
         let program = self.settings.program;
@@ -180,10 +171,7 @@ impl Partner {
                 stepped: self.moment(self.stepped),
                 digest: Digest::of(&self.state),
             }],
-            words: smallvec![Word {
-                mask: ProgramSet::only(program),
-                sum: outputs,
-            }],
+            words: smallvec![Word { mask: ProgramSet::only(program), sum: outputs }],
             recalled: Vec::new(),
             lacks: ProgramSet::EMPTY,
             relayed: Vec::new(),
@@ -194,10 +182,7 @@ impl Partner {
 
     /// A cycle of this term.
     fn moment(&self, cycle: u64) -> Moment {
-        Moment {
-            epoch: Epoch(self.term),
-            cycle: Cycle(cycle),
-        }
+        Moment { epoch: Epoch(self.term), cycle: Cycle(cycle) }
     }
 
     /// The state for the other one; also the heartbeat.
@@ -308,8 +293,7 @@ impl Partner {
             self.standing = Standing::Active;
             self.term += 1;
             self.stepped = self.cycle.saturating_sub(1);
-            self.outbox
-                .push_back(Output::Report(Event::TookOver { forgotten }));
+            self.outbox.push_back(Output::Report(Event::TookOver { forgotten }));
             self.scan(now);
             if !self.done {
                 self.give_state(now);

@@ -53,11 +53,8 @@ struct Measured {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
-    let settings = Settings {
-        cycles: arguments.cycles,
-        period: PERIOD,
-        real_time: !arguments.no_real_time,
-    };
+    let settings =
+        Settings { cycles: arguments.cycles, period: PERIOD, real_time: !arguments.no_real_time };
     let carriers = [
         ("plain sockets", Carrier::Raw, None),
         ("udp", Carrier::Link(LinkKind::Udp), Some(1.2)),
@@ -77,23 +74,17 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
             incomplete_cycles: found.incomplete_cycles,
         });
     }
-    let mut text = format!(
-        "{:14} {:>9} {:>9} {:>6} {:>6}\n",
-        "carrier", "p50", "p99", "ratio", "bar"
-    );
+    let mut text =
+        format!("{:14} {:>9} {:>9} {:>6} {:>6}\n", "carrier", "p50", "p99", "ratio", "bar");
     for measured in &list {
-        let bar = measured
-            .bar
-            .map_or(String::new(), |bar| format!("{bar:.1}"));
+        let bar = measured.bar.map_or(String::new(), |bar| format!("{bar:.1}"));
         let _ = writeln!(
             text,
             "{:14} {:>6.0} us {:>6.0} us {:>6.2} {bar:>6}",
             measured.carrier, measured.p50_us, measured.p99_us, measured.ratio
         );
     }
-    let within = list
-        .iter()
-        .all(|measured| measured.bar.is_none_or(|bar| measured.ratio <= bar));
+    let within = list.iter().all(|measured| measured.bar.is_none_or(|bar| measured.ratio <= bar));
     let status = if within { Status::Done } else { Status::Failed };
     Ok(Answer::done(text, list).with_status(status))
 }

@@ -42,9 +42,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     let plan = ComparisonPlan {
         failures: arguments.failures,
         cycles: arguments.loss_cycles,
-        copies: arguments
-            .copies
-            .unwrap_or(cluster.agreement().schedule.copies()),
+        copies: arguments.copies.unwrap_or(cluster.agreement().schedule.copies()),
         seed: arguments.seed,
     };
     console.note("comparing in the simulator");
@@ -53,10 +51,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     if arguments.kills > 0 {
         for (link, overrides) in arguments.run.overrides.each_link() {
             console.note(&format!("killing real processes, over {link}"));
-            let run = RunArguments {
-                overrides,
-                ..arguments.run.clone()
-            };
+            let run = RunArguments { overrides, ..arguments.run.clone() };
             comparison.real.push(real(arguments, link, &run, console));
         }
     }
@@ -67,11 +62,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         write_file(path, &svg)?;
         text.push_str(&format!("\nfigure: {}\n", path.display()));
     }
-    let status = if is_right(&comparison) {
-        Status::Done
-    } else {
-        Status::Failed
-    };
+    let status = if is_right(&comparison) { Status::Done } else { Status::Failed };
     Ok(Answer::done(text, comparison).with_status(status))
 }
 

@@ -34,19 +34,12 @@ const RESTARTED_AT: u64 = 40;
 /// A trial: the cluster starts, then one station, another one in each trial, is killed and restarted.
 fn scenario(trial: u64, schedule: &Schedule) -> (StationId, Scenario) {
     let station = StationId((trial % schedule.stations() as u64) as u8);
-    let step = |at_cycle, action| Fault {
-        at_cycle,
-        phase: 0.0,
-        member: Member::Station(station),
-        action,
-    };
+    let step =
+        |at_cycle, action| Fault { at_cycle, phase: 0.0, member: Member::Station(station), action };
     let scenario = Scenario {
         title: format!("trial {trial}: a cluster starts, and a station joins"),
         cycles: RESTARTED_AT + JOIN_CYCLES + KILLED_AT,
-        steps: vec![
-            step(KILLED_AT, Action::Crash),
-            step(RESTARTED_AT, Action::Restart),
-        ],
+        steps: vec![step(KILLED_AT, Action::Crash), step(RESTARTED_AT, Action::Restart)],
         ..Scenario::default()
     };
     (station, scenario)
@@ -68,10 +61,7 @@ impl Joined {
         let restart = summary.steps.last().map(|step| step.measured);
         let intervals = summary.stations.get(station.index());
         let join = restart.zip(intervals).and_then(|(restart, found)| {
-            let mut on = found
-                .intervals
-                .iter()
-                .filter(|interval| interval.state == Presence::On);
+            let mut on = found.intervals.iter().filter(|interval| interval.state == Presence::On);
             let first = on.find(|interval| interval.to > restart)?;
             Some(first.from.saturating_sub(restart))
         });
@@ -110,10 +100,7 @@ struct Trials {
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let links = arguments.run.overrides.each_link();
     let links = links.into_iter().map(|(_, overrides)| {
-        let run = RunArguments {
-            overrides,
-            ..arguments.run.clone()
-        };
+        let run = RunArguments { overrides, ..arguments.run.clone() };
         trials(arguments.trials, &run, console)
     });
     let links: Result<Vec<Trials>, Answer> = links.collect();

@@ -70,9 +70,9 @@ impl Target {
             Self::Controllers => stations(0..controllers).collect(),
             Self::Understudies => stations(controllers..schedule.stations() as u8).collect(),
             Self::Stations => stations(0..schedule.stations() as u8).collect(),
-            Self::RemoteIos => (0..controllers)
-                .map(|program| Member::RemoteIo(ProgramId(program)))
-                .collect(),
+            Self::RemoteIos => {
+                (0..controllers).map(|program| Member::RemoteIo(ProgramId(program))).collect()
+            }
         }
     }
 
@@ -118,21 +118,12 @@ impl Trouble {
             };
             let begin = every * number as f64 + RECOVERY_CYCLES / 2.0 + random.random::<f64>();
             for (at, action) in [(begin, begins), (begin + lasts, ends)] {
-                steps.push(Fault {
-                    at_cycle: at as u64,
-                    phase: at.fract(),
-                    member,
-                    action,
-                });
+                steps.push(Fault { at_cycle: at as u64, phase: at.fract(), member, action });
             }
         }
         let stations = target != Target::RemoteIos;
         Scenario {
-            title: format!(
-                "{count} {} {}, from seed {seed}",
-                target.words(),
-                self.words()
-            ),
+            title: format!("{count} {} {}, from seed {seed}", target.words(), self.words()),
             cycles: (every * count as f64 + RECOVERY_CYCLES) as u64,
             steps,
             expect: Expectation {
@@ -191,9 +182,7 @@ impl Row {
             missed: total.missed,
             by_stall: total.held_by_stall + total.fail_safe_by_stall,
             passed: summary.passed,
-            not_met: not_met
-                .map(|it| format!("{}: {}", it.expected, it.found))
-                .collect(),
+            not_met: not_met.map(|it| format!("{}: {}", it.expected, it.found)).collect(),
         }
     }
 }

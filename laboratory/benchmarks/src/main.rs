@@ -1,9 +1,6 @@
 //! The `understudy-bench` command: benchmarks of speed and endurance on this machine.
 
-#![allow(
-    clippy::disallowed_methods,
-    reason = "a benchmark measures the time of this machine"
-)]
+#![allow(clippy::disallowed_methods, reason = "a benchmark measures the time of this machine")]
 
 mod exchange;
 mod failover;

@@ -44,34 +44,23 @@ struct Found {
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let cluster = simulated_press_cell()?;
     let stations = cluster.agreement().schedule.stations() as u64;
-    let network = Network {
-        loss: 0.01,
-        ..Network::default()
-    };
+    let network = Network { loss: 0.01, ..Network::default() };
     let mut simulation = Simulation::new(parts(&cluster), network, 1);
     // The simulation keeps every violation that it finds; here they are counted as they come.
     let mut violations = 0;
     let mut observe = |_: _, _: Option<u64>, _: Member, record: Record<'_>| {
         violations += u64::from(matches!(record, Record::Violation(_)));
     };
-    simulation
-        .run(0, PATIENCE_CYCLES, &mut observe)
-        .map_err(not_ready)?;
+    simulation.run(0, PATIENCE_CYCLES, &mut observe).map_err(not_ready)?;
     let mut points = Vec::new();
     let mut next = arguments.cycles / POINTS;
     for failure in 0..arguments.cycles / FAILURE_EVERY {
         let at_cycle = failure * FAILURE_EVERY + 1;
         let member = Member::Station(StationId((failure % stations) as u8));
-        for (at_cycle, action) in [
-            (at_cycle, Action::Crash),
-            (at_cycle + REPAIR_AFTER, Action::Restart),
-        ] {
-            simulation.schedule(Fault {
-                at_cycle,
-                phase: 0.3,
-                member,
-                action,
-            });
+        for (at_cycle, action) in
+            [(at_cycle, Action::Crash), (at_cycle + REPAIR_AFTER, Action::Restart)]
+        {
+            simulation.schedule(Fault { at_cycle, phase: 0.3, member, action });
         }
         let end = (failure + 1) * FAILURE_EVERY;
         simulation.go_on(end, &mut observe, &mut || false);
@@ -81,9 +70,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         }
     }
     let middle = points.get(points.len() / 2).map_or(0, |(_, kib)| *kib);
-    let growth_kib = points
-        .last()
-        .map_or(0, |(_, kib)| kib.saturating_sub(middle));
+    let growth_kib = points.last().map_or(0, |(_, kib)| kib.saturating_sub(middle));
     let mut text = String::new();
     for (cycles, kib) in &points {
         let _ = writeln!(text, "{cycles:>12} cycles {kib:>9} KiB");
@@ -92,17 +79,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         text,
         "{growth_kib} KiB more at the end than in the middle, {ALLOWED_KIB} allowed; {violations} violations"
     );
-    let status = if growth_kib <= ALLOWED_KIB && violations == 0 {
-        Status::Done
-    } else {
-        Status::Failed
-    };
-    let found = Found {
-        points,
-        growth_kib,
-        allowed_kib: ALLOWED_KIB,
-        violations,
-    };
+    let status =
+        if growth_kib <= ALLOWED_KIB && violations == 0 { Status::Done } else { Status::Failed };
+    let found = Found { points, growth_kib, allowed_kib: ALLOWED_KIB, violations };
     Ok(Answer::done(text, found).with_status(status))
 }
 
@@ -110,9 +89,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
 fn resident_kib() -> Result<u64, Answer> {
     let read = || {
         let status = fs::read_to_string("/proc/self/status").ok()?;
-        let line = status
-            .lines()
-            .find_map(|line| line.strip_prefix("VmRSS:"))?;
+        let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
         line.split_whitespace().next()?.parse().ok()
     };
     read().ok_or_else(|| {

@@ -40,15 +40,13 @@ struct Found {
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let (program, _) = ladder(&arguments.program)?;
     let rungs = program.rungs.len();
-    let circuit = program
-        .lower(PERIOD)
-        .map_err(|error| Answer::failed(Status::BadInput, "U0436", error))?;
+    let circuit =
+        program.lower(PERIOD).map_err(|error| Answer::failed(Status::BadInput, "U0436", error))?;
     let scan = Scan::new(&circuit);
     let images = images(circuit.inputs().len(), arguments.seed);
     let registers = circuit.registers().iter();
-    let mut state: Vec<u64> = registers
-        .map(|register| u64::from(register.initial).wrapping_neg())
-        .collect();
+    let mut state: Vec<u64> =
+        registers.map(|register| u64::from(register.initial).wrapping_neg()).collect();
     let mut scratch = Scratch::default();
     let mut outputs = vec![0; circuit.outputs().len()];
     let rounds = (0..ROUNDS).map(|_| {
@@ -74,9 +72,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
 /// Images of random inputs, taken in turn.
 fn images(inputs: usize, seed: u64) -> Vec<Vec<u64>> {
     let mut draw = Pcg64::seed_from_u64(seed);
-    (0..16)
-        .map(|_| (0..inputs).map(|_| draw.random()).collect())
-        .collect()
+    (0..16).map(|_| (0..inputs).map(|_| draw.random()).collect()).collect()
 }
 
 /// Nanoseconds of one scan.

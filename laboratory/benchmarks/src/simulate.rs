@@ -27,9 +27,7 @@ pub(crate) const PATIENCE_CYCLES: u64 = 1000;
 pub(crate) fn simulated_press_cell() -> Result<Cluster, Answer> {
     let files = press_cell();
     let loaded = read_with_files(files[0].text, files, Overrides::default());
-    loaded
-        .cluster
-        .ok_or_else(|| Answer::bad_files(loaded.reports))
+    loaded.cluster.ok_or_else(|| Answer::bad_files(loaded.reports))
 }
 
 /// The answer if the simulated cluster is not synchronised in time.
@@ -41,19 +39,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let cluster = simulated_press_cell()?;
     let mut simulation = Simulation::new(parts(&cluster), Network::default(), 1);
     let start = Instant::now();
-    simulation
-        .run(arguments.cycles, PATIENCE_CYCLES, &mut |_, _, _, _| {})
-        .map_err(not_ready)?;
+    simulation.run(arguments.cycles, PATIENCE_CYCLES, &mut |_, _, _, _| {}).map_err(not_ready)?;
     let speed = arguments.cycles as f64 / start.elapsed().as_secs_f64();
     let violations = simulation.violations().len();
     let ratio = speed / BAR;
     let text =
         format!("{speed:.0} cycles a second, {ratio:.2} of the bar, {violations} violations");
     let result = json!({ "cycles_per_second": speed, "ratio": ratio, "violations": violations });
-    let status = if ratio >= 1.0 && violations == 0 {
-        Status::Done
-    } else {
-        Status::Failed
-    };
+    let status = if ratio >= 1.0 && violations == 0 { Status::Done } else { Status::Failed };
     Ok(Answer::done(text, result).with_status(status))
 }

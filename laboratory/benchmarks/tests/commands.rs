@@ -11,9 +11,7 @@ const PERIOD: &str = "50ms";
 
 /// An empty folder for one test.
 fn empty_folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
-        .join("benchmarks")
-        .join(name);
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("benchmarks").join(name);
     if folder.exists() {
         fs::remove_dir_all(&folder).expect("the folder of an old run is removed");
     }
@@ -41,9 +39,7 @@ fn on_processes(name: &str, arguments: &[&str]) -> Value {
     let out = out.to_str().expect("text");
     let common = ["--link", "udp", "--period", PERIOD, "--out", out];
     let (_, document) = answer(&[arguments, &common].concat());
-    let left = fs::read_dir("/proc")
-        .expect("a Linux")
-        .filter_map(Result::ok);
+    let left = fs::read_dir("/proc").expect("a Linux").filter_map(Result::ok);
     let mut left = left.filter_map(|folder| fs::read(folder.path().join("cmdline")).ok());
     assert!(!left.any(|line| String::from_utf8_lossy(&line).contains(out)));
     assert!(document["result"].is_array(), "{document:#}");
@@ -85,10 +81,7 @@ fn the_scan_of_a_program_is_measured() {
     let (_, document) = answer(&["scan", "examples/press-cell/robot.ladder"]);
     let result = &document["result"];
     assert_eq!(result["runs"], 64, "{document:#}");
-    assert!(
-        result["nanoseconds_per_scan"].as_f64() > Some(0.0),
-        "{document:#}"
-    );
+    assert!(result["nanoseconds_per_scan"].as_f64() > Some(0.0), "{document:#}");
 }
 
 #[test]

@@ -116,9 +116,7 @@ pub fn run_campaign(
                     let number = next.fetch_add(1, Ordering::Relaxed);
                     // One that cannot be run ends the campaign; nobody listens then.
                     if number >= plan.failures
-                        || sender
-                            .send((number, simulated(cluster, plan, number)))
-                            .is_err()
+                        || sender.send((number, simulated(cluster, plan, number))).is_err()
                     {
                         return;
                     }
@@ -167,19 +165,16 @@ fn gathered(
     for run in runs {
         total_ns += run.ran_ns;
         match run.cause {
-            Some(cause) => campaign.failures.push(SystemFailure {
-                hours: plant_hours(run.ran_ns),
-                cause,
-            }),
+            Some(cause) => {
+                campaign.failures.push(SystemFailure { hours: plant_hours(run.ran_ns), cause })
+            }
             None => campaign.censored_hours.push(plant_hours(run.ran_ns)),
         }
         campaign.box_failures += run.asked;
         campaign.masked += run.asked - run.unmasked;
         let hours = |times: Vec<u64>| times.into_iter().map(plant_hours);
         campaign.repair_hours.extend(hours(run.repair.finished_ns));
-        campaign
-            .unfinished_repair_hours
-            .extend(hours(run.repair.unfinished_ns));
+        campaign.unfinished_repair_hours.extend(hours(run.repair.unfinished_ns));
         detection.extend(run.detection);
         taking_over.extend(run.taking_over);
         shadow.extend(run.shadow);

@@ -114,10 +114,7 @@ pub fn inject(
 ) -> Result<Findings, NotReady> {
     let bench = Bench::new(cluster)?;
     let target = Target::of(cluster);
-    let plan = &InjectionPlan {
-        kinds: target.kinds(&plan.kinds),
-        ..plan.clone()
-    };
+    let plan = &InjectionPlan { kinds: target.kinds(&plan.kinds), ..plan.clone() };
     let next = AtomicU64::new(0);
     let total = Mutex::new(Count::new(plan));
     std::thread::scope(|scope| {
@@ -232,12 +229,7 @@ fn small(
     let schedule = target.schedule;
     let (faultload, seed) = plan.draw(&target, run);
     let drawn = faultload.size().0;
-    let found = Violating {
-        faultload,
-        cycles: plan.cycles,
-        seed,
-        symptom: symptom.clone(),
-    };
+    let found = Violating { faultload, cycles: plan.cycles, seed, symptom: symptom.clone() };
     let shortens = plan.property != Property::Unprotected;
     let mut attempt = |faultload: &Faultload, cycles: u64, seed: u64| {
         bench.run(faultload, cycles, seed, plan.property).symptom

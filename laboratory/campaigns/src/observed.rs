@@ -125,11 +125,8 @@ fn view(mut watch: Watch, frame: &Frame, cut: bool) -> JournalView {
     let repairing = watch.repairing + open;
     let undetected: u64 = watch.detections.iter().sum();
     let all = (frame.to - frame.from) * frame.stations as u64;
-    let mut failures_at: Vec<f64> = watch
-        .failures
-        .iter()
-        .map(|at| hours(at.saturating_sub(frame.from)))
-        .collect();
+    let mut failures_at: Vec<f64> =
+        watch.failures.iter().map(|at| hours(at.saturating_sub(frame.from))).collect();
     failures_at.sort_by(f64::total_cmp);
     let count = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
     JournalView {
@@ -168,23 +165,14 @@ fn sign(record: &Record) -> Option<Sign> {
             Happening::RemoteIo(RemoteIo::Applied { source, .. }),
             Some(Member::RemoteIo(program)),
         ) => Some(Sign::Applied(program, *source)),
-        (
-            Happening::Run(RunEvent::Fault {
-                action,
-                member: Member::Station(rank),
-                ..
-            }),
-            _,
-        ) if Process::after(*action).is_some_and(|process| !process.is_running()) => {
+        (Happening::Run(RunEvent::Fault { action, member: Member::Station(rank), .. }), _)
+            if Process::after(*action).is_some_and(|process| !process.is_running()) =>
+        {
             Some(Sign::Taken(*rank))
         }
-        (
-            Happening::Run(RunEvent::Ended {
-                member: Member::Station(rank),
-                ..
-            }),
-            _,
-        ) => Some(Sign::Taken(*rank)),
+        (Happening::Run(RunEvent::Ended { member: Member::Station(rank), .. }), _) => {
+            Some(Sign::Taken(*rank))
+        }
         _ => None,
     }
 }
@@ -251,30 +239,16 @@ fn frame(signs: &[(u64, Sign)]) -> Result<Frame, ObservationError> {
         .collect();
     let from = first.values().max().copied().unwrap_or(0);
     if stations == 0 || programs == 0 || !silent.is_empty() || from >= to {
-        let silent = if silent.is_empty() {
-            "all".to_owned()
-        } else {
-            silent.join(", ")
-        };
+        let silent = if silent.is_empty() { "all".to_owned() } else { silent.join(", ") };
         return Err(ObservationError::NeverWhole { silent });
     }
-    Ok(Frame {
-        stations,
-        programs,
-        from,
-        to,
-    })
+    Ok(Frame { stations, programs, from, to })
 }
 
 impl Watch {
     fn new(frame: &Frame, signs: &[(u64, Sign)]) -> Self {
-        let up = Life::Up {
-            published: frame.from,
-            taken: None,
-        };
-        let stalls = signs
-            .iter()
-            .filter(|(_, sign)| matches!(sign, Sign::Stalled));
+        let up = Life::Up { published: frame.from, taken: None };
+        let stalls = signs.iter().filter(|(_, sign)| matches!(sign, Sign::Stalled));
         Self {
             lives: vec![up; frame.stations],
             programs: frame.programs,
@@ -325,10 +299,7 @@ impl Watch {
             Life::Up { taken, .. } => taken.filter(|taken| at < *taken),
             Life::Repaired { .. } => None,
         };
-        self.lives[rank.index()] = Life::Up {
-            published: at,
-            taken,
-        };
+        self.lives[rank.index()] = Life::Up { published: at, taken };
     }
 
     fn flagged(&mut self, at: u64, rank: StationId) {
@@ -359,12 +330,8 @@ impl Watch {
 
     /// Whether a stall of the host lies near.
     fn stands_still(&self, at: u64) -> bool {
-        let place = self
-            .stalls
-            .partition_point(|stall| *stall < at.saturating_sub(STALL_NS));
-        self.stalls
-            .get(place)
-            .is_some_and(|stall| *stall <= at + STALL_NS)
+        let place = self.stalls.partition_point(|stall| *stall < at.saturating_sub(STALL_NS));
+        self.stalls.get(place).is_some_and(|stall| *stall <= at + STALL_NS)
     }
 
     fn has_failed(&self) -> bool {

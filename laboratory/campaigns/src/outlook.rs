@@ -81,14 +81,7 @@ pub fn look_ahead(
         Mode::Paper => Rule::Paper,
     };
     let mut random = Pcg64::seed_from_u64(SEED);
-    let found = outlook(
-        &observed,
-        &options.system()?,
-        ahead,
-        CONFIDENCE,
-        DRAWS,
-        &mut random,
-    )?;
+    let found = outlook(&observed, &options.system()?, ahead, CONFIDENCE, DRAWS, &mut random)?;
     if observed.failures_at.len() < 5 {
         remarks.push(format!(
             "{} failures are too few to test whether they come at a constant rate and independently; that is assumed.",
@@ -146,10 +139,7 @@ impl JournalOutlook {
             &format!("R over the next {} h", grouped(outlook.ahead_hours)),
             said(&outlook.reliability),
         );
-        line(
-            "  averaged over what is unknown",
-            grouped(outlook.predicted),
-        );
+        line("  averaged over what is unknown", grouped(outlook.predicted));
         for remark in &self.remarks {
             let _ = writeln!(text, "{remark}");
         }

@@ -42,10 +42,7 @@ pub fn check(model: Model, threads: usize) -> Verdict {
         .map(|(property, path)| {
             let path = path.into_actions();
             let faults = checker.model().faults(&path);
-            let steps = path
-                .into_iter()
-                .filter(|&step| step != Step::Wait)
-                .collect();
+            let steps = path.into_iter().filter(|&step| step != Step::Wait).collect();
             let named = ALL.iter().find(|known| known.name == property);
             Counterexample {
                 property,
@@ -57,9 +54,5 @@ pub fn check(model: Model, threads: usize) -> Verdict {
         })
         .collect();
     counterexamples.sort_by_key(|example| example.property);
-    Verdict {
-        states: checker.unique_state_count(),
-        depth: checker.max_depth(),
-        counterexamples,
-    }
+    Verdict { states: checker.unique_state_count(), depth: checker.max_depth(), counterexamples }
 }

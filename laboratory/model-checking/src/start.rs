@@ -60,10 +60,7 @@ impl Start {
             [Action::Crash, Action::Restart].map(|action| fault(first, member, action))
         });
         let broken = self.broken.iter().flat_map(|&(from, to)| {
-            [
-                fault(SYNCHRONISED, from, Action::Cut { to }),
-                fault(first, from, Action::Heal { to }),
-            ]
+            [fault(SYNCHRONISED, from, Action::Cut { to }), fault(first, from, Action::Heal { to })]
         });
         stops.chain(goes_on).chain(restarts).chain(broken).collect()
     }

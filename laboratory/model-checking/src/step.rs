@@ -96,11 +96,7 @@ pub(crate) fn revivals(down: &[(Member, bool)], place: Place) -> Vec<Fault> {
         at_cycle: place.cycle,
         phase: place.phase(),
         member,
-        action: if crashed {
-            Action::Restart
-        } else {
-            Action::Continue
-        },
+        action: if crashed { Action::Restart } else { Action::Continue },
     };
     down.iter().map(back).collect()
 }
@@ -114,10 +110,7 @@ pub(crate) fn faults(step: Step, place: Place, members: &[Member], period: Durat
         action,
     };
     let for_a_slot = |member, during, after| {
-        vec![
-            fault(place, member, during),
-            fault(place.next(), member, after),
-        ]
+        vec![fault(place, member, during), fault(place.next(), member, after)]
     };
     match step {
         Step::Lose { from, to } => for_a_slot(from, Action::Cut { to }, Action::Heal { to }),
@@ -127,11 +120,7 @@ pub(crate) fn faults(step: Step, place: Place, members: &[Member], period: Durat
                 .flat_map(|&to| for_a_slot(from, Action::Cut { to }, Action::Heal { to }))
                 .collect()
         }
-        Step::Late {
-            from,
-            to,
-            per_mille,
-        } => {
+        Step::Late { from, to, per_mille } => {
             let by = period * per_mille / 1000;
             let on_time = Duration::ZERO;
             let late = Action::Delay { to, by };

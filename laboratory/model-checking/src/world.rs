@@ -59,22 +59,12 @@ impl Model {
         let period = parts.stations[0].agreement.schedule.period();
         let mut origin = Simulation::new(parts, Self::network(period), 0);
         origin.run(1, PATIENCE_CYCLES, &mut |_, _, _, _| {})?;
-        Ok(Self {
-            origin,
-            start,
-            members,
-            period,
-            budget,
-            properties: properties.to_vec(),
-        })
+        Ok(Self { origin, start, members, period, budget, properties: properties.to_vec() })
     }
 
     /// On which each frame takes T/20, and nothing is left to chance.
     pub fn network(period: Duration) -> Network {
-        Network {
-            latency: period / 20,
-            ..Network::default()
-        }
+        Network { latency: period / 20, ..Network::default() }
     }
 
     /// A run from the same start in which `faults` are done.
@@ -178,11 +168,7 @@ impl stateright::Model for Model {
         }
         let is_down = |member: Member| world.down.iter().any(|&(down, _)| down == member);
         for &(member, crashed) in &world.down {
-            steps.push(if crashed {
-                Step::Restart(member)
-            } else {
-                Step::Continue(member)
-            });
+            steps.push(if crashed { Step::Restart(member) } else { Step::Continue(member) });
         }
         if used.total < budget.total {
             let senders = self.senders(world);
@@ -238,8 +224,7 @@ impl stateright::Model for Model {
                 next.last = None;
                 next.place = world.place.next();
                 let Place { cycle, .. } = next.place;
-                next.simulation
-                    .go_to(cycle, next.place.phase(), &mut |_, _, _, _| {});
+                next.simulation.go_to(cycle, next.place.phase(), &mut |_, _, _, _| {});
             }
             _ => {}
         }
@@ -248,22 +233,13 @@ impl stateright::Model for Model {
 
     fn properties(&self) -> Vec<Checked<Self>> {
         let properties = self.properties.iter();
-        properties
-            .map(|property| Checked::always(property.name, property.holds))
-            .collect()
+        properties.map(|property| Checked::always(property.name, property.holds)).collect()
     }
 }
 
 impl Hash for World {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
-        let Self {
-            simulation,
-            place,
-            used,
-            down,
-            was_down,
-            last,
-        } = self;
+        let Self { simulation, place, used, down, was_down, last } = self;
         (simulation, place, used, down, was_down, last).hash(hasher);
         let untrue = |tally: &understudy_simulator::Tally| tally.held + tally.fail_safe > 0;
         simulation.tallies().iter().any(untrue).hash(hasher);

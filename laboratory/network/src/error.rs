@@ -71,9 +71,6 @@ impl NetworkError {
     }
 
     pub(crate) fn system<E: Into<io::Error>>(what: &'static str) -> impl FnOnce(E) -> Self {
-        move |error| Self::System {
-            what,
-            source: error.into(),
-        }
+        move |error| Self::System { what, source: error.into() }
     }
 }

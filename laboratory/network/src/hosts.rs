@@ -67,10 +67,7 @@ pub struct Hosts {
 
 /// The programs that [`Hosts`] needs and this machine does not have, with the packages that have them.
 pub fn missing_tools() -> Vec<NetworkError> {
-    [IP, NFT]
-        .into_iter()
-        .filter_map(|tool| tool.find().err())
-        .collect()
+    [IP, NFT].into_iter().filter_map(|tool| tool.find().err()).collect()
 }
 
 impl Hosts {
@@ -217,17 +214,13 @@ fn rules(cuts: &BTreeSet<(usize, usize)>, losses: &BTreeMap<(usize, usize), Shar
 
 fn current_namespace() -> Result<OwnedFd, NetworkError> {
     let file = File::open("/proc/thread-self/ns/net");
-    Ok(file
-        .map_err(NetworkError::system("this thread's own network namespace"))?
-        .into())
+    Ok(file.map_err(NetworkError::system("this thread's own network namespace"))?.into())
 }
 
 /// A new one; the thread is back in `own` afterwards.
 fn new_namespace(own: &OwnedFd) -> Result<OwnedFd, NetworkError> {
     unshare(CloneFlags::CLONE_NEWNET).map_err(|error| match error {
-        Errno::EPERM => NetworkError::NotPermitted {
-            source: error.into(),
-        },
+        Errno::EPERM => NetworkError::NotPermitted { source: error.into() },
         _ => NetworkError::system("a network namespace")(error),
     })?;
     let made = current_namespace();
@@ -244,9 +237,8 @@ fn visit<T>(there: &OwnedFd, own: &OwnedFd, work: impl FnOnce() -> T) -> Result<
 }
 
 fn come_back(own: &OwnedFd) -> Result<(), NetworkError> {
-    setns(own, CloneFlags::CLONE_NEWNET).map_err(NetworkError::system(
-        "to come back from a network namespace",
-    ))
+    setns(own, CloneFlags::CLONE_NEWNET)
+        .map_err(NetworkError::system("to come back from a network namespace"))
 }
 
 #[cfg(test)]
@@ -256,10 +248,7 @@ mod tests {
     #[test]
     fn rules_name_pairs_and_shares() {
         let share = Share::new(0.1).expect("a share");
-        let text = rules(
-            &BTreeSet::from([(0, 1)]),
-            &BTreeMap::from([((2, 0), share)]),
-        );
+        let text = rules(&BTreeSet::from([(0, 1)]), &BTreeMap::from([((2, 0), share)]));
         let rules: Vec<&str> = text.lines().skip(3).collect();
         assert_eq!(
             rules,

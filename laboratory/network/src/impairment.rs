@@ -167,18 +167,12 @@ impl From<Rate> for u64 {
 fn plain_number(text: &str) -> Option<f64> {
     let text = text.trim();
     let plain = text.starts_with(|first: char| first.is_ascii_digit())
-        && text
-            .bytes()
-            .all(|byte| byte.is_ascii_digit() || byte == b'.');
+        && text.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.');
     plain.then(|| text.parse().ok()).flatten()
 }
 
 fn wrong(found: &str, what: &'static str, example: &'static str) -> WrittenImpairment {
-    WrittenImpairment {
-        found: found.to_owned(),
-        what,
-        example,
-    }
+    WrittenImpairment { found: found.to_owned(), what, example }
 }
 
 #[cfg(test)]

@@ -143,10 +143,7 @@ impl Proxy {
         let mut addresses = Vec::new();
         let (mut lanes, mut streams) = (Vec::new(), Vec::new());
         for (number, route) in routes.iter().enumerate() {
-            let failed = |source| NetworkError::Listen {
-                address: route.listen,
-                source,
-            };
+            let failed = |source| NetworkError::Listen { address: route.listen, source };
             let seed = seed.wrapping_add(number as u64 * 2);
             match route.transport {
                 Transport::Udp => {
@@ -171,11 +168,7 @@ impl Proxy {
                 datagrams::carry(lanes, streams, &worker);
             })
             .map_err(NetworkError::system("a thread for the proxy"))?;
-        Ok(Self {
-            addresses,
-            shared,
-            threads: vec![thread],
-        })
+        Ok(Self { addresses, shared, threads: vec![thread] })
     }
 
     /// Where it listens, in the order of the routes.
@@ -224,10 +217,9 @@ fn check(route: &Route) -> Result<(), NetworkError> {
         return Ok(());
     }
     for impairment in [&route.forth, &route.back] {
-        for (share, what) in [
-            (impairment.duplicate, "to double"),
-            (impairment.reorder, "to reorder"),
-        ] {
+        for (share, what) in
+            [(impairment.duplicate, "to double"), (impairment.reorder, "to reorder")]
+        {
             if !share.is_never() {
                 return Err(NetworkError::NotOverTcp { what });
             }

@@ -23,14 +23,10 @@ pub fn run_proxy(
     let mut ending = SigSet::empty();
     ending.add(Signal::SIGINT);
     ending.add(Signal::SIGTERM);
-    ending
-        .thread_block()
-        .map_err(NetworkError::system("to hold back SIGINT and SIGTERM"))?;
+    ending.thread_block().map_err(NetworkError::system("to hold back SIGINT and SIGTERM"))?;
     let proxy = Proxy::start(routes, seed)?;
     announce(proxy.addresses());
-    ending
-        .wait()
-        .map_err(NetworkError::system("to wait for SIGINT or SIGTERM"))?;
+    ending.wait().map_err(NetworkError::system("to wait for SIGINT or SIGTERM"))?;
     Ok(proxy.counters())
 }
 

@@ -43,12 +43,7 @@ impl Shaper {
 
     /// A line that has carried nothing yet.
     pub fn new(impairment: Impairment, seed: u64) -> Self {
-        Self {
-            impairment,
-            random: Pcg64Mcg::seed_from_u64(seed),
-            free_ns: 0,
-            last_ns: 0,
-        }
+        Self { impairment, random: Pcg64Mcg::seed_from_u64(seed), free_ns: 0, last_ns: 0 }
     }
 
     /// A datagram that is sent at `now_ns`: nothing, once or twice what arrives.
@@ -69,10 +64,7 @@ impl Shaper {
                     self.last_ns = self.last_ns.max(due_ns);
                     self.last_ns
                 };
-                Passed {
-                    due_ns,
-                    bytes: self.content(bytes),
-                }
+                Passed { due_ns, bytes: self.content(bytes) }
             });
         }
         passed.into_iter().flatten()
@@ -81,18 +73,11 @@ impl Shaper {
     /// A piece of a stream, which always arrives, and in order.
     pub fn piece(&mut self, now_ns: u64, bytes: &[u8]) -> Passed {
         let lost = self.happens(self.impairment.loss);
-        let again_ns = if lost {
-            nanoseconds(Self::RETRANSMISSION)
-        } else {
-            0
-        };
+        let again_ns = if lost { nanoseconds(Self::RETRANSMISSION) } else { 0 };
         self.free_ns = self.free_ns.max(now_ns) + self.on_the_line_ns(bytes.len());
         let due_ns = self.free_ns + self.latency_ns() + again_ns;
         self.last_ns = self.last_ns.max(due_ns);
-        Passed {
-            due_ns: self.last_ns,
-            bytes: self.content(bytes),
-        }
+        Passed { due_ns: self.last_ns, bytes: self.content(bytes) }
     }
 
     /// When it has left, or nothing where too much waits.
@@ -111,10 +96,8 @@ impl Shaper {
     }
 
     fn latency_ns(&mut self) -> u64 {
-        let (delay, jitter) = (
-            nanoseconds(self.impairment.delay),
-            nanoseconds(self.impairment.jitter),
-        );
+        let (delay, jitter) =
+            (nanoseconds(self.impairment.delay), nanoseconds(self.impairment.jitter));
         if jitter == 0 {
             return delay;
         }
@@ -165,10 +148,7 @@ mod tests {
             }
         }
         found.sort();
-        found
-            .into_iter()
-            .map(|(due, _, bytes)| (due, bytes))
-            .collect()
+        found.into_iter().map(|(due, _, bytes)| (due, bytes)).collect()
     }
 
     #[test]
@@ -184,31 +164,12 @@ mod tests {
     #[test]
     fn shares_come_out_as_asked() {
         let tenth = share(0.1);
-        let lost = arrivals(
-            Impairment {
-                loss: tenth,
-                ..Impairment::default()
-            },
-            10_000,
-        );
+        let lost = arrivals(Impairment { loss: tenth, ..Impairment::default() }, 10_000);
         assert!((8_800..9_200).contains(&lost.len()), "{}", lost.len());
-        let duplicate = Impairment {
-            duplicate: tenth,
-            ..Impairment::default()
-        };
+        let duplicate = Impairment { duplicate: tenth, ..Impairment::default() };
         let doubled = arrivals(duplicate, 10_000);
-        assert!(
-            (10_800..11_200).contains(&doubled.len()),
-            "{}",
-            doubled.len()
-        );
-        let corrupted = arrivals(
-            Impairment {
-                corrupt: share(1.0),
-                ..Impairment::default()
-            },
-            100,
-        );
+        assert!((10_800..11_200).contains(&doubled.len()), "{}", doubled.len());
+        let corrupted = arrivals(Impairment { corrupt: share(1.0), ..Impairment::default() }, 100);
         for (number, (_, bytes)) in corrupted.iter().enumerate() {
             let changed = u16::from_be_bytes([bytes[0], bytes[1]]) ^ number as u16;
             assert_eq!(changed.count_ones(), 1);
@@ -224,10 +185,7 @@ mod tests {
         };
         let in_order = |found: &[(u64, Vec<u8>)]| found.windows(2).all(|two| two[0].1 <= two[1].1);
         assert!(in_order(&arrivals(jittered, 1000)));
-        let reordered = Impairment {
-            reorder: share(0.1),
-            ..jittered
-        };
+        let reordered = Impairment { reorder: share(0.1), ..jittered };
         let found = arrivals(reordered, 1000);
         assert_eq!(found.len(), 1000);
         assert!(!in_order(&found));
@@ -236,13 +194,7 @@ mod tests {
     #[test]
     fn a_rate_delays_and_then_drops() {
         let rate = Rate::new(1000);
-        let found = arrivals(
-            Impairment {
-                rate,
-                ..Impairment::default()
-            },
-            1000,
-        );
+        let found = arrivals(Impairment { rate, ..Impairment::default() }, 1000);
         // 16 bits take 16 ms, one comes every 1 ms: what would wait for more than a second is dropped.
         assert!(found.len() < 200, "{}", found.len());
         let gaps = found.windows(2).map(|two| two[1].0 - two[0].0);

@@ -13,15 +13,9 @@ pub(crate) struct Tool {
     pub(crate) package: &'static str,
 }
 
-pub(crate) const IP: Tool = Tool {
-    program: "ip",
-    package: "iproute2",
-};
+pub(crate) const IP: Tool = Tool { program: "ip", package: "iproute2" };
 
-pub(crate) const NFT: Tool = Tool {
-    program: "nft",
-    package: "nftables",
-};
+pub(crate) const NFT: Tool = Tool { program: "nft", package: "nftables" };
 
 /// Where programs of the system lie that are not on everybody's path.
 const SYSTEM_FOLDERS: [&str; 3] = ["/usr/sbin", "/sbin", "/usr/bin"];
@@ -33,20 +27,14 @@ impl Tool {
         folders
             .map(|folder| folder.join(self.program))
             .find(|program| program.is_file())
-            .ok_or(NetworkError::NoTool {
-                program: self.program,
-                package: self.package,
-            })
+            .ok_or(NetworkError::NoTool { program: self.program, package: self.package })
     }
 }
 
 /// Runs `program` with `input` on its standard input.
 pub(crate) fn run(program: &Path, arguments: &[&str], input: &str) -> Result<(), NetworkError> {
     let command = || format!("{} {}", program.display(), arguments.join(" "));
-    let failed = |said: String| NetworkError::Tool {
-        command: command(),
-        said,
-    };
+    let failed = |said: String| NetworkError::Tool { command: command(), said };
     let mut child = Command::new(program)
         .args(arguments)
         .stdin(Stdio::piped())
@@ -58,9 +46,7 @@ pub(crate) fn run(program: &Path, arguments: &[&str], input: &str) -> Result<(),
         // One that ends early says why on its standard error.
         let _ = standard_input.write_all(input.as_bytes());
     }
-    let output = child
-        .wait_with_output()
-        .map_err(|error| failed(error.to_string()))?;
+    let output = child.wait_with_output().map_err(|error| failed(error.to_string()))?;
     if output.status.success() {
         return Ok(());
     }

@@ -40,9 +40,7 @@ fn arrive(sockets: &[UdpSocket], from: usize, to: usize, count: usize) -> usize 
         sockets[from].send_to(b"frame", address).expect("sent");
     }
     let mut buffer = [0; 16];
-    (0..count)
-        .take_while(|_| sockets[to].recv(&mut buffer).is_ok())
-        .count()
+    (0..count).take_while(|_| sockets[to].recv(&mut buffer).is_ok()).count()
 }
 
 #[test]
@@ -95,8 +93,5 @@ fn the_machines_own_network_stays_as_it_is() {
     assert_eq!(namespace(), before);
     let named = std::fs::read_dir("/run/netns").map_or(0, Iterator::count);
     drop(hosts);
-    assert_eq!(
-        std::fs::read_dir("/run/netns").map_or(0, Iterator::count),
-        named
-    );
+    assert_eq!(std::fs::read_dir("/run/netns").map_or(0, Iterator::count), named);
 }

@@ -22,13 +22,7 @@ fn socket(patience: Duration) -> UdpSocket {
 }
 
 fn route(to: SocketAddr, transport: Transport, forth: Impairment) -> Route {
-    Route {
-        listen: anywhere(),
-        to,
-        transport,
-        forth,
-        back: Impairment::default(),
-    }
+    Route { listen: anywhere(), to, transport, forth, back: Impairment::default() }
 }
 
 /// A proxy before a socket: client, server, and where the client sends to.
@@ -58,10 +52,7 @@ fn datagrams_go_there_and_answers_come_back_to_whom_they_are_for() {
     drop(proxy);
     first.send_to(b"late", at).expect("sent");
     server.set_read_timeout(Some(MOMENT)).expect("a timeout");
-    assert!(
-        server.recv(&mut buffer).is_err(),
-        "a proxy that ended carries nothing"
-    );
+    assert!(server.recv(&mut buffer).is_err(), "a proxy that ended carries nothing");
 }
 
 #[test]
@@ -108,12 +99,7 @@ fn a_stream_arrives_whole_however_bad_the_line_is() {
     let mut received = Vec::new();
     server.read_to_end(&mut received).expect("it ends");
     writing.join().expect("no panic");
-    assert!(
-        received == sent,
-        "{} of {} bytes",
-        received.len(),
-        sent.len()
-    );
+    assert!(received == sent, "{} of {} bytes", received.len(), sent.len());
     server.write_all(b"thanks").expect("taken");
     drop(server);
     let mut answer = Vec::new();
@@ -123,25 +109,17 @@ fn a_stream_arrives_whole_however_bad_the_line_is() {
 
 #[test]
 fn what_a_stream_cannot_have_is_refused() {
-    let forth = Impairment {
-        reorder: Share::new(0.1).expect("a share"),
-        ..Impairment::default()
-    };
+    let forth = Impairment { reorder: Share::new(0.1).expect("a share"), ..Impairment::default() };
     let refused = Proxy::start(&[route(anywhere(), Transport::Tcp, forth)], 1);
-    assert!(matches!(
-        refused,
-        Err(NetworkError::NotOverTcp { what: "to reorder" })
-    ));
+    assert!(matches!(refused, Err(NetworkError::NotOverTcp { what: "to reorder" })));
 }
 
 #[test]
 fn an_address_in_use_is_named() {
     let taken = socket(DEADLINE);
     let address = taken.local_addr().expect("bound");
-    let route = Route {
-        listen: address,
-        ..route(anywhere(), Transport::Udp, Impairment::default())
-    };
+    let route =
+        Route { listen: address, ..route(anywhere(), Transport::Udp, Impairment::default()) };
     let refused = Proxy::start(&[route], 1);
     assert!(
         matches!(refused, Err(NetworkError::Listen { address: named, .. }) if named == address)

@@ -121,10 +121,8 @@ impl Binding {
         let mut places = |direction: Direction, terminals: &[&Terminal], points: &Points| {
             let mut places = Vec::with_capacity(terminals.len());
             let mut taken = HashSet::new();
-            let point_of: HashMap<&str, &Point> = points
-                .iter()
-                .map(|point| (point.name.as_str(), point))
-                .collect();
+            let point_of: HashMap<&str, &Point> =
+                points.iter().map(|point| (point.name.as_str(), point)).collect();
             for &terminal in terminals {
                 let signal = signals.get(&terminal.name).unwrap_or(&terminal.name);
                 let Some(&point) = point_of.get(signal.as_str()) else {

@@ -44,15 +44,7 @@ pub enum Pace {
 
 impl From<Refusal> for Event {
     fn from(refusal: Refusal) -> Self {
-        let Refusal {
-            member,
-            theirs,
-            ours,
-        } = refusal;
-        Self::Refused {
-            member,
-            theirs,
-            ours,
-        }
+        let Refusal { member, theirs, ours } = refusal;
+        Self::Refused { member, theirs, ours }
     }
 }

@@ -21,10 +21,7 @@ impl Feeder {
         let supply = if fed {
             Supply::OtherPlant
         } else {
-            Supply::Own {
-                pause_cycles,
-                free_cycles: pause_cycles,
-            }
+            Supply::Own { pause_cycles, free_cycles: pause_cycles }
         };
         Self { supply }
     }
@@ -37,10 +34,7 @@ impl Feeder {
                 *free_cycles = 0;
                 0
             }
-            Supply::Own {
-                pause_cycles,
-                free_cycles,
-            } => {
+            Supply::Own { pause_cycles, free_cycles } => {
                 if *free_cycles < *pause_cycles {
                     *free_cycles += 1;
                     return 0;

@@ -166,12 +166,8 @@ impl PlantMachine {
         if !self.driven.as_ref().is_none_or(newer) && !self.watchdog_has_run_out(now) {
             return;
         }
-        self.driven = Some(Driven {
-            at: now,
-            moment,
-            alone: header.alone,
-            outputs: outputs.clone(),
-        });
+        self.driven =
+            Some(Driven { at: now, moment, alone: header.alone, outputs: outputs.clone() });
         self.wakeup = now + self.period() * 3 / 2;
         self.step(moment, outputs.clone(), Pace::Driven);
     }
@@ -198,12 +194,7 @@ impl PlantMachine {
         let arrived = std::mem::take(&mut self.feed.arrived);
         let field = self.settings.plant.step(&outputs, arrived);
         self.send_field(moment, field.clone());
-        self.endpoint.report(Event::Stepped {
-            moment,
-            pace,
-            outputs,
-            field,
-        });
+        self.endpoint.report(Event::Stepped { moment, pace, outputs, field });
     }
 
     fn send_field(&mut self, moment: Moment, field: Field) {

@@ -61,10 +61,7 @@ where
     Interface: From<&'a P>,
 {
     fn from(program: &'a P) -> Self {
-        Self {
-            executable: program.into(),
-            interface: program.into(),
-        }
+        Self { executable: program.into(), interface: program.into() }
     }
 }
 
@@ -90,10 +87,7 @@ pub struct Terminal {
 impl Terminal {
     /// One that is on or off.
     fn bit(name: &str) -> Self {
-        Self {
-            name: name.to_owned(),
-            of: Elementary::Bool,
-        }
+        Self { name: name.to_owned(), of: Elementary::Bool }
     }
 
     pub(crate) fn bits(&self) -> usize {

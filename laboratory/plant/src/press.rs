@@ -22,10 +22,7 @@ pub struct PressParameters {
 
 impl Default for PressParameters {
     fn default() -> Self {
-        Self {
-            ram_cycles: 8,
-            feed_cycles: 5,
-        }
+        Self { ram_cycles: 8, feed_cycles: 5 }
     }
 }
 
@@ -54,13 +51,7 @@ enum Part {
 impl Press {
     pub(crate) fn new(parameters: PressParameters, fed: bool) -> Self {
         let feeder = Feeder::new(fed, parameters.feed_cycles);
-        let mut press = Self {
-            parameters,
-            feeder,
-            ram: 0,
-            part: None,
-            counts: Counts::default(),
-        };
+        let mut press = Self { parameters, feeder, ram: 0, part: None, counts: Counts::default() };
         press.take_parts(0);
         press
     }

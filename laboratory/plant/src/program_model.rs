@@ -31,10 +31,7 @@ fn is_sensor(point: &&Point) -> bool {
 }
 
 fn terminal(point: &Point) -> Terminal {
-    Terminal {
-        name: point.name.clone(),
-        of: point.of,
-    }
+    Terminal { name: point.name.clone(), of: point.of }
 }
 
 /// The inputs that the controller drives: all but `part_arrives`.
@@ -94,11 +91,7 @@ impl Counter {
     /// What is 1 from the start is no edge: `outputs` are those that the plant shows before its first scan.
     fn of(points: &Points, name: &str, outputs: &Image) -> Self {
         let place = points.find(name).map(|point| point.bit as usize);
-        Self {
-            place,
-            last: place.is_some_and(|place| outputs.get(place)),
-            count: 0,
-        }
+        Self { place, last: place.is_some_and(|place| outputs.get(place)), count: 0 }
     }
 
     fn see(&mut self, outputs: &Image) {

@@ -31,22 +31,13 @@ pub struct RobotParameters {
 /// About 48 cycles for each part: six parts in 300 cycles.
 impl Default for RobotParameters {
     fn default() -> Self {
-        Self {
-            horizontal_cycles: 10,
-            vertical_cycles: 5,
-            feed_cycles: 5,
-        }
+        Self { horizontal_cycles: 10, vertical_cycles: 5, feed_cycles: 5 }
     }
 }
 
 /// Sensors in the order of u10 to u14.
-pub(crate) const SENSORS: [&str; 5] = [
-    "part_present",
-    "arm_left",
-    "arm_right",
-    "arm_up",
-    "arm_down",
-];
+pub(crate) const SENSORS: [&str; 5] =
+    ["part_present", "arm_left", "arm_right", "arm_up", "arm_down"];
 /// Actuators in the order of y11 to y15.
 pub(crate) const ACTUATORS: [&str; 5] = ["move_right", "move_left", "move_down", "move_up", "grip"];
 pub(crate) const POSITIONS: [&str; 3] = ["horizontal", "vertical", "gripper"];

@@ -18,14 +18,7 @@ const ROBOT_OUTPUTS: [&str; 5] = ["move_right", "move_left", "move_down", "move_
 
 fn robot(reading: Reading) -> Circuit {
     let mut builder = CircuitBuilder::new("robot");
-    let names = [
-        "part_present",
-        "arm_left",
-        "arm_right",
-        "arm_up",
-        "arm_down",
-        "stop",
-    ];
+    let names = ["part_present", "arm_left", "arm_right", "arm_up", "arm_down", "stop"];
     let [u10, u11, u12, u13, u14, u15] = names.map(|name| builder.input(name));
     let registers = [1, 2, 3, 4, 5, 6, 7].map(|k| builder.register(format!("x1{k}"), false));
     let [x11, x12, x13, x14, x15, x16, x17] = registers.map(|(_, value)| value);
@@ -223,12 +216,7 @@ fn outputs(names: &[&str]) -> Image {
 /// Drives the arm by hand: each entry is what is on, and for how many cycles.
 fn check_arm(script: &[(&[&str], usize)], handed_over: u64, plant_faults: u64) {
     let kind = ModelKind::Robot(RobotParameters::default());
-    let (plant, _) = Plant::new(
-        &kind,
-        &(&robot(Reading::Working)).into(),
-        &Signals::new(),
-        false,
-    );
+    let (plant, _) = Plant::new(&kind, &(&robot(Reading::Working)).into(), &Signals::new(), false);
     let mut plant = plant.expect("it fits");
     for (names, cycles) in script {
         for _ in 0..*cycles {
@@ -236,10 +224,7 @@ fn check_arm(script: &[(&[&str], usize)], handed_over: u64, plant_faults: u64) {
         }
     }
     let field = plant.field();
-    assert_eq!(
-        (field.handed_over, field.plant_faults),
-        (handed_over, plant_faults)
-    );
+    assert_eq!((field.handed_over, field.plant_faults), (handed_over, plant_faults));
 }
 
 #[test]
@@ -264,14 +249,7 @@ fn the_arm_knows_what_must_not_happen() {
     // Sideways while low is one plant fault, however long it lasts.
     check_arm(&[down, (&["move_right"], 7)], 0, 1);
     // Against the ends, and both ways at once.
-    check_arm(
-        &[
-            (&["move_left", "move_up"], 9),
-            (&["move_left", "move_right"], 3),
-        ],
-        0,
-        0,
-    );
+    check_arm(&[(&["move_left", "move_up"], 9), (&["move_left", "move_right"], 3)], 0, 0);
     // Closed in the air, the gripper takes nothing.
     check_arm(&[take, lower, lift, carry, lower, release], 0, 0);
 }

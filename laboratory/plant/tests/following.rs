@@ -23,9 +23,7 @@ const PILOT: ProgramId = ProgramId(0);
 fn circuit(name: &str, inputs: &[&str], output: &str) -> Circuit {
     let mut builder = CircuitBuilder::new(name);
     let inputs: Vec<_> = inputs.iter().map(|input| builder.input(*input)).collect();
-    let all = inputs
-        .into_iter()
-        .reduce(|all, input| builder.graph().and(all, input));
+    let all = inputs.into_iter().reduce(|all, input| builder.graph().and(all, input));
     builder.output(output, all.expect("an input"));
     builder.finish().expect("a circuit")
 }
@@ -103,11 +101,7 @@ fn machine() -> PlantMachine {
             agreement: Arc::new(agreement),
             plant: plant(),
             fed_by: None,
-            follows: vec![Followed {
-                from: PILOT,
-                sensor: 2,
-                bits: 1,
-            }],
+            follows: vec![Followed { from: PILOT, sensor: 2, bits: 1 }],
             fail_safe: Image::zero(1),
             watchdog_cycles: WATCHDOG_CYCLES,
         },
@@ -119,10 +113,7 @@ fn frame(epoch: u64, cycle: u64, sender: Member, body: Body) -> Arc<Frame> {
     let header = Header {
         cluster: ClusterHash(1),
         configuration: ConfigurationHash(2),
-        moment: Moment {
-            epoch: Epoch(epoch),
-            cycle: Cycle(cycle),
-        },
+        moment: Moment { epoch: Epoch(epoch), cycle: Cycle(cycle) },
         sender,
         alone: false,
     };

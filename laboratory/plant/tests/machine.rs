@@ -58,10 +58,7 @@ fn machine() -> PlantMachine {
 }
 
 fn at(cycle: u64) -> Moment {
-    Moment {
-        epoch: Epoch(1),
-        cycle: Cycle(cycle),
-    }
+    Moment { epoch: Epoch(1), cycle: Cycle(cycle) }
 }
 
 fn frame(moment: Moment, sender: Member, body: Body) -> Arc<Frame> {
@@ -77,11 +74,7 @@ fn frame(moment: Moment, sender: Member, body: Body) -> Arc<Frame> {
 
 fn actuation(cycle: u64, down: bool) -> Arc<Frame> {
     let outputs = Image::from_bits([down, false]);
-    frame(
-        at(cycle),
-        Member::RemoteIo(PRESS),
-        Body::Actuation(Actuation { outputs }),
-    )
+    frame(at(cycle), Member::RemoteIo(PRESS), Body::Actuation(Actuation { outputs }))
 }
 
 fn feeder(moment: Moment, handed_over: u64) -> Arc<Frame> {
@@ -156,16 +149,10 @@ fn it_shows_its_sensors_each_period_until_it_is_driven() {
 fn one_actuation_steps_once_and_an_older_one_never() {
     let mut machine = machine();
     let now = periods(1);
-    assert_eq!(
-        hear(&mut machine, now, &actuation(7, true)),
-        [(Pace::Driven, 7)]
-    );
+    assert_eq!(hear(&mut machine, now, &actuation(7, true)), [(Pace::Driven, 7)]);
     assert_eq!(hear(&mut machine, now, &actuation(7, true)), []);
     assert_eq!(hear(&mut machine, now, &actuation(6, true)), []);
-    assert_eq!(
-        hear(&mut machine, now, &actuation(8, true)),
-        [(Pace::Driven, 8)]
-    );
+    assert_eq!(hear(&mut machine, now, &actuation(8, true)), [(Pace::Driven, 8)]);
     assert_eq!(machine.field().positions[0], 250);
 }
 
@@ -179,11 +166,7 @@ fn without_actuations_it_goes_on_and_then_falls_safe() {
     // At 7.5 and 8.5 periods the last outputs hold; from 9 periods on the watchdog has run out.
     let expected = [(Pace::Alone, 6), (Pace::Alone, 6), (Pace::Watchdog, 6)];
     assert_eq!(steps, expected);
-    assert_eq!(
-        machine.field().positions[0],
-        875,
-        "down twice more, then up once"
-    );
+    assert_eq!(machine.field().positions[0], 875, "down twice more, then up once");
     // Whoever drives now is believed, even one who counts anew.
     let steps = hear(&mut machine, periods(10), &actuation(1, true));
     assert_eq!(steps, [(Pace::Driven, 1)]);
@@ -202,16 +185,9 @@ fn a_stalled_host_does_not_make_it_run_after_lost_time() {
 fn check_feed(frames: &[(u64, u64)], expected: u64) {
     let mut machine = machine();
     for (index, &(cycle, handed_over)) in frames.iter().enumerate() {
-        let moment = if cycle == 0 {
-            Moment::default()
-        } else {
-            at(cycle)
-        };
+        let moment = if cycle == 0 { Moment::default() } else { at(cycle) };
         machine.handle_input(periods(1), Input::Frame(&feeder(moment, handed_over)));
-        machine.handle_input(
-            periods(1),
-            Input::Frame(&actuation(index as u64 + 1, false)),
-        );
+        machine.handle_input(periods(1), Input::Frame(&actuation(index as u64 + 1, false)));
     }
     let field = machine.field();
     let seen = u64::from(field.sensors.get(0)) + field.plant_faults;
@@ -251,9 +227,7 @@ fn another_configuration_is_refused_once_and_another_cluster_without_a_word() {
     let stranger = frame(
         at(1),
         Member::RemoteIo(FEEDER),
-        Body::Actuation(Actuation {
-            outputs: Image::from_bits([true, false]),
-        }),
+        Body::Actuation(Actuation { outputs: Image::from_bits([true, false]) }),
     );
     assert_eq!(hear(&mut machine, periods(1), &stranger), []);
 }
@@ -261,24 +235,18 @@ fn another_configuration_is_refused_once_and_another_cluster_without_a_word() {
 #[test]
 fn every_misfit_between_a_model_and_its_controller_is_named_in_one_run() {
     let kind = ModelKind::Press(PressParameters::default());
-    let signals: Signals = [
-        ("ram_up", "ram_upp"),
-        ("move_up", "rise"),
-        ("ramp", "ram_up"),
-    ]
-    .map(|(terminal, signal)| (terminal.to_owned(), signal.to_owned()))
-    .into();
+    let signals: Signals = [("ram_up", "ram_upp"), ("move_up", "rise"), ("ramp", "ram_up")]
+        .map(|(terminal, signal)| (terminal.to_owned(), signal.to_owned()))
+        .into();
     let (plant, problems) = Plant::new(&kind, &(&controller()).into(), &signals, true);
     assert!(plant.is_none());
     let found: Vec<_> = problems
         .iter()
         .map(|problem| match problem {
             BindingProblem::UnknownTerminal { terminal, .. } => format!("terminal {terminal}"),
-            BindingProblem::UnknownSignal {
-                direction: Direction::Sensor,
-                signal,
-                ..
-            } => format!("input {signal}"),
+            BindingProblem::UnknownSignal { direction: Direction::Sensor, signal, .. } => {
+                format!("input {signal}")
+            }
             BindingProblem::UnknownSignal { signal, .. } => format!("output {signal}"),
             other => format!("{other:?}"),
         })
@@ -316,12 +284,8 @@ fn a_program_can_be_a_plant() {
     assert!(kind.takes_parts() && kind.hands_over());
     let (plant, problems) = Plant::new(&kind, &(&controller).into(), &Signals::new(), true);
     let expected = [
-        BindingProblem::InputStaysZero {
-            input: "lid_closed".into(),
-        },
-        BindingProblem::OutputHasNoEffect {
-            output: "lamp".into(),
-        },
+        BindingProblem::InputStaysZero { input: "lid_closed".into() },
+        BindingProblem::OutputHasNoEffect { output: "lamp".into() },
     ];
     assert_eq!(problems, expected);
     let mut plant = plant.expect("warnings only");
@@ -347,8 +311,5 @@ fn events_are_read_back_as_they_were_written() {
     };
     let text = serde_json::to_string(&event).expect("it is plain data");
     assert!(text.starts_with(r#"{"event":"stepped""#), "{text}");
-    assert_eq!(
-        serde_json::from_str::<Event>(&text).expect("the same"),
-        event
-    );
+    assert_eq!(serde_json::from_str::<Event>(&text).expect("the same"), event);
 }

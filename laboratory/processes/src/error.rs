@@ -119,11 +119,9 @@ impl LaboratoryError {
     pub fn code(&self) -> &str {
         match self {
             Self::Start { .. } => "U0521",
-            Self::Ended { lines, .. } => lines
-                .iter()
-                .rev()
-                .find_map(|line| code_in(line))
-                .unwrap_or("U0522"),
+            Self::Ended { lines, .. } => {
+                lines.iter().rev().find_map(|line| code_in(line)).unwrap_or("U0522")
+            }
             Self::NotReady { .. } => "U0523",
             Self::NotInStep { .. } => "U0524",
             Self::NoCycles { .. } => "U0525",

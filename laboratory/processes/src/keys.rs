@@ -17,10 +17,7 @@ pub(super) struct RunKeys {
 
 impl RunKeys {
     /// Makes them in `folder`.
-    #[allow(
-        clippy::disallowed_methods,
-        reason = "certificates hold from one date to another"
-    )]
+    #[allow(clippy::disallowed_methods, reason = "certificates hold from one date to another")]
     pub(super) fn make(cluster: &Cluster, folder: PathBuf) -> Result<Self, Vec<KeysError>> {
         if cluster.security() == Security::Off {
             return Ok(Self { authority: None });
@@ -29,9 +26,7 @@ impl RunKeys {
         let members = cluster.members();
         let names = members.filter_map(|member| cluster.member_name(member));
         let names: Vec<String> = names.map(str::to_owned).collect();
-        let made = Self {
-            authority: Some(folder),
-        };
+        let made = Self { authority: Some(folder) };
         if let Some(folder) = &made.authority {
             let mut authority =
                 Authority::init(folder, cluster, now).map_err(|error| vec![error])?;
@@ -44,9 +39,7 @@ impl RunKeys {
     pub(super) fn arguments(&self, name: &str) -> Vec<PathBuf> {
         let folder = self.authority.as_ref();
         let folder = folder.map(|folder| folder.join("members").join(name));
-        folder
-            .map(|folder| vec![PathBuf::from("--keys"), folder])
-            .unwrap_or_default()
+        folder.map(|folder| vec![PathBuf::from("--keys"), folder]).unwrap_or_default()
     }
 }
 

@@ -154,9 +154,7 @@ pub fn run_commanded(
 ) -> Result<LaboratoryRun, LaboratoryError> {
     let mut steps = Steps::new(scenario, cluster.agreement().schedule.period());
     let conductor = &mut steps;
-    run(
-        cluster, scenario, settings, directory, commands, afterwards, conductor, watch,
-    )
+    run(cluster, scenario, settings, directory, commands, afterwards, conductor, watch)
 }
 
 /// The same with a conductor in place of the scenario's steps.
@@ -171,15 +169,10 @@ pub fn run_conducted(
     conductor: &mut dyn Conductor,
     watch: &mut dyn FnMut(Progress),
 ) -> Result<LaboratoryRun, LaboratoryError> {
-    run(
-        cluster, scenario, settings, directory, None, None, conductor, watch,
-    )
+    run(cluster, scenario, settings, directory, None, None, conductor, watch)
 }
 
-#[allow(
-    clippy::too_many_arguments,
-    reason = "the three ways to call it differ in these"
-)]
+#[allow(clippy::too_many_arguments, reason = "the three ways to call it differ in these")]
 fn run(
     cluster: &Cluster,
     scenario: &Scenario,
@@ -195,11 +188,8 @@ fn run(
     let site = Site::prepare(cluster, scenario, &settings, directory)?;
     keep_cluster(directory.path(), &settings.cluster_file, cluster)
         .map_err(|error| system("to keep the cluster file")(std::io::Error::other(error)))?;
-    let journal = Journal::create(
-        &directory.file("journal.jsonl"),
-        settings.journal_limit_bytes,
-    )
-    .map_err(system("to write journal.jsonl"))?;
+    let journal = Journal::create(&directory.file("journal.jsonl"), settings.journal_limit_bytes)
+        .map_err(system("to write journal.jsonl"))?;
     let keys = RunKeys::make(cluster, directory.file(KEYS))
         .map_err(|errors| LaboratoryError::Keys { errors })?;
     let runtime = tokio::runtime::Builder::new_current_thread()
@@ -317,13 +307,8 @@ impl Laboratory<'_> {
         let system = |what| move |source| LaboratoryError::System { what, source };
         let mut interrupt = signal(SignalKind::interrupt()).map_err(system("to hear SIGINT"))?;
         let mut terminate = signal(SignalKind::terminate()).map_err(system("to hear SIGTERM"))?;
-        let members: Vec<Member> = self
-            .account
-            .terms
-            .members
-            .iter()
-            .map(|(member, _)| member)
-            .collect();
+        let members: Vec<Member> =
+            self.account.terms.members.iter().map(|(member, _)| member).collect();
         for member in members {
             self.start(member).await?;
         }
@@ -375,10 +360,7 @@ impl Laboratory<'_> {
     }
 
     fn names(&self, members: impl IntoIterator<Item = Member>) -> Vec<String> {
-        members
-            .into_iter()
-            .map(|member| self.name(member))
-            .collect()
+        members.into_iter().map(|member| self.name(member)).collect()
     }
 
     /// A record of the laboratory's own.

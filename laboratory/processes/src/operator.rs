@@ -9,12 +9,7 @@ use crate::process::Process;
 
 impl Laboratory<'_> {
     pub(super) async fn obey(&mut self, commanded: Commanded) {
-        let OperatorAction::Command {
-            member,
-            command,
-            owner,
-            reason,
-        } = commanded.action.clone()
+        let OperatorAction::Command { member, command, owner, reason } = commanded.action.clone()
         else {
             let event = commanded.action.alarm_event(&self.account.terms.alarms);
             let done = event.map(|event| {
@@ -74,10 +69,7 @@ impl Laboratory<'_> {
         let running = self.is_running(member);
         let still = process.is_some_and(Process::is_suspended);
         let already = |is| Refusal::Already { name: name(), is };
-        let wrong = |needs| Refusal::WrongMember {
-            name: name(),
-            needs,
-        };
+        let wrong = |needs| Refusal::WrongMember { name: name(), needs };
         let remote_io = matches!(member, Member::RemoteIo(_));
         match command {
             Command::Restart if running => Some(Refusal::Running(name())),
@@ -126,23 +118,17 @@ impl Laboratory<'_> {
             Command::Isolate => return self.cut_all(member, true).await,
             Command::Rejoin => return self.cut_all(member, false).await,
             Command::Force(force) => {
-                return self
-                    .tell(member, line("force", serde_json::to_string(force)))
-                    .await;
+                return self.tell(member, line("force", serde_json::to_string(force))).await;
             }
             Command::Write(_) if !self.write_limiter.admits() => {
                 let refusal = WriteRefusal::Busy;
                 return Err(Refusal::Write { refusal });
             }
             Command::Write(write) => {
-                return self
-                    .tell(member, line("write", serde_json::to_string(write)))
-                    .await;
+                return self.tell(member, line("write", serde_json::to_string(write))).await;
             }
             Command::Unforce { signal } => {
-                return self
-                    .tell(member, line("unforce", serde_json::to_string(signal)))
-                    .await;
+                return self.tell(member, line("unforce", serde_json::to_string(signal))).await;
             }
         };
         self.act(member, action).await
@@ -170,11 +156,7 @@ impl Laboratory<'_> {
         });
         for other in others {
             for (from, to) in [(member, other), (other, member)] {
-                let action = if cut {
-                    Action::Cut { to }
-                } else {
-                    Action::Heal { to }
-                };
+                let action = if cut { Action::Cut { to } } else { Action::Heal { to } };
                 self.act(from, action).await?;
             }
         }
@@ -196,9 +178,6 @@ impl Laboratory<'_> {
     }
 
     fn system(&self, member: Member, error: impl std::fmt::Display) -> Refusal {
-        Refusal::System {
-            name: self.name(member),
-            reason: error.to_string(),
-        }
+        Refusal::System { name: self.name(member), reason: error.to_string() }
     }
 }

@@ -16,13 +16,10 @@ impl Laboratory<'_> {
                 cycle: cycle.min(self.account.cycles),
                 cycles: self.account.cycles,
             },
-            None if self.ready.len() < self.processes.len() => Progress::Starting {
-                ready: self.ready.len(),
-                members: self.processes.len(),
-            },
-            None => Progress::ComingIntoStep {
-                names: self.names(self.account.awaited()),
-            },
+            None if self.ready.len() < self.processes.len() => {
+                Progress::Starting { ready: self.ready.len(), members: self.processes.len() }
+            }
+            None => Progress::ComingIntoStep { names: self.names(self.account.awaited()) },
         };
         if waits.shown.as_ref() != Some(&progress) {
             (self.watch)(progress.clone());
@@ -71,10 +68,7 @@ impl Laboratory<'_> {
             waits.cycle = Some(cycle);
             waits.cycle_since = now;
         } else if over(waits.cycle_since, CYCLE_PATIENCE) {
-            return Err(LaboratoryError::NoCycles {
-                seconds: CYCLE_PATIENCE.as_secs(),
-                cycle,
-            });
+            return Err(LaboratoryError::NoCycles { seconds: CYCLE_PATIENCE.as_secs(), cycle });
         }
         Ok(())
     }
@@ -92,12 +86,6 @@ pub(super) struct Waits {
 impl Waits {
     pub(super) fn new() -> Self {
         let now = Instant::now();
-        Self {
-            started: now,
-            ready_since: now,
-            cycle: None,
-            cycle_since: now,
-            shown: None,
-        }
+        Self { started: now, ready_since: now, cycle: None, cycle_since: now, shown: None }
     }
 }

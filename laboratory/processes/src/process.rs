@@ -90,13 +90,7 @@ impl Process {
             // Nobody listens any more when the laboratory itself has ended.
             let _ = said.send(Said { member, life, what }).await;
         });
-        Ok(Self {
-            member,
-            life,
-            child,
-            input,
-            state: State::Running,
-        })
+        Ok(Self { member, life, child, input, state: State::Running })
     }
 
     pub(super) fn life(&self) -> u32 {

@@ -40,11 +40,7 @@ impl Laboratory<'_> {
             .args(self.keys.arguments(&name))
             .args(&self.settings.arguments)
             .env(ZENOH_RUNTIME.0, ZENOH_RUNTIME.1);
-        let life = self
-            .lives
-            .entry(member)
-            .and_modify(|life| *life += 1)
-            .or_insert(1);
+        let life = self.lives.entry(member).and_modify(|life| *life += 1).or_insert(1);
         let start = || Process::start(member, *life, command, self.sender.clone());
         let process = self.site.at(member, start)?;
         let mut process = process.map_err(|source| LaboratoryError::Start {
@@ -111,11 +107,7 @@ impl Laboratory<'_> {
         lines: Vec<String>,
     ) -> Result<(), LaboratoryError> {
         let how = status.map_or("it closed its output".to_owned(), |it| it.to_string());
-        self.note(RunEvent::Ended {
-            member,
-            how: how.clone(),
-            said: lines.clone(),
-        });
+        self.note(RunEvent::Ended { member, how: how.clone(), said: lines.clone() });
         self.show_journal();
         // A member that says itself why it cannot work keeps the run from beginning; what a signal does comes from outside.
         let refused = status.is_some_and(|status| status.code().is_some());
@@ -146,10 +138,7 @@ impl Laboratory<'_> {
                 line: line.chars().take(200).collect(),
             });
         };
-        if let Happening::Host(HostEvent::Ready {
-            rights, version, ..
-        }) = &record.event
-        {
+        if let Happening::Host(HostEvent::Ready { rights, version, .. }) = &record.event {
             check_version(*version).map_err(|wrong| LaboratoryError::Version {
                 name: self.name(member),
                 found: wrong.found,
@@ -197,12 +186,8 @@ impl Laboratory<'_> {
             (Action::Continue, Some(process)) => process.go_on(),
             (Action::Release, Some(process)) => process.command("release").await,
             (Action::Write { .. }, Some(process)) => {
-                let write = step
-                    .write()
-                    .and_then(|write| serde_json::to_string(&write).ok());
-                process
-                    .command(&format!("write {}", write.unwrap_or_default()))
-                    .await
+                let write = step.write().and_then(|write| serde_json::to_string(&write).ok());
+                process.command(&format!("write {}", write.unwrap_or_default())).await
             }
             (Action::Set { .. }, Some(process)) => {
                 let force = step.action.force();

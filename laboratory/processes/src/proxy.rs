@@ -35,11 +35,7 @@ impl LinkProxy {
             .spawn()?;
         let input = child.stdin.take();
         let output = child.stdout.take().ok_or(io::ErrorKind::BrokenPipe)?;
-        let mut proxy = Self {
-            child,
-            input,
-            output: BufReader::new(output),
-        };
+        let mut proxy = Self { child, input, output: BufReader::new(output) };
         let mut line = serde_json::to_string(plan)?;
         line.push('\n');
         if let Some(input) = &mut proxy.input {
@@ -55,10 +51,7 @@ impl LinkProxy {
     /// Ends it; what has passed, or nothing where it has not answered.
     pub(super) fn end(&mut self) -> Option<ProxyCounters> {
         self.input = None;
-        let mut readable = [PollFd::new(
-            self.output.get_ref().as_fd(),
-            PollFlags::POLLIN,
-        )];
+        let mut readable = [PollFd::new(self.output.get_ref().as_fd(), PollFlags::POLLIN)];
         let answers =
             poll(&mut readable, PollTimeout::from(END_PATIENCE_MS)).is_ok_and(|ready| ready > 0);
         match answers.then(|| self.report()) {

@@ -98,20 +98,13 @@ impl Site {
             .iter()
             .zip(addresses)
             .filter_map(|(&member, address)| {
-                Some(Peer {
-                    member,
-                    name: cluster.member_name(member)?.to_owned(),
-                    address,
-                })
+                Some(Peer { member, name: cluster.member_name(member)?.to_owned(), address })
             })
             .collect();
         let list = directory.file("endpoints.json");
         write_list(&list, &peers).map_err(system("to write endpoints.json"))?;
         let mut site = Self {
-            endpoints: members
-                .iter()
-                .map(|&member| (member, list.clone()))
-                .collect(),
+            endpoints: members.iter().map(|&member| (member, list.clone())).collect(),
             members,
             hosts: None,
             host_of,
@@ -121,11 +114,7 @@ impl Site {
             impairment,
             multicast: None,
         };
-        let only_loss = impairment
-            == Impairment {
-                loss: impairment.loss,
-                ..Impairment::default()
-            };
+        let only_loss = impairment == Impairment { loss: impairment.loss, ..Impairment::default() };
         match &mut hosts {
             Some(hosts) if only_loss => {
                 let pairs = site.pairs_of_hosts();
@@ -185,9 +174,7 @@ impl Site {
         let mut notes = Vec::new();
         if let Some(hosts) = &self.hosts {
             let count = hosts.hosts().len();
-            notes.push(format!(
-                "{count} hosts, each a network namespace of its own"
-            ));
+            notes.push(format!("{count} hosts, each a network namespace of its own"));
             if self.proxy.is_none() && !self.impairment.loss.is_never() {
                 notes.push(format!("nft loses {} on every link", self.impairment.loss));
             }
@@ -226,13 +213,10 @@ impl Site {
                 if !opens || !own.talks_with(second.member) {
                     continue;
                 }
-                self.routes
-                    .insert((first.member, second.member), routes.len());
+                self.routes.insert((first.member, second.member), routes.len());
                 routes.push(Route {
                     listen: SocketAddr::new(IpAddr::V4(host), 0),
-                    to: link
-                        .frames_address(second.address)
-                        .map_err(LaboratoryError::Endpoints)?,
+                    to: link.frames_address(second.address).map_err(LaboratoryError::Endpoints)?,
                     transport: match link {
                         LinkKind::Zenoh => Transport::Tcp,
                         LinkKind::Udp => Transport::Udp,
@@ -243,10 +227,7 @@ impl Site {
             }
         }
         let free = understudy_bus::free_addresses(routes.len()).map_err(|source| {
-            LaboratoryError::System {
-                what: "free ports for the proxy",
-                source,
-            }
+            LaboratoryError::System { what: "free ports for the proxy", source }
         })?;
         for (route, free) in routes.iter_mut().zip(free) {
             let stands_for = SocketAddr::new(IpAddr::V4(host), free.port());
@@ -261,10 +242,8 @@ impl Site {
             Some(hosts) => hosts.in_switch(start)?,
             None => start(),
         };
-        let proxy = proxy.map_err(|source| LaboratoryError::System {
-            what: "the proxy of the links",
-            source,
-        })?;
+        let proxy = proxy
+            .map_err(|source| LaboratoryError::System { what: "the proxy of the links", source })?;
         self.proxy = Some(proxy);
         Ok(())
     }
@@ -279,10 +258,7 @@ impl Site {
                 .map(|peer| {
                     let route = self.routes.get(&(own.member, peer.member));
                     let stands_for = route.and_then(|&route| self.stand_ins.get(route));
-                    Peer {
-                        address: stands_for.copied().unwrap_or(peer.address),
-                        ..peer.clone()
-                    }
+                    Peer { address: stands_for.copied().unwrap_or(peer.address), ..peer.clone() }
                 })
                 .collect();
             let path = folder.join(format!("{}.json", own.name));
@@ -293,10 +269,7 @@ impl Site {
     }
 
     fn pairs_of_hosts(&self) -> Vec<(usize, usize)> {
-        let count = self
-            .members
-            .iter()
-            .filter_map(|member| self.host_of.get(member));
+        let count = self.members.iter().filter_map(|member| self.host_of.get(member));
         let count = count.max().map_or(0, |last| last + 1);
         let pairs = (0..count).flat_map(|from| (0..count).map(move |to| (from, to)));
         pairs.filter(|(from, to)| from != to).collect()
@@ -342,16 +315,11 @@ fn host_names(cluster: &Cluster, host_of: &BTreeMap<Member, usize>) -> Vec<Strin
 
 /// From the cluster file, or free ones of the loopback interface.
 fn loopback_addresses(cluster: &Cluster) -> io::Result<Vec<SocketAddr>> {
-    let known: Vec<Option<SocketAddr>> = cluster
-        .members()
-        .map(|member| cluster.address(member))
-        .collect();
+    let known: Vec<Option<SocketAddr>> =
+        cluster.members().map(|member| cluster.address(member)).collect();
     let lacking = known.iter().filter(|address| address.is_none()).count();
     let mut free = understudy_bus::free_addresses(lacking)?.into_iter();
-    Ok(known
-        .into_iter()
-        .filter_map(|address| address.or_else(|| free.next()))
-        .collect())
+    Ok(known.into_iter().filter_map(|address| address.or_else(|| free.next())).collect())
 }
 
 fn namespace_addresses(

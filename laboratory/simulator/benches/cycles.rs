@@ -19,9 +19,7 @@ fn press_cell_cycles(bencher: divan::Bencher<'_, '_>) {
         .counter(divan::counter::ItemsCount::new(CYCLES))
         .with_inputs(|| Simulation::new(press_cell::parts(Mode::Full, 1), Network::default(), 1))
         .bench_values(|mut simulation| {
-            simulation
-                .run(CYCLES, 100, &mut |_, _, _, _| {})
-                .expect("the cluster gets ready");
+            simulation.run(CYCLES, 100, &mut |_, _, _, _| {}).expect("the cluster gets ready");
             assert_eq!(simulation.violations(), []);
         });
 }

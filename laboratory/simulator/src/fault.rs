@@ -132,10 +132,7 @@ impl Fault {
         };
         let step = format!("{self:?}");
         Some(Write {
-            id: WriteId {
-                session: ProgramHash::of(step.as_bytes()).0,
-                number: 1,
-            },
+            id: WriteId { session: ProgramHash::of(step.as_bytes()).0, number: 1 },
             input,
             value,
             role: Role::Engineer,
@@ -171,9 +168,7 @@ impl Action {
             Self::Continue => "continue",
             Self::Slow { .. } => "slow",
             Self::Release | Self::Unset { .. } => "release",
-            Self::Choose {
-                choice: StateChoice::Cold,
-            } => "cold-start",
+            Self::Choose { choice: StateChoice::Cold } => "cold-start",
             Self::Choose { .. } => "accept-state",
             Self::Write { .. } => "write",
             Self::Set { .. } => "set",

@@ -32,9 +32,7 @@ impl Plants {
         Self {
             initial: parts.plants.clone(),
             running: parts.plants.clone(),
-            shown: shown
-                .map(|plant| plant.as_ref().map(Plant::field))
-                .collect(),
+            shown: shown.map(|plant| plant.as_ref().map(Plant::field)).collect(),
             fed_by: parts.fed_by.clone(),
             follows: parts.follows.clone(),
             taken: vec![0; parts.plants.len()],

@@ -117,8 +117,7 @@ impl Links {
 
     /// Frames that a member has sent so far; none for one that is not of the cluster.
     pub(crate) fn sent(&self, member: Member) -> u64 {
-        self.place(member)
-            .map_or(0, |place| self.senders[place].frames)
+        self.place(member).map_or(0, |place| self.senders[place].frames)
     }
 
     /// Whether frames of one member reach another one, and on time.

@@ -38,9 +38,7 @@ pub fn parts(cluster: &Cluster) -> Parts {
         stations: stations
             .filter_map(|rank| cluster.station_settings(StationId(rank as u8), Epoch::default()))
             .collect(),
-        remote_ios: programs
-            .filter_map(|program| cluster.remote_io_settings(program))
-            .collect(),
+        remote_ios: programs.filter_map(|program| cluster.remote_io_settings(program)).collect(),
         plants: cluster
             .plants()
             .iter()

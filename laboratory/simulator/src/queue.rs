@@ -34,13 +34,7 @@ impl Queue {
         remote_ios: ProgramSet,
     ) {
         self.sent += 1;
-        let delivery = Delivery {
-            at,
-            order: self.sent,
-            frame,
-            stations,
-            remote_ios,
-        };
+        let delivery = Delivery { at, order: self.sent, frame, stations, remote_ios };
         if self.even.back().is_none_or(|last| last.at <= at) {
             self.even.push_back(delivery);
         } else {
@@ -94,13 +88,7 @@ impl Hash for Queue {
         let mut deliveries: Vec<&Delivery> = self.even.iter().chain(&self.uneven).collect();
         deliveries.sort_unstable_by_key(|delivery| (delivery.at, delivery.order));
         for delivery in deliveries {
-            (
-                delivery.at,
-                &delivery.frame,
-                delivery.stations,
-                delivery.remote_ios,
-            )
-                .hash(hasher);
+            (delivery.at, &delivery.frame, delivery.stations, delivery.remote_ios).hash(hasher);
         }
     }
 }
@@ -130,12 +118,7 @@ mod tests {
             let times: Vec<u64> = (0..5).map(|place| times / 4_u64.pow(place) % 4).collect();
             let mut queue = Queue::default();
             for &time in &times {
-                queue.push(
-                    Time(time),
-                    Arc::clone(&frame),
-                    StationSet::EMPTY,
-                    ProgramSet::EMPTY,
-                );
+                queue.push(Time(time), Arc::clone(&frame), StationSet::EMPTY, ProgramSet::EMPTY);
             }
             let mut expected: Vec<(u64, u64)> = times.iter().copied().zip(1..).collect();
             expected.sort_unstable();

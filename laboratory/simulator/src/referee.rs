@@ -94,9 +94,7 @@ struct State {
 impl Hash for Referee {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
         // States before the floor only tell how far a program went back.
-        self.states
-            .range(self.floor..)
-            .for_each(|state| state.hash(hasher));
+        self.states.range(self.floor..).for_each(|state| state.hash(hasher));
         let newest = self.newest.map(|place| place - self.floor.min(place));
         (newest, &self.truth, &self.last_true).hash(hasher);
         // Without ramps there is one way to the fail-safe values.
@@ -210,9 +208,7 @@ impl Referee {
 
     /// h(x(t), u(t)) of the newest sample, with its cycle.
     pub fn truth(&self) -> Option<(Moment, &Image)> {
-        self.truth
-            .as_ref()
-            .map(|(moment, outputs)| (*moment, outputs))
+        self.truth.as_ref().map(|(moment, outputs)| (*moment, outputs))
     }
 
     /// Starts from the initial state, the first one included.
@@ -226,12 +222,7 @@ impl Referee {
     /// The violation that it is, if it is one; the referee goes on with what was sampled and applied.
     pub fn observe(&mut self, event: &Event) -> Result<(), Violation> {
         match event {
-            Event::Sampled {
-                moment,
-                inputs,
-                born,
-                before,
-            } => {
+            Event::Sampled { moment, inputs, born, before } => {
                 self.unrecorded.resumes(inputs);
                 let continued = self.continue_from(*moment, *born, *before);
                 self.is_new = false;
@@ -244,12 +235,7 @@ impl Referee {
                 self.unrecorded.written(write.input, write.value);
                 Ok(())
             }
-            Event::Applied {
-                moment,
-                outputs,
-                source,
-                ..
-            } => self.judge(*moment, outputs, *source),
+            Event::Applied { moment, outputs, source, .. } => self.judge(*moment, outputs, *source),
             _ => Ok(()),
         }
     }
@@ -262,9 +248,7 @@ impl Referee {
     }
 
     fn place_of(&self, lineage: Lineage) -> Option<usize> {
-        self.states
-            .iter()
-            .rposition(|state| state.lineage == lineage)
+        self.states.iter().rposition(|state| state.lineage == lineage)
     }
 
     fn remember(&mut self, stepped: Moment, lineage: Lineage, bits: Image) {
@@ -274,11 +258,7 @@ impl Referee {
         } else if self.states.len() >= REMEMBERED_FROM_FLOOR {
             self.states.remove(1);
         }
-        self.states.push_back(State {
-            lineage,
-            stepped,
-            bits,
-        });
+        self.states.push_back(State { lineage, stepped, bits });
         self.newest = Some(self.states.len() - 1);
         self.blind = false;
     }
@@ -307,11 +287,7 @@ impl Referee {
             return if chosen {
                 Ok(())
             } else {
-                Err(Violation::WentBack {
-                    moment,
-                    from,
-                    applied,
-                })
+                Err(Violation::WentBack { moment, from, applied })
             };
         }
         if before == Lineage::genesis(self.hash, born) {
@@ -334,10 +310,7 @@ impl Referee {
             self.misses_records();
             return Ok(());
         }
-        Err(Violation::UnknownHistory {
-            moment,
-            lineage: before,
-        })
+        Err(Violation::UnknownHistory { moment, lineage: before })
     }
 
     /// Finds the samples without a record that lead to a lineage from a state that may be continued from, and goes there.
@@ -362,9 +335,7 @@ impl Referee {
         let Some(place) = self.newest else {
             return;
         };
-        let State {
-            lineage, mut bits, ..
-        } = self.states[place].clone();
+        let State { lineage, mut bits, .. } = self.states[place].clone();
         let mut outputs = Image::zero(self.executable.output_count());
         self.executable.step(
             &mut self.scratch,

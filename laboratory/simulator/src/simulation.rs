@@ -102,10 +102,7 @@ impl Simulation {
             .remote_ios
             .iter()
             .map(|settings| {
-                Referee::new(
-                    settings,
-                    programs[settings.program.index()].executable.clone(),
-                )
+                Referee::new(settings, programs[settings.program.index()].executable.clone())
             })
             .collect();
         let stations = parts.stations.iter().enumerate().map(|(rank, settings)| {
@@ -115,9 +112,8 @@ impl Simulation {
         });
         let stations: Vec<_> = stations.collect();
         let remote_ios = parts.remote_ios.iter();
-        let remote_ios: Vec<_> = remote_ios
-            .map(|settings| Slot::new(RemoteIo::new(now, settings.clone())))
-            .collect();
+        let remote_ios: Vec<_> =
+            remote_ios.map(|settings| Slot::new(RemoteIo::new(now, settings.clone()))).collect();
         let due = stations.iter().map(Slot::due);
         let due = due.chain(remote_ios.iter().map(Slot::due)).collect();
         let mut simulation = Self {
@@ -154,9 +150,7 @@ impl Simulation {
     pub fn schedule(&mut self, fault: Fault) {
         self.links.expect(fault.action);
         let key = |fault: &Fault| fault.at_cycle as f64 + fault.phase;
-        let place = self
-            .faults
-            .partition_point(|other| key(other) > key(&fault));
+        let place = self.faults.partition_point(|other| key(other) > key(&fault));
         self.faults.insert(place, fault);
     }
 
@@ -289,11 +283,7 @@ impl Simulation {
     /// Lets the operator answer where a state is lost, now: the newest available state, or a cold start where no station holds one.
     pub fn let_operator_choose(&mut self) {
         let choices = [StateChoice::Newest { cycle: None }, StateChoice::Cold];
-        for (program, choice) in self
-            .asking()
-            .iter()
-            .flat_map(|it| choices.map(|one| (it, one)))
-        {
+        for (program, choice) in self.asking().iter().flat_map(|it| choices.map(|one| (it, one))) {
             // The second one is refused where the first was taken.
             self.schedule(Fault {
                 at_cycle: 0,
@@ -365,10 +355,8 @@ impl Simulation {
     fn next_fault_at(&self) -> Option<Time> {
         let fault = self.faults.last()?;
         let cycle = self.pace.cycle()?;
-        (fault.at_cycle <= cycle).then(|| {
-            self.now
-                .max(self.pace.started() + self.period().mul_f64(fault.phase))
-        })
+        (fault.at_cycle <= cycle)
+            .then(|| self.now.max(self.pace.started() + self.period().mul_f64(fault.phase)))
     }
 
     fn deliver(&mut self, delivery: &Delivery, observe: &mut Observe<'_>) {
@@ -382,11 +370,7 @@ impl Simulation {
             if let (Member::Station(station), true) = (delivery.frame.header.sender, is_running) {
                 self.arrived[program.index()][0].insert(station);
             }
-            self.give(
-                Member::RemoteIo(program),
-                Input::Frame(&delivery.frame),
-                observe,
-            );
+            self.give(Member::RemoteIo(program), Input::Frame(&delivery.frame), observe);
         }
     }
 
@@ -442,12 +426,7 @@ impl Simulation {
                 }
                 Output::Report(event) => {
                     self.judge(program, &event, observe);
-                    observe(
-                        self.now,
-                        self.pace.cycle(),
-                        member,
-                        Record::RemoteIo(&event),
-                    );
+                    observe(self.now, self.pace.cycle(), member, Record::RemoteIo(&event));
                 }
                 // The event says the same.
                 Output::Answer(_) => {}

@@ -24,10 +24,7 @@ pub struct Tally {
 impl Tally {
     /// Counts a deadline.
     pub fn count(&mut self, event: &Event) {
-        if let Event::Applied {
-            source, missing, ..
-        } = event
-        {
+        if let Event::Applied { source, missing, .. } = event {
             *match source {
                 Source::Direct => &mut self.direct,
                 Source::Reconstructed => &mut self.reconstructed,

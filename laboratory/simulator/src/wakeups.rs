@@ -15,11 +15,7 @@ pub(crate) struct Wakeups {
 impl Wakeups {
     /// The wake-ups of `stations` stations, and of the remote I/Os after them.
     pub(crate) fn new(stations: usize, due: Vec<Time>) -> Self {
-        let mut wakeups = Self {
-            stations,
-            due,
-            first: 0,
-        };
+        let mut wakeups = Self { stations, due, first: 0 };
         wakeups.find_first();
         wakeups
     }
@@ -53,9 +49,7 @@ impl Wakeups {
 
     fn find_first(&mut self) {
         let places = self.due.iter().enumerate();
-        self.first = places
-            .min_by_key(|(_, at)| **at)
-            .map_or(0, |(place, _)| place);
+        self.first = places.min_by_key(|(_, at)| **at).map_or(0, |(place, _)| place);
     }
 }
 
@@ -80,10 +74,7 @@ mod tests {
                 due[place] = at;
                 wakeups.set(member[place], at);
                 let earliest = *due.iter().min().expect("three members");
-                let first = due
-                    .iter()
-                    .position(|at| *at == earliest)
-                    .expect("one of them");
+                let first = due.iter().position(|at| *at == earliest).expect("one of them");
                 assert_eq!(wakeups.next(), (earliest, member[first]));
             }
         }

@@ -97,17 +97,11 @@ fn accuses(record: &Record<'_>) -> bool {
 }
 
 fn check(mode: Mode, understudies: usize, troubles: &[Trouble], network: Network, seed: u64) {
-    let quiet = Network {
-        latency: network.latency,
-        ..Network::default()
-    };
+    let quiet = Network { latency: network.latency, ..Network::default() };
     let ends = troubles.iter().map(|it| it.at_cycle + it.cycles + 50);
     let cycles = ends.fold(200, u64::max);
     let mut simulation = Simulation::new(press_cell::parts(mode, understudies), quiet, seed);
-    simulation.disturb(Disturbance {
-        network,
-        cycles: Some(0..200),
-    });
+    simulation.disturb(Disturbance { network, cycles: Some(0..200) });
     for trouble in troubles {
         let mut schedule = |at_cycle, action| {
             simulation.schedule(Fault {
@@ -124,16 +118,11 @@ fn check(mode: Mode, understudies: usize, troubles: &[Trouble], network: Network
     }
     let mut accusations = 0;
     let mut observe = |_, _, _, record: Record<'_>| accusations += u64::from(accuses(&record));
-    simulation
-        .run(cycles, 2000, &mut observe)
-        .expect("the cluster gets ready");
+    simulation.run(cycles, 2000, &mut observe).expect("the cluster gets ready");
     assert_eq!(simulation.violations().first(), None);
     // All are back by now: all are synchronised again without help, unless an operator is asked.
     if let Err(error) = simulation.run(10, 200, &mut observe) {
-        assert!(
-            !simulation.asking().is_empty(),
-            "protection comes back: {error}"
-        );
+        assert!(!simulation.asking().is_empty(), "protection comes back: {error}");
         simulation.let_operator_choose();
         simulation
             .run(10, 200, &mut observe)

@@ -12,13 +12,8 @@ use understudy_wire::{ConfigurationHash, Member, ProgramId, StationId};
 const ROBOT: Member = Member::Station(StationId(0));
 const UNDERSTUDY: Member = Member::Station(StationId(2));
 const ROBOT_IO: Member = Member::RemoteIo(ProgramId(0));
-const MEMBERS: [Member; 5] = [
-    ROBOT,
-    Member::Station(StationId(1)),
-    UNDERSTUDY,
-    ROBOT_IO,
-    Member::RemoteIo(ProgramId(1)),
-];
+const MEMBERS: [Member; 5] =
+    [ROBOT, Member::Station(StationId(1)), UNDERSTUDY, ROBOT_IO, Member::RemoteIo(ProgramId(1))];
 
 /// What a run came to.
 struct Outcome {
@@ -32,21 +27,12 @@ struct Outcome {
 fn check(network: Network, faults: &[(u64, f64, Member, Action)]) -> Outcome {
     let mut simulation = Simulation::new(press_cell::parts(Mode::Full, 1), network, 1);
     for &(at_cycle, phase, member, action) in faults {
-        simulation.schedule(Fault {
-            at_cycle,
-            phase,
-            member,
-            action,
-        });
+        simulation.schedule(Fault { at_cycle, phase, member, action });
     }
     let mut refusals = Vec::new();
     let mut observe = |_, _, member, record: Record<'_>| {
         let refused = match record {
-            Record::Station(Event::Refused {
-                member: other,
-                theirs,
-                ours,
-            })
+            Record::Station(Event::Refused { member: other, theirs, ours })
             | Record::RemoteIo(understudy_remote_io::Event::Refused {
                 member: other,
                 theirs,
@@ -56,19 +42,11 @@ fn check(network: Network, faults: &[(u64, f64, Member, Action)]) -> Outcome {
         };
         refusals.extend(refused);
     };
-    simulation
-        .run(200, 100, &mut observe)
-        .expect("the cluster gets ready");
+    simulation.run(200, 100, &mut observe).expect("the cluster gets ready");
     let tallies = simulation.tallies().to_vec();
-    simulation
-        .run(5, 100, &mut observe)
-        .expect("protection comes back");
+    simulation.run(5, 100, &mut observe).expect("protection comes back");
     assert_eq!(simulation.violations().first(), None, "{faults:?}");
-    Outcome {
-        tallies,
-        refused_frames: simulation.refused_frames(),
-        refusals,
-    }
+    Outcome { tallies, refused_frames: simulation.refused_frames(), refusals }
 }
 
 fn quiet(faults: &[(u64, f64, Member, Action)]) -> Outcome {
@@ -91,10 +69,7 @@ fn a_corrupted_frame_is_refused_and_its_copy_serves() {
 
 #[test]
 fn a_network_that_corrupts_is_as_one_that_loses() {
-    let network = Network {
-        corruption: 0.05,
-        ..Network::default()
-    };
+    let network = Network { corruption: 0.05, ..Network::default() };
     assert!(check(network, &[]).refused_frames > 0);
 }
 
@@ -143,9 +118,7 @@ fn a_misconfigured_station_is_refused_with_both_hashes() {
         (150, 0.0, ROBOT, Action::Restart),
     ]);
     assert_eq!(untrue(&outcome), 0);
-    let right = press_cell::parts(Mode::Full, 1).stations[0]
-        .agreement
-        .configuration;
+    let right = press_cell::parts(Mode::Full, 1).stations[0].agreement.configuration;
     let mut refusals = outcome.refusals;
     let wrong = refusals.iter().find(|refusal| refusal.1 == ROBOT);
     let wrong = wrong.expect("the robot is refused").2;
@@ -184,10 +157,7 @@ fn a_restart_storm_costs_no_cycle() {
             let storm: Vec<_> = (0..100 / every)
                 .flat_map(|restart| {
                     let cycle = 50 + restart * every;
-                    [
-                        (cycle, 0.2, member, Action::Crash),
-                        (cycle, 0.6, member, Action::Restart),
-                    ]
+                    [(cycle, 0.2, member, Action::Crash), (cycle, 0.6, member, Action::Restart)]
                 })
                 .collect();
             assert_eq!(untrue(&quiet(&storm)), 0, "{member:?} every {every} cycles");
@@ -219,10 +189,7 @@ fn a_wall_clock_that_jumps_renumbers_nobody() {
         let in_epoch = Action::RestartInEpoch { epoch };
         for rank in 0..3 {
             let member = Member::Station(StationId(rank));
-            let faults = [
-                (50, 0.3, member, Action::Crash),
-                (80, 0.6, member, in_epoch),
-            ];
+            let faults = [(50, 0.3, member, Action::Crash), (80, 0.6, member, in_epoch)];
             let outcome = quiet(&faults);
             assert_eq!(untrue(&outcome), 0, "{member:?} in epoch {epoch}");
         }
@@ -307,10 +274,5 @@ fn a_cold_start_waits_for_the_operator() {
     let mut simulation = Simulation::new(parts, Network::default(), 1);
     let nobody = simulation.run(1, 100, &mut |_, _, _, _| {});
     assert!(nobody.is_err(), "nothing is driven directly yet");
-    assert!(
-        simulation
-            .tallies()
-            .iter()
-            .all(|it| it.fail_safe > 90 && it.direct == 0)
-    );
+    assert!(simulation.tallies().iter().all(|it| it.fail_safe > 90 && it.direct == 0));
 }

@@ -7,12 +7,7 @@ use understudy_simulator::{Action, Fault, Network, Simulation, Tally};
 use understudy_wire::{Member, ProgramId, StationId};
 
 fn fault(at_cycle: u64, phase: f64, rank: u8, action: Action) -> Fault {
-    Fault {
-        at_cycle,
-        phase,
-        member: Member::Station(StationId(rank)),
-        action,
-    }
+    Fault { at_cycle, phase, member: Member::Station(StationId(rank)), action }
 }
 
 /// Runs the cell under `faults` for `cycles`; nothing wrong may be driven. Answers with what each remote I/O did.
@@ -22,13 +17,9 @@ fn run(mode: Mode, understudies: usize, faults: &[Fault], cycles: u64) -> (Vec<T
     for fault in faults {
         simulation.schedule(*fault);
     }
-    simulation
-        .run(cycles, 100, &mut |_, _, _, _| {})
-        .expect("the cluster gets ready");
+    simulation.run(cycles, 100, &mut |_, _, _, _| {}).expect("the cluster gets ready");
     assert_eq!(simulation.violations(), []);
-    let finished = simulation
-        .field(ProgramId(1))
-        .map_or(0, |field| field.finished);
+    let finished = simulation.field(ProgramId(1)).map_or(0, |field| field.finished);
     (simulation.tallies().to_vec(), finished)
 }
 
@@ -38,10 +29,8 @@ fn no_cycle_is_held_for_one_killed_station() {
     for rank in 0..3 {
         for tenth in 0..10 {
             let phase = f64::from(tenth) / 10.0;
-            let faults = [
-                fault(100, phase, rank, Action::Crash),
-                fault(227, phase, rank, Action::Restart),
-            ];
+            let faults =
+                [fault(100, phase, rank, Action::Crash), fault(227, phase, rank, Action::Restart)];
             let (tallies, _) = run(Mode::Full, 1, &faults, 300);
             for tally in &tallies {
                 assert_eq!(
@@ -52,10 +41,7 @@ fn no_cycle_is_held_for_one_killed_station() {
             }
             if rank < 2 {
                 let restored = tallies[usize::from(rank)].reconstructed;
-                assert!(
-                    (120..=135).contains(&restored),
-                    "rank {rank}, phase {phase}: {tallies:?}"
-                );
+                assert!((120..=135).contains(&restored), "rank {rank}, phase {phase}: {tallies:?}");
             }
         }
     }

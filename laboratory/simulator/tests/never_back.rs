@@ -16,12 +16,7 @@ const STATIONS: u8 = PROGRAMS + 1;
 const ROBOT_IO: Member = Member::RemoteIo(ProgramId(0));
 
 fn fault(at_cycle: u64, phase: f64, member: Member, action: Action) -> Fault {
-    Fault {
-        at_cycle,
-        phase,
-        member,
-        action,
-    }
+    Fault { at_cycle, phase, member, action }
 }
 
 fn station(rank: u8) -> Member {
@@ -86,9 +81,7 @@ fn a_remote_io_that_receives_nobody_for_long_does_not_forget_its_history() {
         simulation.schedule(fault(20, 0.0, from, Action::Cut { to: ROBOT_IO }));
         simulation.schedule(fault(1_300, 0.0, from, Action::Heal { to: ROBOT_IO }));
     }
-    simulation
-        .run(1_400, 100, &mut |_, _, _, _| {})
-        .expect("the cluster gets ready");
+    simulation.run(1_400, 100, &mut |_, _, _, _| {}).expect("the cluster gets ready");
     assert_eq!(simulation.violations(), []);
     let robot = &simulation.tallies()[0];
     assert!(robot.fail_safe > 1_200 && robot.direct > 90, "{robot:?}");
@@ -106,18 +99,8 @@ fn a_station_that_comes_back_as_its_program_starts_cold_is_too_late_or_continues
             Simulation::new(press_cell::parts(Mode::Full, 1), Network::default(), 1);
         simulation.schedule(fault(20, phase, station(0), Action::Stop));
         let crashes = if phase > 0.0 { 29 } else { 20 };
-        simulation.schedule(fault(
-            crashes,
-            phase,
-            Member::Station(UNDERSTUDY),
-            Action::Crash,
-        ));
-        simulation.schedule(fault(
-            crashes,
-            phase,
-            Member::Station(UNDERSTUDY),
-            Action::Restart,
-        ));
+        simulation.schedule(fault(crashes, phase, Member::Station(UNDERSTUDY), Action::Crash));
+        simulation.schedule(fault(crashes, phase, Member::Station(UNDERSTUDY), Action::Restart));
         simulation.schedule(fault(continues, phase, station(0), Action::Continue));
         let mut cold = 0;
         simulation
@@ -171,9 +154,7 @@ impl Seen {
                 let reasons = lacking.iter().map(|one| one.reason).collect();
                 self.unprotected.push((cycle, reasons));
             }
-            Event::StateLost {
-                newest, applied, ..
-            } => {
+            Event::StateLost { newest, applied, .. } => {
                 let applied = applied.map(|applied| applied.cycle.0);
                 self.lost.push((cycle, newest.cycle.0, applied));
             }
@@ -198,27 +179,15 @@ fn a_stale_state_is_not_adopted_and_the_operator_is_asked() {
         let [(at, reasons)] = &seen.unprotected[..] else {
             panic!("{:?}", seen.unprotected);
         };
-        assert!(
-            (10..10 + 5).contains(at),
-            "protection is lost with the link, not later: {at}"
-        );
-        assert!(
-            matches!(reasons[..], [LackingReason::Behind { .. }]),
-            "{reasons:?}"
-        );
+        assert!((10..10 + 5).contains(at), "protection is lost with the link, not later: {at}");
+        assert!(matches!(reasons[..], [LackingReason::Behind { .. }]), "{reasons:?}");
         let [(_, newest, Some(applied))] = seen.lost[..] else {
             panic!("{:?}", seen.lost);
         };
-        assert!(
-            (length - 2..=length + 2).contains(&(applied - newest)),
-            "{applied} {newest}"
-        );
+        assert!((length - 2..=length + 2).contains(&(applied - newest)), "{applied} {newest}");
         assert_eq!(seen.cold, 0);
         let after = |source| {
-            let dead = seen
-                .sources
-                .iter()
-                .filter(|(cycle, _)| *cycle > 10 + length);
+            let dead = seen.sources.iter().filter(|(cycle, _)| *cycle > 10 + length);
             dead.filter(|(_, of)| *of == source).count()
         };
         assert_eq!(after(Source::Reconstructed) + after(Source::Direct), 0);
@@ -243,9 +212,7 @@ fn a_stale_state_is_followed_by_a_cold_start_where_that_is_configured() {
     let mut simulation = stale(100, StaleState::Cold, Action::Crash);
     let mut seen = Seen::default();
     simulation
-        .run(300, 100, &mut |_, cycle, member, record| {
-            seen.note(cycle, member, &record)
-        })
+        .run(300, 100, &mut |_, cycle, member, record| seen.note(cycle, member, &record))
         .expect("the cluster gets ready");
     assert_eq!(simulation.violations(), []);
     assert_eq!((seen.lost.len(), seen.cold), (1, 1));
@@ -261,10 +228,8 @@ fn a_station_that_returns_with_the_state_ends_the_loss() {
     let mut recovered = 0;
     simulation
         .run(300, 100, &mut |_, _, _, record| {
-            recovered += u64::from(matches!(
-                record,
-                Record::RemoteIo(Event::StateRecovered { .. })
-            ));
+            recovered +=
+                u64::from(matches!(record, Record::RemoteIo(Event::StateRecovered { .. })));
         })
         .expect("the cluster gets ready");
     assert_eq!(recovered, 1);
@@ -276,13 +241,8 @@ fn a_station_that_returns_with_the_state_ends_the_loss() {
 /// the controller was gone before, or dies after the remote I/O was seen to be silent, nothing newer can have been applied.
 #[test]
 fn a_remote_io_that_cannot_know_what_it_applied_asks() {
-    for (controller_dies, asks) in [
-        (20, false),
-        (99, true),
-        (100, true),
-        (101, true),
-        (108, false),
-    ] {
+    for (controller_dies, asks) in [(20, false), (99, true), (100, true), (101, true), (108, false)]
+    {
         let parts = press_cell::parts(Mode::Full, 1);
         let mut simulation = Simulation::new(parts, Network::default(), 1);
         simulation.schedule(fault(controller_dies, 0.3, station(0), Action::Crash));
@@ -290,23 +250,12 @@ fn a_remote_io_that_cannot_know_what_it_applied_asks() {
         simulation.schedule(fault(120, 0.3, ROBOT_IO, Action::Restart));
         let mut seen = Seen::default();
         simulation
-            .run(250, 100, &mut |_, cycle, member, record| {
-                seen.note(cycle, member, &record)
-            })
+            .run(250, 100, &mut |_, cycle, member, record| seen.note(cycle, member, &record))
             .expect("the cluster gets ready");
         assert_eq!(simulation.violations(), []);
-        assert_eq!(
-            !seen.lost.is_empty(),
-            asks,
-            "{controller_dies}: {:?}",
-            seen.lost
-        );
+        assert_eq!(!seen.lost.is_empty(), asks, "{controller_dies}: {:?}", seen.lost);
         let last = seen.sources.last().map(|(_, source)| *source);
-        let expected = if asks {
-            Source::FailSafe
-        } else {
-            Source::Reconstructed
-        };
+        let expected = if asks { Source::FailSafe } else { Source::Reconstructed };
         assert_eq!(last, Some(expected), "{controller_dies}");
     }
 }
@@ -343,9 +292,7 @@ fn a_state_that_is_handed_over_while_a_remote_io_listens_is_waited_for() {
             }
             let mut seen = Seen::default();
             simulation
-                .run(200, 100, &mut |_, cycle, member, record| {
-                    seen.note(cycle, member, &record)
-                })
+                .run(200, 100, &mut |_, cycle, member, record| seen.note(cycle, member, &record))
                 .expect("the cluster gets ready");
             let starts = faults.len();
             assert_eq!(simulation.violations(), [], "{at} {phase} {starts}");
@@ -379,9 +326,7 @@ fn a_remote_io_that_was_suspended_decides_by_the_present() {
         simulation.schedule(fault(stopped + length, 0.0, ROBOT_IO, Action::Continue));
         let mut seen = Seen::default();
         simulation
-            .run(200, 100, &mut |_, cycle, member, record| {
-                seen.note(cycle, member, &record)
-            })
+            .run(200, 100, &mut |_, cycle, member, record| seen.note(cycle, member, &record))
             .expect("the cluster gets ready");
         assert_eq!(simulation.violations(), [], "{stopped} {length}");
         // It stays awake for so long that it starts cold before the state is there, or not at all.
@@ -408,9 +353,7 @@ fn what_a_station_recalled_before_its_restart_proves_nothing() {
         simulation.schedule(fault(63, 0.8, ROBOT_IO, Action::Restart));
         simulation.schedule(fault(dies, phase, station(0), Action::Crash));
         simulation.schedule(fault(dies, phase, station(0), Action::Restart));
-        simulation
-            .run(200, 100, &mut |_, _, _, _| {})
-            .expect("the cluster gets ready");
+        simulation.run(200, 100, &mut |_, _, _, _| {}).expect("the cluster gets ready");
         assert_eq!(simulation.violations(), [], "{dies} {phase}");
     }
 }

@@ -61,10 +61,7 @@ fn faults() -> Vec<Fault> {
 fn check(programs: usize, mode: Mode, network: Network, faults: &[Fault], expected: u64) {
     let mut simulation =
         Simulation::new(press_cell::line(programs, mode, 1), Network::default(), 7);
-    simulation.disturb(Disturbance {
-        network,
-        cycles: Some(40..200),
-    });
+    simulation.disturb(Disturbance { network, cycles: Some(40..200) });
     for fault in faults {
         simulation.schedule(*fault);
     }
@@ -75,83 +72,31 @@ fn check(programs: usize, mode: Mode, network: Network, faults: &[Fault], expect
         })
         .expect("the cluster gets ready");
     digest.take(&format!("{:?}", simulation.tallies()));
-    assert_eq!(
-        digest.0, expected,
-        "{programs} {mode:?}: {:#018x}",
-        digest.0
-    );
+    assert_eq!(digest.0, expected, "{programs} {mode:?}: {:#018x}", digest.0);
 }
 
 const QUIET: Duration = Duration::ZERO;
 
 fn network(loss: f64, duplicate: f64, jitter: Duration) -> Network {
-    Network {
-        loss,
-        duplicate,
-        jitter,
-        corruption: loss / 2.0,
-        ..Network::default()
-    }
+    Network { loss, duplicate, jitter, corruption: loss / 2.0, ..Network::default() }
 }
 
 #[test]
 fn undisturbed_runs_have_known_outcomes() {
-    check(
-        2,
-        Mode::Full,
-        network(0.0, 0.0, QUIET),
-        &[],
-        0x7333_0fab_3f7f_95f5,
-    );
-    check(
-        2,
-        Mode::Paper,
-        network(0.0, 0.0, QUIET),
-        &[],
-        0x0c69_95d2_6e84_1137,
-    );
-    check(
-        16,
-        Mode::Full,
-        network(0.0, 0.0, QUIET),
-        &[],
-        0x7c28_a624_e075_cc6d,
-    );
+    check(2, Mode::Full, network(0.0, 0.0, QUIET), &[], 0x7333_0fab_3f7f_95f5);
+    check(2, Mode::Paper, network(0.0, 0.0, QUIET), &[], 0x0c69_95d2_6e84_1137);
+    check(16, Mode::Full, network(0.0, 0.0, QUIET), &[], 0x7c28_a624_e075_cc6d);
 }
 
 #[test]
 fn faulty_runs_have_known_outcomes() {
-    check(
-        3,
-        Mode::Full,
-        network(0.0, 0.0, QUIET),
-        &faults(),
-        0x2577_6930_2807_1a40,
-    );
-    check(
-        3,
-        Mode::Paper,
-        network(0.0, 0.0, QUIET),
-        &faults(),
-        0x0540_995b_0ef0_770a,
-    );
+    check(3, Mode::Full, network(0.0, 0.0, QUIET), &faults(), 0x2577_6930_2807_1a40);
+    check(3, Mode::Paper, network(0.0, 0.0, QUIET), &faults(), 0x0540_995b_0ef0_770a);
 }
 
 #[test]
 fn lossy_runs_have_known_outcomes() {
     let jitter = Duration::from_millis(2);
-    check(
-        3,
-        Mode::Full,
-        network(0.1, 0.1, jitter),
-        &[],
-        0x1845_21b3_eb5f_0647,
-    );
-    check(
-        8,
-        Mode::Full,
-        network(0.05, 0.1, jitter),
-        &faults(),
-        0x0775_e721_554f_b2a9,
-    );
+    check(3, Mode::Full, network(0.1, 0.1, jitter), &[], 0x1845_21b3_eb5f_0647);
+    check(8, Mode::Full, network(0.05, 0.1, jitter), &faults(), 0x0775_e721_554f_b2a9);
 }

@@ -58,11 +58,7 @@ fn change(simulation: &mut Simulation, at_cycle: u64, before: Cut, after: Cut) {
                 // Somewhere else in the cycle for each length.
                 phase: at_cycle as f64 * 0.37 % 1.0,
                 member: member(from),
-                action: if is {
-                    Action::Cut { to }
-                } else {
-                    Action::Heal { to }
-                },
+                action: if is { Action::Cut { to } } else { Action::Heal { to } },
             });
         }
     }
@@ -81,9 +77,7 @@ fn check(cut: Cut, seed: u64) {
             let starts = matches!(record, Record::RemoteIo(Event::StartedCold { .. }));
             cold += u64::from(starts && cycle.is_some());
         };
-        simulation
-            .run(at + length + 1, 100, &mut observe)
-            .expect("the cluster gets ready");
+        simulation.run(at + length + 1, 100, &mut observe).expect("the cluster gets ready");
         let what = format!("cut {cut:x?} for {length} cycles");
         for program in 0..PROGRAMS {
             let tally = &simulation.tallies()[program];

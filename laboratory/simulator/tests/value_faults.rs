@@ -29,26 +29,17 @@ fn run(understudies: usize, answer: ValueFault, faults: &[(u64, f64, Member, Act
     }
     let mut simulation = Simulation::new(parts, Network::default(), 1);
     for &(at_cycle, phase, member, action) in faults {
-        simulation.schedule(Fault {
-            at_cycle,
-            phase,
-            member,
-            action,
-        });
+        simulation.schedule(Fault { at_cycle, phase, member, action });
     }
     let mut accusations = Vec::new();
     let mut observe = |_, cycle: Option<u64>, member, record: Record<'_>| {
-        if let Record::RemoteIo(Event::ValueFault {
-            accused, located, ..
-        }) = record
+        if let Record::RemoteIo(Event::ValueFault { accused, located, .. }) = record
             && let Member::RemoteIo(program) = member
         {
             accusations.push((program, cycle.unwrap_or(0), *accused, *located));
         }
     };
-    simulation
-        .run(CYCLES, 100, &mut observe)
-        .expect("the cluster gets ready");
+    simulation.run(CYCLES, 100, &mut observe).expect("the cluster gets ready");
     Outcome {
         tallies: simulation.tallies().to_vec(),
         violations: simulation.violations().to_vec(),
@@ -66,19 +57,13 @@ fn untrue(tally: &Tally) -> u64 {
 }
 
 fn both(one: usize, other: usize) -> StationSet {
-    [one, other]
-        .map(|rank| StationId(rank as u8))
-        .into_iter()
-        .collect()
+    [one, other].map(|rank| StationId(rank as u8)).into_iter().collect()
 }
 
 /// Every bit of x(i), in the controller and in each understudy: program, station, and the fault.
 fn state_flips(understudies: usize) -> impl Iterator<Item = (usize, usize, Action)> {
     let parts = press_cell::parts(Mode::Full, understudies);
-    let widths = parts.stations[0]
-        .programs
-        .iter()
-        .map(|it| it.executable.state_count());
+    let widths = parts.stations[0].programs.iter().map(|it| it.executable.state_count());
     let widths: Vec<usize> = widths.collect();
     (0..2).flat_map(move |program| {
         let holders = [program].into_iter().chain(2..2 + understudies);
@@ -147,10 +132,7 @@ fn fail_safe_is_at_once_and_until_the_operator_releases_it() {
         let outcome = run(
             1,
             ValueFault::FailSafe,
-            &[
-                (AT, 0.0, station(rank), action),
-                (AT + 10, 0.0, remote_io, Action::Release),
-            ],
+            &[(AT, 0.0, station(rank), action), (AT + 10, 0.0, remote_io, Action::Release)],
         );
         assert_eq!(outcome.violations, []);
         let tally = &outcome.tallies[rank];
@@ -168,15 +150,9 @@ fn one_understudy_sees_a_flipped_word() {
             assert_eq!(outcome.violations, [], "bit {bit} of station {rank}");
             for (program, tally) in outcome.tallies.iter().enumerate() {
                 let touched = rank == 2 || rank == program;
-                assert!(
-                    untrue(tally) <= u64::from(touched),
-                    "{rank} {bit} {tally:?}"
-                );
+                assert!(untrue(tally) <= u64::from(touched), "{rank} {bit} {tally:?}");
             }
-            assert!(
-                !outcome.accusations.is_empty(),
-                "bit {bit} of station {rank}"
-            );
+            assert!(!outcome.accusations.is_empty(), "bit {bit} of station {rank}");
         }
     }
 }
@@ -190,15 +166,9 @@ fn two_understudies_locate_a_flipped_state_and_exclude_its_station() {
         let wrong = StationSet::only(StationId(rank as u8));
         let accused = (ProgramId(program as u8), AT + 1, wrong, true);
         assert_eq!(outcome.accusations, [accused], "{what}");
-        assert!(
-            outcome.tallies.iter().all(|tally| untrue(tally) == 0),
-            "{what}"
-        );
+        assert!(outcome.tallies.iter().all(|tally| untrue(tally) == 0), "{what}");
         if rank < 2 {
-            assert!(
-                outcome.tallies[program].reconstructed > CYCLES - AT - 5,
-                "{what}"
-            );
+            assert!(outcome.tallies[program].reconstructed > CYCLES - AT - 5, "{what}");
         }
         let mut simulation = outcome.simulation;
         if rank < 2 {
@@ -240,10 +210,8 @@ fn who_is_excluded_stays_so_when_the_remote_io_restarts() {
         let readmitted = |simulation: &mut Simulation, cycles| {
             let mut count = 0;
             let synchronised = simulation.run(1, cycles, &mut |_, _, _, record| {
-                let is_back = matches!(
-                    record,
-                    Record::Station(understudy_node::Event::Readmitted { .. })
-                );
+                let is_back =
+                    matches!(record, Record::Station(understudy_node::Event::Readmitted { .. }));
                 count += u64::from(is_back);
             });
             (synchronised.is_ok(), count, simulation.violations().len())
@@ -271,11 +239,7 @@ fn two_understudies_mask_a_flipped_word() {
             let wrong = StationSet::only(StationId(rank as u8));
             assert!(!outcome.accusations.is_empty());
             for (_, _, accused, located) in &outcome.accusations {
-                assert_eq!(
-                    (*accused, *located),
-                    (wrong, true),
-                    "bit {bit} of station {rank}"
-                );
+                assert_eq!((*accused, *located), (wrong, true), "bit {bit} of station {rank}");
             }
         }
     }

@@ -63,9 +63,7 @@ fn cluster(kibibytes: usize) -> Parts {
         "recorder.st" => Ok(recorder(kibibytes)),
         _ => Ok(COUNTER.to_owned()),
     });
-    let cluster = loaded
-        .cluster
-        .unwrap_or_else(|| panic!("{:?}", loaded.reports));
+    let cluster = loaded.cluster.unwrap_or_else(|| panic!("{:?}", loaded.reports));
     parts(&cluster)
 }
 
@@ -74,12 +72,7 @@ fn station(rank: u8) -> Member {
 }
 
 fn fault(at_cycle: u64, member: Member, action: Action) -> Fault {
-    Fault {
-        at_cycle,
-        phase: 0.3,
-        member,
-        action,
-    }
+    Fault { at_cycle, phase: 0.3, member, action }
 }
 
 const STATIONS: u64 = 4;
@@ -92,10 +85,7 @@ fn run(
     cycles: u64,
     seed: u64,
 ) -> (Simulation, Vec<(Member, u64)>) {
-    let network = Network {
-        loss,
-        ..Network::default()
-    };
+    let network = Network { loss, ..Network::default() };
     let mut simulation = Simulation::new(cluster(kibibytes), network, seed);
     for fault in faults {
         simulation.schedule(*fault);
@@ -106,9 +96,7 @@ fn run(
             synchronised.push((member, cycle));
         }
     };
-    simulation
-        .run(cycles, 1000, &mut observe)
-        .expect("the cluster gets ready");
+    simulation.run(cycles, 1000, &mut observe).expect("the cluster gets ready");
     assert_eq!(simulation.violations(), []);
     (simulation, synchronised)
 }

@@ -73,9 +73,7 @@ fn cluster() -> Parts {
         "counter.st" => Ok(COUNTER.to_owned()),
         _ => Ok(READER.to_owned()),
     });
-    let cluster = loaded
-        .cluster
-        .unwrap_or_else(|| panic!("{:?}", loaded.reports));
+    let cluster = loaded.cluster.unwrap_or_else(|| panic!("{:?}", loaded.reports));
     parts(&cluster)
 }
 
@@ -127,11 +125,9 @@ impl Seen {
             Event::WriteVoid { id, .. } => {
                 self.outcomes.insert(*id, refused(WriteRefusal::Void));
             }
-            Event::Applied {
-                outputs,
-                missing: None,
-                ..
-            } => self.outputs[program.index()] = Some(outputs.clone()),
+            Event::Applied { outputs, missing: None, .. } => {
+                self.outputs[program.index()] = Some(outputs.clone())
+            }
             Event::StartedCold { .. } => self.cold_starts += 1,
             _ => {}
         }
@@ -152,19 +148,14 @@ impl Bench {
         simulation.run(3, 200, &mut observe).expect("it gets ready");
         // The first start.
         seen.cold_starts = 0;
-        Self {
-            simulation,
-            seen,
-            cycle: 3,
-        }
+        Self { simulation, seen, cycle: 3 }
     }
 
     fn pass(&mut self, cycles: u64) {
         let seen = &mut self.seen;
         let mut observe = |_, _, member, record: Record<'_>| seen.observe(member, record);
         self.cycle += cycles;
-        self.simulation
-            .go_on(self.cycle, &mut observe, &mut || false);
+        self.simulation.go_on(self.cycle, &mut observe, &mut || false);
     }
 
     fn write(&mut self, write: &Write) {
@@ -194,12 +185,7 @@ impl Bench {
     }
 
     fn fault(&mut self, member: Member, action: Action) {
-        self.simulation.schedule(Fault {
-            at_cycle: 0,
-            phase: 0.0,
-            member,
-            action,
-        });
+        self.simulation.schedule(Fault { at_cycle: 0, phase: 0.0, member, action });
     }
 }
 
@@ -211,11 +197,7 @@ fn a_write_is_in_effect_and_read_by_another_program() {
     bench.write(&write(2, 1, VALUE, real(-3.0)));
     bench.pass(2);
     let in_effect = |outcome| matches!(outcome, Some(WriteOutcome::InEffect { .. }));
-    assert!(
-        in_effect(bench.outcome(&press)),
-        "{:?}",
-        bench.seen.outcomes
-    );
+    assert!(in_effect(bench.outcome(&press)), "{:?}", bench.seen.outcomes);
     assert_eq!((bench.count(), bench.echo()), (1.0, -3.0));
     bench.pass(2);
     let seen = bench.seen.outputs[1].as_ref().expect("applied");
@@ -277,14 +259,8 @@ fn what_is_wrong_is_refused_and_has_no_effect() {
     check(write(1, 1, PRESS, real(1.0)), WriteRefusal::Type);
     check(write(1, 1, VALUE + 1, real(1.0)), WriteRefusal::NotWritable);
     let required = Role::Engineer;
-    check(
-        write(1, 1, SERVICE, true.into()),
-        WriteRefusal::Role { required },
-    );
-    check(
-        write(1, 2, VALUE, real(1.0)),
-        WriteRefusal::Order { expected: 1 },
-    );
+    check(write(1, 1, SERVICE, true.into()), WriteRefusal::Role { required });
+    check(write(1, 2, VALUE, real(1.0)), WriteRefusal::Order { expected: 1 });
     bench.write(&write(1, 1, VALUE, real(1.0)));
     let mut check = |write: Write, expected: WriteRefusal| {
         bench.write(&write);
@@ -294,10 +270,7 @@ fn what_is_wrong_is_refused_and_has_no_effect() {
     // One write of an input at a time, and none before the one before it is decided.
     check(write(2, 1, VALUE, real(2.0)), WriteRefusal::Busy);
     check(write(1, 2, PRESS, true.into()), WriteRefusal::Busy);
-    check(
-        write(1, 1, VALUE, real(2.0)),
-        WriteRefusal::Order { expected: 2 },
-    );
+    check(write(1, 1, VALUE, real(2.0)), WriteRefusal::Order { expected: 2 });
     bench.pass(2);
     assert_eq!((bench.count(), bench.echo()), (0.0, 1.0));
 }
@@ -335,11 +308,8 @@ fn arbitrary_fault() -> impl Strategy<Value = (Member, Action, Action, u64)> {
     });
     let cut = (0..3_u8).prop_map(|rank| {
         let to = Member::Station(StationId(rank));
-        let (from, cut, heal) = (
-            Member::RemoteIo(PROGRAM),
-            Action::Cut { to },
-            Action::Heal { to },
-        );
+        let (from, cut, heal) =
+            (Member::RemoteIo(PROGRAM), Action::Cut { to }, Action::Heal { to });
         (from, cut, heal)
     });
     (prop_oneof![killed, suspended, deaf, cut], 1..40_u64)

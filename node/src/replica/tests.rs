@@ -31,17 +31,11 @@ fn shift_register() -> Circuit {
 }
 
 fn program() -> Program {
-    Program {
-        hash: HASH,
-        executable: (&shift_register()).into(),
-    }
+    Program { hash: HASH, executable: (&shift_register()).into() }
 }
 
 fn moment(cycle: u64) -> Moment {
-    Moment {
-        epoch: Epoch(1),
-        cycle: Cycle(cycle),
-    }
+    Moment { epoch: Epoch(1), cycle: Cycle(cycle) }
 }
 
 /// The remote I/O's side: the true chain of samples, and the state after each by the naive run.
@@ -228,20 +222,9 @@ fn a_transferred_state_is_published_only_after_its_shadow_mode() {
     let follow = |replica: &mut Replica, scratch: &mut Scratch, frame: &Arc<Frame>| {
         replica.follow(&program, scratch, frame, SHADOW_CYCLES)
     };
-    assert_eq!(
-        follow(&mut replica, &mut scratch, &truth.frame()),
-        Followed::Lost
-    );
-    let wrong = Transfer {
-        hash: ProgramHash(12),
-        ..truth.transfer(0)
-    };
-    assert!(!replica.adopt(
-        &program,
-        &mut scratch,
-        (StationId(1), &wrong),
-        SHADOW_CYCLES
-    ));
+    assert_eq!(follow(&mut replica, &mut scratch, &truth.frame()), Followed::Lost);
+    let wrong = Transfer { hash: ProgramHash(12), ..truth.transfer(0) };
+    assert!(!replica.adopt(&program, &mut scratch, (StationId(1), &wrong), SHADOW_CYCLES));
     assert!(!replica.adopt(
         &program,
         &mut scratch,
@@ -257,14 +240,8 @@ fn a_transferred_state_is_published_only_after_its_shadow_mode() {
     let mut proved = Vec::new();
     for _ in 0..3 {
         let frame = truth.sample(true);
-        assert_eq!(
-            follow(&mut replica, &mut scratch, &frame),
-            Followed::Synchronised
-        );
-        assert_eq!(
-            replica.may_publish(frame.header.moment),
-            proved.contains(&true)
-        );
+        assert_eq!(follow(&mut replica, &mut scratch, &frame), Followed::Synchronised);
+        assert_eq!(replica.may_publish(frame.header.moment), proved.contains(&true));
         proved.push(replica.close_cycle(frame.header.moment));
     }
     assert_eq!(proved, [false, true, false]);

@@ -80,11 +80,7 @@ impl Replica {
         partial: Option<&Partial>,
         budget: &mut usize,
     ) -> Vec<Transfer> {
-        let Some(held) = self
-            .held
-            .as_ref()
-            .filter(|_| self.standing == Standing::Proven)
-        else {
+        let Some(held) = self.held.as_ref().filter(|_| self.standing == Standing::Proven) else {
             return Vec::new();
         };
         if let Remembered::Relayed(recalled) | Remembered::Received(_, recalled) =
@@ -223,11 +219,7 @@ impl Replica {
         if !log.starts_at(held.state.lineage) {
             return false;
         }
-        self.joining.behind = Some(Behind {
-            from,
-            held,
-            past: VecDeque::new(),
-        });
+        self.joining.behind = Some(Behind { from, held, past: VecDeque::new() });
         self.catch_up(program, scratch, shadow_cycles).is_some()
     }
 
@@ -246,17 +238,10 @@ impl Replica {
             return None;
         }
         let is_wide = Segment::count(held.state.bits.width()) > 1;
-        let most = if is_wide {
-            REPLAYED_A_CYCLE
-        } else {
-            usize::MAX
-        };
+        let most = if is_wide { REPLAYED_A_CYCLE } else { usize::MAX };
         let samples: Vec<Image> = std::iter::from_fn(|| log.take()).take(most).collect();
         let (moment, is_over) = (log.moment, log.is_empty());
-        let before = (
-            self.held.replace(held),
-            std::mem::replace(&mut self.past, past),
-        );
+        let before = (self.held.replace(held), std::mem::replace(&mut self.past, past));
         for inputs in &samples {
             self.step(program, scratch, inputs, moment);
         }

@@ -46,9 +46,7 @@ impl Station {
         let first = if self.publishes() {
             living.and(lower)
         } else {
-            living
-                .or(self.joining.and(lower))
-                .without(StationSet::only(own))
+            living.or(self.joining.and(lower)).without(StationSet::only(own))
         };
         self.member.clock.anchor() + schedule.period() + schedule.guard() * first.len() as u32
     }
@@ -58,15 +56,8 @@ impl Station {
         // A cycle master keeps to its plan, so that late wake-ups do not add up; one that is far behind starts from
         // now.
         let schedule = &self.settings.agreement.schedule;
-        let anchor = if now.since(planned) < schedule.guard() {
-            planned
-        } else {
-            now
-        };
-        let moment = self
-            .member
-            .clock
-            .pace(now, self.settings.epoch, anchor, schedule.period());
+        let anchor = if now.since(planned) < schedule.guard() { planned } else { now };
+        let moment = self.member.clock.pace(now, self.settings.epoch, anchor, schedule.period());
         if self.role != Role::CycleMaster {
             self.role = Role::CycleMaster;
             self.report(Event::BecameCycleMaster { moment });

@@ -42,10 +42,7 @@ impl Station {
                 continue;
             }
             let header = Header { sender, ..*header };
-            let frame = Arc::new(Frame {
-                header,
-                body: Body::Sample(sample.clone()),
-            });
+            let frame = Arc::new(Frame { header, body: Body::Sample(sample.clone()) });
             self.follow(*program, &frame, sample);
         }
     }
@@ -83,32 +80,22 @@ impl Station {
     /// Ends a cycle: stations that lacked a sample in it are expected to lack it in the next one.
     pub(super) fn close_relay(&mut self) {
         self.lacked = self.cycle.lacked;
-        let had = self
-            .cycle
-            .samples
-            .iter()
-            .filter_map(|frame| match frame.header.sender {
-                Member::RemoteIo(program) => Some(program),
-                _ => None,
-            });
+        let had = self.cycle.samples.iter().filter_map(|frame| match frame.header.sender {
+            Member::RemoteIo(program) => Some(program),
+            _ => None,
+        });
         self.awaited = self.lacked.and(had.collect());
     }
 
     /// The turn with the samples that others lack and that no station has relayed in this cycle, as many as a frame
     /// takes.
     pub(super) fn with_relayed(&self, mut turn: Turn) -> Body {
-        let lacked = self
-            .lacked
-            .or(self.cycle.lacked)
-            .without(self.cycle.relayed);
+        let lacked = self.lacked.or(self.cycle.lacked).without(self.cycle.relayed);
         let samples = self.cycle.samples.iter();
         turn.relayed = samples
             .filter_map(|frame| match (frame.header.sender, &frame.body) {
                 (Member::RemoteIo(program), Body::Sample(sample)) if lacked.contains(program) => {
-                    Some(Relayed {
-                        program,
-                        sample: sample.clone(),
-                    })
+                    Some(Relayed { program, sample: sample.clone() })
                 }
                 _ => None,
             })

@@ -26,10 +26,7 @@ impl Station {
             let Some(replica) = replica_mut(&mut self.replicas, program) else {
                 continue;
             };
-            let partial = join
-                .partial
-                .iter()
-                .find(|partial| partial.program == program);
+            let partial = join.partial.iter().find(|partial| partial.program == program);
             let program = &self.settings.programs[program.index()];
             for transfer in replica.transfer(program, station, partial, &mut budget) {
                 self.member.send(Body::Transfer(transfer));

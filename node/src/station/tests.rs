@@ -53,10 +53,7 @@ fn circuit() -> Circuit {
 }
 
 fn moment(cycle: u64) -> Moment {
-    Moment {
-        epoch: Epoch(1),
-        cycle: Cycle(cycle),
-    }
+    Moment { epoch: Epoch(1), cycle: Cycle(cycle) }
 }
 
 fn hash(program: u8) -> ProgramHash {
@@ -90,10 +87,8 @@ fn settings(rank: u8, shadow_cycles: u32) -> Settings {
         shadow_cycles,
         listen_cycles: 2,
     };
-    let programs = (0..CONTROLLERS as u8).map(|program| Program {
-        hash: hash(program),
-        executable: (&circuit()).into(),
-    });
+    let programs = (0..CONTROLLERS as u8)
+        .map(|program| Program { hash: hash(program), executable: (&circuit()).into() });
     Settings {
         station: StationId(rank),
         agreement: Arc::new(agreement),
@@ -136,10 +131,8 @@ fn sent(what: Sent, cycle: u64, to: u8) -> Option<(Member, Body)> {
                 stepped: moment(cycle),
                 digest: Digest::of(&state),
             };
-            let word = Word {
-                mask: ProgramSet::only(program),
-                sum: Image::from_bits([!state.get(0)]),
-            };
+            let word =
+                Word { mask: ProgramSet::only(program), sum: Image::from_bits([!state.get(0)]) };
             let turn = understudy_wire::Turn {
                 heard: StationSet::EMPTY,
                 holdings: [holding].into_iter().collect(),

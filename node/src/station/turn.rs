@@ -137,12 +137,8 @@ impl Station {
                 replica.may_publish(moment) && Segment::count(state.width()) == 1
             });
             if let Some((lineage, state)) = state {
-                let event = Event::Holds {
-                    moment,
-                    program: replica.id(),
-                    lineage,
-                    state: state.clone(),
-                };
+                let event =
+                    Event::Holds { moment, program: replica.id(), lineage, state: state.clone() };
                 self.report(event);
             }
         }
@@ -151,10 +147,7 @@ impl Station {
     pub(super) fn publish(&mut self, now: Time, moment: Moment) {
         self.cycle.token = Token::Passed;
         let words = self.words(moment);
-        self.report(Event::Published {
-            moment,
-            words: words.clone(),
-        });
+        self.report(Event::Published { moment, words: words.clone() });
         self.report_states(moment);
         let turn = Turn {
             heard: self.member.published(),

@@ -75,11 +75,7 @@ pub struct Unheard {
 
 fn list(tried: &[Unheard]) -> String {
     let each = tried.iter().map(|member| {
-        let Unheard {
-            name,
-            address,
-            reason,
-        } = member;
+        let Unheard { name, address, reason } = member;
         format!("{name} at {address} ({reason})")
     });
     each.collect::<Vec<_>>().join(", ")

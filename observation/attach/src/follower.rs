@@ -71,11 +71,7 @@ impl Follower {
             // Reported once for all attempts.
             if said != reason && !self.ends.load(Ordering::Relaxed) {
                 said.clone_from(&reason);
-                if self
-                    .told
-                    .blocking_send(Told::Detached(member, reason))
-                    .is_err()
-                {
+                if self.told.blocking_send(Told::Detached(member, reason)).is_err() {
                     return;
                 }
             }

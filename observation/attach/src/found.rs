@@ -96,35 +96,20 @@ pub fn find(cluster: &Cluster, keys: TlsKeys, peers: Vec<Peer>) -> Result<Found,
         signals: controllers
             .map(|own| (own.interface.inputs.width(), own.interface.outputs.width()))
             .collect(),
-        members: members
-            .map(|(peer, call)| (peer, call.map_err(Vain::words)))
-            .collect(),
+        members: members.map(|(peer, call)| (peer, call.map_err(Vain::words))).collect(),
     })
 }
 
 fn why_nobody(called: Vec<(Peer, Result<Call, Vain>)>, ours: ConfigurationHash) -> AttachError {
     let (mut silent, mut strange) = (Vec::new(), Vec::new());
     for (Peer { name, address, .. }, call) in called {
-        let unheard = |reason| Unheard {
-            name: name.clone(),
-            address,
-            reason,
-        };
+        let unheard = |reason| Unheard { name: name.clone(), address, reason };
         match call {
             Err(Vain::Other(theirs)) => {
-                return AttachError::OtherConfiguration {
-                    name,
-                    address,
-                    theirs,
-                    ours,
-                };
+                return AttachError::OtherConfiguration { name, address, theirs, ours };
             }
             Err(Vain::Version(found)) => {
-                return AttachError::OtherVersion {
-                    name,
-                    address,
-                    found,
-                };
+                return AttachError::OtherVersion { name, address, found };
             }
             Err(Vain::Nobody(reason)) => silent.push(unheard(reason)),
             Err(Vain::NotAdmitted(reason)) => strange.push(unheard(reason)),

@@ -129,12 +129,7 @@ impl Found {
                 });
             })
             .map_err(system("a thread that writes the journal"))?;
-        Ok(Attached {
-            commander,
-            ends,
-            end: Some(end),
-            recorder: Some(recorder),
-        })
+        Ok(Attached { commander, ends, end: Some(end), recorder: Some(recorder) })
     }
 }
 
@@ -241,12 +236,7 @@ impl Recorder {
             let (member, write) = (*member, write.clone());
             return self.write(member, write, commanded);
         }
-        let OperatorAction::Command {
-            member,
-            command,
-            owner,
-            reason,
-        } = commanded.action.clone()
+        let OperatorAction::Command { member, command, owner, reason } = commanded.action.clone()
         else {
             let event = commanded.action.alarm_event(&self.alarms);
             let done = event.map(|event| {
@@ -271,10 +261,8 @@ impl Recorder {
 
     async fn command(&self, member: Member, command: &Command) -> Result<Done, Refusal> {
         let name = self.names.get(&member).cloned().unwrap_or_default();
-        let elsewhere = |reason: &str| Refusal::Elsewhere {
-            name: name.clone(),
-            reason: reason.to_owned(),
-        };
+        let elsewhere =
+            |reason: &str| Refusal::Elsewhere { name: name.clone(), reason: reason.to_owned() };
         let request = match command {
             Command::Release => Request::Release,
             Command::Choose { choice } => Request::Choose(*choice),
@@ -288,10 +276,7 @@ impl Recorder {
             }
         };
         let Member::RemoteIo(program) = member else {
-            return Err(Refusal::WrongMember {
-                name,
-                needs: "it is for remote I/Os",
-            });
+            return Err(Refusal::WrongMember { name, needs: "it is for remote I/Os" });
         };
         if let (Command::Force(force), Some((inputs, outputs))) =
             (command, self.signals.get(program.index()))
@@ -308,10 +293,7 @@ impl Recorder {
             // The receiver is gone when the program ends.
             let _ = tell.send(call.ask(&request));
         });
-        let system = |reason: String| Refusal::System {
-            name: name.clone(),
-            reason,
-        };
+        let system = |reason: String| Refusal::System { name: name.clone(), reason };
         asking.map_err(|error| system(error.to_string()))?;
         match told.await {
             Ok(Ok(answer)) if answer == DONE => Ok(Done::default()),

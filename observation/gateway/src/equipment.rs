@@ -50,10 +50,7 @@ impl Equipment {
         let table = |points: &Points| {
             let registers = declared(points).map(|point| registers_of(point.of)).sum();
             if registers > ADDRESSES {
-                return Err(GatewayError::TooManyRegisters {
-                    registers,
-                    most: ADDRESSES,
-                });
+                return Err(GatewayError::TooManyRegisters { registers, most: ADDRESSES });
             }
             Ok(vec![0; registers])
         };
@@ -98,18 +95,11 @@ impl Equipment {
     fn scan(&mut self) -> bool {
         for (at, point) in addressed(&self.interface.inputs) {
             let words = &self.holding[at..at + registers_of(point.of)];
-            let stored = words
-                .iter()
-                .fold(0, |stored, word| stored << 16 | u64::from(*word));
+            let stored = words.iter().fold(0, |stored, word| stored << 16 | u64::from(*word));
             point.set(&mut self.inputs, stored);
         }
         let before = self.outputs.clone();
-        self.executable.step(
-            &mut self.scratch,
-            &mut self.state,
-            &self.inputs,
-            &mut self.outputs,
-        );
+        self.executable.step(&mut self.scratch, &mut self.state, &self.inputs, &mut self.outputs);
         for (at, point) in addressed(&self.interface.outputs) {
             let stored = point.of.signed(point.get(&self.outputs)) as u64;
             let words = &mut self.input[at..at + registers_of(point.of)];
@@ -248,11 +238,7 @@ pub fn serve_equipment(
     ready: impl FnOnce(SocketAddr),
     changed: Changed,
 ) -> Result<(), GatewayError> {
-    let mut served = Served {
-        equipment,
-        changed,
-        scans_after_writes: period.is_none(),
-    };
+    let mut served = Served { equipment, changed, scans_after_writes: period.is_none() };
     served.scan();
     let client = Client(Arc::new(Mutex::new(served)));
     let equipment = Arc::clone(&client.0);
@@ -313,28 +299,19 @@ mod tests {
 
     fn equipment() -> Equipment {
         let (file, _) = parse(ECHO);
-        let options = Options {
-            text: ECHO,
-            ..Options::default()
-        };
+        let options = Options { text: ECHO, ..Options::default() };
         let program = lower(&file, &options).program.expect("a program");
         Equipment::new((&program).into(), (&program).into()).expect("few registers")
     }
 
     fn served(equipment: Equipment, changed: Changed) -> Served {
-        Served {
-            equipment,
-            changed,
-            scans_after_writes: true,
-        }
+        Served { equipment, changed, scans_after_writes: true }
     }
 
     #[test]
     fn points_have_consecutive_registers_of_their_types() {
         let equipment = equipment();
-        let places = equipment
-            .places()
-            .map(|(point, place)| format!("{} {place}", point.name));
+        let places = equipment.places().map(|(point, place)| format!("{} {place}", point.name));
         let places: Vec<String> = places.collect();
         let expected = "step holding:0 udint, open holding:2.0, level holding:3 real, offset holding:5 int, mask holding:6 uint, \
             rest holding:7 lint, mass holding:11 lreal, scans input:0 uint, o input:1.0, l input:2 real, s input:4 int, m input:5 uint, \
@@ -346,9 +323,7 @@ mod tests {
     fn each_write_is_followed_by_one_scan_and_reads_by_none() {
         let (sender, changes) = mpsc::channel();
         let changed: Changed = Box::new(move |equipment| {
-            sender
-                .send(equipment.outputs().to_vec())
-                .expect("the test listens");
+            sender.send(equipment.outputs().to_vec()).expect("the test listens");
         });
         let mut served = served(equipment(), changed);
         let words = [
@@ -376,28 +351,16 @@ mod tests {
         let mut served = served(equipment(), changed);
         let address = Err(ExceptionCode::IllegalDataAddress);
         for (request, expected) in [
-            (
-                Request::WriteMultipleRegisters(14, vec![1, 2].into()),
-                address.clone(),
-            ),
+            (Request::WriteMultipleRegisters(14, vec![1, 2].into()), address.clone()),
             (Request::WriteSingleRegister(u16::MAX, 1), address.clone()),
             (
                 Request::WriteMultipleRegisters(0, vec![].into()),
                 Err(ExceptionCode::IllegalDataValue),
             ),
             (Request::ReadInputRegisters(13, 2), address),
-            (
-                Request::ReadInputRegisters(0, 0),
-                Err(ExceptionCode::IllegalDataValue),
-            ),
-            (
-                Request::ReadCoils(0, 1),
-                Err(ExceptionCode::IllegalFunction),
-            ),
-            (
-                Request::WriteSingleCoil(0, true),
-                Err(ExceptionCode::IllegalFunction),
-            ),
+            (Request::ReadInputRegisters(0, 0), Err(ExceptionCode::IllegalDataValue)),
+            (Request::ReadCoils(0, 1), Err(ExceptionCode::IllegalFunction)),
+            (Request::WriteSingleCoil(0, true), Err(ExceptionCode::IllegalFunction)),
         ] {
             assert_eq!(served.answer(&request), expected, "{request:?}");
         }

@@ -21,12 +21,7 @@ const LOOK: Duration = Duration::from_millis(40);
 const SHOW: Duration = Duration::from_millis(100);
 
 /// Gateways show the present; the past is for the views.
-pub const BOUNDS: Bounds = Bounds {
-    cycles: 64,
-    events: 1000,
-    changes: 64,
-    timings: 600,
-};
+pub const BOUNDS: Bounds = Bounds { cycles: 64, events: 1000, changes: 64, timings: 600 };
 
 /// The newest state of a run.
 #[derive(Debug)]
@@ -134,13 +129,7 @@ impl Followed {
                 what: "a thread to read the journal with",
                 source,
             })?;
-        Ok(Self {
-            cluster: Arc::clone(run.cluster()),
-            metrics,
-            newest,
-            ends,
-            thread: Some(thread),
-        })
+        Ok(Self { cluster: Arc::clone(run.cluster()), metrics, newest, ends, thread: Some(thread) })
     }
 
     /// The cluster of the run.
@@ -228,8 +217,7 @@ impl Reader {
                 }
                 unshown = true;
             }
-            self.metrics
-                .times(self.following.past().unwrap_or(&self.model));
+            self.metrics.times(self.following.past().unwrap_or(&self.model));
             unshown |= taken > 0;
             if taken == 0 && is_finished {
                 // Its results were there before the journal was read to its end.

@@ -90,16 +90,11 @@ pub fn forward_signals(
 ) -> Result<(), GatewayError> {
     let taken = signals_of(gate.cluster());
     if taken.is_empty() {
-        return Err(GatewayError::NoGroupSignals {
-            cluster: gate.cluster().name().to_owned(),
-        });
+        return Err(GatewayError::NoGroupSignals { cluster: gate.cluster().name().to_owned() });
     }
     let runtime = runtime()?;
-    let mut forwarder = Forwarder {
-        states: vec![State::default(); taken.len()],
-        taken,
-        cycles: BTreeMap::new(),
-    };
+    let mut forwarder =
+        Forwarder { states: vec![State::default(); taken.len()], taken, cycles: BTreeMap::new() };
     while !ends() {
         match Documents::open(address, keys) {
             Ok(documents) => {
@@ -184,11 +179,7 @@ impl Forwarder {
             BTreeMap::new();
         for place in 0..self.taken.len() {
             let taken = self.taken[place].clone();
-            let GroupSignal {
-                group,
-                controller,
-                output,
-            } = &taken.from;
+            let GroupSignal { group, controller, output } = &taken.from;
             let root = format!("understudy/mirror/{group}");
             if !advances.contains_key(group) {
                 let run = documents.document(&format!("{root}/run"));
@@ -203,9 +194,7 @@ impl Forwarder {
                 let text = documents.document(&format!("{root}/programs/{controller}"));
                 (text.and_then(|text| serde_json::from_str(&text).ok()), read)
             });
-            let value = document
-                .as_ref()
-                .and_then(|document| document.proved(output));
+            let value = document.as_ref().and_then(|document| document.proved(output));
             let value = value.filter(|_| advances.get(group) == Some(&true));
             let state = &mut self.states[place];
             let result = match value {
@@ -264,16 +253,9 @@ fn write(taken: &Taken, value: &Value, send: Send<'_>) -> Result<u64, String> {
         (true, Some(nanoseconds)) => Some(nanoseconds as u64),
         _ => None,
     };
-    let GroupSignal {
-        group,
-        controller,
-        output,
-    } = &taken.from;
+    let GroupSignal { group, controller, output } = &taken.from;
     let owner: String = format!("group {group}").chars().take(40).collect();
-    let reason: String = format!("signal {controller}.{output}")
-        .chars()
-        .take(80)
-        .collect();
+    let reason: String = format!("signal {controller}.{output}").chars().take(80).collect();
     send(
         taken.member,
         &WriteRequest {
@@ -343,23 +325,18 @@ mod tests {
             let root = "understudy/mirror/line-1";
             let run = json!({ "run": "running", "cycle": cycle });
             self.known.0.insert(format!("{root}/run"), run);
-            self.known
-                .0
-                .insert(format!("{root}/programs/press"), program);
+            self.known.0.insert(format!("{root}/programs/press"), program);
             let written = &mut self.written;
             written.clear();
-            self.forwarder
-                .turn(&self.known, &mut |_| {}, &mut |_, request| {
-                    let RequestedValue::Text(text) = request.value else {
-                        panic!("a text");
-                    };
-                    written.push((request.input.to_owned(), text.to_owned()));
-                    Ok(7)
-                });
+            self.forwarder.turn(&self.known, &mut |_| {}, &mut |_, request| {
+                let RequestedValue::Text(text) = request.value else {
+                    panic!("a text");
+                };
+                written.push((request.input.to_owned(), text.to_owned()));
+                Ok(7)
+            });
             let written = self.written.iter();
-            written
-                .map(|(input, value)| format!("{input}={value}"))
-                .collect()
+            written.map(|(input, value)| format!("{input}={value}")).collect()
         }
     }
 
@@ -371,10 +348,7 @@ mod tests {
         let both = ["their_done=true", "their_level=2.5"];
         assert_eq!(bench.turn(20, program("direct", true)), both);
         assert!(bench.turn(30, program("direct", true)).is_empty());
-        assert_eq!(
-            bench.turn(40, program("reconstructed", false)),
-            ["their_done=false"]
-        );
+        assert_eq!(bench.turn(40, program("reconstructed", false)), ["their_done=false"]);
     }
 
     #[test]
@@ -382,10 +356,7 @@ mod tests {
         let mut bench = Bench::new();
         let _ = bench.turn(10, program("direct", true));
         for (source, cycle) in [("held", 20), ("fail-safe", 30), ("direct", 5)] {
-            assert!(
-                bench.turn(cycle, program(source, true)).is_empty(),
-                "{source} {cycle}"
-            );
+            assert!(bench.turn(cycle, program(source, true)).is_empty(), "{source} {cycle}");
         }
         for (key, value) in [
             ("fault", json!("division by zero")),

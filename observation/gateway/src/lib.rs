@@ -56,16 +56,11 @@ fn runtime() -> Result<Runtime, GatewayError> {
         .worker_threads(1)
         .enable_all()
         .build()
-        .map_err(|source| GatewayError::System {
-            what: "a thread to serve with",
-            source,
-        })
+        .map_err(|source| GatewayError::System { what: "a thread to serve with", source })
 }
 
 async fn listen(address: SocketAddr) -> Result<TcpListener, GatewayError> {
-    TcpListener::bind(address)
-        .await
-        .map_err(|source| GatewayError::Listen { address, source })
+    TcpListener::bind(address).await.map_err(|source| GatewayError::Listen { address, source })
 }
 
 /// Ends with SIGINT or with SIGTERM, which are listened for from this call on, within a runtime.
@@ -109,10 +104,7 @@ where
         let listener = listen(address).await?;
         // A signal may come as soon as the address is known.
         let end = asked_to_end();
-        let system = |source| GatewayError::System {
-            what: "serving",
-            source,
-        };
+        let system = |source| GatewayError::System { what: "serving", source };
         ready(listener.local_addr().map_err(system)?);
         tokio::select! {
             ended = serve(listener) => ended.map_err(system),

@@ -28,9 +28,8 @@ use crate::labels::{
 };
 
 /// Bounds of the buckets of times within a cycle, as shares of the time to the deadline.
-const SHARES: [f64; 15] = [
-    0.0, 0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0,
-];
+const SHARES: [f64; 15] =
+    [0.0, 0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0];
 
 /// Bounds of the buckets of the times between cycles, as shares of the period.
 const CYCLE_SHARES: [f64; 11] = [0.5, 0.9, 0.95, 0.99, 1.01, 1.05, 1.1, 1.5, 2.0, 5.0, 10.0];
@@ -143,14 +142,10 @@ impl Metrics {
     /// Every counter is exposed at 0 before it counts.
     fn begin(&self, cluster: &Cluster) {
         for (member, name) in self.members.iter() {
-            let of_member = OfMember {
-                member: name.to_owned(),
-            };
-            for family in [
-                &self.values.refused_frames,
-                &self.values.stalls,
-                &self.values.records_lost,
-            ] {
+            let of_member = OfMember { member: name.to_owned() };
+            for family in
+                [&self.values.refused_frames, &self.values.stalls, &self.values.records_lost]
+            {
                 let _ = family.get_or_create(&of_member);
             }
             let _ = self.values.stall_seconds.get_or_create(&of_member);
@@ -160,9 +155,7 @@ impl Metrics {
             }
         }
         for controller in cluster.controllers() {
-            let of_program = OfProgram {
-                program: controller.name.clone(),
-            };
+            let of_program = OfProgram { program: controller.name.clone() };
             for family in [
                 &self.values.voided_samples,
                 &self.values.substituted_inputs,
@@ -173,10 +166,7 @@ impl Metrics {
                 let _ = family.get_or_create(&of_program);
             }
             for source in ["direct", "reconstructed", "held", "fail-safe"] {
-                let of_source = OfSource {
-                    program: controller.name.clone(),
-                    source,
-                };
+                let of_source = OfSource { program: controller.name.clone(), source };
                 let _ = self.values.deadlines.get_or_create(&of_source);
             }
         }
@@ -194,11 +184,7 @@ impl Metrics {
                 "Time from the last turn of a cycle to its deadline; 0 for a late turn",
                 &self.margin,
             ),
-            (
-                "token",
-                "Time from the first sample of a cycle to its last turn",
-                &self.token,
-            ),
+            ("token", "Time from the first sample of a cycle to its last turn", &self.token),
             (
                 "cycle_time",
                 "Time from the start of a cycle to the start of the next",
@@ -251,10 +237,7 @@ impl Metrics {
 
     /// The metrics in the OpenMetrics text format.
     pub fn exposition(&self) -> String {
-        let registry = self
-            .registry
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        let registry = self.registry.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let mut text = String::new();
         // Writing to a text does not fail.
         let _ = encode(&mut text, &registry);

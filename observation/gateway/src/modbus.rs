@@ -56,10 +56,7 @@ pub fn serve_modbus(
 ) -> Result<(), GatewayError> {
     let map = RegisterMap::new(run.cluster())?;
     let served = Arc::new(Served { run, map, gate });
-    let client = move |caller| Client {
-        served: Arc::clone(&served),
-        caller,
-    };
+    let client = move |caller| Client { served: Arc::clone(&served), caller };
     serve_until_asked(address, ready, |listener| serve(listener, client))
 }
 
@@ -176,9 +173,7 @@ async fn write(
             reason: REASON,
         };
         let write = gate.check(target.member, &request);
-        write
-            .map(|write| (target.member, write))
-            .map_err(|refusal| exception(&refusal))
+        write.map(|write| (target.member, write)).map_err(|refusal| exception(&refusal))
     });
     let checked: Vec<_> = checked.collect::<Result<_, _>>()?;
     for (place, (member, write)) in checked.into_iter().enumerate() {
@@ -261,9 +256,7 @@ pub(crate) fn part<T: Copy>(
     }
     let start = usize::from(address);
     let found = table.get(start..start + usize::from(count));
-    found
-        .map(<[T]>::to_vec)
-        .ok_or(ExceptionCode::IllegalDataAddress)
+    found.map(<[T]>::to_vec).ok_or(ExceptionCode::IllegalDataAddress)
 }
 
 #[cfg(test)]
@@ -285,18 +278,9 @@ mod tests {
             &Request::ReadDiscreteInputs(0, 3),
             Ok(Response::ReadDiscreteInputs(vec![true, false, true])),
         );
-        check(
-            &Request::ReadCoils(1, 1),
-            Ok(Response::ReadCoils(vec![true])),
-        );
-        check(
-            &Request::ReadInputRegisters(1, 2),
-            Ok(Response::ReadInputRegisters(vec![2, 3])),
-        );
-        check(
-            &Request::ReadHoldingRegisters(2, 1),
-            Ok(Response::ReadHoldingRegisters(vec![3])),
-        );
+        check(&Request::ReadCoils(1, 1), Ok(Response::ReadCoils(vec![true])));
+        check(&Request::ReadInputRegisters(1, 2), Ok(Response::ReadInputRegisters(vec![2, 3])));
+        check(&Request::ReadHoldingRegisters(2, 1), Ok(Response::ReadHoldingRegisters(vec![3])));
         for (address, count) in [(3, 1), (2, 2), (u16::MAX, 1)] {
             check(
                 &Request::ReadInputRegisters(address, count),
@@ -304,10 +288,7 @@ mod tests {
             );
         }
         for count in [0, 126, u16::MAX] {
-            check(
-                &Request::ReadInputRegisters(0, count),
-                Err(ExceptionCode::IllegalDataValue),
-            );
+            check(&Request::ReadInputRegisters(0, count), Err(ExceptionCode::IllegalDataValue));
         }
         for request in [
             Request::WriteSingleCoil(0, true),

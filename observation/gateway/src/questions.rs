@@ -89,13 +89,8 @@ mod tests {
         };
         check(Ok(7), json!({ "outcome": "in-effect", "cycle": 7 }));
         let text = "the value is outside the limits of the setpoint";
-        let limits = Refusal::Write {
-            refusal: WriteRefusal::Limits,
-        };
-        check(
-            Err(limits),
-            json!({ "outcome": "refused", "code": "U0642", "message": text }),
-        );
+        let limits = Refusal::Write { refusal: WriteRefusal::Limits };
+        check(Err(limits), json!({ "outcome": "refused", "code": "U0642", "message": text }));
         let undecided = outcome(&Err(Refusal::Undecided));
         assert_eq!(undecided["outcome"], "undecided");
         assert_eq!(undecided["code"], "U0648");

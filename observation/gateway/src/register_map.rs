@@ -185,10 +185,7 @@ impl RegisterMap {
             }
             let bits = places.len() - first;
             if bits > ADDRESSES {
-                return Err(GatewayError::TooManyBits {
-                    bits,
-                    most: ADDRESSES,
-                });
+                return Err(GatewayError::TooManyBits { bits, most: ADDRESSES });
             }
         }
         let register = |address: usize, width, name, meaning: &'static str| Place {
@@ -208,12 +205,7 @@ impl RegisterMap {
             .chain(cluster.understudies().iter().map(|station| &station.name));
         let mut count = 0;
         for (rank, name) in stations.enumerate() {
-            places.push(register(
-                STATIONS + rank,
-                1,
-                format!("{name}.state"),
-                STATION_STATES,
-            ));
+            places.push(register(STATIONS + rank, 1, format!("{name}.state"), STATION_STATES));
             count = rank + 1;
         }
         for (index, program) in programs.iter().enumerate() {
@@ -237,11 +229,7 @@ impl RegisterMap {
                     let name = format!("{}.{}", program.name, point.name);
                     let target = written.remove(&name);
                     let meaning = target.as_ref().map_or(meaning, |target| &target.meaning);
-                    let unit = if point.of.is_time() {
-                        " in nanoseconds"
-                    } else {
-                        ""
-                    };
+                    let unit = if point.of.is_time() { " in nanoseconds" } else { "" };
                     places.push(Place {
                         area: Area::Register,
                         address: address as u16,
@@ -258,10 +246,7 @@ impl RegisterMap {
             }
         }
         if address > ADDRESSES {
-            return Err(GatewayError::TooManyRegisters {
-                registers: address,
-                most: ADDRESSES,
-            });
+            return Err(GatewayError::TooManyRegisters { registers: address, most: ADDRESSES });
         }
         Ok(Self {
             places,
@@ -333,25 +318,19 @@ fn targets(
     wanted: impl Fn(Elementary) -> bool + Copy,
 ) -> impl Iterator<Item = WritableInput> {
     let programs = cluster.controllers().iter().zip(cluster.remote_ios());
-    programs
-        .enumerate()
-        .flat_map(move |(index, (controller, remote_io))| {
-            let member = Member::RemoteIo(ProgramId(index as u8));
-            let inputs = remote_io.inputs.iter();
-            inputs.filter_map(move |source| {
-                let declaration = source.operator()?;
-                let point = controller.interface.inputs.find(&source.name)?;
-                wanted(point.of).then(|| WritableInput {
-                    name: format!("{}.{}", controller.name, source.name),
-                    meaning: meaning_of(declaration),
-                    target: Target {
-                        member,
-                        point: point.clone(),
-                        width: registers_of(point),
-                    },
-                })
+    programs.enumerate().flat_map(move |(index, (controller, remote_io))| {
+        let member = Member::RemoteIo(ProgramId(index as u8));
+        let inputs = remote_io.inputs.iter();
+        inputs.filter_map(move |source| {
+            let declaration = source.operator()?;
+            let point = controller.interface.inputs.find(&source.name)?;
+            wanted(point.of).then(|| WritableInput {
+                name: format!("{}.{}", controller.name, source.name),
+                meaning: meaning_of(declaration),
+                target: Target { member, point: point.clone(), width: registers_of(point) },
             })
         })
+    })
 }
 
 /// How an operator writes an input.
@@ -375,9 +354,7 @@ fn meaning_of(declaration: &OperatorDeclaration) -> String {
 
 /// The value of registers, as a signal of that type stores it; nothing where it does not fit.
 fn stored_of(of: Elementary, words: &[u16]) -> Option<u64> {
-    let value = words
-        .iter()
-        .fold(0, |value, word| value << 16 | u64::from(*word));
+    let value = words.iter().fold(0, |value, word| value << 16 | u64::from(*word));
     if of.bits() >= 16 {
         return Some(value);
     }

@@ -91,9 +91,6 @@ impl WriteGate {
     fn log(&self, member: Member, owner: &str, refusal: &Refusal) {
         let name = self.cluster.member_name(member).unwrap_or_default();
         // The reader of the log may have ended.
-        let _ = writeln!(
-            std::io::stderr(),
-            "write to {name} by {owner:?} refused: {refusal}"
-        );
+        let _ = writeln!(std::io::stderr(), "write to {name} by {owner:?} refused: {refusal}");
     }
 }

@@ -60,10 +60,7 @@ fn what_is_told_in_the_end_is_that_of_the_whole_journal() {
         // A family has its metrics in any order.
         lines.map(str::to_owned).collect::<BTreeSet<_>>()
     };
-    let (told, whole) = (
-        counted(&told),
-        counted(&exposition_of(&run).expect("readable")),
-    );
+    let (told, whole) = (counted(&told), counted(&exposition_of(&run).expect("readable")));
     let differing: Vec<_> = told.symmetric_difference(&whole).collect();
     assert!(differing.is_empty(), "{differing:#?}");
     let read = run.read(Bounds::default()).expect("readable");

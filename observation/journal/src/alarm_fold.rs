@@ -30,18 +30,10 @@ struct Condition {
 
 impl Condition {
     /// Before the first value.
-    const UNKNOWN: Self = Self {
-        held: None,
-        since: 0,
-        active: None,
-    };
+    const UNKNOWN: Self = Self { held: None, since: 0, active: None };
 
     /// At the beginning of a run.
-    const OVER: Self = Self {
-        held: Some(false),
-        since: 0,
-        active: Some(false),
-    };
+    const OVER: Self = Self { held: Some(false), since: 0, active: Some(false) };
 
     /// Takes the value of a cycle.
     fn step(&mut self, alarm: &AlarmDeclaration, cycle: i64, value: Option<u64>) {
@@ -57,11 +49,7 @@ impl Condition {
             self.active = None;
             return;
         };
-        let delay = if held {
-            alarm.on_delay
-        } else {
-            alarm.off_delay
-        };
+        let delay = if held { alarm.on_delay } else { alarm.off_delay };
         if cycle.saturating_sub(self.since) >= i64::from(delay) {
             self.active = Some(held);
         }
@@ -171,12 +159,7 @@ impl AlarmFold {
             return Vec::new();
         };
         let (sampled, outputs, missing) = match event {
-            RemoteIoEvent::Applied {
-                sampled,
-                outputs,
-                missing,
-                ..
-            } => (sampled, outputs, missing),
+            RemoteIoEvent::Applied { sampled, outputs, missing, .. } => (sampled, outputs, missing),
             RemoteIoEvent::StartedCold { .. } if !track.begun => {
                 track.begun = true;
                 return self.set(program, Condition::OVER);
@@ -195,11 +178,7 @@ impl AlarmFold {
         }
         let inputs = track.inputs.clone();
         let value = |alarm: &AlarmDeclaration| {
-            let image = if alarm.is_output {
-                Some(outputs)
-            } else {
-                inputs.as_ref()
-            };
+            let image = if alarm.is_output { Some(outputs) } else { inputs.as_ref() };
             let image = image?;
             let ends = alarm.point.bit as usize + alarm.point.of.bits() as usize;
             (ends <= image.width()).then(|| alarm.point.get(image.words()))
@@ -237,11 +216,7 @@ impl AlarmFold {
             return Vec::new();
         };
         track.silent = is_silent;
-        if is_silent {
-            self.forget(*program)
-        } else {
-            Vec::new()
-        }
+        if is_silent { self.forget(*program) } else { Vec::new() }
     }
 
     /// The values of a program are unknown until the next ones.
@@ -277,18 +252,14 @@ impl AlarmFold {
             }
             let lasts = &mut self.lasting[index];
             let transition = match active {
-                Some(true) if !*lasts => Some(AlarmTransition::Raised {
-                    since_before: before.is_none(),
-                }),
+                Some(true) if !*lasts => {
+                    Some(AlarmTransition::Raised { since_before: before.is_none() })
+                }
                 Some(false) if *lasts => Some(AlarmTransition::Over),
                 _ => None,
             };
             *lasts = active.unwrap_or(*lasts);
-            changes.push(AlarmChange {
-                alarm: index,
-                active,
-                transition,
-            });
+            changes.push(AlarmChange { alarm: index, active, transition });
         }
         changes
     }

@@ -92,10 +92,8 @@ impl Followed {
         };
         let continues = RunEvent::Continues(Box::new(continuation));
         let in_effect = self.in_effect.records();
-        let in_effect = in_effect.map(|(cycle, record)| RunEvent::InEffect {
-            cycle,
-            record: Box::new(record.clone()),
-        });
+        let in_effect = in_effect
+            .map(|(cycle, record)| RunEvent::InEffect { cycle, record: Box::new(record.clone()) });
         let events = std::iter::once(continues).chain(in_effect);
         events.map(|event| Record::of_run(at_ns, event)).collect()
     }
@@ -155,17 +153,11 @@ impl Followed {
 
 impl Track {
     fn new() -> Self {
-        Self {
-            tally: Tally::new(KEPT),
-            inputs: None,
-        }
+        Self { tally: Tally::new(KEPT), inputs: None }
     }
 
     fn so_far(&self) -> Option<ProgramSoFar> {
-        Some(ProgramSoFar {
-            deadlines: self.tally.deadlines()?,
-            inputs: self.inputs.clone(),
-        })
+        Some(ProgramSoFar { deadlines: self.tally.deadlines()?, inputs: self.inputs.clone() })
     }
 }
 

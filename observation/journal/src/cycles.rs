@@ -25,11 +25,7 @@ impl Cycles {
 
     /// A count that goes on with the numbers of another, whose cycle 0 has the number `origin`.
     pub fn continuing(numbering: Numbering, origin: i64) -> Self {
-        Self {
-            numbering,
-            origin: Some(origin),
-            ..Self::default()
-        }
+        Self { numbering, origin: Some(origin), ..Self::default() }
     }
 
     /// The numbers that the cycles are counted with.
@@ -66,9 +62,8 @@ impl Cycles {
         if let Some((fixed, _)) = self.fixed {
             return fixed;
         }
-        let number = moment
-            .and_then(|moment| self.numbering.of(moment))
-            .or_else(|| self.numbering.latest());
+        let number =
+            moment.and_then(|moment| self.numbering.of(moment)).or_else(|| self.numbering.latest());
         self.counted(number.unwrap_or(0))
     }
 
@@ -112,10 +107,7 @@ impl Cycles {
     /// From the first record on again, with the origin that is known now.
     #[must_use]
     pub fn again(&self) -> Self {
-        Self {
-            origin: self.origin,
-            ..Self::default()
-        }
+        Self { origin: self.origin, ..Self::default() }
     }
 
     /// Whether the origin is known.

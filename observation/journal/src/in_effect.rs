@@ -48,11 +48,7 @@ impl InEffect {
             let now = (field.finished, field.plant_faults);
             let before = self.plants.insert(record.member, now);
             if field.plant_faults > before.map_or(0, |(_, faults)| faults) {
-                self.replaces(
-                    (record.member, "plant-faults", String::new()),
-                    record,
-                    cycle,
-                );
+                self.replaces((record.member, "plant-faults", String::new()), record, cycle);
             } else if before != Some(now) {
                 self.replaces((record.member, "plant", String::new()), record, cycle);
             }
@@ -83,10 +79,7 @@ impl InEffect {
     }
 
     fn end_all(&mut self, is_over: impl Fn(&Subject) -> bool) {
-        for (_, number) in self
-            .by_subject
-            .extract_if(.., |subject, _| is_over(subject))
-        {
+        for (_, number) in self.by_subject.extract_if(.., |subject, _| is_over(subject)) {
             self.records.remove(&number);
         }
     }
@@ -155,9 +148,7 @@ fn of_remote_io(record: &Record, event: &RemoteIo) -> Option<Effect> {
         RemoteIo::Disputed { .. } => of("disputed"),
         RemoteIo::StateLost { .. } => of("state-lost"),
         RemoteIo::StateRecovered { .. } => of("state-recovered"),
-        RemoteIo::ChoiceRefused {
-            newest: Some(_), ..
-        } => of("choice-refused"),
+        RemoteIo::ChoiceRefused { newest: Some(_), .. } => of("choice-refused"),
         RemoteIo::Protected { .. } | RemoteIo::Unprotected { .. } => of("protection"),
         RemoteIo::Released { .. } => of("released"),
         RemoteIo::Forced { force, .. } => about("forced", &force.signal),

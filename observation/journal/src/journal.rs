@@ -177,11 +177,7 @@ pub fn records_of(
             Err(error) => (None, Some(Err(error.into()))),
         };
         let is_closed = segment != newest;
-        let mut found = file
-            .into_iter()
-            .map(BufReader::new)
-            .flat_map(records)
-            .peekable();
+        let mut found = file.into_iter().map(BufReader::new).flat_map(records).peekable();
         let whole = iter::from_fn(move || {
             let next = found.next()?;
             let is_cut = matches!(next, Err(JournalError::Line { line, .. }) if line > 1);
@@ -194,28 +190,22 @@ pub fn records_of(
 /// The records of one file of a journal after its header, in order. A file of another version has none: the only item is the error.
 pub fn records(journal: impl BufRead) -> impl Iterator<Item = Result<Record, JournalError>> {
     let mut refused = false;
-    journal
-        .lines()
-        .enumerate()
-        .filter_map(move |(index, line)| {
-            if refused {
-                return None;
-            }
-            let line = match line {
-                Ok(line) => line,
-                Err(error) => return Some(Err(error.into())),
-            };
-            if index == 0 {
-                let wrong = check_header(line.as_bytes()).err();
-                refused = matches!(wrong, Some(JournalError::Version(_)));
-                return wrong.map(Err);
-            }
-            let record = serde_json::from_str(&line);
-            Some(record.map_err(|reason| JournalError::Line {
-                line: index + 1,
-                reason,
-            }))
-        })
+    journal.lines().enumerate().filter_map(move |(index, line)| {
+        if refused {
+            return None;
+        }
+        let line = match line {
+            Ok(line) => line,
+            Err(error) => return Some(Err(error.into())),
+        };
+        if index == 0 {
+            let wrong = check_header(line.as_bytes()).err();
+            refused = matches!(wrong, Some(JournalError::Version(_)));
+            return wrong.map(Err);
+        }
+        let record = serde_json::from_str(&line);
+        Some(record.map_err(|reason| JournalError::Line { line: index + 1, reason }))
+    })
 }
 
 #[cfg(test)]
@@ -258,10 +248,7 @@ mod tests {
     fn a_journal_of_another_version_is_refused_once() {
         let record = "{\"at_ns\":7,\"name\":\"laboratory\",\"member\":null,\"event\":{\"event\":\"finished\"}}\n";
         let read: Vec<_> = records(record.repeat(3).as_bytes()).collect();
-        assert!(matches!(
-            read.as_slice(),
-            [Err(JournalError::Version(WrongVersion { found: 1 }))]
-        ));
+        assert!(matches!(read.as_slice(), [Err(JournalError::Version(WrongVersion { found: 1 }))]));
     }
 
     #[test]
@@ -271,9 +258,8 @@ mod tests {
         let mut journal = Journal::new(&mut bytes);
         journal.write(&record);
         assert_eq!(journal.finish().lost, 0);
-        let read: Vec<Record> = records(bytes.as_slice())
-            .collect::<Result<_, _>>()
-            .expect("one record");
+        let read: Vec<Record> =
+            records(bytes.as_slice()).collect::<Result<_, _>>().expect("one record");
         assert_eq!(read, [record]);
     }
 
@@ -288,10 +274,8 @@ mod tests {
             journal.write(&Record::of_run(at_ns, RunEvent::ScenarioOver { verdict }));
         }
         assert_eq!(journal.finish().lost, 0);
-        let read: Vec<Record> = records_of(&path)
-            .expect("readable")
-            .collect::<Result<_, _>>()
-            .expect("whole lines");
+        let read: Vec<Record> =
+            records_of(&path).expect("readable").collect::<Result<_, _>>().expect("whole lines");
         let times: Vec<u64> = read.iter().map(|record| record.at_ns).collect();
         let first = 5000 - times.len() as u64;
         assert!(first > 0 && times.len() > 100, "{}", times.len());

@@ -76,10 +76,7 @@ pub fn keep_cluster(run: &Path, file: &Path, cluster: &Cluster) -> Result<(), Ru
         let written = fs::create_dir_all(&folder).and_then(|()| fs::write(&path, bytes));
         written.map_err(|source| RunDirectoryError::Write { path, source })
     };
-    let failed = |source| RunDirectoryError::Write {
-        path: file.to_owned(),
-        source,
-    };
+    let failed = |source| RunDirectoryError::Write { path: file.to_owned(), source };
     let bytes = fs::read(file).map_err(failed)?;
     let text = decode(bytes.clone()).map_err(|error| failed(io::Error::other(error)))?;
     let beside = file.parent().unwrap_or(Path::new(""));
@@ -106,10 +103,8 @@ pub fn keep_cluster(run: &Path, file: &Path, cluster: &Cluster) -> Result<(), Ru
         write(&file, ladder)?;
         kept.ladders.insert(name.clone(), file);
     }
-    let json = serde_json::to_string_pretty(&kept).map_err(|source| RunDirectoryError::Json {
-        path: folder.join(KEPT_FILE),
-        source,
-    })?;
+    let json = serde_json::to_string_pretty(&kept)
+        .map_err(|source| RunDirectoryError::Json { path: folder.join(KEPT_FILE), source })?;
     write(KEPT_FILE, (json + "\n").as_bytes())
 }
 
@@ -149,26 +144,20 @@ pub fn kept_cluster(run: &Path) -> Result<Cluster, KeptError> {
         let file = kept.ladders.get(name).map_or(name, String::as_str);
         named_file(&folder, file)
     });
-    loaded.cluster.ok_or(KeptError::Files {
-        reports: loaded.reports,
-    })
+    loaded.cluster.ok_or(KeptError::Files { reports: loaded.reports })
 }
 
 /// The last part of a name, which no other ladder and no file of ours has.
 fn unique(name: &str, taken: &BTreeMap<String, String>) -> String {
-    let last = Path::new(name).file_name().map_or_else(
-        || "ladder".to_owned(),
-        |last| last.to_string_lossy().into_owned(),
-    );
+    let last = Path::new(name)
+        .file_name()
+        .map_or_else(|| "ladder".to_owned(), |last| last.to_string_lossy().into_owned());
     let free = |candidate: &String| {
         ![CLUSTER_FILE, KEPT_FILE].contains(&candidate.as_str())
             && !taken.values().any(|taken| taken == candidate)
     };
     let numbered = (2..).map(|number| format!("{number}-{last}"));
-    std::iter::once(last.clone())
-        .chain(numbered)
-        .find(free)
-        .unwrap_or(last)
+    std::iter::once(last.clone()).chain(numbered).find(free).unwrap_or(last)
 }
 
 #[cfg(test)]
@@ -216,10 +205,7 @@ mod tests {
         assert_eq!(schedule.period(), Duration::from_millis(7));
         assert_eq!(kept.agreement().mode, Mode::Paper);
         assert_eq!((kept.link(), kept.security()), (Link::Udp, Security::Off));
-        assert_eq!(
-            kept.agreement().configuration,
-            cluster.agreement().configuration
-        );
+        assert_eq!(kept.agreement().configuration, cluster.agreement().configuration);
         fs::write(run.join("cluster/robot.ladder"), "rung oh").expect("written");
         assert!(matches!(kept_cluster(&run), Err(KeptError::Files { .. })));
     }

@@ -69,18 +69,12 @@ impl Members {
     pub fn new(members: impl IntoIterator<Item = (Member, String)>) -> Self {
         let mut members: Vec<_> = members.into_iter().collect();
         members.sort();
-        Self {
-            members,
-            operator_inputs: Vec::new(),
-            signals: Vec::new(),
-        }
+        Self { members, operator_inputs: Vec::new(), signals: Vec::new() }
     }
 
     /// Members with their names, in ascending order.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = (Member, &str)> {
-        self.members
-            .iter()
-            .map(|(member, name)| (*member, name.as_str()))
+        self.members.iter().map(|(member, name)| (*member, name.as_str()))
     }
 
     /// Its name; for a member that is none of this cluster, its rank.
@@ -93,9 +87,7 @@ impl Members {
 
     /// The member of a name.
     pub fn find(&self, name: &str) -> Option<Member> {
-        self.iter()
-            .find(|(_, known)| *known == name)
-            .map(|(member, _)| member)
+        self.iter().find(|(_, known)| *known == name).map(|(member, _)| member)
     }
 
     /// Inputs of a program that operators write.

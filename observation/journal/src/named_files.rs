@@ -24,18 +24,13 @@ pub fn named_file(folder: &Path, name: &str) -> Result<String, String> {
 /// As [`named_file`], the bytes as they are.
 pub(crate) fn named_bytes(folder: &Path, name: &str) -> Result<Vec<u8>, String> {
     let more = env::var_os(ALLOWED_FOLDERS).unwrap_or_default();
-    let more: Vec<PathBuf> = env::split_paths(&more)
-        .filter(|folder| !folder.as_os_str().is_empty())
-        .collect();
+    let more: Vec<PathBuf> =
+        env::split_paths(&more).filter(|folder| !folder.as_os_str().is_empty()).collect();
     read_below(folder, &more, name)
 }
 
 fn read_below(folder: &Path, more: &[PathBuf], name: &str) -> Result<Vec<u8>, String> {
-    let folder = if folder.as_os_str().is_empty() {
-        Path::new(".")
-    } else {
-        folder
-    };
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let path = folder.join(name);
     let places = || std::iter::once(folder).chain(more.iter().map(PathBuf::as_path));
     let below = |path: &Path, resolve: fn(&Path) -> io::Result<PathBuf>| {
@@ -102,14 +97,9 @@ mod tests {
             assert_eq!(read(name), bytes(text), "{name}");
         }
         let secret = root.join("secret").display().to_string();
-        for name in [
-            "../secret",
-            "../gone",
-            "../cell-two/other",
-            "link",
-            secret.as_str(),
-            "/etc/passwd",
-        ] {
+        for name in
+            ["../secret", "../gone", "../cell-two/other", "link", secret.as_str(), "/etc/passwd"]
+        {
             let error = read(name).expect_err(name);
             assert!(error.contains("outside the folder"), "{name}: {error}");
         }

@@ -51,20 +51,13 @@ impl From<Written> for Numbering {
     fn from(written: Written) -> Self {
         let epochs = written.epochs.into_iter();
         let remote_ios = written.remote_ios.into_iter().map(|(program, last)| {
-            let last = Last {
-                number: bounded(last.number),
-                idle: bounded(last.idle).max(0),
-                ..last
-            };
+            let last =
+                Last { number: bounded(last.number), idle: bounded(last.idle).max(0), ..last };
             (program, last)
         });
         Self {
-            offsets: epochs
-                .map(|(epoch, offset)| (epoch, bounded(offset)))
-                .collect(),
-            newest: written
-                .newest
-                .map(|(moment, number)| (moment, bounded(number))),
+            offsets: epochs.map(|(epoch, offset)| (epoch, bounded(offset))).collect(),
+            newest: written.newest.map(|(moment, number)| (moment, bounded(number))),
             remote_ios: remote_ios.collect(),
         }
     }
@@ -91,11 +84,7 @@ impl Numbering {
             return last.number.saturating_add(last.idle);
         }
         let number = self.start(remote_io, moment);
-        let last = Last {
-            moment,
-            number,
-            idle: 0,
-        };
+        let last = Last { moment, number, idle: 0 };
         self.remote_ios.insert(remote_io, last);
         number
     }
@@ -135,13 +124,9 @@ impl Numbering {
                 *offset = offset.saturating_add((idle - skipped).max(0));
             }
         } else {
-            let next = newest_number
-                .saturating_add(self.idle_of_all(newest_number))
-                .saturating_add(1);
-            let offset = self
-                .offsets
-                .entry(moment.epoch)
-                .or_insert(next - cycle(moment));
+            let next =
+                newest_number.saturating_add(self.idle_of_all(newest_number)).saturating_add(1);
+            let offset = self.offsets.entry(moment.epoch).or_insert(next - cycle(moment));
             // One that comes back to an epoch goes on counting from where it was.
             let own = self.remote_ios.get(&remote_io).map(|last| last.number);
             if own.is_some_and(|own| cycle(moment).saturating_add(*offset) <= own) {
@@ -188,10 +173,7 @@ mod tests {
     fn check(rows: &[(u8, u64, u64, bool, i64)]) {
         let mut numbering = Numbering::default();
         for &(remote_io, epoch, cycle, idle, expected) in rows {
-            let moment = Moment {
-                epoch: Epoch(epoch),
-                cycle: Cycle(cycle),
-            };
+            let moment = Moment { epoch: Epoch(epoch), cycle: Cycle(cycle) };
             let number = numbering.deadline(ProgramId(remote_io), moment, idle);
             assert_eq!(number, expected, "{remote_io} at {moment} in {rows:?}");
         }

@@ -219,9 +219,7 @@ impl Done {
     /// [`Refusal::Write`].
     pub fn of_write(outcome: WriteOutcome) -> Result<Self, Refusal> {
         match outcome {
-            WriteOutcome::InEffect { since } => Ok(Self {
-                cycle: Some(since.cycle.0),
-            }),
+            WriteOutcome::InEffect { since } => Ok(Self { cycle: Some(since.cycle.0) }),
             WriteOutcome::Refused { refusal } => Err(Refusal::Write { refusal }),
         }
     }
@@ -300,9 +298,7 @@ enum Way {
 
 /// Waits for an action on a thread that has nothing else to do.
 fn block_on<T>(action: impl Future<Output = T>) -> Result<T, Refusal> {
-    let runtime = tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build();
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
     let runtime = runtime.map_err(|error| Refusal::System {
         name: "a runtime".to_owned(),
         reason: error.to_string(),
@@ -321,10 +317,7 @@ pub struct Commands {
 /// Both ends, in one process.
 pub fn commands() -> (Commander, Commands) {
     let (sender, receiver) = mpsc::channel(WAITING);
-    let commands = Commands {
-        receiver,
-        sender: sender.clone(),
-    };
+    let commands = Commands { receiver, sender: sender.clone() };
     (Commander(Way::Queue(sender)), commands)
 }
 
@@ -345,13 +338,7 @@ impl Commander {
         owner: String,
         reason: String,
     ) -> Result<Done, Refusal> {
-        self.act(OperatorAction::Command {
-            member,
-            command,
-            owner,
-            reason,
-        })
-        .await
+        self.act(OperatorAction::Command { member, command, owner, reason }).await
     }
 
     /// Says that an alarm was seen, and waits until that is in the journal.

@@ -50,11 +50,7 @@ pub(crate) fn pack_file(from: &Path, to: &Path) -> io::Result<()> {
         }
         length += block.len() as u64;
         let bytes = packed(&block);
-        for number in [
-            length_of(&bytes)?,
-            length_of(&block)?,
-            crc32fast::hash(&bytes),
-        ] {
+        for number in [length_of(&bytes)?, length_of(&block)?, crc32fast::hash(&bytes)] {
             file.write_all(&number.to_le_bytes())?;
         }
         file.write_all(&bytes)?;
@@ -116,9 +112,7 @@ impl SegmentFile {
         let inode = file.metadata()?.ino();
         let mut head = Vec::new();
         (&mut file).take(HEAD_BYTES).read_to_end(&mut head)?;
-        let length = head
-            .strip_prefix(&MAGIC)
-            .and_then(|length| length.try_into().ok());
+        let length = head.strip_prefix(&MAGIC).and_then(|length| length.try_into().ok());
         let blocks = length.map(|length| Blocks {
             text_bytes: u64::from_le_bytes(length),
             next: HEAD_BYTES,
@@ -128,12 +122,7 @@ impl SegmentFile {
         if blocks.is_none() {
             file.seek(SeekFrom::Start(0))?;
         }
-        Ok(Self {
-            file,
-            inode,
-            blocks,
-            pieces: Vec::new(),
-        })
+        Ok(Self { file, inode, blocks, pieces: Vec::new() })
     }
 
     /// The number that the system gives the file.
@@ -244,20 +233,14 @@ impl SegmentFile {
         let Some([packed_bytes, text_bytes, crc]) = self.block_head(at)? else {
             return Ok(None);
         };
-        self.file
-            .seek(SeekFrom::Start(at + BLOCK_HEAD_BYTES as u64))?;
+        self.file.seek(SeekFrom::Start(at + BLOCK_HEAD_BYTES as u64))?;
         let mut bytes = Vec::new();
-        (&mut self.file)
-            .take(u64::from(packed_bytes))
-            .read_to_end(&mut bytes)?;
+        (&mut self.file).take(u64::from(packed_bytes)).read_to_end(&mut bytes)?;
         let next = at + BLOCK_HEAD_BYTES as u64 + u64::from(packed_bytes);
         let length = text_bytes as usize;
         let whole = bytes.len() == packed_bytes as usize && crc32fast::hash(&bytes) == crc;
-        let text = if whole && length <= LARGEST_BLOCK {
-            unpacked(&bytes, length).ok()
-        } else {
-            None
-        };
+        let text =
+            if whole && length <= LARGEST_BLOCK { unpacked(&bytes, length).ok() } else { None };
         let damaged = || {
             format!("the {length} bytes of records packed at byte {at} are damaged\n").into_bytes()
         };
@@ -341,19 +324,13 @@ mod tests {
         fs::write(&to, changed).expect("written");
         let found = String::from_utf8(read(&to)).expect("text");
         let expected = String::from_utf8(text()).expect("text");
-        let said: Vec<&str> = found
-            .lines()
-            .filter(|line| line.ends_with("are damaged"))
-            .collect();
+        let said: Vec<&str> = found.lines().filter(|line| line.ends_with("are damaged")).collect();
         assert_eq!(said.len(), 1);
         let lines = found.lines().filter(|line| !line.ends_with("are damaged"));
         assert!(lines.clone().all(|line| expected.contains(line)));
         assert!(lines.count() > 4000);
         // Cut anywhere, what is read is a beginning, and a block that is not whole is said.
-        for cut in (0..whole.len())
-            .step_by(97)
-            .chain(blocks.iter().map(|at| *at as usize))
-        {
+        for cut in (0..whole.len()).step_by(97).chain(blocks.iter().map(|at| *at as usize)) {
             fs::write(&to, &whole[..cut]).expect("written");
             if cut < HEAD_BYTES as usize {
                 continue;
@@ -363,10 +340,7 @@ mod tests {
             let (last, before) = lines.split_last().unwrap_or((&"", &[]));
             assert!(
                 expected.starts_with(
-                    &before
-                        .iter()
-                        .map(|line| format!("{line}\n"))
-                        .collect::<String>()
+                    &before.iter().map(|line| format!("{line}\n")).collect::<String>()
                 )
             );
             assert!(

@@ -34,9 +34,9 @@ pub(crate) fn packed(text: &[u8]) -> Vec<u8> {
         let place = found.unwrap_or_else(|| known.add(numbers.len()));
         let pattern = &mut known.patterns[place];
         let marked = numbers.iter().zip(&pattern.numbers).take(MARKED);
-        let marks = marked.rev().fold(0, |marks, (number, track)| {
-            marks << 1 | u64::from(*number != track.forecast())
-        });
+        let marks = marked
+            .rev()
+            .fold(0, |marks, (number, track)| marks << 1 | u64::from(*number != track.forecast()));
         put(&mut bytes, marks << 1 | u64::from(is_forecast));
         if found.is_none() {
             put(&mut bytes, 0);
@@ -104,11 +104,7 @@ pub(crate) fn unpacked(mut bytes: &[u8], length: usize) -> Result<Vec<u8>, Damag
         }
         known.follows(place);
     }
-    if text.len() == length {
-        Ok(text)
-    } else {
-        Err(Damaged)
-    }
+    if text.len() == length { Ok(text) } else { Err(Damaged) }
 }
 
 /// What packer and unpacker both know from the lines before.
@@ -132,10 +128,7 @@ impl Known {
     }
 
     fn add(&mut self, numbers: usize) -> usize {
-        self.patterns.push(Pattern {
-            numbers: vec![Track::default(); numbers],
-            next: None,
-        });
+        self.patterns.push(Pattern { numbers: vec![Track::default(); numbers], next: None });
         self.patterns.len() - 1
     }
 
@@ -157,11 +150,7 @@ struct Track {
 
 impl Track {
     fn forecast(&self) -> u64 {
-        if self.steady > 0 {
-            self.last.wrapping_add(self.step)
-        } else {
-            self.last
-        }
+        if self.steady > 0 { self.last.wrapping_add(self.step) } else { self.last }
     }
 
     fn note(&mut self, number: u64) {
@@ -264,9 +253,7 @@ fn take(bytes: &mut &[u8]) -> Result<u64, Damaged> {
     *bytes = rest;
     let high = u64::from(first) & (0x7f_u64 >> more.min(7));
     let high = if more >= 7 { 0 } else { high };
-    Ok(own[1..]
-        .iter()
-        .fold(high, |number, byte| number << 8 | u64::from(*byte)))
+    Ok(own[1..].iter().fold(high, |number, byte| number << 8 | u64::from(*byte)))
 }
 
 #[cfg(test)]
@@ -304,10 +291,7 @@ mod tests {
     #[test]
     fn lines_that_differ_by_a_steady_step_are_two_bytes_each() {
         let line = |cycle: u64| {
-            format!(
-                "{{\"at_ns\":{},\"cycle\":{cycle},\"u\":[5]}}\n",
-                cycle * 10_000_000
-            )
+            format!("{{\"at_ns\":{},\"cycle\":{cycle},\"u\":[5]}}\n", cycle * 10_000_000)
         };
         let text: String = (0..1000).map(line).collect();
         assert!(check(text.as_bytes()) < 2100);

@@ -40,12 +40,7 @@ impl Place {
         let mut header = Vec::new();
         file.go_to(0)?;
         BufReader::new((&mut file).take(LONGEST_HEADER)).read_until(b'\n', &mut header)?;
-        Ok(check_header(&header).ok().map(|promised| Self {
-            file,
-            promised,
-            is_closed,
-            piece,
-        }))
+        Ok(check_header(&header).ok().map(|promised| Self { file, promised, is_closed, piece }))
     }
 }
 
@@ -65,11 +60,7 @@ pub fn continuation_before(path: &Path, cycle: i64, newest: usize) -> io::Result
         return Ok(None);
     };
     let file = SegmentFile::open(segment)?;
-    if SegmentFile::open(segment)
-        .ok()
-        .and_then(continued_after)
-        .is_none()
-    {
+    if SegmentFile::open(segment).ok().and_then(continued_after).is_none() {
         return Ok(None);
     }
     Place::of(file, 0, segment != path)
@@ -104,11 +95,7 @@ pub fn place_before(path: &Path, cycle: i64) -> io::Result<Option<CheckpointPlac
             continue;
         };
         let place = Place::of(file, piece, segment != path)?;
-        return Ok(place.map(|place| CheckpointPlace {
-            place,
-            moment,
-            cycle,
-        }));
+        return Ok(place.map(|place| CheckpointPlace { place, moment, cycle }));
     }
     Ok(None)
 }

@@ -151,22 +151,12 @@ pub const LABORATORY: &str = "laboratory";
 impl Record {
     /// Of whoever runs the scenario.
     pub fn of_run(at_ns: u64, event: RunEvent) -> Self {
-        Self {
-            at_ns,
-            name: LABORATORY.to_owned(),
-            member: None,
-            event: Happening::Run(event),
-        }
+        Self { at_ns, name: LABORATORY.to_owned(), member: None, event: Happening::Run(event) }
     }
 
     /// Record of a member.
     pub fn of_member(at_ns: u64, member: Member, members: &Members, event: Happening) -> Self {
-        Self {
-            at_ns,
-            name: members.name(member).to_owned(),
-            member: Some(member),
-            event,
-        }
+        Self { at_ns, name: members.name(member).to_owned(), member: Some(member), event }
     }
 }
 
@@ -238,12 +228,7 @@ impl<'de> Deserialize<'de> for Record {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let line = Line::deserialize(deserializer)?;
         let event = happening(line.member, line.event.get()).map_err(de::Error::custom)?;
-        Ok(Self {
-            at_ns: line.at_ns,
-            name: line.name,
-            member: line.member,
-            event,
-        })
+        Ok(Self { at_ns: line.at_ns, name: line.name, member: line.member, event })
     }
 }
 

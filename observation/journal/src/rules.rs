@@ -111,9 +111,5 @@ impl SourceCounts {
     }
 }
 
-const SOURCES: [Source; 4] = [
-    Source::Direct,
-    Source::Reconstructed,
-    Source::Held,
-    Source::FailSafe,
-];
+const SOURCES: [Source; 4] =
+    [Source::Direct, Source::Reconstructed, Source::Held, Source::FailSafe];

@@ -67,10 +67,7 @@ impl RunDirectory {
                     let lock = WriterLock::of_new(&path).map_err(at(&path))?;
                     point_latest(runs, &name).map_err(at(&runs.join("latest")))?;
                     remove_leftovers(runs);
-                    return Ok(Self {
-                        path,
-                        _lock: Arc::new(lock),
-                    });
+                    return Ok(Self { path, _lock: Arc::new(lock) });
                 }
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(at(&path)(error)),
@@ -85,18 +82,11 @@ impl RunDirectory {
     /// [`RunDirectoryError::Write`].
     pub fn inside(&self, name: &str) -> Result<Self, RunDirectoryError> {
         let path = self.path.join(name);
-        fs::create_dir(&path).map_err(|source| RunDirectoryError::Write {
-            path: path.clone(),
-            source,
-        })?;
-        let lock = WriterLock::of_new(&path).map_err(|source| RunDirectoryError::Write {
-            path: path.clone(),
-            source,
-        })?;
-        Ok(Self {
-            path,
-            _lock: Arc::new(lock),
-        })
+        fs::create_dir(&path)
+            .map_err(|source| RunDirectoryError::Write { path: path.clone(), source })?;
+        let lock = WriterLock::of_new(&path)
+            .map_err(|source| RunDirectoryError::Write { path: path.clone(), source })?;
+        Ok(Self { path, _lock: Arc::new(lock) })
     }
 
     /// Takes back a run that never began, of which there is no journal: its directory goes, and `latest` points to the newest that is
@@ -110,10 +100,7 @@ impl RunDirectory {
         let Some(runs) = self.path.parent() else {
             return;
         };
-        let entries = fs::read_dir(runs)
-            .into_iter()
-            .flatten()
-            .filter_map(Result::ok);
+        let entries = fs::read_dir(runs).into_iter().flatten().filter_map(Result::ok);
         let directories = entries.filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_dir()));
         let left = directories.filter_map(|entry| entry.file_name().into_string().ok());
         let _ = match left.max() {

@@ -89,11 +89,7 @@ impl Segments {
 
     /// Bytes of what the next segment begins with before its first line, at most; 0 where the next line goes into this segment.
     pub(crate) fn room_to_continue(&self) -> u64 {
-        if self.is_full() {
-            self.segment_bytes / 4
-        } else {
-            0
-        }
+        if self.is_full() { self.segment_bytes / 4 } else { 0 }
     }
 
     fn rotate(&mut self) -> io::Result<()> {
@@ -110,9 +106,8 @@ impl Segments {
     /// Removes the oldest segments until there is room for the one that begins.
     fn remove_oldest(&self) -> io::Result<()> {
         let closed = closed(&self.path)?;
-        let sizes = closed
-            .iter()
-            .map(|(_, path)| fs::metadata(path).map_or(0, |found| found.len()));
+        let sizes =
+            closed.iter().map(|(_, path)| fs::metadata(path).map_or(0, |found| found.len()));
         let sizes: Vec<u64> = sizes.collect();
         let mut all = sizes.iter().sum::<u64>() + self.segment_bytes;
         for ((_, path), size) in closed.iter().zip(sizes) {
@@ -147,10 +142,7 @@ impl Packer {
             .name("packer".into())
             .stack_size(STACK_BYTES)
             .spawn(pack_all)?;
-        Ok(Self {
-            closed: Some(closed),
-            thread: Some(thread),
-        })
+        Ok(Self { closed: Some(closed), thread: Some(thread) })
     }
 
     fn pack(&self, text: PathBuf) {
@@ -218,11 +210,7 @@ pub fn segments_of(path: &Path) -> io::Result<Vec<PathBuf>> {
 
 /// A new file with its header, and the bytes of it.
 fn open(path: &Path, number: u64) -> io::Result<(BufWriter<File>, u64)> {
-    let file = OpenOptions::new()
-        .create(true)
-        .write(true)
-        .truncate(true)
-        .open(path)?;
+    let file = OpenOptions::new().create(true).write(true).truncate(true).open(path)?;
     let mut writer = BufWriter::with_capacity(1 << 16, file);
     let header = journal_header(number);
     writer.write_all(&header)?;
@@ -312,10 +300,7 @@ mod tests {
 
     fn size(path: &Path) -> u64 {
         let files = segments_of(path).expect("readable");
-        files
-            .iter()
-            .map(|file| fs::metadata(file).expect("a file").len())
-            .sum()
+        files.iter().map(|file| fs::metadata(file).expect("a file").len()).sum()
     }
 
     #[test]
@@ -369,27 +354,16 @@ mod tests {
     #[test]
     fn other_files_of_the_folder_are_left_alone() {
         let folder = Folder::new("segments-others");
-        for name in [
-            "journal.jsonl.bak",
-            "journal.1.jsonl",
-            "summary.000001.json",
-        ] {
+        for name in ["journal.jsonl.bak", "journal.1.jsonl", "summary.000001.json"] {
             fs::write(folder.join(name), "kept").expect("written");
         }
         let path = folder.join("journal.jsonl");
         let mut segments = Segments::create(&path, 0).expect("created");
         for number in 0..10_000 {
-            writeln!(
-                segments,
-                "{number}xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx"
-            )
-            .expect("written");
+            writeln!(segments, "{number}xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx")
+                .expect("written");
         }
-        for name in [
-            "journal.jsonl.bak",
-            "journal.1.jsonl",
-            "summary.000001.json",
-        ] {
+        for name in ["journal.jsonl.bak", "journal.1.jsonl", "summary.000001.json"] {
             let text = fs::read_to_string(folder.join(name));
             assert_eq!(text.expect("it is there"), "kept");
         }

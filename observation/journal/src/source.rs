@@ -3,12 +3,8 @@
 use understudy_wire::Source;
 
 /// All sources, in the order of their worth.
-pub const SOURCES: [Source; 4] = [
-    Source::Direct,
-    Source::Reconstructed,
-    Source::Held,
-    Source::FailSafe,
-];
+pub const SOURCES: [Source; 4] =
+    [Source::Direct, Source::Reconstructed, Source::Held, Source::FailSafe];
 
 /// A source as files and tables write it.
 pub fn source_word(source: Source) -> &'static str {

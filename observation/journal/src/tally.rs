@@ -57,19 +57,14 @@ pub struct Tally {
 impl Tally {
     /// A tally that remembers so many rows; those before stay counted.
     pub fn new(most: usize) -> Self {
-        Self {
-            rows: VecDeque::new(),
-            most: most.max(1),
-            before_origin: SourceCounts::default(),
-        }
+        Self { rows: VecDeque::new(), most: most.max(1), before_origin: SourceCounts::default() }
     }
 
     /// Goes on from deadlines that were counted before.
     pub fn continues(&mut self, counted: &Deadlines) {
         self.before_origin = SourceCounts::default();
         let before = counted.until.min(0).saturating_sub(counted.since);
-        self.before_origin
-            .add(counted.source, u64::try_from(before).unwrap_or(0));
+        self.before_origin.add(counted.source, u64::try_from(before).unwrap_or(0));
         self.rows.clear();
         self.rows.push_back(Row {
             from: counted.since,
@@ -138,10 +133,7 @@ impl Tally {
     fn until(&self, cycle: i64) -> SourceCounts {
         match self.row_at(cycle) {
             Some(row) => row.before(cycle.saturating_add(1)),
-            None => self
-                .rows
-                .front()
-                .map_or_else(SourceCounts::default, |row| row.before),
+            None => self.rows.front().map_or_else(SourceCounts::default, |row| row.before),
         }
     }
 

@@ -86,11 +86,7 @@ pub fn check_header(line: &[u8]) -> Result<Option<u64>, JournalError> {
 /// # Errors
 /// [`WrongVersion`].
 pub fn check_version(found: u32) -> Result<(), WrongVersion> {
-    if found == JOURNAL_VERSION {
-        Ok(())
-    } else {
-        Err(WrongVersion { found })
-    }
+    if found == JOURNAL_VERSION { Ok(()) } else { Err(WrongVersion { found }) }
 }
 
 /// Whether a journal can be read, by its oldest and its newest segment; readers check each one. A file that is empty yet says nothing.

@@ -31,11 +31,8 @@ impl WriterLock {
 
     /// Takes the lock of a run; nothing where another process has it.
     pub(crate) fn take(run: &Path) -> io::Result<Option<Self>> {
-        let file = OpenOptions::new()
-            .create(true)
-            .truncate(false)
-            .write(true)
-            .open(run.join(LOCK))?;
+        let file =
+            OpenOptions::new().create(true).truncate(false).write(true).open(run.join(LOCK))?;
         match file.try_lock() {
             Ok(()) => Ok(Some(Self(file))),
             Err(std::fs::TryLockError::WouldBlock) => Ok(None),

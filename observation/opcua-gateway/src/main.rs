@@ -77,20 +77,10 @@ struct ServeArguments {
     #[arg(long, value_name = "FOLDER")]
     certificates: Option<PathBuf>,
     /// File with a line `ROLE NAME PASSWORD` for each login, readable by its owner only; roles: viewer, operator, engineer
-    #[arg(
-        long,
-        value_name = "FILE",
-        requires = "certificates",
-        conflicts_with = "user"
-    )]
+    #[arg(long, value_name = "FILE", requires = "certificates", conflicts_with = "user")]
     logins: Option<PathBuf>,
     /// User name of a viewer; without it and --logins no login is needed
-    #[arg(
-        long,
-        value_name = "NAME",
-        requires = "password_file",
-        requires = "certificates"
-    )]
+    #[arg(long, value_name = "NAME", requires = "password_file", requires = "certificates")]
     user: Option<String>,
     /// File whose first line is the password, readable by its owner only
     #[arg(long, value_name = "FILE", requires = "user")]
@@ -165,10 +155,7 @@ fn nodes(run: &RunArgument, json: bool) -> Result<(), OpcuaError> {
     let text = if json {
         let list: Vec<_> = variables.iter().map(document).collect();
         let namespace = format!("urn:understudy:{}", cluster.name());
-        format!(
-            "{:#}\n",
-            json!({ "namespace": namespace, "variables": list })
-        )
+        format!("{:#}\n", json!({ "namespace": namespace, "variables": list }))
     } else {
         table(&variables)
     };
@@ -186,11 +173,8 @@ fn document(variable: &Variable) -> serde_json::Value {
 }
 
 fn table(variables: &[Variable]) -> String {
-    let width = variables
-        .iter()
-        .map(|variable| variable.path().chars().count())
-        .max()
-        .unwrap_or_default();
+    let width =
+        variables.iter().map(|variable| variable.path().chars().count()).max().unwrap_or_default();
     variables
         .iter()
         .map(|variable| {

@@ -47,11 +47,7 @@ impl Writing {
             let input = variable.writable()?.clone();
             Some((variable.path(), input))
         });
-        Self {
-            gate,
-            logins,
-            inputs: inputs.collect(),
-        }
+        Self { gate, logins, inputs: inputs.collect() }
     }
 
     async fn write(&self, token: &str, input: &WritableInput, value: &Variant) -> StatusCode {
@@ -133,11 +129,7 @@ pub(crate) fn node_manager(
         let namespace_index = types.namespaces_mut().add_namespace(&namespace_uri);
         space.add_namespace(&namespace_uri, namespace_index);
         Nodes {
-            namespace: NamespaceMetadata {
-                namespace_uri,
-                namespace_index,
-                ..Default::default()
-            },
+            namespace: NamespaceMetadata { namespace_uri, namespace_index, ..Default::default() },
             writing,
         }
     };
@@ -217,23 +209,11 @@ mod tests {
             assert_eq!(stored_of(of, &value), expected, "{of} {value:?}");
         };
         check(Elementary::Bool, true.into(), Ok(1));
-        check(
-            Elementary::Bool,
-            1_u64.into(),
-            Err(StatusCode::BadTypeMismatch),
-        );
+        check(Elementary::Bool, 1_u64.into(), Err(StatusCode::BadTypeMismatch));
         check(Elementary::Real, 120.0.into(), Ok(0x42f0_0000));
         check(Elementary::Sint, (-1_i64).into(), Ok(0xff));
-        check(
-            Elementary::Sint,
-            128_i64.into(),
-            Err(StatusCode::BadOutOfRange),
-        );
-        check(
-            Elementary::Usint,
-            256_u64.into(),
-            Err(StatusCode::BadOutOfRange),
-        );
+        check(Elementary::Sint, 128_i64.into(), Err(StatusCode::BadOutOfRange));
+        check(Elementary::Usint, 256_u64.into(), Err(StatusCode::BadOutOfRange));
         check(Elementary::Uint, 65_535_u64.into(), Ok(65_535));
     }
 }

@@ -64,10 +64,7 @@ impl Login {
     /// # Errors
     /// [`OpcuaError::Password`].
     pub fn read_all(file: &Path) -> Result<Vec<Self>, OpcuaError> {
-        let wrong = |reason: String| OpcuaError::Password {
-            path: file.to_owned(),
-            reason,
-        };
+        let wrong = |reason: String| OpcuaError::Password { path: file.to_owned(), reason };
         let text = fs::read_to_string(file).map_err(|error| wrong(error.to_string()))?;
         private(file).map_err(wrong)?;
         let mut logins: Vec<Self> = Vec::new();
@@ -90,11 +87,7 @@ impl Login {
             if logins.iter().any(|login| login.user == user) {
                 return Err(wrong(format!("line {number}: {user} has a line already")));
             }
-            logins.push(Self {
-                user: user.to_owned(),
-                role,
-                password: password.to_owned(),
-            });
+            logins.push(Self { user: user.to_owned(), role, password: password.to_owned() });
         }
         if logins.is_empty() {
             return Err(wrong("it contains no login".to_owned()));
@@ -107,10 +100,7 @@ impl Login {
     /// # Errors
     /// [`OpcuaError::Password`].
     pub fn read(user: &str, file: &Path) -> Result<Self, OpcuaError> {
-        let wrong = |reason: String| OpcuaError::Password {
-            path: file.to_owned(),
-            reason,
-        };
+        let wrong = |reason: String| OpcuaError::Password { path: file.to_owned(), reason };
         let text = fs::read_to_string(file).map_err(|error| wrong(error.to_string()))?;
         private(file).map_err(wrong)?;
         match text.lines().next() {
@@ -134,15 +124,10 @@ impl Settings {
         let address = self.address.ip();
         let host = self.host.clone().unwrap_or_else(|| {
             let own = X509Data::computer_hostnames().into_iter().next();
-            own.filter(|_| address.is_unspecified())
-                .unwrap_or_else(|| address.to_string())
+            own.filter(|_| address.is_unspecified()).unwrap_or_else(|| address.to_string())
         });
         // An IPv6 address is in brackets in a URL.
-        if host.contains(':') && !host.starts_with('[') {
-            format!("[{host}]")
-        } else {
-            host
-        }
+        if host.contains(':') && !host.starts_with('[') { format!("[{host}]") } else { host }
     }
 
     /// Names this server among all.
@@ -158,23 +143,16 @@ impl Settings {
         match &self.certificates {
             Some(folder) => self.certificate(folder),
             None if self.address.ip().is_loopback() => Ok(()),
-            None => Err(OpcuaError::InTheClear {
-                address: self.address,
-            }),
+            None => Err(OpcuaError::InTheClear { address: self.address }),
         }
     }
 
     fn certificate(&self, folder: &Path) -> Result<(), OpcuaError> {
-        let wrong = |path: &Path, reason: String| OpcuaError::Certificate {
-            path: path.to_owned(),
-            reason,
-        };
-        for (name, mode) in [
-            ("own", 0o755),
-            ("private", 0o700),
-            ("trusted", 0o755),
-            ("rejected", 0o755),
-        ] {
+        let wrong =
+            |path: &Path, reason: String| OpcuaError::Certificate { path: path.to_owned(), reason };
+        for (name, mode) in
+            [("own", 0o755), ("private", 0o700), ("trusted", 0o755), ("rejected", 0o755)]
+        {
             let path = folder.join(name);
             let mut builder = DirBuilder::new();
             let made = builder.recursive(true).mode(mode).create(&path);
@@ -186,8 +164,7 @@ impl Settings {
             (false, false) => {
                 private(&folder.join("private"))
                     .map_err(|reason| wrong(&folder.join("private"), reason))?;
-                self.make(&certificate, &key)
-                    .map_err(|reason| wrong(folder, reason))?;
+                self.make(&certificate, &key).map_err(|reason| wrong(folder, reason))?;
             }
             (true, false) => return Err(wrong(&key, "the certificate has no key".to_owned())),
             (false, true) => {
@@ -233,10 +210,7 @@ impl Settings {
 
 /// Where they are in the folder.
 pub(crate) fn certificate_and_key(folder: &Path) -> (PathBuf, PathBuf) {
-    (
-        folder.join("own/cert.der"),
-        folder.join("private/private.pem"),
-    )
+    (folder.join("own/cert.der"), folder.join("private/private.pem"))
 }
 
 /// Readable by its owner only.
@@ -247,10 +221,6 @@ fn private(path: &Path) -> Result<(), String> {
     if mode & 0o077 == 0 {
         Ok(())
     } else {
-        Err(format!(
-            "others can read it (mode {:o}): chmod go= {}",
-            mode & 0o777,
-            path.display()
-        ))
+        Err(format!("others can read it (mode {:o}): chmod go= {}", mode & 0o777, path.display()))
     }
 }

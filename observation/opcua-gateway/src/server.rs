@@ -94,18 +94,15 @@ pub fn serve(
         journal: run.path().join("journal.jsonl"),
         followed: Followed::new(run)?,
     };
-    let served = serve_until_asked(settings.address, ready, |listener| {
-        listen(listener, settings, shown)
-    });
+    let served =
+        serve_until_asked(settings.address, ready, |listener| listen(listener, settings, shown));
     Ok(served?)
 }
 
 /// The logins by the tokens of their users.
 fn tokens(logins: &[Login]) -> BTreeMap<String, Login> {
     let logins = logins.iter();
-    logins
-        .map(|login| (format!("login {}", login.user), login.clone()))
-        .collect()
+    logins.map(|login| (format!("login {}", login.user), login.clone())).collect()
 }
 
 /// What is served.
@@ -182,10 +179,7 @@ fn server(
         .hello_timeout(HELLO_TIMEOUT_S)
         .max_secure_channel_token_lifetime_ms(LONGEST_TOKEN_MS);
     builder.limits_mut().max_sessions = MOST_SESSIONS;
-    builder
-        .limits_mut()
-        .subscriptions
-        .max_monitored_item_queue_size = LONGEST_QUEUE;
+    builder.limits_mut().subscriptions.max_monitored_item_queue_size = LONGEST_QUEUE;
     let logins = tokens(&settings.logins);
     let mut users: Vec<String> = logins.keys().cloned().collect();
     if users.is_empty() {
@@ -318,9 +312,8 @@ impl<'a> Showing<'a> {
         index: u16,
     ) -> Self {
         let variables = shown.variables.iter();
-        let nodes: Vec<NodeId> = variables
-            .map(|variable| NodeId::new(index, variable.path()))
-            .collect();
+        let nodes: Vec<NodeId> =
+            variables.map(|variable| NodeId::new(index, variable.path())).collect();
         Self {
             shown,
             handle,
@@ -336,10 +329,9 @@ impl<'a> Showing<'a> {
     fn look(&mut self) {
         // Until the journal is read, every variable waits for its first value.
         let observation = self.shown.followed.observation().ok();
-        let seen = observation.as_deref().map(|observation| Seen {
-            observation,
-            feed: observation.feed(Instant::now()),
-        });
+        let seen = observation
+            .as_deref()
+            .map(|observation| Seen { observation, feed: observation.feed(Instant::now()) });
         let stamp = stamp(self.shown, seen.map_or(Feed::Silent, |seen| seen.feed));
         let mut changed = Vec::new();
         for (place, variable) in self.shown.variables.iter().enumerate() {
@@ -358,9 +350,7 @@ impl<'a> Showing<'a> {
             }
         }
         let nodes = &self.nodes;
-        let values = changed
-            .into_iter()
-            .map(|(place, value)| (&nodes[place], None, value));
+        let values = changed.into_iter().map(|(place, value)| (&nodes[place], None, value));
         // Every one of these nodes is there, and is a variable.
         let _ = self.manager.set_values(self.handle.subscriptions(), values);
         let level = trust::service_level(seen.map(|seen| (seen.observation, seen.feed)));
@@ -403,9 +393,7 @@ fn tell(handle: &ServerHandle, index: u16, events: &[Event], stamp: DateTime) {
         .collect();
     let places = [ObjectId::Server.into(), NodeId::new(index, ROOT)];
     for place in &places {
-        let events = told
-            .iter()
-            .map(|event| (event as &dyn opcua::nodes::Event, place));
+        let events = told.iter().map(|event| (event as &dyn opcua::nodes::Event, place));
         handle.subscriptions().notify_events(events);
     }
 }

@@ -85,10 +85,7 @@ impl Seen<'_> {
             Some(_) => own,
             None => StatusCode::BadNoDataAvailable,
         };
-        Reading {
-            value,
-            status: trust::present(self.feed, own),
-        }
+        Reading { value, status: trust::present(self.feed, own) }
     }
 
     /// A value that depends on everything that was recorded.
@@ -118,10 +115,8 @@ pub(crate) struct Reading {
 
 impl Reading {
     /// Answer while the journal is being read.
-    pub(crate) const WAITING: Self = Self {
-        value: None,
-        status: StatusCode::BadWaitingForInitialData,
-    };
+    pub(crate) const WAITING: Self =
+        Self { value: None, status: StatusCode::BadWaitingForInitialData };
 }
 
 /// An operator input.
@@ -197,10 +192,7 @@ impl Variable {
 
 /// All variables of a cluster.
 pub fn variables(cluster: &Cluster) -> Vec<Variable> {
-    let mut tree = Tree {
-        folders: Vec::new(),
-        variables: Vec::new(),
-    };
+    let mut tree = Tree { folders: Vec::new(), variables: Vec::new() };
     tree.run();
     for (place, declared) in cluster.alarms().iter().enumerate() {
         tree.alarm(place, declared);

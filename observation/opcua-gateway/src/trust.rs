@@ -92,11 +92,7 @@ pub(crate) fn outputs(program: &ProgramSnapshot) -> StatusCode {
 
 /// Of one of its outputs.
 pub(crate) fn output(program: &ProgramSnapshot, name: &str) -> StatusCode {
-    if is_forced(program, name) {
-        StatusCode::GoodLocalOverride
-    } else {
-        outputs(program)
-    }
+    if is_forced(program, name) { StatusCode::GoodLocalOverride } else { outputs(program) }
 }
 
 /// Of an input whose channel `has_failed`: the program is given its last good value then.
@@ -112,16 +108,10 @@ pub(crate) fn input(program: &ProgramSnapshot, name: &str, has_failed: bool) -> 
 
 /// Of its state, which does not advance without provable outputs.
 pub(crate) fn state(program: &ProgramSnapshot) -> StatusCode {
-    if outputs(program).is_good() {
-        StatusCode::Good
-    } else {
-        StatusCode::UncertainLastUsableValue
-    }
+    if outputs(program).is_good() { StatusCode::Good } else { StatusCode::UncertainLastUsableValue }
 }
 
 fn is_forced(program: &ProgramSnapshot, name: &str) -> bool {
     let forced = program.forced.iter();
-    forced
-        .filter_map(|force| force.split_once(" = "))
-        .any(|(signal, _)| signal == name)
+    forced.filter_map(|force| force.split_once(" = ")).any(|(signal, _)| signal == name)
 }

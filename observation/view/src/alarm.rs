@@ -275,10 +275,7 @@ mod tests {
             let alarm = alarms.iter().next().expect("one");
             alarm.acknowledgement(by.to_owned(), 0)
         };
-        let other = Acknowledgement {
-            raised_ns: 1,
-            ..seen(&alarms, "anna")
-        };
+        let other = Acknowledgement { raised_ns: 1, ..seen(&alarms, "anna") };
         alarms.acknowledged(&other, 10);
         assert!(alarms.iter().all(Alarm::is_open), "another one");
         alarms.acknowledged(&seen(&alarms, "anna"), 10);

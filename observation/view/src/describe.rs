@@ -70,11 +70,7 @@ pub(crate) fn describe(record: &Record, names: &Members, writes: &Writes) -> Des
     let (event, level, text) = match &record.event {
         Happening::Station(event) => members::station(event, names),
         Happening::RemoteIo(event) => {
-            let names = signals::Names {
-                members: names,
-                writes,
-                by: record.member,
-            };
+            let names = signals::Names { members: names, writes, by: record.member };
             members::remote_io(event, &names)
         }
         Happening::Plant(event) => members::plant(event, names),
@@ -115,26 +111,14 @@ pub(crate) const PROGRAM_FAULT: &str = "program-fault";
 pub(crate) fn alarm_event(declared: &AlarmDeclaration, transition: AlarmTransition) -> Words {
     let (event, level, what) = match transition {
         AlarmTransition::Raised { since_before } => {
-            let since = if since_before {
-                ", perhaps since an earlier cycle"
-            } else {
-                ""
-            };
+            let since = if since_before { ", perhaps since an earlier cycle" } else { "" };
             let text = &declared.text;
-            (
-                ALARM_RAISED,
-                Level::Alarm,
-                format!("is active{since}: {text}"),
-            )
+            (ALARM_RAISED, Level::Alarm, format!("is active{since}: {text}"))
         }
         AlarmTransition::Over => (ALARM_OVER, Level::Notice, "is over".to_owned()),
     };
     let (name, priority) = (&declared.name, declared.priority.word());
-    (
-        event,
-        level,
-        format!("the alarm {name} ({priority}) {what}"),
-    )
+    (event, level, format!("the alarm {name} ({priority}) {what}"))
 }
 
 /// A program fault in words: the program, and where it stopped and why, as far as that is known.
@@ -149,10 +133,7 @@ pub(crate) fn program_fault_text(
     match typed.zip(fault) {
         Some((typed, fault)) => {
             let assigned = fault_lines::assigned_text(typed, fault);
-            format!(
-                "program fault in {name}: {}{assigned}",
-                fault.describe(typed)
-            )
+            format!("program fault in {name}: {}{assigned}", fault.describe(typed))
         }
         None => format!("program fault in {name}"),
     }
@@ -201,15 +182,11 @@ pub(crate) fn program_name(program: ProgramId, members: &Members) -> &str {
 }
 
 fn programs(set: ProgramSet, members: &Members) -> String {
-    names(set, |program: ProgramId| {
-        program_name(program, members).to_owned()
-    })
+    names(set, |program: ProgramId| program_name(program, members).to_owned())
 }
 
 pub(crate) fn stations(set: StationSet, members: &Members) -> String {
-    names(set, |station: StationId| {
-        members.name(Member::Station(station)).to_owned()
-    })
+    names(set, |station: StationId| members.name(Member::Station(station)).to_owned())
 }
 
 fn names<E: Element>(set: Set<E>, name: impl Fn(E) -> String) -> String {

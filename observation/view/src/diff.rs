@@ -66,9 +66,8 @@ impl RunDiff {
         if !self.same_configuration {
             text += "They ran different configurations: what has the same name is compared.\n";
         }
-        let last = self
-            .cycles
-            .map(|cycle| cycle.map_or("none".to_owned(), |cycle| cycle.to_string()));
+        let last =
+            self.cycles.map(|cycle| cycle.map_or("none".to_owned(), |cycle| cycle.to_string()));
         text += &format!(
             "{} cycles compared (the runs end at {} and {})\n",
             self.compared, last[0], last[1]
@@ -84,11 +83,7 @@ impl RunDiff {
                         Differing::Source => "source",
                         Differing::Events => "events",
                     };
-                    let unit = if found.what == Differing::Events {
-                        "events"
-                    } else {
-                        "cycles"
-                    };
+                    let unit = if found.what == Differing::Events { "events" } else { "cycles" };
                     text += &format!(
                         "{:>8}  {:14} {what:8} {} | {}  ({} {unit})\n",
                         found.cycle, found.name, found.left, found.right, found.count
@@ -104,12 +99,7 @@ impl RunDiff {
 pub fn diff(left: &Model, right: &Model) -> RunDiff {
     let configuration = |model: &Model| model.cluster().agreement().configuration;
     let cycles = [left.cycle(), right.cycle()];
-    let end = cycles
-        .iter()
-        .flatten()
-        .min()
-        .map_or(0, |last| last.saturating_add(1))
-        .max(0);
+    let end = cycles.iter().flatten().min().map_or(0, |last| last.saturating_add(1)).max(0);
     let mut differences = Vec::new();
     for (place, controller) in left.cluster().controllers().iter().enumerate() {
         let name = &controller.name;
@@ -122,18 +112,8 @@ pub fn diff(left: &Model, right: &Model) -> RunDiff {
         let interface = &controller.interface;
         let (inputs, outputs) = (&interface.inputs, &interface.outputs);
         let pairs = [
-            (
-                Differing::Inputs,
-                inputs,
-                one.inputs(ours),
-                two.inputs(theirs),
-            ),
-            (
-                Differing::Outputs,
-                outputs,
-                one.outputs(ours),
-                two.outputs(theirs),
-            ),
+            (Differing::Inputs, inputs, one.inputs(ours), two.inputs(theirs)),
+            (Differing::Outputs, outputs, one.outputs(ours), two.outputs(theirs)),
         ];
         for (what, points, one, two) in pairs {
             if let (Some(one), Some(two)) = (one, two) {
@@ -147,9 +127,7 @@ pub fn diff(left: &Model, right: &Model) -> RunDiff {
         }
         if let (Some(one), Some(two)) = (one.sources(ours), two.sources(theirs)) {
             let word = |source: Option<&understudy_wire::Source>| {
-                source
-                    .map_or("nothing", |source| source_word(*source))
-                    .to_owned()
+                source.map_or("nothing", |source| source_word(*source)).to_owned()
             };
             differences.extend(first(name, Differing::Source, one, two, end, word));
         }
@@ -179,18 +157,13 @@ fn differing_values(found: &mut Difference, points: &Points, images: [Option<&Im
         return;
     }
     let points = points.iter();
-    let differing: Vec<&Point> = points
-        .filter(|point| point.get(left.words()) != point.get(right.words()))
-        .collect();
+    let differing: Vec<&Point> =
+        points.filter(|point| point.get(left.words()) != point.get(right.words())).collect();
     let text = |image: &Image| {
         let values = differing.iter();
         let texts: Vec<String> = values
             .map(|point| {
-                format!(
-                    "{} = {}",
-                    point.name,
-                    stored_text(point.of, point.get(image.words()))
-                )
+                format!("{} = {}", point.name, stored_text(point.of, point.get(image.words())))
             })
             .collect();
         texts.join(", ")
@@ -242,14 +215,10 @@ fn events(left: &Model, right: &Model, end: i64) -> Vec<Difference> {
     fn told(model: &Model, end: i64) -> std::collections::BTreeMap<Key<'_>, Told<'_>> {
         let mut told = std::collections::BTreeMap::<Key<'_>, Told<'_>>::new();
         for event in model.events() {
-            let of_the_host = [
-                "stalled", "ready", "stopped", "started", "origin", "finished",
-            ];
+            let of_the_host = ["stalled", "ready", "stopped", "started", "origin", "finished"];
             if (0..end).contains(&event.cycle) && !of_the_host.contains(&event.event) {
                 let key = (event.name.as_str(), event.event);
-                told.entry(key)
-                    .or_default()
-                    .push((event.cycle, &event.text));
+                told.entry(key).or_default().push((event.cycle, &event.text));
             }
         }
         told

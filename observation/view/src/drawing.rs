@@ -30,11 +30,8 @@ impl Model {
         let (typed, text) = (code.typed()?, code.source_text()?);
         let units = self.drawings.get(program.index())?.get_or_init(|| {
             // A document begins with a sign that no Structured Text begins with.
-            let name = if text.trim_start().starts_with('<') {
-                "program.xml"
-            } else {
-                "program.st"
-            };
+            let name =
+                if text.trim_start().starts_with('<') { "program.xml" } else { "program.st" };
             let units = drawn_units(name, text, Bodies::Blocks);
             units.unwrap_or_default()
         });
@@ -46,9 +43,7 @@ impl Model {
         let mut picture = Picture::new();
         for unit in units.iter().filter(|unit| unit.is_program) {
             let mut unit = unit.clone();
-            let scan = trace
-                .as_ref()
-                .map(|trace| Scan::new(typed, trace, &unit.name));
+            let scan = trace.as_ref().map(|trace| Scan::new(typed, trace, &unit.name));
             if let Some(scan) = scan {
                 match &mut unit.body {
                     DrawnBody::Networks(networks) => {
@@ -87,12 +82,7 @@ impl<'t> Scan<'t> {
                 lines.entry(done.line).or_default().push(done);
             }
         }
-        Self {
-            typed,
-            trace,
-            unit,
-            lines,
-        }
+        Self { typed, trace, unit, lines }
     }
 
     /// The address of a variable of the program.
@@ -117,13 +107,8 @@ impl<'t> Scan<'t> {
             let done = self.lines.get(&line).map_or(&[][..], Vec::as_slice);
             let object = &mut network.objects[at];
             // A call that is given nothing assigns nothing: it is not known here whether it was made.
-            let is_silent = matches!(
-                &object.kind,
-                Kind::Block {
-                    instance: Some(_),
-                    ..
-                }
-            ) && object.inputs.iter().all(|input| input.name == "EN");
+            let is_silent = matches!(&object.kind, Kind::Block { instance: Some(_), .. })
+                && object.inputs.iter().all(|input| input.name == "EN");
             object.executed = (!is_silent).then_some(!done.is_empty());
             match &mut object.kind {
                 Kind::Contacts(contacts) => contacts.each(&mut |name, value| {
@@ -134,10 +119,7 @@ impl<'t> Scan<'t> {
                     let value = self.read(text, done);
                     object.outputs[0].value = value.filter(|_| is_name(text));
                 }
-                Kind::Block {
-                    instance: Some(instance),
-                    ..
-                } => {
+                Kind::Block { instance: Some(instance), .. } => {
                     let instance = instance.clone();
                     for output in &mut object.outputs {
                         output.value = self.after(&format!("{instance}.{}", output.name));
@@ -187,10 +169,9 @@ impl<'t> Scan<'t> {
             for input in object.inputs.iter().filter(|input| input.name != "EN") {
                 let assigned = match &object.kind {
                     Kind::Target(name) | Kind::Coil(name, Coil::Plain) => name.clone(),
-                    Kind::Block {
-                        instance: Some(instance),
-                        ..
-                    } => format!("{instance}.{}", input.name),
+                    Kind::Block { instance: Some(instance), .. } => {
+                        format!("{instance}.{}", input.name)
+                    }
                     _ => continue,
                 };
                 if let (Some(from), Some(part)) = (input.from, self.part(&assigned)) {
@@ -212,10 +193,9 @@ impl<'t> Scan<'t> {
 /// The one assignment of an address, with its value.
 fn assignment<'t>(done: &[&'t Done], address: u64) -> Option<(&'t Done, Elementary, u64)> {
     let mut found = done.iter().filter_map(|done| match done.effect {
-        Effect::Assigned {
-            address: at,
-            value: Some((of, value)),
-        } if at == address => Some((*done, of, value)),
+        Effect::Assigned { address: at, value: Some((of, value)) } if at == address => {
+            Some((*done, of, value))
+        }
         _ => None,
     });
     let first = found.next()?;
@@ -254,9 +234,7 @@ fn fill(
 /// A variable without computed parts.
 fn is_name(text: &str) -> bool {
     let mut letters = text.chars();
-    let first = letters
-        .next()
-        .is_some_and(|it| it.is_alphabetic() || it == '_' || it == '%');
+    let first = letters.next().is_some_and(|it| it.is_alphabetic() || it == '_' || it == '%');
     first && letters.all(|it| it.is_alphanumeric() || it == '_' || it == '.')
 }
 
@@ -279,10 +257,7 @@ fn is_literal(text: &str) -> bool {
 fn matched(network: &Network, root: usize, results: &[Made]) -> Option<Vec<(usize, Made)>> {
     let mut matching = Matching {
         network,
-        results: results
-            .iter()
-            .filter(|it| !is_between(it.operation))
-            .collect(),
+        results: results.iter().filter(|it| !is_between(it.operation)).collect(),
         next: 0,
         found: Vec::new(),
     };
@@ -307,15 +282,12 @@ impl Matching<'_> {
             Kind::Value(text) => return (is_name(text) || is_literal(text)).then_some(()),
             Kind::Contacts(contacts) => return self.contacts(contacts, at),
             Kind::Target(_) | Kind::Coil(..) => return None,
-            Kind::Block {
-                instance: Some(_), ..
-            } => return Some(()),
+            Kind::Block { instance: Some(_), .. } => return Some(()),
             Kind::Block { of, .. } => of.as_str(),
         };
         let inputs = object.inputs.iter().filter(|input| input.name != "EN");
-        let (names, values): (Vec<&str>, Vec<usize>) = inputs
-            .filter_map(|input| Some((input.name.as_str(), input.from?.0)))
-            .unzip();
+        let (names, values): (Vec<&str>, Vec<usize>) =
+            inputs.filter_map(|input| Some((input.name.as_str(), input.from?.0))).unzip();
         if of == "NOT" || of == "MOVE" || of.contains("_TO_") {
             return values.iter().try_for_each(|value| self.object(*value));
         }
@@ -330,9 +302,7 @@ impl Matching<'_> {
         let last = match (of, names.as_slice(), values.as_slice()) {
             ("LIMIT", ["MN", "IN", "MX"], [least, value, most]) => {
                 // The last input is looked at first.
-                [most, least, value]
-                    .into_iter()
-                    .try_for_each(|value| self.object(*value))?;
+                [most, least, value].into_iter().try_for_each(|value| self.object(*value))?;
                 self.take("MAX")?;
                 self.take("MIN")?
             }
@@ -386,10 +356,7 @@ impl Matching<'_> {
 
 /// Operations that stand between two functions and are no function of a drawing.
 fn is_between(operation: Operation) -> bool {
-    matches!(
-        operation,
-        Operation::Convert(..) | Operation::Reinterpret(..) | Operation::Not(_)
-    )
+    matches!(operation, Operation::Convert(..) | Operation::Reinterpret(..) | Operation::Not(_))
 }
 
 /// The function of a drawing that an operation is.

@@ -62,11 +62,7 @@ pub(crate) struct Events {
 
 impl Events {
     pub(crate) fn new(most: usize) -> Self {
-        Self {
-            kept: VecDeque::new(),
-            most: most.max(1),
-            count: 0,
-        }
+        Self { kept: VecDeque::new(), most: most.max(1), count: 0 }
     }
 
     /// Takes an event, and numbers it.
@@ -85,9 +81,7 @@ impl Events {
     }
 
     pub(crate) fn shift(&mut self, by: i64) {
-        self.kept
-            .iter_mut()
-            .for_each(|event| event.cycle = event.cycle.saturating_add(by));
+        self.kept.iter_mut().for_each(|event| event.cycle = event.cycle.saturating_add(by));
     }
 
     pub(crate) fn count(&self) -> u64 {

@@ -91,8 +91,7 @@ fn without_numbers(text: &str) -> impl Iterator<Item = char> + '_ {
 impl EventFilter {
     fn is_before(&self, event: &Event) -> bool {
         // What is done in a cycle is felt in the next one.
-        self.until
-            .is_none_or(|until| event.cycle <= until.saturating_add(1))
+        self.until.is_none_or(|until| event.cycle <= until.saturating_add(1))
     }
 
     fn names(&self, event: &Event, find: &str) -> bool {
@@ -163,9 +162,7 @@ fn repetition(events: &[&Event]) -> (usize, usize) {
         (period, 1 + same / period)
     });
     let folds = |(period, count): &(usize, usize)| *count >= if *period == 1 { 2 } else { 3 };
-    let longest = found
-        .filter(folds)
-        .max_by_key(|(period, count)| period * count);
+    let longest = found.filter(folds).max_by_key(|(period, count)| period * count);
     longest.unwrap_or((1, 1))
 }
 
@@ -192,13 +189,7 @@ mod tests {
             let late = format!("host stall: woken {number}.5ms late");
             match letter {
                 'h' => event(number, "robot", "stalled", Level::Notice, &late),
-                letter => event(
-                    number,
-                    "press",
-                    "flagged",
-                    Level::Warning,
-                    &letter.to_string(),
-                ),
+                letter => event(number, "press", "flagged", Level::Warning, &letter.to_string()),
             }
         });
         events.collect()
@@ -209,8 +200,7 @@ mod tests {
         let events = events(letters);
         let list = list(events.iter().rev(), filter);
         let rows = list.rows.iter();
-        rows.map(|row| (row.event.text.clone(), row.count, row.first.cycle))
-            .collect()
+        rows.map(|row| (row.event.text.clone(), row.count, row.first.cycle)).collect()
     }
 
     #[test]
@@ -249,11 +239,7 @@ mod tests {
 
     #[test]
     fn repeated_events_are_folded_and_others_keep_their_order() {
-        let filter = EventFilter {
-            folds: true,
-            of_host: true,
-            ..EventFilter::default()
-        };
+        let filter = EventFilter { folds: true, of_host: true, ..EventFilter::default() };
         let text = |text: &str, count, first| (text.to_owned(), count, first);
         assert_eq!(shown("aaaa", &filter), [text("a", 4, 1)]);
         assert_eq!(
@@ -264,10 +250,7 @@ mod tests {
         assert_eq!(shown("abab", &filter).len(), 4, "two incidents");
         let late = text("host stall: woken 3.5ms late", 3, 1);
         assert_eq!(shown("hhh", &filter), [late], "whatever the time was");
-        let each = EventFilter {
-            folds: false,
-            ..filter
-        };
+        let each = EventFilter { folds: false, ..filter };
         assert_eq!(shown("hhh", &each).len(), 3);
     }
 
@@ -280,27 +263,15 @@ mod tests {
         };
         assert_eq!(of(&EventFilter::default()), (2, 3));
         let kinds = BTreeSet::from(["stalled".to_owned()]);
-        let stalled = EventFilter {
-            kinds,
-            ..EventFilter::default()
-        };
+        let stalled = EventFilter { kinds, ..EventFilter::default() };
         assert_eq!(of(&stalled), (3, 0));
         let members = BTreeSet::from(["press".to_owned()]);
-        let press = EventFilter {
-            members,
-            ..EventFilter::default()
-        };
+        let press = EventFilter { members, ..EventFilter::default() };
         assert_eq!(of(&press), (2, 0), "none of this member is hidden");
-        let alarms = EventFilter {
-            levels: BTreeSet::from([Level::Alarm]),
-            ..EventFilter::default()
-        };
+        let alarms =
+            EventFilter { levels: BTreeSet::from([Level::Alarm]), ..EventFilter::default() };
         assert_eq!(of(&alarms), (0, 0));
-        let early = EventFilter {
-            until: Some(1),
-            find: "A".to_owned(),
-            ..EventFilter::default()
-        };
+        let early = EventFilter { until: Some(1), find: "A".to_owned(), ..EventFilter::default() };
         assert_eq!(of(&early), (1, 1), "`late` has the letter too");
     }
 

@@ -93,9 +93,7 @@ impl Model {
     pub fn film(&self, scene: Scene<'_>) -> Result<Film, ViewError> {
         let program = match scene.program {
             Some(name) => self.program_called(name)?,
-            None => self
-                .first_killed()
-                .ok_or_else(|| ViewError::NoScene(NO_KILL.to_owned()))?,
+            None => self.first_killed().ok_or_else(|| ViewError::NoScene(NO_KILL.to_owned()))?,
         };
         let (from, to) = self.filmed_cycles(program, scene)?;
         let stations = self.filmed_stations(program);
@@ -114,17 +112,13 @@ impl Model {
                 .iter()
                 .map(|&station| self.filmed_station(station, (from, to)))
                 .collect(),
-            faults: faults
-                .map(|event| (event.cycle, event.text.clone()))
-                .collect(),
+            faults: faults.map(|event| (event.cycle, event.text.clone())).collect(),
         })
     }
 
     fn program_called(&self, name: &str) -> Result<ProgramId, ViewError> {
-        let names: Vec<&str> = self
-            .program_ids()
-            .map(|program| self.program_name(program))
-            .collect();
+        let names: Vec<&str> =
+            self.program_ids().map(|program| self.program_name(program)).collect();
         let place = names.iter().position(|known| *known == name);
         let place = place.ok_or_else(|| ViewError::NoName {
             kind: "controller",
@@ -136,9 +130,8 @@ impl Model {
 
     /// The controller that was killed first.
     fn first_killed(&self) -> Option<ProgramId> {
-        let killed = self
-            .program_ids()
-            .filter_map(|program| Some((self.killed_at(program)?, program)));
+        let killed =
+            self.program_ids().filter_map(|program| Some((self.killed_at(program)?, program)));
         Some(killed.min_by_key(|(cycle, _)| *cycle)?.1)
     }
 
@@ -168,10 +161,7 @@ impl Model {
                 .map_or(end, |direct| direct.saturating_add(AROUND).min(end)),
         };
         let asked = [from, to.saturating_sub(1)];
-        if let Some(absent) = asked
-            .into_iter()
-            .find(|cycle| !(first..end).contains(cycle))
-        {
+        if let Some(absent) = asked.into_iter().find(|cycle| !(first..end).contains(cycle)) {
             return Err(no_cycle(absent));
         }
         if to <= from {
@@ -241,10 +231,7 @@ impl Model {
         (from, to): (i64, i64),
         stations: &[StationId],
     ) -> Vec<Span<Applied>> {
-        let steps = self
-            .history(program)
-            .into_iter()
-            .flat_map(|history| history.steps());
+        let steps = self.history(program).into_iter().flat_map(|history| history.steps());
         let within = steps.filter(|step| (from..to).contains(&step.cycle));
         joined(within.filter_map(|step| {
             let driven = step.driven.as_ref()?;
@@ -265,11 +252,7 @@ impl Model {
 }
 
 fn owned<T: Clone>(span: Span<&T>) -> Span<T> {
-    Span {
-        from: span.from,
-        to: span.to,
-        value: span.value.clone(),
-    }
+    Span { from: span.from, to: span.to, value: span.value.clone() }
 }
 
 /// Neighbours of equal value become one span.

@@ -31,10 +31,7 @@ impl Following {
     /// The model of a run before its first record, and the reader whose records it is to take.
     pub fn of(run: &Run, bounds: Bounds) -> (Model, Self) {
         let past = run.follow_newest().map(|newest| {
-            let past = Past {
-                model: run.model(bounds),
-                source: run.follow(),
-            };
+            let past = Past { model: run.model(bounds), source: run.follow() };
             (newest, past)
         });
         let (source, past) = match past {

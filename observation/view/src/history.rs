@@ -233,13 +233,7 @@ impl History {
     /// Takes a sample; what it did, where the state before it is known, and what is wrong with it.
     fn sample(&mut self, event: &Event) -> (Option<Sampled>, Option<Violation>) {
         let violation = self.referee.observe(event).err();
-        let Event::Sampled {
-            moment,
-            inputs,
-            before,
-            ..
-        } = event
-        else {
+        let Event::Sampled { moment, inputs, before, .. } = event else {
             return (None, violation);
         };
         let truth = self.referee.truth().filter(|(of, _)| of == moment);
@@ -304,23 +298,9 @@ impl History {
         match event {
             Event::Sampled { moment, .. } => {
                 self.place_later(*moment, event);
-                self.push(Step {
-                    cycle,
-                    moment: *moment,
-                    sampled,
-                    driven: None,
-                    void: false,
-                });
+                self.push(Step { cycle, moment: *moment, sampled, driven: None, void: false });
             }
-            Event::Applied {
-                moment,
-                outputs,
-                source,
-                word_of,
-                missing,
-                heard,
-                ..
-            } => {
+            Event::Applied { moment, outputs, source, word_of, missing, heard, .. } => {
                 let driven = Driven {
                     outputs: outputs.clone(),
                     source: *source,
@@ -370,9 +350,7 @@ impl History {
     }
 
     pub(crate) fn shift(&mut self, by: i64) {
-        self.steps
-            .iter_mut()
-            .for_each(|step| step.cycle = step.cycle.saturating_add(by));
+        self.steps.iter_mut().for_each(|step| step.cycle = step.cycle.saturating_add(by));
     }
 }
 

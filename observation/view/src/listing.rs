@@ -71,16 +71,9 @@ impl Listing {
     /// Every name and word of the filter that does not exist.
     pub fn new(cluster: &Cluster, filter: Filter) -> Result<Self, Vec<ViewError>> {
         let members = Members::of(cluster);
-        let names: Vec<&str> = members
-            .iter()
-            .map(|(_, name)| name)
-            .chain(["laboratory"])
-            .collect();
-        let programs: Vec<&str> = cluster
-            .controllers()
-            .iter()
-            .map(|found| found.name.as_str())
-            .collect();
+        let names: Vec<&str> = members.iter().map(|(_, name)| name).chain(["laboratory"]).collect();
+        let programs: Vec<&str> =
+            cluster.controllers().iter().map(|found| found.name.as_str()).collect();
         let mut errors = Vec::new();
         let mut check = |kind, asked: &[String], known: &[&str]| {
             for name in asked.iter().filter(|name| !known.contains(&name.as_str())) {
@@ -232,9 +225,7 @@ impl Listing {
     fn cycle_of(&mut self, record: &Record) -> i64 {
         match (&record.event, record.member) {
             (
-                Happening::RemoteIo(RemoteIoEvent::Applied {
-                    moment, missing, ..
-                }),
+                Happening::RemoteIo(RemoteIoEvent::Applied { moment, missing, .. }),
                 Some(Member::RemoteIo(program)),
             ) => {
                 let idle = *missing == Some(Missing::NoCycle);
@@ -263,18 +254,10 @@ impl Listing {
     }
 
     fn is_wanted(&self, record: &Record, cycle: Option<i64>) -> bool {
-        let Filter {
-            members,
-            from,
-            to,
-            programs,
-            ..
-        } = &self.filter;
+        let Filter { members, from, to, programs, .. } = &self.filter;
         let by_name = members.is_empty() || members.contains(&record.name);
         let by_program = programs.is_empty()
-            || record
-                .member
-                .is_some_and(|member| self.wanted.contains(&member));
+            || record.member.is_some_and(|member| self.wanted.contains(&member));
         let after = from.is_none_or(|from| cycle.is_some_and(|cycle| cycle >= from));
         let before = to.is_none_or(|to| cycle.is_none_or(|cycle| cycle <= to));
         by_name && by_program && after && before
@@ -284,9 +267,7 @@ impl Listing {
     pub fn is_past(&self) -> bool {
         let latest = self.cycles.latest().filter(|_| self.cycles.has_origin());
         // Lines of different members may be a few cycles apart.
-        self.filter
-            .to
-            .is_some_and(|to| latest.is_some_and(|latest| latest > to.saturating_add(64)))
+        self.filter.to.is_some_and(|to| latest.is_some_and(|latest| latest > to.saturating_add(64)))
     }
 }
 
@@ -294,9 +275,6 @@ impl JournalLine {
     /// In columns.
     pub fn to_text(&self) -> String {
         let cycle = self.cycle.map_or("-".to_owned(), |cycle| cycle.to_string());
-        format!(
-            "{cycle:>8}  {:14} {:14} {}",
-            self.name, self.event, self.text
-        )
+        format!("{cycle:>8}  {:14} {:14} {}", self.name, self.event, self.text)
     }
 }

@@ -98,10 +98,7 @@ impl Holders {
         };
         let remote_ios = served.iter().map(|program| Outcome {
             failed: vec![Member::RemoteIo(program)],
-            lost: vec![Loss {
-                program,
-                missing: None,
-            }],
+            lost: vec![Loss { program, missing: None }],
         });
         Margin {
             served,
@@ -123,15 +120,9 @@ impl Holders {
         let sources = self.sources(failed);
         let lost = sources.into_iter().filter_map(|(program, source)| {
             let missing = source.err().filter(|_| served.contains(program))?;
-            Some(Loss {
-                program,
-                missing: Some(missing),
-            })
+            Some(Loss { program, missing: Some(missing) })
         });
-        Outcome {
-            failed: failed.iter().map(Member::Station).collect(),
-            lost: lost.collect(),
-        }
+        Outcome { failed: failed.iter().map(Member::Station).collect(), lost: lost.collect() }
     }
 
     /// What each remote I/O would select.
@@ -146,16 +137,11 @@ impl Holders {
                     .zip(&turns)
                     .map(|(station, turn)| {
                         let turn = turn.as_ref()?;
-                        self.heard[place]
-                            .contains(station)
-                            .then(|| Arc::clone(turn))
+                        self.heard[place].contains(station).then(|| Arc::clone(turn))
                     })
                     .collect();
-                let foreseen = Foreseen {
-                    turns: &heard,
-                    controllers: self.widths.len(),
-                    mode: self.mode,
-                };
+                let foreseen =
+                    Foreseen { turns: &heard, controllers: self.widths.len(), mode: self.mode };
                 let truth = lineage(program);
                 let source = foreseen.source(program, truth, width, self.excluded[place]);
                 (program, source.map(|_| ()))
@@ -167,11 +153,7 @@ impl Holders {
     fn turns(&self, failed: StationSet) -> Vec<Option<Arc<Frame>>> {
         let controllers = self.widths.len();
         let all = ProgramSet::first(controllers);
-        let outputs: Vec<Image> = self
-            .widths
-            .iter()
-            .map(|&width| Image::zero(width))
-            .collect();
+        let outputs: Vec<Image> = self.widths.iter().map(|&width| Image::zero(width)).collect();
         let publishes = |station: StationId| {
             let holds = self.holds[station.index()];
             (!failed.contains(station) && !holds.is_empty()).then_some(holds)

@@ -55,12 +55,7 @@ pub struct Bounds {
 impl Default for Bounds {
     /// Some minutes at 10 ms; some tens of megabytes for a cluster of ten programs.
     fn default() -> Self {
-        Self {
-            cycles: 8192,
-            events: 10_000,
-            changes: 100_000,
-            timings: 600,
-        }
+        Self { cycles: 8192, events: 10_000, changes: 100_000, timings: 600 }
     }
 }
 
@@ -202,9 +197,7 @@ impl Model {
 
     /// Whether an answer needed more than is known.
     pub(crate) fn wanted_more(&self) -> bool {
-        self.histories
-            .iter()
-            .any(|history| history.end().is_reached())
+        self.histories.iter().any(|history| history.end().is_reached())
     }
 
     /// The run is over: its results are there.
@@ -224,9 +217,7 @@ impl Model {
         self.changes.shift(by);
         self.received.shift(by);
         self.programs.iter_mut().for_each(|track| track.shift(by));
-        self.histories
-            .iter_mut()
-            .for_each(|history| history.shift(by));
+        self.histories.iter_mut().for_each(|history| history.shift(by));
         self.series.shift(by);
         self.events.shift(by);
         self.alarms.shift(by);

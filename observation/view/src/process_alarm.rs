@@ -146,9 +146,8 @@ impl ProcessAlarms {
         program_name: impl Fn(&AlarmDeclaration) -> String,
     ) -> Vec<ProcessAlarm> {
         let of_signals = alarms.iter().filter(|alarm| alarm.alarm == PROCESS);
-        let newest: BTreeMap<&str, &Alarm> = of_signals
-            .map(|alarm| (alarm.name.as_str(), alarm))
-            .collect();
+        let newest: BTreeMap<&str, &Alarm> =
+            of_signals.map(|alarm| (alarm.name.as_str(), alarm)).collect();
         let declared = self.declared.iter().enumerate();
         let shown = declared.map(|(index, alarm)| {
             let active = self.active[index].at(until).copied().flatten();

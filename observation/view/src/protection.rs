@@ -49,21 +49,16 @@ impl Protection {
             return "protected".to_owned();
         }
         let texts: Vec<&str> = self.lacking.iter().map(|one| one.text.as_str()).collect();
-        format!(
-            "NOT protected since cycle {}: {}",
-            self.since,
-            texts.join(", ")
-        )
+        format!("NOT protected since cycle {}: {}", self.since, texts.join(", "))
     }
 }
 
 impl LostState {
     /// What is available, and how old it is.
     pub fn text(&self) -> String {
-        let age = self.age_cycles.map_or_else(
-            || "of unknown age".to_owned(),
-            |age| format!("{age} cycles old"),
-        );
+        let age = self
+            .age_cycles
+            .map_or_else(|| "of unknown age".to_owned(), |age| format!("{age} cycles old"));
         format!(
             "STATE LOST since cycle {}: the newest available state is of cycle {} of the cluster, {age}, in {}",
             self.since, self.newest, self.holder

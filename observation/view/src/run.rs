@@ -46,9 +46,7 @@ pub fn find_run(path: &Path) -> Result<PathBuf, ViewError> {
     }
     let folder = path.parent().unwrap_or(Path::new("."));
     if path.is_file()
-        && path
-            .extension()
-            .is_some_and(|extension| extension == "jsonl" || extension == "packed")
+        && path.extension().is_some_and(|extension| extension == "jsonl" || extension == "packed")
     {
         return Ok(folder.to_owned());
     }
@@ -60,10 +58,7 @@ pub fn find_run(path: &Path) -> Result<PathBuf, ViewError> {
     } else {
         ": it has no journal.jsonl".to_owned()
     };
-    Err(ViewError::NoRun {
-        path: path.to_owned(),
-        hint,
-    })
+    Err(ViewError::NoRun { path: path.to_owned(), hint })
 }
 
 /// The newest run of a cluster below a directory of runs: of one with the same configuration, or at least the same name.
@@ -85,10 +80,7 @@ pub fn find_run_of(runs: &Path, cluster: &Cluster) -> Result<Run, ViewError> {
     let configuration = |cluster: &Cluster| cluster.agreement().configuration;
     let same = |run: &&Run| configuration(&run.cluster) == configuration(cluster);
     let namesake = |run: &&Run| run.cluster.name() == cluster.name();
-    let found = opened
-        .iter()
-        .find(same)
-        .or_else(|| opened.iter().find(namesake));
+    let found = opened.iter().find(same).or_else(|| opened.iter().find(namesake));
     found.cloned().ok_or_else(|| ViewError::NoRun {
         path: runs.to_owned(),
         hint: format!(": none of the newest there is one of `{}`", cluster.name()),
@@ -132,16 +124,10 @@ impl Run {
         let journal = path.join(JOURNAL);
         match check_journal(&journal) {
             Err(JournalError::Version(wrong)) => {
-                return Err(ViewError::Version {
-                    path: journal,
-                    wrong,
-                });
+                return Err(ViewError::Version { path: journal, wrong });
             }
             Err(error @ JournalError::Line { .. }) => {
-                return Err(ViewError::Journal {
-                    path: journal,
-                    reason: error.to_string(),
-                });
+                return Err(ViewError::Journal { path: journal, reason: error.to_string() });
             }
             // A file that cannot be read is reported by its follower.
             Err(JournalError::Read(_)) | Ok(()) => {}
@@ -297,9 +283,7 @@ impl Run {
             let taken = source.poll(&mut |found| model.take_found(found));
             any |= taken > 0;
             let past = model.has_origin()
-                && model
-                    .cycle()
-                    .is_some_and(|newest| newest > cycle.saturating_add(BEHIND));
+                && model.cycle().is_some_and(|newest| newest > cycle.saturating_add(BEHIND));
             if taken == 0 && is_finished {
                 model.end();
             }
@@ -352,11 +336,7 @@ impl Run {
         let journal = self.path.join(JOURNAL);
         let found = place_before(&journal, cycle).ok().flatten()?;
         let source = Source::following_from(&journal, found.place).ok()?;
-        Some(Begun {
-            source,
-            moment: found.moment,
-            cycle: found.cycle,
-        })
+        Some(Begun { source, moment: found.moment, cycle: found.cycle })
     }
 
     /// The origin of the summary, for journals whose own record of it is gone.
@@ -364,10 +344,7 @@ impl Run {
         let summary = std::fs::read(self.path.join("summary.json")).ok()?;
         let summary: Value = serde_json::from_slice(&summary).ok()?;
         let (epoch, cycle) = summary["origin"].as_str()?.split_once(':')?;
-        Some(Moment {
-            epoch: Epoch(epoch.parse().ok()?),
-            cycle: Cycle(cycle.parse().ok()?),
-        })
+        Some(Moment { epoch: Epoch(epoch.parse().ok()?), cycle: Cycle(cycle.parse().ok()?) })
     }
 }
 

@@ -47,12 +47,8 @@ impl Series {
     pub(crate) fn shift(&mut self, by: i64) {
         let images = self.inputs.iter_mut().chain(&mut self.outputs);
         images.for_each(|timeline| timeline.shift(by));
-        self.sources
-            .iter_mut()
-            .for_each(|timeline| timeline.shift(by));
-        self.stations
-            .iter_mut()
-            .for_each(|timeline| timeline.shift(by));
+        self.sources.iter_mut().for_each(|timeline| timeline.shift(by));
+        self.stations.iter_mut().for_each(|timeline| timeline.shift(by));
     }
 
     pub(crate) fn applied(

@@ -110,10 +110,7 @@ fn lines(typed: &Program, source: &SourceText<'_>, trace: Option<&Trace>) -> Vec
         }
         executed.insert(done.line);
         // A variable of a frame has no name but in the text.
-        if let Effect::Assigned {
-            address,
-            value: Some((of, stored)),
-        } = done.effect
+        if let Effect::Assigned { address, value: Some((of, stored)) } = done.effect
             && address / 64 >= u64::from(typed.state)
             && let Some((target, _)) = source.line(done.line).and_then(|it| it.split_once(":="))
         {
@@ -133,9 +130,7 @@ fn lines(typed: &Program, source: &SourceText<'_>, trace: Option<&Trace>) -> Vec
         let part = typed.part(&behind_program).or_else(|| typed.part(name));
         let stored = part.and_then(|part| part.stored(memory));
         let key = (unit.to_lowercase(), name.to_lowercase());
-        stored
-            .map(|(of, stored)| elementary(of, stored))
-            .or_else(|| temporary.get(&key).cloned())
+        stored.map(|(of, stored)| elementary(of, stored)).or_else(|| temporary.get(&key).cloned())
     };
     let shown = (1..).zip(source.lines()).map(|(number, line)| {
         let mut values: Vec<(String, Value)> = Vec::new();

@@ -51,9 +51,7 @@ const LONGEST_REASON: usize = 200;
 impl Trouble {
     /// A line that is not a record. The reason may quote the line.
     fn of_line(reason: serde_json::Error) -> Self {
-        Self::Line {
-            reason: shortened(&reason.to_string(), LONGEST_REASON).into_owned(),
-        }
+        Self::Line { reason: shortened(&reason.to_string(), LONGEST_REASON).into_owned() }
     }
 }
 
@@ -62,9 +60,7 @@ impl From<JournalError> for Trouble {
         match error {
             JournalError::Version(wrong) => Self::Version(wrong),
             JournalError::Line { reason, .. } => Self::of_line(reason),
-            JournalError::Read(error) => Self::Line {
-                reason: error.to_string(),
-            },
+            JournalError::Read(error) => Self::Line { reason: error.to_string() },
         }
     }
 }

@@ -84,19 +84,10 @@ impl<'t> SourceText<'t> {
                     });
                     is_program = is("PROGRAM");
                 }
-                ends |= name
-                    .get(..4)
-                    .is_some_and(|head| head.eq_ignore_ascii_case("END_"))
-                    && UNITS
-                        .into_iter()
-                        .any(|word| name[4..].eq_ignore_ascii_case(word));
+                ends |= name.get(..4).is_some_and(|head| head.eq_ignore_ascii_case("END_"))
+                    && UNITS.into_iter().any(|word| name[4..].eq_ignore_ascii_case(word));
             }
-            lines.push(Line {
-                text,
-                unit,
-                is_program,
-                names,
-            });
+            lines.push(Line { text, unit, is_program, names });
             if ends {
                 unit = None;
             }
@@ -268,9 +259,6 @@ mod tests {
         assert_eq!(uses(6), [("PV", Use::Parameter), ("level", Use::Read)]);
         let written: Vec<_> = [uses(7), uses(8)].concat();
         let written = written.iter().filter(|(_, kind)| *kind == Use::Written);
-        assert_eq!(
-            written.map(|(name, _)| *name).collect::<Vec<_>>(),
-            ["t", "p"]
-        );
+        assert_eq!(written.map(|(name, _)| *name).collect::<Vec<_>>(), ["t", "p"]);
     }
 }

@@ -94,9 +94,7 @@ impl Model {
         signals: &[StateSignal],
     ) -> Result<Vec<Value>, ViewError> {
         let history = self.history_of(program)?;
-        let place = history
-            .place_of(cycle)
-            .ok_or_else(|| self.no_cycle(program, cycle))?;
+        let place = history.place_of(cycle).ok_or_else(|| self.no_cycle(program, cycle))?;
         self.state_values_at(history, place, signals)
     }
 
@@ -244,9 +242,7 @@ fn of_typed(controller: &Controller, typed: &TypedProgram) -> Vec<StateSignal> {
         let end = 64 * (u64::from(variable.slot) + variable.of.slots());
         let mut address = 64 * u64::from(variable.slot);
         while address < end && signals.len() < MAXIMUM_SIGNALS {
-            let part = typed
-                .part_at(address)
-                .filter(|part| part.address == address);
+            let part = typed.part_at(address).filter(|part| part.address == address);
             let of = part.as_ref().and_then(|part| part.of.elementary());
             if let Some((part, of)) = part.zip(of)
                 && !own.contains(&(address / 64))
@@ -264,11 +260,7 @@ fn of_typed(controller: &Controller, typed: &TypedProgram) -> Vec<StateSignal> {
             // Elements of an array may share a slot; all else begins at one.
             let next = address + of.map_or(64, |of| u64::from(of.bits()));
             let shares = typed.part_at(next).is_some_and(|part| part.address == next);
-            address = if shares {
-                next
-            } else {
-                (address / 64 + 1) * 64
-            };
+            address = if shares { next } else { (address / 64 + 1) * 64 };
         }
     }
     signals

@@ -77,18 +77,12 @@ const CYCLES: usize = 2;
 impl Stops {
     pub(crate) fn new(cluster: &Cluster) -> Self {
         let cluster = Arc::new(cluster.clone());
-        Self {
-            programs: Self::begun(&cluster),
-            cluster,
-        }
+        Self { programs: Self::begun(&cluster), cluster }
     }
 
     /// The same before the first record.
     pub(crate) fn again(&self) -> Self {
-        Self {
-            programs: Self::begun(&self.cluster),
-            cluster: Arc::clone(&self.cluster),
-        }
+        Self { programs: Self::begun(&self.cluster), cluster: Arc::clone(&self.cluster) }
     }
 
     fn begun(cluster: &Cluster) -> Vec<(History, Stop)> {
@@ -141,9 +135,7 @@ pub(crate) fn fits(cluster: &Cluster, program: ProgramId, event: &RemoteIoEvent)
     let are_inputs = |width| width == interface.inputs.width();
     match event {
         RemoteIoEvent::Sampled { inputs, .. } => are_inputs(inputs.width()),
-        RemoteIoEvent::Applied {
-            sampled, outputs, ..
-        } => {
+        RemoteIoEvent::Applied { sampled, outputs, .. } => {
             let sampled = sampled.as_ref();
             sampled.is_none_or(|sampled| are_inputs(sampled.width()))
                 && outputs.width() == interface.outputs.width()

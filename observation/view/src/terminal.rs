@@ -145,24 +145,17 @@ impl Screen {
         let programs = rows(snapshot.programs.len(), area.height);
         let protected = tables::protection(&snapshot);
         let lines = u16::try_from(protected.len()).unwrap_or(u16::MAX);
-        let [
-            head,
-            station_area,
-            program_area,
-            protection,
-            survives,
-            timing,
-            bottom,
-        ] = Layout::vertical([
-            Constraint::Length(1),
-            Constraint::Length(stations),
-            Constraint::Length(programs),
-            Constraint::Length(lines.min((area.height / 6).max(1))),
-            Constraint::Length(2),
-            Constraint::Length(2),
-            Constraint::Min(3),
-        ])
-        .areas(area);
+        let [head, station_area, program_area, protection, survives, timing, bottom] =
+            Layout::vertical([
+                Constraint::Length(1),
+                Constraint::Length(stations),
+                Constraint::Length(programs),
+                Constraint::Length(lines.min((area.height / 6).max(1))),
+                Constraint::Length(2),
+                Constraint::Length(2),
+                Constraint::Min(3),
+            ])
+            .areas(area);
         frame.render_widget(self.head(&snapshot, head.width), head);
         frame.render_widget(tables::stations(&snapshot, self.above), station_area);
         frame.render_widget(tables::programs(&snapshot, model, self.above), program_area);
@@ -177,26 +170,18 @@ impl Screen {
     }
 
     fn head(&self, snapshot: &Snapshot, width: u16) -> Line<'static> {
-        let run = if self.paused {
-            "paused"
-        } else {
-            snapshot.run.word()
-        };
+        let run = if self.paused { "paused" } else { snapshot.run.word() };
         let period = std::time::Duration::from_micros(snapshot.period_us);
         let left = format!(" {}  {}  {period:?}", snapshot.cluster, snapshot.mode);
-        let cycle = snapshot
-            .cycle
-            .map_or("-".to_owned(), |cycle| cycle.to_string());
+        let cycle = snapshot.cycle.map_or("-".to_owned(), |cycle| cycle.to_string());
         let left_out = match snapshot.left_out {
             0 => String::new(),
             left_out => format!("  {left_out} records left out"),
         };
-        let age = self.age.map_or(String::new(), |age| {
-            format!("  NO RECORD FOR {} s", age.as_secs())
-        });
-        let past = self.past.map_or(String::new(), |percent| {
-            format!("  reading the past: {percent} %")
-        });
+        let age =
+            self.age.map_or(String::new(), |age| format!("  NO RECORD FOR {} s", age.as_secs()));
+        let past =
+            self.past.map_or(String::new(), |percent| format!("  reading the past: {percent} %"));
         let right = format!("{run}  cycle {cycle}{past}{age}{left_out}  h help  q quit ");
         let gap = usize::from(width).saturating_sub(left.chars().count() + right.chars().count());
         let text = format!("{left}{}{right}", " ".repeat(gap.max(1)));
@@ -212,19 +197,13 @@ fn rows(count: usize, height: u16) -> u16 {
 
 /// The label of a line.
 pub(crate) fn label(text: &str) -> Span<'static> {
-    Span::styled(
-        format!(" {text:10} "),
-        Style::new().add_modifier(Modifier::BOLD),
-    )
+    Span::styled(format!(" {text:10} "), Style::new().add_modifier(Modifier::BOLD))
 }
 
 fn draw_timing(frame: &mut Frame<'_>, area: Rect, model: &Model, snapshot: &Snapshot) {
-    let [left, middle, right] = Layout::horizontal([
-        Constraint::Length(12),
-        Constraint::Min(10),
-        Constraint::Length(34),
-    ])
-    .areas(area);
+    let [left, middle, right] =
+        Layout::horizontal([Constraint::Length(12), Constraint::Min(10), Constraint::Length(34)])
+            .areas(area);
     frame.render_widget(Line::from(label("margin")), left);
     let width = usize::from(middle.width);
     let mut margins: Vec<u64> = model
@@ -235,16 +214,13 @@ fn draw_timing(frame: &mut Frame<'_>, area: Rect, model: &Model, snapshot: &Snap
         .collect();
     margins.reverse();
     let period_ns = snapshot.period_us.saturating_mul(1000);
-    frame.render_widget(
-        Sparkline::default().data(margins).max(period_ns * 65 / 100),
-        middle,
-    );
+    frame.render_widget(Sparkline::default().data(margins).max(period_ns * 65 / 100), middle);
     let text = snapshot.timing.map_or_else(
         || " no times yet".to_owned(),
         |timing| {
-            let cycle = timing.cycle_us.map_or(String::new(), |cycle| {
-                format!(", cycle {}", milliseconds(cycle))
-            });
+            let cycle = timing
+                .cycle_us
+                .map_or(String::new(), |cycle| format!(", cycle {}", milliseconds(cycle)));
             format!(
                 " {} before the deadline\n token {}{cycle}",
                 milliseconds(timing.margin_us),

@@ -26,11 +26,7 @@ pub struct Timeline<T> {
 
 impl<T: Clone + PartialEq> Timeline<T> {
     pub(crate) fn new(most: usize) -> Self {
-        Self {
-            spans: VecDeque::new(),
-            most: most.max(1),
-            cut: false,
-        }
+        Self { spans: VecDeque::new(), most: most.max(1), cut: false }
     }
 
     /// The value in cycle `at`. A second value of a cycle, or one of an earlier cycle, is ignored.
@@ -48,11 +44,7 @@ impl<T: Clone + PartialEq> Timeline<T> {
             self.spans.pop_front();
             self.cut = true;
         }
-        self.spans.push_back(Span {
-            from: at,
-            to: at.saturating_add(1),
-            value: value.clone(),
-        });
+        self.spans.push_back(Span { from: at, to: at.saturating_add(1), value: value.clone() });
     }
 
     /// Cycles are counted from somewhere else from now on.
@@ -73,14 +65,11 @@ impl<T: Clone + PartialEq> Timeline<T> {
     /// What is known of the cycles `from` to below `to`, cut to them.
     pub fn spans(&self, from: i64, to: i64) -> impl Iterator<Item = Span<&T>> {
         let first = self.spans.partition_point(|span| span.to <= from);
-        self.spans
-            .range(first..)
-            .take_while(move |span| span.from < to)
-            .map(move |span| Span {
-                from: span.from.max(from),
-                to: span.to.min(to),
-                value: &span.value,
-            })
+        self.spans.range(first..).take_while(move |span| span.from < to).map(move |span| Span {
+            from: span.from.max(from),
+            to: span.to.min(to),
+            value: &span.value,
+        })
     }
 
     /// The first cycle that is known, and the first one behind the last.
@@ -121,10 +110,7 @@ mod tests {
                 .spans(1, 5)
                 .map(|span| u32::try_from(span.to - span.from).unwrap_or(0))
                 .sum();
-            assert_eq!(
-                listed,
-                (1..5).filter(|&cycle| value(cycle).is_some()).count() as u32
-            );
+            assert_eq!(listed, (1..5).filter(|&cycle| value(cycle).is_some()).count() as u32);
         }
     }
 

@@ -100,9 +100,7 @@ impl Timings {
         let (Some(cycle), Some(start)) = (open.cycle, open.first_sample) else {
             return;
         };
-        let before = self
-            .started
-            .filter(|(last, _)| last.checked_add(1) == Some(cycle));
+        let before = self.started.filter(|(last, _)| last.checked_add(1) == Some(cycle));
         self.started = Some((cycle, start));
         let Some(turn) = open.last_turn else {
             return;
@@ -130,12 +128,8 @@ impl Timings {
         for open in &mut self.open {
             open.cycle = open.cycle.map(|cycle| cycle.saturating_add(by));
         }
-        self.closed
-            .iter_mut()
-            .for_each(|closed| closed.cycle = closed.cycle.saturating_add(by));
-        self.started = self
-            .started
-            .map(|(cycle, at)| (cycle.saturating_add(by), at));
+        self.closed.iter_mut().for_each(|closed| closed.cycle = closed.cycle.saturating_add(by));
+        self.started = self.started.map(|(cycle, at)| (cycle.saturating_add(by), at));
     }
 
     pub(crate) fn iter(&self) -> impl DoubleEndedIterator<Item = &CycleTiming> {

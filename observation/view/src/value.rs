@@ -8,9 +8,7 @@ use understudy_wire::{Force, Image, SignalPlace};
 /// The bits of a point as they are stored; nothing where the text ends before them.
 pub fn stored(point: &Point, bits: &str) -> Option<u64> {
     let first = point.bit as usize;
-    let own = bits
-        .as_bytes()
-        .get(first..first + point.of.bits() as usize)?;
+    let own = bits.as_bytes().get(first..first + point.of.bits() as usize)?;
     let shifted = own.iter().rev();
     Some(shifted.fold(0, |value, &bit| value << 1 | u64::from(bit == b'1')))
 }
@@ -137,18 +135,9 @@ mod tests {
             point.set(&mut words, value);
         }
         let bits: String = (0..points.width())
-            .map(|bit| {
-                if words[bit / 64] >> (bit % 64) & 1 == 1 {
-                    '1'
-                } else {
-                    '0'
-                }
-            })
+            .map(|bit| if words[bit / 64] >> (bit % 64) & 1 == 1 { '1' } else { '0' })
             .collect();
-        let found: Vec<Value> = points
-            .iter()
-            .filter_map(|point| value_of(point, &bits))
-            .collect();
+        let found: Vec<Value> = points.iter().filter_map(|point| value_of(point, &bits)).collect();
         let expected: [Value; 4] = [true.into(), (-5).into(), 12.1.into(), u64::MAX.into()];
         assert_eq!(found, expected);
         let last = points.iter().next_back().expect("a point");

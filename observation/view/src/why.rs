@@ -172,10 +172,8 @@ impl Model {
             (Some(output), Some(sampled)) => Some(value_in(output, &sampled.outputs)),
             _ => None,
         };
-        let driven = step
-            .driven
-            .as_ref()
-            .and_then(|driven| Some(value_in(output?, &driven.outputs)));
+        let driven =
+            step.driven.as_ref().and_then(|driven| Some(value_in(output?, &driven.outputs)));
         let because = match &controller.code {
             Code::Ladder(ladder, _) => explained
                 .map(|explained| Explainer::new(self, history, ladder).root(name, explained))
@@ -184,9 +182,7 @@ impl Model {
                 let mut explainer = statements::Explainer::new(self, history, typed, text);
                 let stopped = missing == Some(Missing::ProgramFault) && output.is_some();
                 let value = driven.clone().unwrap_or_default();
-                let fault = stopped
-                    .then(|| explainer.fault(name, value, place))
-                    .flatten();
+                let fault = stopped.then(|| explainer.fault(name, value, place)).flatten();
                 match (fault, explained, typed.part(name)) {
                     (Some(fault), ..) => Some(fault),
                     (None, Some(explained), Some(part)) => Some(explainer.root(&part, explained)?),
@@ -197,13 +193,10 @@ impl Model {
         let fail_safe = &self.cluster.remote_ios()[program.index()].fail_safe;
         let configured = output.map(|output| value_in(output, fail_safe));
         let on_ramp = source == Some(Source::FailSafe) && configured != driven;
-        let value = driven
-            .or(because.as_ref().map(|reason| reason.value.clone()))
-            .unwrap_or_default();
+        let value =
+            driven.or(because.as_ref().map(|reason| reason.value.clone())).unwrap_or_default();
         let sampled = step.sampled.as_ref().into_iter();
-        let inputs = sampled
-            .clone()
-            .flat_map(|it| named(&controller.interface.inputs, &it.inputs));
+        let inputs = sampled.clone().flat_map(|it| named(&controller.interface.inputs, &it.inputs));
         let typed = controller.code.typed();
         let is_typed = |_: &&Sampled| typed.is_some();
         let mut sampled = sampled.filter(is_typed);
@@ -286,24 +279,18 @@ impl Model {
         step: &Step,
         driven: &Driven,
     ) -> Option<Reconstructed> {
-        let station = driven
-            .word_of
-            .filter(|_| driven.source == Source::Reconstructed)?;
+        let station = driven.word_of.filter(|_| driven.source == Source::Reconstructed)?;
         let turns = self.sent_turns(step.moment);
         let turn = turns.iter().find(|turn| turn.station == station)?;
         let word = turn.words.iter().find(|word| word.mask.contains(program))?;
         let published = |other: ProgramId| {
-            let turn = turns
-                .iter()
-                .find(|turn| turn.station == StationId(other.0))?;
+            let turn = turns.iter().find(|turn| turn.station == StationId(other.0))?;
             turn.words.first().map(|word| &word.sum)
         };
         let sum = reconstruct(word, program, driven.outputs.width(), published).ok()?;
         let others = word.mask.iter().filter(|other| *other != program);
         let outputs_of = |program: ProgramId, image: &Image| {
-            let outputs = &self.cluster.controllers()[program.index()]
-                .interface
-                .outputs;
+            let outputs = &self.cluster.controllers()[program.index()].interface.outputs;
             (image.width() >= outputs.width()).then_some(outputs)
         };
         let values = |program: ProgramId, image: &Image| {
@@ -312,10 +299,7 @@ impl Model {
         };
         let values_text = |program: ProgramId, image: &Image| {
             let typed = self.cluster.controllers()[program.index()].code.typed();
-            Some(named_text(
-                outputs_of(program, image).filter(|_| typed.is_some())?,
-                image,
-            ))
+            Some(named_text(outputs_of(program, image).filter(|_| typed.is_some())?, image))
         };
         let others = others.filter_map(|other| {
             let outputs = published(other)?;
@@ -333,11 +317,7 @@ impl Model {
         let sampled = step.sampled.as_ref();
         Some(Reconstructed {
             word_of: self.members.name(Member::Station(station)).to_owned(),
-            mask: word
-                .mask
-                .iter()
-                .map(|member| self.program_name(member).to_owned())
-                .collect(),
+            mask: word.mask.iter().map(|member| self.program_name(member).to_owned()).collect(),
             word: word.sum.to_string(),
             others: others.collect(),
             lineage: sampled.map_or_else(String::new, |sampled| sampled.after.to_string()),

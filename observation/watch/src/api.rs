@@ -39,19 +39,13 @@ pub(crate) fn router(app: Arc<App>) -> Router {
         .route("/api/state", get(facts::state))
         .route("/api/events", get(events::events))
         .route("/api/ladder/{program}", get(ladder::picture))
-        .route(
-            "/api/cross-reference/{program}",
-            get(ladder::cross_reference),
-        )
+        .route("/api/cross-reference/{program}", get(ladder::cross_reference))
         .route("/api/why/{program}/{output}", get(why::why))
         .route("/api/signals", get(signals::signals))
         .route("/api/values", get(signals::values))
         .route("/api/trends", get(trends::trends))
         .route("/api/compare", get(compare::compare))
-        .route(
-            "/api/alarms/{number}/acknowledge",
-            post(alarms::acknowledge),
-        )
+        .route("/api/alarms/{number}/acknowledge", post(alarms::acknowledge))
         .route("/api/alarms/shelve", post(alarms::shelve))
         .route("/api/alarms/unshelve", post(alarms::unshelve))
         .route("/api/command", post(command::command))

@@ -116,10 +116,7 @@ impl App {
     /// The alarm of a number.
     pub(crate) fn alarm(&self, number: u64) -> Result<Option<Alarm>, Reading> {
         let model = self.model();
-        let mut alarms = model
-            .present()?
-            .into_iter()
-            .flat_map(|known| known.run.alarms());
+        let mut alarms = model.present()?.into_iter().flat_map(|known| known.run.alarms());
         Ok(alarms.find(|alarm| alarm.number == number).cloned())
     }
 }

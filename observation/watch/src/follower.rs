@@ -23,10 +23,7 @@ pub(crate) struct Newest {
 
 impl Default for Newest {
     fn default() -> Self {
-        Self {
-            state: Arc::from(NOTHING),
-            progress: Progress::default(),
-        }
+        Self { state: Arc::from(NOTHING), progress: Progress::default() }
     }
 }
 
@@ -64,9 +61,7 @@ pub(crate) fn follow(
         // Records are read before the model is locked, so that no request waits for a disk.
         let mut found = Vec::new();
         let taken = following.poll(&mut |record| found.push(record));
-        lock(model, |model| {
-            found.into_iter().for_each(|found| model.note(found))
-        });
+        lock(model, |model| found.into_iter().for_each(|found| model.note(found)));
         unsaid |= taken > 0;
         let reads_past = following.past_percent();
         if reads_past.is_some() {
@@ -91,10 +86,7 @@ pub(crate) fn follow(
         let is_due = said.elapsed() >= SAY || !was_current;
         if unsaid && is_due && progress.current(now).is_ok() {
             let state = newest_state(&model.read().unwrap_or_else(PoisonError::into_inner));
-            newest.send_replace(Newest {
-                state: Arc::from(state),
-                progress,
-            });
+            newest.send_replace(Newest { state: Arc::from(state), progress });
             said = now;
             unsaid = false;
         } else {

@@ -71,16 +71,12 @@ fn admit(app: &App, request: &Request) -> Result<Person, Refused> {
     let path = request.uri().path();
     match &app.logins {
         // The loopback interface is reached from this machine only.
-        None => Ok(Person {
-            name: String::new(),
-            role: Role::Engineer,
-        }),
+        None => Ok(Person { name: String::new(), role: Role::Engineer }),
         Some(logins) => match logins.person(headers, Instant::now()) {
             Some(person) => Ok(person),
-            None if path == "/api/login" || BEFORE_LOGIN.contains(&path) => Ok(Person {
-                name: String::new(),
-                role: Role::Viewer,
-            }),
+            None if path == "/api/login" || BEFORE_LOGIN.contains(&path) => {
+                Ok(Person { name: String::new(), role: Role::Viewer })
+            }
             None => Err(Refused::NotLoggedIn),
         },
     }
@@ -167,16 +163,7 @@ mod tests {
         check(&[("origin", "null")], false);
         check(&[], false);
         check(&[("x-understudy", "1")], true);
-        check(
-            &[("x-understudy", "1"), ("sec-fetch-site", "cross-site")],
-            false,
-        );
-        check(
-            &[
-                ("origin", "http://localhost:1"),
-                ("sec-fetch-site", "same-origin"),
-            ],
-            true,
-        );
+        check(&[("x-understudy", "1"), ("sec-fetch-site", "cross-site")], false);
+        check(&[("origin", "http://localhost:1"), ("sec-fetch-site", "same-origin")], true);
     }
 }

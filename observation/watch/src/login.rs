@@ -56,10 +56,7 @@ impl Logins {
     /// # Errors
     /// [`WatchError::Logins`] where it cannot be read or made, is readable by others, or has an invalid line.
     pub fn of_file(path: &Path) -> Result<Self, WatchError> {
-        let bad = |reason: String| WatchError::Logins {
-            path: path.to_owned(),
-            reason,
-        };
+        let bad = |reason: String| WatchError::Logins { path: path.to_owned(), reason };
         if !path.exists() {
             make_file(path).map_err(bad)?;
         }
@@ -69,11 +66,7 @@ impl Logins {
         }
         let text = fs::read_to_string(path).map_err(|error| bad(error.to_string()))?;
         let tokens = read_tokens(&text).map_err(bad)?;
-        Ok(Self {
-            tokens,
-            sessions: Mutex::default(),
-            failures: tokio::sync::Mutex::default(),
-        })
+        Ok(Self { tokens, sessions: Mutex::default(), failures: tokio::sync::Mutex::default() })
     }
 
     /// The person with this token. A wrong token costs time.
@@ -198,9 +191,7 @@ mod tests {
             let found = read_tokens(text);
             let found = found.map(|tokens| {
                 let people = tokens.into_iter().map(|(_, person)| person);
-                people
-                    .map(|person| (person.name, person.role))
-                    .collect::<Vec<_>>()
+                people.map(|person| (person.name, person.role)).collect::<Vec<_>>()
             });
             let expected = expected
                 .map(|people| {
@@ -249,10 +240,7 @@ mod tests {
         assert_eq!(logins.person(&sent, now), Some(anna.clone()));
         assert_eq!(logins.person(&sent, now + SESSION_TIME), None);
         assert_eq!(logins.person(&HeaderMap::new(), now), None);
-        assert_eq!(
-            logins.person(&headers("understudy_session=guess"), now),
-            None
-        );
+        assert_eq!(logins.person(&headers("understudy_session=guess"), now), None);
         logins.close(&sent);
         assert_eq!(logins.person(&sent, now), None);
     }

@@ -64,11 +64,7 @@ impl Model {
     /// The run has started: its records are read by the returned reader.
     pub(crate) fn begin(&mut self, run: &Run) -> Following {
         let (run, following) = Following::of(run, Bounds::default());
-        self.known = Some(Known {
-            run,
-            ended: false,
-            past_percent: following.past_percent(),
-        });
+        self.known = Some(Known { run, ended: false, past_percent: following.past_percent() });
         following
     }
 

@@ -19,19 +19,12 @@ pub(crate) fn by_address(program: &Program) -> Program {
             *name = address.clone();
         }
     };
-    for signal in renamed
-        .inputs
-        .iter_mut()
-        .chain(&mut renamed.outputs)
-        .chain(&mut renamed.memory)
-    {
+    for signal in renamed.inputs.iter_mut().chain(&mut renamed.outputs).chain(&mut renamed.memory) {
         rename_signal(signal, &rename);
     }
     for rung in &mut renamed.rungs {
         rename_series(&mut rung.network, &rename);
-        rung.coils
-            .iter_mut()
-            .for_each(|coil| rename(&mut coil.target));
+        rung.coils.iter_mut().for_each(|coil| rename(&mut coil.target));
     }
     renamed
 }
@@ -52,13 +45,12 @@ fn rename_series(series: &mut Series, rename: &impl Fn(&mut Name)) {
     for element in series {
         match element {
             Element::Contact(contact) => rename(&mut contact.operand),
-            Element::Branches(branches) => branches
-                .iter_mut()
-                .for_each(|branch| rename_series(branch, rename)),
-            Element::Block(block) => block
-                .pins
-                .iter_mut()
-                .for_each(|feed| rename_series(&mut feed.network, rename)),
+            Element::Branches(branches) => {
+                branches.iter_mut().for_each(|branch| rename_series(branch, rename))
+            }
+            Element::Block(block) => {
+                block.pins.iter_mut().for_each(|feed| rename_series(&mut feed.network, rename))
+            }
             Element::Comparison(_) => {}
         }
     }

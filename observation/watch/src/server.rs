@@ -55,11 +55,7 @@ pub struct Served {
 impl Served {
     /// Where it is found.
     pub fn url(&self) -> String {
-        let scheme = if self.fingerprint.is_some() {
-            "https"
-        } else {
-            "http"
-        };
+        let scheme = if self.fingerprint.is_some() { "https" } else { "http" };
         format!("{scheme}://{}/", self.address)
     }
 
@@ -108,14 +104,7 @@ impl Drop for Served {
 /// # Errors
 /// [`WatchError`].
 pub fn serve(settings: Settings) -> Result<Served, WatchError> {
-    let Settings {
-        run,
-        address,
-        commanding,
-        logins,
-        certificate,
-        names,
-    } = settings;
+    let Settings { run, address, commanding, logins, certificate, names } = settings;
     if !address.ip().is_loopback() && logins.is_none() {
         return Err(WatchError::NoLogins(address));
     }
@@ -151,13 +140,7 @@ pub fn serve(settings: Settings) -> Result<Served, WatchError> {
             run_server(listener, tls, app, stopped);
         })
         .map_err(system("a thread that serves the page"))?;
-    Ok(Served {
-        address,
-        fingerprint,
-        stop: Some(stop),
-        threads: vec![server, follower],
-        ending,
-    })
+    Ok(Served { address, fingerprint, stop: Some(stop), threads: vec![server, follower], ending })
 }
 
 fn system(what: &'static str) -> impl Fn(std::io::Error) -> WatchError {

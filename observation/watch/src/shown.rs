@@ -178,9 +178,8 @@ pub(crate) const NOTHING: &str = "null";
 
 /// The newest state as JSON; [`NOTHING`] where nothing is known yet.
 pub(crate) fn newest_state(model: &Model) -> String {
-    let mut state = model
-        .known()
-        .and_then(|known| state(&known.run, known.run.newest()?, known.has_ended()));
+    let mut state =
+        model.known().and_then(|known| state(&known.run, known.run.newest()?, known.has_ended()));
     if let (Some(state), Some(known)) = (&mut state, model.known()) {
         state.past_is(known);
         let age = model.progress.age(Instant::now()).unwrap_or_default();
@@ -257,11 +256,7 @@ fn shown_program(
     let values = |points: &Points, bits: Option<&str>| {
         let bits = bits?;
         let values = points.iter();
-        Some(
-            values
-                .map(|point| value_of(point, bits).unwrap_or_default())
-                .collect(),
-        )
+        Some(values.map(|point| value_of(point, bits).unwrap_or_default()).collect())
     };
     let controller = snapshot.stations.get(index);
     let published = controller.and_then(|controller| controller.words.first());
@@ -280,22 +275,12 @@ fn shown_program(
         published_values: values(&interface.outputs, published.map(|word| word.sum.as_str())),
         signals: signals(run, index, program),
         awaits_release: program.awaits_release,
-        forced: program
-            .forces
-            .iter()
-            .map(|force| shown_force(controller_of, force))
-            .collect(),
+        forced: program.forces.iter().map(|force| shown_force(controller_of, force)).collect(),
         protection: program
             .protection
             .clone()
-            .map(|protection| ShownProtection {
-                words: protection.text(),
-                protection,
-            }),
-        lost: program.lost.clone().map(|lost| ShownLost {
-            words: lost.text(),
-            lost,
-        }),
+            .map(|protection| ShownProtection { words: protection.text(), protection }),
+        lost: program.lost.clone().map(|lost| ShownLost { words: lost.text(), lost }),
         counts: Counts {
             direct: program.direct,
             reconstructed: program.reconstructed,
@@ -309,17 +294,12 @@ fn shown_program(
 fn signals(run: &RunModel, index: usize, program: &ProgramSnapshot) -> Vec<ShownSignal> {
     let interface = &run.cluster().controllers()[index].interface;
     let declared = run.cluster().remote_ios().get(index);
-    let declared = declared
-        .into_iter()
-        .flat_map(|remote_io| remote_io.signals());
+    let declared = declared.into_iter().flat_map(|remote_io| remote_io.signals());
     let shown = declared.filter_map(|signal| {
         let SignalInput { place, valid, .. } = signal.input;
         let sampled = program.inputs.as_deref();
         Some(ShownSignal {
-            input: interface
-                .inputs
-                .iter()
-                .position(|point| point.bit == u32::from(place.bit))?,
+            input: interface.inputs.iter().position(|point| point.bit == u32::from(place.bit))?,
             valid: sampled.and_then(|sampled| match valid {
                 Some(valid) => Some(*sampled.as_bytes().get(usize::from(valid))? == b'1'),
                 None => program.validity.get(&place.bit).copied(),
@@ -358,9 +338,7 @@ fn timing(run: &RunModel, snapshot: &Snapshot) -> Timing {
     // The newest cycles are not closed yet.
     let own = timings().next_back();
     Timing {
-        cycle_us: own
-            .and_then(|timing| timing.cycle_ns)
-            .map(|cycle_ns| cycle_ns / 1000),
+        cycle_us: own.and_then(|timing| timing.cycle_ns).map(|cycle_ns| cycle_ns / 1000),
         margin_us: own.map(|timing| timing.margin_ns / 1000),
         least_margin_us: least.map(|least| least / 1000),
         stalls: snapshot.host_stalls,
@@ -371,16 +349,13 @@ fn redundancy(snapshot: &Snapshot) -> Redundancy {
     let margin = &snapshot.margin;
     let is_station = |name: &String| snapshot.stations.iter().any(|known| known.name == *name);
     let singles = margin.singles.iter();
-    let singles: Vec<&OutcomeSnapshot> = singles
-        .filter(|outcome| outcome.failed.iter().all(is_station))
-        .collect();
+    let singles: Vec<&OutcomeSnapshot> =
+        singles.filter(|outcome| outcome.failed.iter().all(is_station)).collect();
     let (level, words) = in_words(margin, &singles);
     // A program that has no provable outputs is no good sign, whatever else would be masked.
     let programs = snapshot.programs.iter().map(|program| &program.program);
-    let lost: Vec<&str> = programs
-        .filter(|program| !margin.served.contains(program))
-        .map(String::as_str)
-        .collect();
+    let lost: Vec<&str> =
+        programs.filter(|program| !margin.served.contains(program)).map(String::as_str).collect();
     let (level, words) = if lost.is_empty() || level == "none" {
         (level, words)
     } else {
@@ -408,24 +383,14 @@ fn in_words(margin: &MarginSnapshot, singles: &[&OutcomeSnapshot]) -> (&'static 
             let words = format!("{masked} of {of} failures of a single station would be masked");
             return ("some", words);
         }
-        (1, _) => (
-            "all",
-            "any one further failure of a station would be masked",
-        ),
-        _ => (
-            "all",
-            "any two further failures of stations would be masked",
-        ),
+        (1, _) => ("all", "any one further failure of a station would be masked"),
+        _ => ("all", "any two further failures of stations would be masked"),
     };
     (level, words.to_owned())
 }
 
 fn failure(outcome: &OutcomeSnapshot) -> Failure {
-    Failure {
-        names: outcome.failed.clone(),
-        masked: outcome.masked,
-        why: outcome.why.clone(),
-    }
+    Failure { names: outcome.failed.clone(), masked: outcome.masked, why: outcome.why.clone() }
 }
 
 /// The newest alarms up to a cycle, newest first.

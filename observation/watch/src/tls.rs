@@ -43,15 +43,10 @@ pub(crate) fn acceptor(
             (vec![made.cert.der().clone()], PrivateKeyDer::Pkcs8(key))
         }
     };
-    let first: &CertificateDer<'_> = chain
-        .first()
-        .ok_or_else(|| bad(&"the file holds no certificate"))?;
+    let first: &CertificateDer<'_> =
+        chain.first().ok_or_else(|| bad(&"the file holds no certificate"))?;
     let digest = ring::digest::digest(&ring::digest::SHA256, first);
-    let bytes: Vec<String> = digest
-        .as_ref()
-        .iter()
-        .map(|byte| format!("{byte:02X}"))
-        .collect();
+    let bytes: Vec<String> = digest.as_ref().iter().map(|byte| format!("{byte:02X}")).collect();
     let provider = Arc::new(rustls::crypto::ring::default_provider());
     let config = rustls::ServerConfig::builder_with_provider(provider)
         .with_protocol_versions(&[&rustls::version::TLS13])

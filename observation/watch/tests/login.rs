@@ -17,10 +17,7 @@ const OPERATOR: &str = "0123456789abcdef0123456789abcdef";
 const VIEWER: &str = "fedcba9876543210fedcba9876543210";
 
 fn looking() -> Commanding {
-    Commanding {
-        forbidden: Some("a test looks only".to_owned()),
-        ..commanding()
-    }
+    Commanding { forbidden: Some("a test looks only".to_owned()), ..commanding() }
 }
 
 fn commanding() -> Commanding {
@@ -32,9 +29,7 @@ fn commanding() -> Commanding {
 }
 
 fn empty_folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
-        .join("login")
-        .join(name);
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("login").join(name);
     if folder.exists() {
         fs::remove_dir_all(&folder).expect("an old run's folder goes");
     }
@@ -175,12 +170,7 @@ fn a_role_limits_writes_and_commands() {
         assert_eq!(answer.split(' ').nth(1), Some(status), "{answer}");
         assert!(answer.contains(code) && answer.contains(text), "{answer}");
     };
-    is(
-        give(VIEWER, write),
-        "403",
-        "U0684",
-        "a viewer may not change anything",
-    );
+    is(give(VIEWER, write), "403", "U0684", "a viewer may not change anything");
     let kill = r#"{"command":"kill"}"#;
     is(give(OPERATOR, kill), "403", "U0684", "only an engineer");
     // Allowed; the run has not begun, so it has no member.
@@ -215,18 +205,12 @@ fn other_machines_need_logins_that_are_secret() {
         certificate: None,
         names: Vec::new(),
     };
-    assert!(matches!(
-        serve(settings(None)),
-        Err(WatchError::NoLogins(_))
-    ));
+    assert!(matches!(serve(settings(None)), Err(WatchError::NoLogins(_))));
     let readable = Logins::of_file(&logins_file(&folder, 0o644));
     assert!(matches!(readable, Err(WatchError::Logins { .. })));
     let made = folder.join("made.txt");
     assert!(Logins::of_file(&made).is_ok());
-    let rights = fs::metadata(&made)
-        .expect("it was made")
-        .permissions()
-        .mode();
+    let rights = fs::metadata(&made).expect("it was made").permissions().mode();
     assert_eq!(rights & 0o777, 0o600);
     let served = serve(settings(Some(Logins::of_file(&made).expect("logins"))));
     let served = served.expect("with logins");

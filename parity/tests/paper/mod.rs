@@ -25,10 +25,7 @@ const ROBOT_OUTPUTS: [&str; 5] = [
 ];
 
 /// (28).
-const PRESS_STATES: [&str; 2] = [
-    "(u20 ∧ u21 ∨ x21 ∧ ¬u22) ∧ ¬u23",
-    "(u22 ∨ x22 ∧ ¬u21) ∧ ¬u23",
-];
+const PRESS_STATES: [&str; 2] = ["(u20 ∧ u21 ∨ x21 ∧ ¬u22) ∧ ¬u23", "(u22 ∨ x22 ∧ ¬u21) ∧ ¬u23"];
 
 /// (29).
 const PRESS_OUTPUTS: [&str; 2] = ["x21 ∧ ¬u23", "x22 ∧ ¬u23"];
@@ -79,17 +76,9 @@ pub(crate) fn parse(
     signal: &dyn Fn(&str) -> Expression,
 ) -> Expression {
     let signs: Vec<char> = text.chars().filter(|sign| *sign != ' ').collect();
-    let mut reader = Reader {
-        graph,
-        signs: &signs,
-        signal,
-    };
+    let mut reader = Reader { graph, signs: &signs, signal };
     let root = reader.sum();
-    assert!(
-        reader.signs.is_empty(),
-        "{text}: stopped at {:?}",
-        reader.signs
-    );
+    assert!(reader.signs.is_empty(), "{text}: stopped at {:?}", reader.signs);
     root
 }
 

@@ -101,11 +101,7 @@ pub struct Output {
 impl Network {
     /// Adds an expression that is read; its place.
     pub fn value(&mut self, text: impl Into<String>) -> usize {
-        self.add(
-            Kind::Value(text.into()),
-            Vec::new(),
-            vec![Output::default()],
-        )
+        self.add(Kind::Value(text.into()), Vec::new(), vec![Output::default()])
     }
 
     /// Adds a variable that is assigned; its place.
@@ -119,22 +115,13 @@ impl Network {
     }
 
     fn assigned(&mut self, kind: Kind, from: (usize, usize)) -> usize {
-        let input = Input {
-            from: Some(from),
-            ..Input::default()
-        };
+        let input = Input { from: Some(from), ..Input::default() };
         self.add(kind, vec![input], Vec::new())
     }
 
     /// Adds a part; its place.
     pub fn add(&mut self, kind: Kind, inputs: Vec<Input>, outputs: Vec<Output>) -> usize {
-        self.objects.push(Object {
-            kind,
-            inputs,
-            outputs,
-            executed: None,
-            source: None,
-        });
+        self.objects.push(Object { kind, inputs, outputs, executed: None, source: None });
         self.objects.len() - 1
     }
 }

@@ -38,10 +38,7 @@ pub struct Picture {
 impl Picture {
     /// An empty one.
     pub fn new() -> Self {
-        Self {
-            bottom: MARGIN,
-            ..Self::default()
-        }
+        Self { bottom: MARGIN, ..Self::default() }
     }
 
     /// A heading.
@@ -114,10 +111,7 @@ impl Picture {
                 self.rectangle("field", place);
                 let x = place.x + CHARACTER / 2;
                 self.text("name", x, place.y + place.height / 2, text);
-                let value = object
-                    .outputs
-                    .first()
-                    .and_then(|output| output.value.as_ref());
+                let value = object.outputs.first().and_then(|output| output.value.as_ref());
                 if let Some(value) = value {
                     let x = x + width(text) + CHARACTER;
                     self.text(class_of(value), x, place.y + place.height / 2, value);
@@ -178,30 +172,19 @@ impl Picture {
         let to = from.x + contacts.width();
         match contacts {
             Contacts::Power(_) => self.wire(after, from.y, inputs.x, from.x),
-            Contacts::Contact {
-                name,
-                negated,
-                value,
-            } => {
+            Contacts::Contact { name, negated, value } => {
                 let middle = (from.x + to) / 2;
                 let (left, right) = (middle - BARS / 2, middle + BARS / 2);
                 self.wire(before, from.y, from.x, left);
                 self.wire(after, from.y, right, to);
                 let is_closed = value.is_some_and(|value| value != *negated);
                 let class = if is_closed { "live" } else { "bar" };
-                let upright = |x| {
-                    [-9, 9].map(|down| Point {
-                        x,
-                        y: from.y + down,
-                    })
-                };
+                let upright = |x| [-9, 9].map(|down| Point { x, y: from.y + down });
                 self.line(class, &upright(left));
                 self.line(class, &upright(right));
                 if *negated {
-                    let [begin, end] = [(left, 9), (right, -9)].map(|(x, down)| Point {
-                        x,
-                        y: from.y + down,
-                    });
+                    let [begin, end] =
+                        [(left, 9), (right, -9)].map(|(x, down)| Point { x, y: from.y + down });
                     self.line(class, &[begin, end]);
                 }
                 self.centred("name", middle, from.y - LINE, name);
@@ -267,10 +250,7 @@ impl Picture {
         for (input, row) in object.inputs.iter().zip(&placed.inputs) {
             if input.negated {
                 let (x, y) = (placed.place.x - 4, placed.place.y + row);
-                let _ = writeln!(
-                    self.body,
-                    r#"<circle class="box" cx="{x}" cy="{y}" r="4"/>"#
-                );
+                let _ = writeln!(self.body, r#"<circle class="box" cx="{x}" cy="{y}" r="4"/>"#);
             }
         }
     }
@@ -295,11 +275,7 @@ impl Picture {
         match part {
             Part::Step(step) => {
                 let step = &chart.steps[step];
-                let class = if step.active == Some(true) {
-                    "active"
-                } else {
-                    "box"
-                };
+                let class = if step.active == Some(true) { "active" } else { "box" };
                 self.rectangle(class, place);
                 if step.is_initial {
                     let inner = Place {
@@ -389,12 +365,7 @@ impl Picture {
     }
 
     fn rectangle(&mut self, class: &str, place: Place) {
-        let Place {
-            x,
-            y,
-            width,
-            height,
-        } = place;
+        let Place { x, y, width, height } = place;
         let _ = writeln!(
             self.body,
             r#"<rect class="{class}" x="{x}" y="{y}" width="{width}" height="{height}"/>"#
@@ -403,9 +374,7 @@ impl Picture {
 
     fn line(&mut self, class: &str, points: &[Point]) {
         let mut path = String::new();
-        for (point, letter) in points
-            .iter()
-            .zip(std::iter::once('M').chain(std::iter::repeat('L')))
+        for (point, letter) in points.iter().zip(std::iter::once('M').chain(std::iter::repeat('L')))
         {
             let _ = write!(path, "{letter}{} {}", point.x, point.y);
         }

@@ -21,11 +21,7 @@ fn block(network: &mut Network, dice: &mut Dice, depth: usize) -> usize {
             }
             _ => Some((network.value("v".repeat(1 + dice.below(12))), 0)),
         };
-        inputs.push(Input {
-            name: format!("IN{at}"),
-            negated: dice.below(4) == 0,
-            from,
-        });
+        inputs.push(Input { name: format!("IN{at}"), negated: dice.below(4) == 0, from });
     }
     let outputs = (0..1 + dice.below(3)).map(|at| Output {
         name: format!("Q{at}"),
@@ -75,10 +71,8 @@ fn rung(network: &mut Network, dice: &mut Dice) {
     let first = contacts(dice, 3, is_fed, &mut count);
     let behind = contacts(dice, 1, false, &mut count);
     let contacts = Contacts::Series(vec![first, behind]);
-    let inputs = (0..count).map(|_| Input {
-        from: Some((block(network, dice, 2), 0)),
-        ..Input::default()
-    });
+    let inputs =
+        (0..count).map(|_| Input { from: Some((block(network, dice, 2), 0)), ..Input::default() });
     let inputs = inputs.collect();
     let outputs = vec![Output::default()];
     let object = network.add(Kind::Contacts(contacts), inputs, outputs);
@@ -89,14 +83,8 @@ fn rung(network: &mut Network, dice: &mut Dice) {
 fn parts(points: &[Point]) -> impl Iterator<Item = (Point, Point)> + '_ {
     points.windows(2).map(|ends| {
         let (from, to) = (ends[0], ends[1]);
-        let least = Point {
-            x: from.x.min(to.x),
-            y: from.y.min(to.y),
-        };
-        let most = Point {
-            x: from.x.max(to.x),
-            y: from.y.max(to.y),
-        };
+        let least = Point { x: from.x.min(to.x), y: from.y.min(to.y) };
+        let most = Point { x: from.x.max(to.x), y: from.y.max(to.y) };
         (least, most)
     })
 }
@@ -131,9 +119,7 @@ fn parts_of_networks_do_not_overlap_and_wires_do_not_cross() {
             .zip(&plan.objects)
             .map(|(object, placed)| match &object.kind {
                 // The name of an instance is above its block.
-                Kind::Block {
-                    instance: Some(_), ..
-                } => Place {
+                Kind::Block { instance: Some(_), .. } => Place {
                     y: placed.place.y - 18,
                     height: placed.place.height + 18,
                     ..placed.place
@@ -143,10 +129,7 @@ fn parts_of_networks_do_not_overlap_and_wires_do_not_cross() {
             .collect();
         for (at, place) in places.iter().enumerate() {
             assert!(place.x >= 0 && place.y >= 20, "seed {seed}: {place:?}");
-            assert!(
-                place.right() <= plan.right && place.bottom() <= plan.bottom,
-                "seed {seed}"
-            );
+            assert!(place.right() <= plan.right && place.bottom() <= plan.bottom, "seed {seed}");
             for other in &places[..at] {
                 assert!(!place.overlaps(other), "seed {seed}: {place:?} {other:?}");
             }
@@ -183,31 +166,21 @@ fn random_chart(dice: &mut Dice) -> Chart {
     let steps = (0..count).map(|at| Step {
         name: format!("S{at}"),
         is_initial: at == 0 || dice.below(12) == 0,
-        actions: (0..dice.below(3))
-            .map(|at| ("N".to_owned(), format!("action{at}")))
-            .collect(),
+        actions: (0..dice.below(3)).map(|at| ("N".to_owned(), format!("action{at}"))).collect(),
         active: None,
     });
     let steps = steps.collect();
     let mut transitions = Vec::new();
     for _ in 0..dice.below(14) {
         let mut some = || {
-            let several = if dice.below(4) == 0 {
-                1 + dice.below(3)
-            } else {
-                1
-            };
+            let several = if dice.below(4) == 0 { 1 + dice.below(3) } else { 1 };
             let mut all: Vec<usize> = (0..several).map(|_| dice.below(count)).collect();
             all.sort_unstable();
             all.dedup();
             all
         };
         let (from, to) = (some(), some());
-        transitions.push(Transition {
-            condition: "a AND b".to_owned(),
-            from,
-            to,
-        });
+        transitions.push(Transition { condition: "a AND b".to_owned(), from, to });
     }
     Chart { steps, transitions }
 }
@@ -231,38 +204,25 @@ fn every_step_and_transition_of_a_chart_has_one_place_that_nothing_overlaps() {
     for seed in 0..20_000 {
         let chart = random_chart(&mut Dice::new(seed));
         let plan = chart::lay_out(&chart, 20);
-        let count = |part: Part| {
-            plan.objects
-                .iter()
-                .filter(|object| object.part == part)
-                .count()
-        };
+        let count = |part: Part| plan.objects.iter().filter(|object| object.part == part).count();
         for step in 0..chart.steps.len() {
             assert_eq!(count(Part::Step(step)), 1, "seed {seed}: {chart:#?}");
         }
         for transition in 0..chart.transitions.len() {
-            assert_eq!(
-                count(Part::Transition(transition)),
-                1,
-                "seed {seed}: {chart:#?}"
-            );
+            assert_eq!(count(Part::Transition(transition)), 1, "seed {seed}: {chart:#?}");
         }
 
         let solid = plan.objects.iter().filter_map(|object| match object.part {
             Part::Step(_) | Part::Actions(_) | Part::Jump(_) => Some(object.place),
-            Part::Transition(_) => Some(Place {
-                width: object.place.width + 8 + 7 * 8,
-                ..object.place
-            }),
+            Part::Transition(_) => {
+                Some(Place { width: object.place.width + 8 + 7 * 8, ..object.place })
+            }
             _ => None,
         });
         let solid: Vec<Place> = solid.collect();
         for (at, place) in solid.iter().enumerate() {
             for other in &solid[..at] {
-                assert!(
-                    !place.overlaps(other),
-                    "seed {seed}: {place:?} {other:?} {chart:#?}"
-                );
+                assert!(!place.overlaps(other), "seed {seed}: {place:?} {other:?} {chart:#?}");
             }
         }
         for object in &plan.objects {
@@ -277,11 +237,7 @@ fn every_step_and_transition_of_a_chart_has_one_place_that_nothing_overlaps() {
                 }
             }
         }
-        assert_eq!(
-            meaning(&plan),
-            wanted(&chart),
-            "seed {seed}: {chart:#?} {plan:#?}"
-        );
+        assert_eq!(meaning(&plan), wanted(&chart), "seed {seed}: {chart:#?} {plan:#?}");
     }
 }
 
@@ -290,18 +246,12 @@ type Meaning = Vec<(Vec<usize>, Vec<usize>)>;
 
 fn wanted(chart: &Chart) -> Meaning {
     let transitions = chart.transitions.iter();
-    transitions
-        .map(|it| (it.from.clone(), it.to.clone()))
-        .collect()
+    transitions.map(|it| (it.from.clone(), it.to.clone())).collect()
 }
 
 /// The same, found by following the lines of a drawing backwards.
 fn meaning(plan: &chart::ChartPlan) -> Meaning {
-    let count = plan
-        .objects
-        .iter()
-        .filter(|it| matches!(it.part, Part::Transition(_)))
-        .count();
+    let count = plan.objects.iter().filter(|it| matches!(it.part, Part::Transition(_))).count();
     let mut found: Meaning = vec![Default::default(); count];
     let sources = |from: usize| {
         let mut found = Vec::new();

@@ -23,10 +23,7 @@ pub fn digest(executable: &Executable, interface: &Interface, scans: u64) -> Dig
     let mut driven = vec![0; outputs.width().div_ceil(64)];
     let (reset, fault) = (inputs.find(Program::RESET), outputs.find(Program::FAULT));
     let mut random = Random(0);
-    let mut digest = Digest {
-        outputs: 0xcbf2_9ce4_8422_2325,
-        faults: 0,
-    };
+    let mut digest = Digest { outputs: 0xcbf2_9ce4_8422_2325, faults: 0 };
     for _ in 0..scans {
         let stopped = fault.is_some_and(|fault| fault.get(&driven) == 1);
         for point in inputs.iter() {

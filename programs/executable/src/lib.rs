@@ -112,17 +112,12 @@ impl From<&Circuit> for Interface {
 
 impl From<&Program> for Interface {
     fn from(program: &Program) -> Self {
-        Self {
-            inputs: program.inputs.clone(),
-            outputs: program.outputs.clone(),
-        }
+        Self { inputs: program.inputs.clone(), outputs: program.outputs.clone() }
     }
 }
 
 /// The points that a program declares: the reset and the fault of a program with numbers are not among them.
 pub fn declared(points: &Points) -> impl Iterator<Item = &Point> {
     let implied = [Program::RESET, Program::FAULT];
-    points
-        .iter()
-        .filter(move |point| !implied.contains(&point.name.as_str()))
+    points.iter().filter(move |point| !implied.contains(&point.name.as_str()))
 }

@@ -80,11 +80,7 @@ impl Format {
 
     /// The usual ending of its files.
     pub fn ending(self) -> &'static str {
-        let known = if self == Self::Digraph {
-            Self::PlcOpen
-        } else {
-            self
-        };
+        let known = if self == Self::Digraph { Self::PlcOpen } else { self };
         let found = ENDINGS.iter().find(|(_, format)| *format == known);
         found.map_or("", |(ending, _)| ending)
     }
@@ -146,10 +142,7 @@ pub fn read(format: Format, name: &str, text: &str, unit: Option<&str>) -> Readi
         && format != Format::Ladder
         && program.rungs.is_empty()
     {
-        let message = format!(
-            "the program `{}` has no rungs: it does nothing",
-            program.name
-        );
+        let message = format!("the program `{}` has no rungs: it does nothing", program.name);
         let found = Diagnostic::warning("U1023", message, program.name.span());
         reading.diagnostics.push(found);
     }
@@ -178,11 +171,7 @@ fn read_form(format: Format, name: &str, text: &str, unit: Option<&str>) -> Read
         }
         Format::Digraph => {
             let read = digraph::read(text);
-            Reading {
-                program: read.program,
-                diagnostics: read.diagnostics,
-                ..Reading::default()
-            }
+            Reading { program: read.program, diagnostics: read.diagnostics, ..Reading::default() }
         }
         Format::LdMicro => {
             let read = ldmicro::read(stem(name), text);
@@ -208,15 +197,9 @@ pub fn parse_program(name: &str, text: &str) -> Parsed {
     let reading = match Format::of(name, text) {
         Some(Format::Ladder) => return parse(text),
         Some(format) => read(format, name, text, None),
-        None => Reading {
-            diagnostics: vec![unknown_form(text)],
-            ..Reading::default()
-        },
+        None => Reading { diagnostics: vec![unknown_form(text)], ..Reading::default() },
     };
-    Parsed {
-        program: reading.program.unwrap_or_default(),
-        diagnostics: reading.diagnostics,
-    }
+    Parsed { program: reading.program.unwrap_or_default(), diagnostics: reading.diagnostics }
 }
 
 /// The finding on a file of which neither name nor contents tell the form.
@@ -246,20 +229,12 @@ mod tests {
         check("a.scl", "", Some(Format::StructuredText));
         check("a.ld", "LDmicro0.1", Some(Format::LdMicro));
         check("a.ld", "\u{feff}<project/>", Some(Format::PlcOpen));
-        check(
-            "a.xml",
-            "<?xml?><!-- a --><LadderDiagram>",
-            Some(Format::Digraph),
-        );
+        check("a.xml", "<?xml?><!-- a --><LadderDiagram>", Some(Format::Digraph));
         check("a.xml", "", Some(Format::PlcOpen));
         check("a.clp", "_FILES_CLASSICLADDER\n", None);
         check("a", "", None);
         check("a.txt", "-- a pump\n\nprogram pump\n", Some(Format::Ladder));
-        check(
-            "a.txt",
-            "program p VAR END_VAR end_program",
-            Some(Format::StructuredText),
-        );
+        check("a.txt", "program p VAR END_VAR end_program", Some(Format::StructuredText));
         check("a.txt", "LDmicro0.2\n", Some(Format::LdMicro));
         check("a.txt", "programs of all kinds\n", None);
         check("a.b/c", "", None);

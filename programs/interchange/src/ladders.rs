@@ -49,12 +49,7 @@ pub(crate) fn ladder(
             (found.name.key(), u32::try_from(line).unwrap_or(u32::MAX))
         })
         .collect();
-    let around = Surroundings {
-        names,
-        ranges: &ranges,
-        places: &places,
-        comments: &comments,
-    };
+    let around = Surroundings { names, ranges: &ranges, places: &places, comments: &comments };
     let place = |line: usize| match line.checked_sub(1) {
         Some(index) => {
             let range = lines.range(index);
@@ -90,12 +85,10 @@ pub(crate) fn ladder(
         found.span = place(found.span.start);
     }
     let footer = unit.map(footer).unwrap_or_default();
-    let made = made
-        .filter(|_| !has_errors(&diagnostics))
-        .map(|mut ladder| {
-            ladder.footer.extend(footer);
-            ladder
-        });
+    let made = made.filter(|_| !has_errors(&diagnostics)).map(|mut ladder| {
+        ladder.footer.extend(footer);
+        ladder
+    });
     if made.is_some() {
         diagnostics.extend(lost::lost(text, file, program));
     }

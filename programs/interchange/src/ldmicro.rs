@@ -48,10 +48,12 @@ pub fn read(name: &str, text: &str) -> Reading {
         diagnostics.extend(found);
         if !has_errors(&diagnostics) {
             let reading = crate::text::read(&written.text, None);
-            diagnostics.extend(reading.diagnostics.into_iter().map(|found| Diagnostic {
-                span: written.place_of(found.span.start),
-                ..found
-            }));
+            diagnostics.extend(
+                reading
+                    .diagnostics
+                    .into_iter()
+                    .map(|found| Diagnostic { span: written.place_of(found.span.start), ..found }),
+            );
             program = reading.program;
         }
     }
@@ -60,23 +62,11 @@ pub fn read(name: &str, text: &str) -> Reading {
     let mut program = program.filter(|_| !has_errors(&diagnostics));
     if let Some(program) = &mut program {
         let legal = |letter: char| {
-            if letter.is_alphanumeric() {
-                letter
-            } else {
-                '_'
-            }
+            if letter.is_alphanumeric() { letter } else { '_' }
         };
         let name: String = name.chars().map(legal).take(100).collect();
         let starts = name.starts_with(|first: char| first.is_alphabetic());
-        program.name = Name::from(if starts {
-            name
-        } else {
-            format!("program_{name}")
-        });
+        program.name = Name::from(if starts { name } else { format!("program_{name}") });
     }
-    Reading {
-        program,
-        period: file.period,
-        diagnostics,
-    }
+    Reading { program, period: file.period, diagnostics }
 }

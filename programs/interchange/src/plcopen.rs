@@ -35,10 +35,8 @@ use crate::written::USUAL_PERIOD;
 use document::{ActionContent, Body, Condition, Instance, Kind, Language, Pou, PouKind, Project};
 
 /// The namespaces of 2.01 and 2.0.
-const NAMESPACES: [&str; 2] = [
-    "http://www.plcopen.org/xml/tc6_0201",
-    "http://www.plcopen.org/xml/tc6_0200",
-];
+const NAMESPACES: [&str; 2] =
+    ["http://www.plcopen.org/xml/tc6_0201", "http://www.plcopen.org/xml/tc6_0200"];
 
 /// What a file says.
 #[derive(Debug, Default)]
@@ -71,10 +69,7 @@ pub fn read(text: &str, unit: Option<&str>) -> Reading {
             root.tag_name().name()
         );
         let error = Diagnostic::error("U1001", message, xml::start_tag(root));
-        let help = format!(
-            "it should be `project` in the namespace {:?}",
-            NAMESPACES[0]
-        );
+        let help = format!("it should be `project` in the namespace {:?}", NAMESPACES[0]);
         reading.diagnostics.push(error.with_help(help));
         return reading;
     }
@@ -85,10 +80,7 @@ pub fn read(text: &str, unit: Option<&str>) -> Reading {
     }
     for found in &mut reading.diagnostics {
         within(text, &mut found.span);
-        found
-            .related
-            .iter_mut()
-            .for_each(|related| within(text, &mut related.span));
+        found.related.iter_mut().for_each(|related| within(text, &mut related.span));
     }
     for note in &mut reading.fidelity.notes {
         within(text, &mut note.span);
@@ -136,19 +128,9 @@ fn chosen<'a>(
     unit: Option<&str>,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<&'a Pou> {
-    let programs = || {
-        project
-            .pous
-            .iter()
-            .filter(|pou| pou.kind == PouKind::Program)
-    };
+    let programs = || project.pous.iter().filter(|pou| pou.kind == PouKind::Program);
     let names: Vec<String> = programs().map(|pou| format!("`{}`", pou.name)).collect();
-    let find = |name: &str| {
-        project
-            .pous
-            .iter()
-            .find(|pou| pou.name.eq_ignore_ascii_case(name))
-    };
+    let find = |name: &str| project.pous.iter().find(|pou| pou.name.eq_ignore_ascii_case(name));
     if let Some(unit) = unit {
         let found = find(unit).filter(|pou| pou.kind != PouKind::Function);
         if found.is_none() {
@@ -224,10 +206,7 @@ fn unnamed_parts(pou: &Pou, diagnostics: &mut Vec<Diagnostic>) {
     }
     let parts = [("action", &pou.actions), ("transition", &pou.transitions)];
     for (what, parts) in parts {
-        for part in parts
-            .iter()
-            .filter(|part| !named.contains(&part.name.to_uppercase()))
-        {
+        for part in parts.iter().filter(|part| !named.contains(&part.name.to_uppercase())) {
             let message = format!("the {what} `{}` is not used by `{}`", part.name, pou.name);
             diagnostics.push(Diagnostic::warning("U1023", message, part.name.span()));
         }

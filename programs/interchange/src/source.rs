@@ -50,25 +50,13 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
         return source(whole(text, parsed, wanted.program, wanted.period));
     }
     let Some(format) = Format::of(name, text) else {
-        return SourceFile {
-            diagnostics: vec![unknown_form(text)],
-            ..SourceFile::default()
-        };
+        return SourceFile { diagnostics: vec![unknown_form(text)], ..SourceFile::default() };
     };
     if format == Format::StructuredText {
         return source(whole(text, parse(text), wanted.program, wanted.period));
     }
-    let Reading {
-        program,
-        period,
-        diagnostics,
-        ..
-    } = read(format, name, text, wanted.program);
-    let ladder = SourceFile {
-        source: program.map(Source::Ladder),
-        period,
-        diagnostics,
-    };
+    let Reading { program, period, diagnostics, .. } = read(format, name, text, wanted.program);
+    let ladder = SourceFile { source: program.map(Source::Ladder), period, diagnostics };
     let is_ladder = ladder.source.is_some();
     let are_several = wanted.program.is_none() && text.matches("<pouInstance").nth(1).is_some();
     if is_ladder && !are_several || format != Format::PlcOpen {
@@ -78,16 +66,10 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
     let parsed = plcopen::read_typed(text);
     if !is_ladder && parsed.1.iter().any(|found| found.code == "U1001") {
         // Nothing was read, so there is nothing to lower.
-        return SourceFile {
-            diagnostics: parsed.1,
-            ..ladder
-        };
+        return SourceFile { diagnostics: parsed.1, ..ladder };
     }
     let read = whole(text, parsed, wanted.program, wanted.period);
-    let runs_several = read
-        .typed
-        .as_ref()
-        .is_some_and(|typed| typed.tasks.len() > 1);
+    let runs_several = read.typed.as_ref().is_some_and(|typed| typed.tasks.len() > 1);
     if is_ladder && !runs_several {
         return ladder;
     }
@@ -120,11 +102,7 @@ fn source(whole: Whole) -> SourceFile {
         (None, Some(typed)) => Some(Source::Typed(Arc::new(typed))),
         (None, None) => library,
     };
-    SourceFile {
-        source,
-        period: whole.period,
-        diagnostics,
-    }
+    SourceFile { source, period: whole.period, diagnostics }
 }
 
 /// The error of a file that a program is wanted of, and that has none.

@@ -37,17 +37,8 @@ pub(crate) fn whole(
     period: Option<Duration>,
 ) -> Whole {
     let nanoseconds = |period: Duration| i64::try_from(period.as_nanos()).unwrap_or(i64::MAX);
-    let options = Options {
-        text,
-        program,
-        period: period.map(nanoseconds),
-    };
-    let Lowered {
-        program: typed,
-        checked,
-        names,
-        diagnostics: found,
-    } = lower(&file, &options);
+    let options = Options { text, program, period: period.map(nanoseconds) };
+    let Lowered { program: typed, checked, names, diagnostics: found } = lower(&file, &options);
     diagnostics.extend(found);
     diagnostics.extend(periods(&file));
     diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
@@ -72,9 +63,7 @@ pub(crate) fn whole(
 /// The findings on intervals of tasks that no station has.
 fn periods(file: &File) -> Vec<Diagnostic> {
     let wrong = file.tasks.iter().filter(|task| {
-        let interval = task
-            .interval
-            .and_then(|interval| u64::try_from(interval).ok());
+        let interval = task.interval.and_then(|interval| u64::try_from(interval).ok());
         task.interval.is_some()
             && interval.is_none_or(|interval| !PERIODS.contains(&Duration::from_nanos(interval)))
     });
@@ -106,12 +95,7 @@ impl Whole {
         }
         diagnostics.extend(self.reasons);
         diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
-        Reading {
-            program: self.ladder,
-            period: self.period,
-            diagnostics,
-            ..Reading::default()
-        }
+        Reading { program: self.ladder, period: self.period, diagnostics, ..Reading::default() }
     }
 }
 

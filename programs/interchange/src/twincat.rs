@@ -192,13 +192,7 @@ VAR in AT %IW0 : INT; out AT %QW0 : INT; END_VAR
     #[test]
     fn a_unit_with_an_action_is_a_program() {
         let (file, mut found) = read(UNIT).expect("a file of TwinCAT");
-        let lowered = lower(
-            &file,
-            &Options {
-                text: UNIT,
-                ..Options::default()
-            },
-        );
+        let lowered = lower(&file, &Options { text: UNIT, ..Options::default() });
         found.extend(lowered.diagnostics);
         assert!(!has_errors(&found), "{found:?}");
         assert!(lowered.program.is_some());

@@ -74,18 +74,11 @@ pub fn typed_text(
         _ => parse(&printed),
     };
     let again = whole(&printed, again, wanted.program, None);
-    let compared = Compared {
-        scans: compare(&read, &again)?,
-        ..Compared::default()
-    };
+    let compared = Compared { scans: compare(&read, &again)?, ..Compared::default() };
     if format == Some(Format::StructuredText) {
         losses.extend(lost_comments(text, &as_text));
     }
-    let written = Written {
-        losses,
-        text: printed,
-        compared,
-    };
+    let written = Written { losses, text: printed, compared };
     Ok((Some(written), diagnostics))
 }
 
@@ -123,12 +116,7 @@ fn in_text(reasons: &[String]) -> Option<Diagnostic> {
     if reasons.is_empty() {
         return None;
     }
-    let mut listed = reasons
-        .iter()
-        .take(8)
-        .cloned()
-        .collect::<Vec<_>>()
-        .join(", ");
+    let mut listed = reasons.iter().take(8).cloned().collect::<Vec<_>>().join(", ");
     if let Some(more @ 1..) = reasons.len().checked_sub(8) {
         listed = format!("{listed} and {more} more");
     }
@@ -142,12 +130,8 @@ fn configure(file: &mut File, wanted: Wanted<'_>, period: Option<Duration>) {
     let is_wanted = |unit: &&Unit| {
         unit.kind == UnitKind::Program && wanted.program.is_none_or(|name| unit.name.is(name))
     };
-    let chosen: Vec<Name> = file
-        .units
-        .iter()
-        .filter(is_wanted)
-        .map(|unit| unit.name.clone())
-        .collect();
+    let chosen: Vec<Name> =
+        file.units.iter().filter(is_wanted).map(|unit| unit.name.clone()).collect();
     if !file.instances.is_empty() && wanted.program.is_none() {
         return;
     }
@@ -159,15 +143,12 @@ fn configure(file: &mut File, wanted: Wanted<'_>, period: Option<Duration>) {
         priority: Some(0),
         single: None,
     }];
-    let instances = chosen
-        .into_iter()
-        .enumerate()
-        .map(|(place, of)| ProgramInstance {
-            name: name(&format!("Instance{place}")),
-            task: Some(name("Task0")),
-            of,
-            connections: Vec::new(),
-        });
+    let instances = chosen.into_iter().enumerate().map(|(place, of)| ProgramInstance {
+        name: name(&format!("Instance{place}")),
+        task: Some(name("Task0")),
+        of,
+        connections: Vec::new(),
+    });
     file.instances = instances.collect();
 }
 
@@ -205,10 +186,7 @@ fn with_written_names(file: &File, text: String) -> String {
 }
 
 fn names_with_dots(unit: &Unit, made: &mut Vec<String>) {
-    let declared = unit
-        .declarations
-        .iter()
-        .map(|declaration| &declaration.name);
+    let declared = unit.declarations.iter().map(|declaration| &declaration.name);
     let chart = match &unit.body {
         Body::Chart(chart) => Some(chart),
         _ => None,
@@ -218,14 +196,9 @@ fn names_with_dots(unit: &Unit, made: &mut Vec<String>) {
     let steps = chart.iter().flat_map(|chart| &chart.steps);
     let actions = actions.chain(steps.map(|step| &step.name));
     let methods = unit.methods.iter().map(|method| &method.name);
-    let names = declared
-        .chain(actions)
-        .chain(methods)
-        .map(|name| name.as_str());
+    let names = declared.chain(actions).chain(methods).map(|name| name.as_str());
     made.extend(names.filter(|name| name.contains('.')).map(str::to_owned));
-    unit.methods
-        .iter()
-        .for_each(|method| names_with_dots(method, made));
+    unit.methods.iter().for_each(|method| names_with_dots(method, made));
 }
 
 /// The text with another word in place of each `word` that is a whole one.
@@ -258,21 +231,14 @@ fn compare(read: &Whole, again: &Whole) -> Result<usize, WriteError> {
         (Some(before), Some(after)) => {
             let digested = |program: &Program| {
                 let (executable, interface) = (Executable::from(program), Interface::from(program));
-                (
-                    digest(&executable, &interface, SCANS as u64),
-                    points(&interface),
-                )
+                (digest(&executable, &interface, SCANS as u64), points(&interface))
             };
             if digested(before) != digested(after) {
                 return different("its outputs differ in scans with random inputs".to_owned());
             }
             Ok(SCANS)
         }
-        _ => different(format!(
-            "it has {} in place of {}",
-            named(again),
-            named(read)
-        )),
+        _ => different(format!("it has {} in place of {}", named(again), named(read))),
     }
 }
 

@@ -85,11 +85,7 @@ pub fn write(
         Format::LdMicro => return Err(WriteError::ReadOnly),
     };
     let (losses, compared) = compare(format, program, period, &text)?;
-    Ok(Written {
-        text,
-        losses,
-        compared,
-    })
+    Ok(Written { text, losses, compared })
 }
 
 /// What `text` does not hold of `program`.
@@ -140,11 +136,8 @@ impl<'a> Comparison<'a> {
         let standard = StandardNames::of(program);
         let is_standard = matches!(format, Format::PlcOpen | Format::StructuredText);
         let name = |name: &'a understudy_ladder::Name| {
-            let written = if is_standard {
-                standard.signal(name).to_owned()
-            } else {
-                name.to_string()
-            };
+            let written =
+                if is_standard { standard.signal(name).to_owned() } else { name.to_string() };
             (name.as_str(), written)
         };
         let signals = signals(program).map(|signal| name(&signal.name));
@@ -250,10 +243,8 @@ impl<'a> Comparison<'a> {
 
     fn blocks(&mut self) {
         let found = self.again.blocks();
-        let found: HashMap<&str, &Block> = found
-            .into_iter()
-            .map(|block| (block.name.as_str(), block))
-            .collect();
+        let found: HashMap<&str, &Block> =
+            found.into_iter().map(|block| (block.name.as_str(), block)).collect();
         let (mut missing, mut renamed) = (Vec::new(), Vec::new());
         for block in self.program.blocks() {
             self.compared.blocks += 1;
@@ -300,12 +291,8 @@ impl<'a> Comparison<'a> {
 
     /// Proves both equal at the period of the program, and scans them there and at one at which the longest timer ends after a few scans.
     fn behaviour(&mut self, before: &Circuit, period: Duration) -> Result<(), WriteError> {
-        let blocks: HashSet<String> = self
-            .program
-            .blocks()
-            .into_iter()
-            .map(|block| block.name.to_string())
-            .collect();
+        let blocks: HashSet<String> =
+            self.program.blocks().into_iter().map(|block| block.name.to_string()).collect();
         let after = self.again.lower_observed(period)?;
         let pair = self.pair(before, &after, &blocks)?;
         self.compared.proved = pair.is_proved(|name| self.written(name, &blocks));
@@ -333,9 +320,8 @@ impl<'a> Comparison<'a> {
             return None;
         }
         let dots = name.match_indices('.').rev();
-        let mut blocks_before = dots
-            .map(|(dot, _)| dot)
-            .filter(|&dot| blocks.contains(&name[..dot]));
+        let mut blocks_before =
+            dots.map(|(dot, _)| dot).filter(|&dot| blocks.contains(&name[..dot]));
         let dot = blocks_before.next()?;
         Some(format!("{}{}", self.names.get(&name[..dot])?, &name[dot..]))
     }
@@ -367,12 +353,7 @@ impl<'a> Comparison<'a> {
             let preset = block.kind.preset_value()?;
             Some((format!("{}.CV", block.name), preset))
         });
-        Ok(Pair {
-            before,
-            after,
-            outputs: outputs.collect(),
-            counters: counters.collect(),
-        })
+        Ok(Pair { before, after, outputs: outputs.collect(), counters: counters.collect() })
     }
 }
 
@@ -413,9 +394,7 @@ fn lines(program: &Program) -> impl Iterator<Item = &str> {
     let rungs = program.rungs.iter();
     let rungs = rungs.flat_map(|rung| rung.title.iter().chain(&rung.comments));
     let texts = rungs.chain(&program.footer);
-    texts
-        .flat_map(|text| text.lines())
-        .filter(|line| says(line))
+    texts.flat_map(|text| text.lines()).filter(|line| says(line))
 }
 
 fn says(line: &str) -> bool {

@@ -18,10 +18,7 @@ const PERIOD: Duration = Duration::from_millis(10);
 
 fn main() {
     let program = program();
-    assert_eq!(
-        (program.rungs.len(), program.contact_count()),
-        (RUNGS, CONTACTS)
-    );
+    assert_eq!((program.rungs.len(), program.contact_count()), (RUNGS, CONTACTS));
     divan::main();
 }
 
@@ -100,13 +97,7 @@ fn structured_text_from_circuit(bencher: Bencher<'_, '_>) {
 /// 64 random inputs, packed, so that no scan is like the one before.
 fn images() -> Vec<Vec<u64>> {
     let mut state = 2;
-    (0..64)
-        .map(|_| {
-            (0..INPUTS.div_ceil(64))
-                .map(|_| random(&mut state))
-                .collect()
-        })
-        .collect()
+    (0..64).map(|_| (0..INPUTS.div_ceil(64)).map(|_| random(&mut state)).collect()).collect()
 }
 
 /// Time for each contact.
@@ -130,11 +121,8 @@ fn scan(bencher: Bencher<'_, '_>) {
 fn plain_evaluation(bencher: Bencher<'_, '_>) {
     let circuit = circuit();
     let images = images();
-    let mut state: Vec<bool> = circuit
-        .registers()
-        .iter()
-        .map(|register| register.initial)
-        .collect();
+    let mut state: Vec<bool> =
+        circuit.registers().iter().map(|register| register.initial).collect();
     let mut values = vec![false; circuit.graph().operations().len()];
     let mut turn = 0;
     bencher.bench_local(|| {
@@ -156,11 +144,8 @@ fn plain_evaluation(bencher: Bencher<'_, '_>) {
         for (bit, register) in state.iter_mut().zip(circuit.registers()) {
             *bit = values[register.next.index()];
         }
-        let outputs: Vec<bool> = circuit
-            .outputs()
-            .iter()
-            .map(|output| values[output.value.index()])
-            .collect();
+        let outputs: Vec<bool> =
+            circuit.outputs().iter().map(|output| values[output.value.index()]).collect();
         black_box(outputs);
     });
 }

@@ -189,8 +189,7 @@ impl<'a> Checker<'a> {
             && time > MAXIMUM_PRESET_TIME
         {
             let message = format!("the preset of `{}` is longer than 100 days", block.name);
-            self.diagnostics
-                .push(Diagnostic::error("U0110", message, block.name.span()));
+            self.diagnostics.push(Diagnostic::error("U0110", message, block.name.span()));
         }
         if let Some(value) = block.kind.preset_value()
             && value > MAXIMUM_PRESET_VALUE
@@ -199,8 +198,7 @@ impl<'a> Checker<'a> {
                 "the preset {value} of `{}` is more than {MAXIMUM_PRESET_VALUE}",
                 block.name
             );
-            self.diagnostics
-                .push(Diagnostic::error("U0110", message, block.name.span()));
+            self.diagnostics.push(Diagnostic::error("U0110", message, block.name.span()));
         }
     }
 
@@ -225,10 +223,7 @@ impl<'a> Checker<'a> {
                     .with_help(help),
                 );
             }
-            if let Some(first) = block.pins[..place]
-                .iter()
-                .find(|first| first.pin == feed.pin)
-            {
+            if let Some(first) = block.pins[..place].iter().find(|first| first.pin == feed.pin) {
                 let message = format!("the input `{}` is fed twice", feed.pin);
                 self.diagnostics.push(
                     Diagnostic::error("U0111", message, feed.pin.span())
@@ -271,8 +266,7 @@ impl<'a> Checker<'a> {
         if depth > MAXIMUM_NESTING {
             if !self.too_deep {
                 let message = format!("brackets nest deeper than {MAXIMUM_NESTING}");
-                self.diagnostics
-                    .push(Diagnostic::error("U0113", message, 0..0));
+                self.diagnostics.push(Diagnostic::error("U0113", message, 0..0));
             }
             self.too_deep = true;
             return;
@@ -284,8 +278,7 @@ impl<'a> Checker<'a> {
                 Element::Branches(branches) => {
                     if branches.len() < 2 || branches.iter().any(Vec::is_empty) {
                         let message = "branches are two or more, each with an element";
-                        self.diagnostics
-                            .push(Diagnostic::error("U0118", message, 0..0));
+                        self.diagnostics.push(Diagnostic::error("U0118", message, 0..0));
                     }
                     for branch in branches {
                         self.series(branch, rung, depth + 1);

@@ -28,10 +28,7 @@ pub fn from_circuit(circuit: &Circuit) -> Program {
         .collect();
     let helpers = names.shared.iter().map(String::as_str).chain(names.held());
     memory.extend(helpers.map(Signal::new));
-    let writer = Writer {
-        plan: &plan,
-        names: &names,
-    };
+    let writer = Writer { plan: &plan, names: &names };
     let mut rungs = Vec::with_capacity(plan.assignments.len());
     let mut section = "";
     for assignment in &plan.assignments {
@@ -49,12 +46,7 @@ pub fn from_circuit(circuit: &Circuit) -> Program {
         }
         rungs.push(rung);
     }
-    let signals = |names: &[String]| {
-        names
-            .iter()
-            .map(|name| Signal::new(name.as_str()))
-            .collect()
-    };
+    let signals = |names: &[String]| names.iter().map(|name| Signal::new(name.as_str())).collect();
     Program {
         name: Name::from(Namer::new(Language::Ladder).name(circuit.name())),
         inputs: signals(&names.inputs),
@@ -72,23 +64,12 @@ fn sentence(heading: &str) -> String {
 }
 
 fn rung(network: Series, kind: CoilKind, target: &str) -> Rung {
-    Rung {
-        network,
-        coils: vec![Coil {
-            kind,
-            target: target.into(),
-        }],
-        ..Rung::default()
-    }
+    Rung { network, coils: vec![Coil { kind, target: target.into() }], ..Rung::default() }
 }
 
 fn contact(operand: &str, positive: bool) -> Element {
     Element::Contact(Contact {
-        kind: if positive {
-            ContactKind::NormallyOpen
-        } else {
-            ContactKind::NormallyClosed
-        },
+        kind: if positive { ContactKind::NormallyOpen } else { ContactKind::NormallyClosed },
         operand: operand.into(),
     })
 }
@@ -102,11 +83,9 @@ impl Writer<'_> {
     /// The rung that gives `expression` to `target`, whether it is shared or not.
     fn rung(&self, expression: Expression, target: &str) -> Rung {
         match self.plan.operand(expression) {
-            Operand::Shared(number) if self.names.shared[number] != target => rung(
-                vec![contact(&self.names.shared[number], true)],
-                CoilKind::Plain,
-                target,
-            ),
+            Operand::Shared(number) if self.names.shared[number] != target => {
+                rung(vec![contact(&self.names.shared[number], true)], CoilKind::Plain, target)
+            }
             _ => match self.plan.operation(expression) {
                 // A wire cannot be off; a negated coil on it is.
                 Operation::Constant(false) => rung(Vec::new(), CoilKind::Negated, target),
@@ -148,10 +127,7 @@ impl Writer<'_> {
                     series.extend(self.series(right, second));
                     series
                 };
-                vec![Element::Branches(vec![
-                    pair(true, !positive),
-                    pair(false, positive),
-                ])]
+                vec![Element::Branches(vec![pair(true, !positive), pair(false, positive)])]
             }
         }
     }

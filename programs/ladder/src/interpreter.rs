@@ -78,23 +78,15 @@ impl<'a> Interpreter<'a> {
     pub fn scan_observed(&mut self, inputs: &[bool]) -> Evaluation {
         let mut elements = Vec::new();
         let mut rungs = Vec::new();
-        self.scan_rungs(
-            inputs,
-            &mut |flow| elements.push(flow),
-            &mut |power, coils| {
-                rungs.push((power, coils.to_vec()));
-            },
-        );
+        self.scan_rungs(inputs, &mut |flow| elements.push(flow), &mut |power, coils| {
+            rungs.push((power, coils.to_vec()));
+        });
         let mut elements = elements.into_iter();
         let rungs = rungs.into_iter().zip(&self.program.rungs);
         let rungs = rungs.map(|((power, coils), rung)| {
             let mut count = 0;
             visit(&rung.network, &mut |_| count += 1);
-            RungFlow {
-                elements: elements.by_ref().take(count).collect(),
-                power,
-                coils,
-            }
+            RungFlow { elements: elements.by_ref().take(count).collect(), power, coils }
         });
         Evaluation {
             rungs: rungs.collect(),
@@ -145,10 +137,7 @@ impl<'a> Interpreter<'a> {
     }
 
     fn values_of(&self, signals: &[Signal]) -> Vec<bool> {
-        signals
-            .iter()
-            .map(|signal| self.get(&signal.name))
-            .collect()
+        signals.iter().map(|signal| self.get(&signal.name)).collect()
     }
 
     /// The present value of a signal or of a block's output such as `pause.Q`; `None` for a name that is neither.
@@ -205,12 +194,7 @@ impl<'a> Interpreter<'a> {
                     (passes, reading) = (power, state.reading(block.kind, self.now));
                 }
             }
-            seen(ElementFlow {
-                enters,
-                passes,
-                leaves: power,
-                reading,
-            });
+            seen(ElementFlow { enters, passes, leaves: power, reading });
         }
         power
     }

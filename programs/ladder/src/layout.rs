@@ -17,43 +17,17 @@ use crate::program::{Coil, CoilKind, ContactKind, Element, Program, Rung, Series
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Shape {
     /// A wire along a row, from `left` to `right`.
-    Wire {
-        left: i32,
-        right: i32,
-        row: i32,
-        live: bool,
-    },
+    Wire { left: i32, right: i32, row: i32, live: bool },
     /// A wire along a column, from `top` to `bottom`.
-    Riser {
-        column: i32,
-        top: i32,
-        bottom: i32,
-        live: bool,
-    },
+    Riser { column: i32, top: i32, bottom: i32, live: bool },
     /// A power rail along a column; reaches half a cell past both ends.
     Rail { column: i32, top: i32, bottom: i32 },
     /// A contact with its sign between two bars; `left` and `right` are the cells of the bars. `closed` where it passes power.
-    Contact {
-        left: i32,
-        right: i32,
-        row: i32,
-        sign: String,
-        closed: bool,
-    },
+    Contact { left: i32, right: i32, row: i32, sign: String, closed: bool },
     /// A coil with its sign between two arcs; three cells from `left`. `on` where its target is 1.
-    Coil {
-        left: i32,
-        row: i32,
-        sign: &'static str,
-        on: bool,
-    },
+    Coil { left: i32, row: i32, sign: &'static str, on: bool },
     /// The outline of a block, its corners in cells.
-    Outline {
-        left: i32,
-        right: i32,
-        top: i32,
-        bottom: i32,
-    },
+    Outline { left: i32, right: i32, top: i32, bottom: i32 },
     /// A text from `column` on; `signal` where it is the name of something to be looked up.
     Label {
         column: i32,
@@ -68,27 +42,12 @@ pub(crate) enum Shape {
 impl Shape {
     fn moved(mut self, columns: i32, rows: i32) -> Self {
         match &mut self {
-            Self::Wire {
-                left, right, row, ..
-            }
-            | Self::Contact {
-                left, right, row, ..
-            } => {
+            Self::Wire { left, right, row, .. } | Self::Contact { left, right, row, .. } => {
                 *left += columns;
                 *right += columns;
                 *row += rows;
             }
-            Self::Riser {
-                column,
-                top,
-                bottom,
-                ..
-            }
-            | Self::Rail {
-                column,
-                top,
-                bottom,
-            } => {
+            Self::Riser { column, top, bottom, .. } | Self::Rail { column, top, bottom } => {
                 *column += columns;
                 *top += rows;
                 *bottom += rows;
@@ -97,12 +56,7 @@ impl Shape {
                 *left += columns;
                 *row += rows;
             }
-            Self::Outline {
-                left,
-                right,
-                top,
-                bottom,
-            } => {
+            Self::Outline { left, right, top, bottom } => {
                 *left += columns;
                 *right += columns;
                 *top += rows;
@@ -131,8 +85,7 @@ pub(crate) struct Piece {
 impl Piece {
     fn place(&mut self, other: Self, column: i32, row: i32) {
         let shapes = other.shapes.into_iter();
-        self.shapes
-            .extend(shapes.map(|shape| shape.moved(column, row)));
+        self.shapes.extend(shapes.map(|shape| shape.moved(column, row)));
         self.above = self.above.max(other.above - row);
         self.below = self.below.max(other.below + row);
     }
@@ -143,12 +96,7 @@ fn length(text: &str) -> i32 {
 }
 
 fn wire(left: i32, right: i32, row: i32, live: bool) -> Shape {
-    Shape::Wire {
-        left,
-        right,
-        row,
-        live,
-    }
+    Shape::Wire { left, right, row, live }
 }
 
 /// `=1`
@@ -176,20 +124,14 @@ impl Frame {
         let flow_of = |place: usize| evaluation.and_then(|evaluation| evaluation.rungs.get(place));
         let rungs = || program.rungs.iter().enumerate();
         let coils = rungs().map(|(place, rung)| coils_width(rung, flow_of(place)));
-        let coils = coils
-            .filter(|coils| *coils <= WIDEST_COMMON_COIL)
-            .max()
-            .unwrap_or(0);
+        let coils = coils.filter(|coils| *coils <= WIDEST_COMMON_COIL).max().unwrap_or(0);
         let rights = rungs().map(|(place, rung)| {
             let flow = flow_of(place);
             let (network, _) = series(&rung.network, &mut Flows::of(flow));
             network.width + coils.max(coils_width(rung, flow)) + 5
         });
         let right = rights.filter(|right| RIGHT_RAIL.contains(right)).max();
-        Self {
-            right: right.unwrap_or(*RIGHT_RAIL.start()),
-            coils,
-        }
+        Self { right: right.unwrap_or(*RIGHT_RAIL.start()), coils }
     }
 }
 
@@ -215,12 +157,7 @@ pub(crate) fn rung(rung: &Rung, flow: Option<&RungFlow>, frame: Frame) -> Piece 
         let left = middle - 1;
         piece.shapes.extend([
             wire(junction, left, row, power),
-            Shape::Coil {
-                left,
-                row,
-                sign: coil_sign(coil.kind),
-                on: value == "=1",
-            },
+            Shape::Coil { left, row, sign: coil_sign(coil.kind), on: value == "=1" },
             wire(left + 2, right, row, power),
             Shape::Label {
                 column: middle - (length(&label) + length(&value)) / 2,
@@ -232,21 +169,12 @@ pub(crate) fn rung(rung: &Rung, flow: Option<&RungFlow>, frame: Frame) -> Piece 
         ]);
     }
     if row > 0 {
-        piece.shapes.push(Shape::Riser {
-            column: junction,
-            top: 0,
-            bottom: row,
-            live: power,
-        });
+        piece.shapes.push(Shape::Riser { column: junction, top: 0, bottom: row, live: power });
     }
     piece.above = piece.above.max(1);
     piece.below = piece.below.max(row);
     for column in [0, right] {
-        piece.shapes.push(Shape::Rail {
-            column,
-            top: -piece.above,
-            bottom: piece.below,
-        });
+        piece.shapes.push(Shape::Rail { column, top: -piece.above, bottom: piece.below });
     }
     piece.width = right + 1;
     piece
@@ -355,10 +283,7 @@ fn branches_piece<'e>(
     let enters = flow.is_some_and(|flow| flow.enters);
     let widths = pieces.iter().map(|(piece, _)| piece.width);
     let inner = widths.max().unwrap_or(0);
-    let mut whole = Piece {
-        width: inner + 2,
-        ..Piece::default()
-    };
+    let mut whole = Piece { width: inner + 2, ..Piece::default() };
     let mut row = 0;
     let mut lowest_live = 0;
     for (place, (piece, power)) in pieces.into_iter().enumerate() {
@@ -385,12 +310,7 @@ fn branches_piece<'e>(
     ];
     for (column, top, bottom, live) in risers {
         if top < bottom {
-            whole.shapes.push(Shape::Riser {
-                column,
-                top,
-                bottom,
-                live,
-            });
+            whole.shapes.push(Shape::Riser { column, top, bottom, live });
         }
     }
     (whole, flow)

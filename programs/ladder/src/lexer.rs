@@ -41,17 +41,13 @@ pub(crate) struct Placed {
 }
 
 /// The longer of two signs that begin alike comes first.
-const SIGNS: [&str; 15] = [
-    "<>", "<=", ">=", "[", "]", "|", "(", ")", "{", "}", "/", "+", "=", "<", ">",
-];
+const SIGNS: [&str; 15] =
+    ["<>", "<=", ">=", "[", "]", "|", "(", ")", "{", "}", "/", "+", "=", "<", ">"];
 
 /// All lexemes of `text` with an [`Lexeme::End`] last, and what was wrong.
 pub(crate) fn lex(text: &str) -> (Vec<Placed>, Vec<Diagnostic>) {
-    let mut lexer = Lexer {
-        text,
-        characters: text.char_indices().peekable(),
-        diagnostics: Vec::new(),
-    };
+    let mut lexer =
+        Lexer { text, characters: text.char_indices().peekable(), diagnostics: Vec::new() };
     let mut lexemes = Vec::new();
     let mut starts_line = true;
     while let Some(&(start, character)) = lexer.characters.peek() {
@@ -65,18 +61,10 @@ pub(crate) fn lex(text: &str) -> (Vec<Placed>, Vec<Diagnostic>) {
             continue;
         }
         let lexeme = lexer.lexeme(start, character);
-        lexemes.push(Placed {
-            lexeme,
-            span: start..lexer.place(),
-            starts_line,
-        });
+        lexemes.push(Placed { lexeme, span: start..lexer.place(), starts_line });
         starts_line = false;
     }
-    lexemes.push(Placed {
-        lexeme: Lexeme::End,
-        span: text.len()..text.len(),
-        starts_line: true,
-    });
+    lexemes.push(Placed { lexeme: Lexeme::End, span: text.len()..text.len(), starts_line: true });
     (lexemes, lexer.diagnostics)
 }
 
@@ -88,18 +76,12 @@ struct Lexer<'a> {
 
 impl<'a> Lexer<'a> {
     fn place(&mut self) -> usize {
-        self.characters
-            .peek()
-            .map_or(self.text.len(), |&(place, _)| place)
+        self.characters.peek().map_or(self.text.len(), |&(place, _)| place)
     }
 
     fn take_while(&mut self, belongs: impl Fn(char) -> bool) -> &'a str {
         let start = self.place();
-        while self
-            .characters
-            .next_if(|&(_, character)| belongs(character))
-            .is_some()
-        {}
+        while self.characters.next_if(|&(_, character)| belongs(character)).is_some() {}
         let end = self.place();
         &self.text[start..end]
     }
@@ -113,10 +95,7 @@ impl<'a> Lexer<'a> {
             self.characters.next();
             return Lexeme::Sign("-");
         }
-        if let Some(sign) = SIGNS
-            .into_iter()
-            .find(|sign| self.text[start..].starts_with(sign))
-        {
+        if let Some(sign) = SIGNS.into_iter().find(|sign| self.text[start..].starts_with(sign)) {
             for _ in sign.chars() {
                 self.characters.next();
             }
@@ -193,12 +172,8 @@ impl<'a> Lexer<'a> {
         }
         let end = self.place();
         self.diagnostics.push(
-            Diagnostic::error(
-                "U0103",
-                "a text in quotes does not end on its line",
-                start..end,
-            )
-            .with_help("close it with \""),
+            Diagnostic::error("U0103", "a text in quotes does not end on its line", start..end)
+                .with_help("close it with \""),
         );
         Lexeme::Text(content)
     }
@@ -234,12 +209,11 @@ impl<'a> Lexer<'a> {
             Ok(time) => Lexeme::Time(time),
             Err(_) => {
                 let message = format!("`{word}` is neither a number nor a duration");
-                self.diagnostics.push(
-                    Diagnostic::error("U0110", message, start..start + word.len()).with_help(
-                        "write a duration such as 300ms, 1.5s or 1m30s (units d, h, m, s, ms, us and \
+                self.diagnostics
+                    .push(Diagnostic::error("U0110", message, start..start + word.len()).with_help(
+                    "write a duration such as 300ms, 1.5s or 1m30s (units d, h, m, s, ms, us and \
                          ns, the larger first), at most 100 days; names begin with a letter or _",
-                    ),
-                );
+                ));
                 Lexeme::Faulty
             }
         }

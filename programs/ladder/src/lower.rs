@@ -50,10 +50,8 @@ pub enum LowerError {
 }
 
 fn list(diagnostics: &[Diagnostic]) -> String {
-    let messages: Vec<&str> = diagnostics
-        .iter()
-        .map(|diagnostic| diagnostic.message.as_str())
-        .collect();
+    let messages: Vec<&str> =
+        diagnostics.iter().map(|diagnostic| diagnostic.message.as_str()).collect();
     messages.join("; ")
 }
 
@@ -64,10 +62,7 @@ pub(crate) fn validate(program: &Program, period: Duration) -> Result<(), LowerE
     let mut diagnostics = check(program);
     if has_errors(&diagnostics) {
         diagnostics.retain(|found| found.severity == understudy_text::Severity::Error);
-        return Err(LowerError::Invalid {
-            program: program.name.to_string(),
-            diagnostics,
-        });
+        return Err(LowerError::Invalid { program: program.name.to_string(), diagnostics });
     }
     Ok(())
 }
@@ -300,11 +295,7 @@ impl<'a> Lowering<'a> {
                         let passes = self.series(branch, start);
                         any = self.graph.or(any, passes);
                     }
-                    let leaves = if inside {
-                        any
-                    } else {
-                        self.graph.and(power, any)
-                    };
+                    let leaves = if inside { any } else { self.graph.and(power, any) };
                     self.tap_element([enters, leaves, leaves], Wires::None, &[]);
                     leaves
                 }
@@ -377,11 +368,7 @@ impl<'a> Lowering<'a> {
 
     fn number(&mut self, block: &str) -> Number {
         let (first, width) = self.numbers[block];
-        Number(
-            (first..first + width)
-                .map(|place| self.read(place))
-                .collect(),
-        )
+        Number((first..first + width).map(|place| self.read(place)).collect())
     }
 
     /// Numbers the registers and moves everything into one circuit.
@@ -402,14 +389,12 @@ impl<'a> Lowering<'a> {
             }
         }
         roots.extend(shown.iter().map(|(_, value)| *value));
-        let roots = builder
-            .graph()
-            .import(&self.graph, &roots, |graph, variable| match variable {
-                Variable::Input(_) => graph.variable(variable),
-                Variable::Register(place) => {
-                    values[place as usize].expect("only registers are variables")
-                }
-            });
+        let roots = builder.graph().import(&self.graph, &roots, |graph, variable| match variable {
+            Variable::Input(_) => graph.variable(variable),
+            Variable::Register(place) => {
+                values[place as usize].expect("only registers are variables")
+            }
+        });
         let (next, outputs) = roots.split_at(registers.len());
         for (register, &next) in registers.into_iter().zip(next) {
             builder.set_next(register, next);

@@ -32,10 +32,7 @@ pub struct Namer {
 impl Namer {
     /// For one program in `language`.
     pub fn new(language: Language) -> Self {
-        Self {
-            language,
-            taken: HashSet::new(),
-        }
+        Self { language, taken: HashSet::new() }
     }
 
     /// A legal name that is like `wanted`; another one each time.
@@ -72,11 +69,7 @@ pub fn legal_name(wanted: &str) -> String {
         .filter(|part| !part.is_empty())
         .map(|part| {
             let legal = |character| {
-                if is_name_part(character) {
-                    character
-                } else {
-                    '_'
-                }
+                if is_name_part(character) { character } else { '_' }
             };
             part.chars().map(legal).collect()
         })
@@ -91,11 +84,7 @@ pub fn legal_name(wanted: &str) -> String {
 fn structured_text_name(wanted: &str) -> String {
     let mut name = String::new();
     for character in wanted.chars() {
-        let legal = if character.is_ascii_alphanumeric() {
-            character
-        } else {
-            '_'
-        };
+        let legal = if character.is_ascii_alphanumeric() { character } else { '_' };
         if !(legal == '_' && name.ends_with('_')) {
             name.push(legal);
         }

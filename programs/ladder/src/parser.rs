@@ -61,20 +61,12 @@ pub fn parse(text: &str) -> Parsed {
         };
     }
     let (lexemes, diagnostics) = lex(text);
-    let mut parser = Parser {
-        lexemes,
-        position: 0,
-        comments: Vec::new(),
-        diagnostics,
-    };
+    let mut parser = Parser { lexemes, position: 0, comments: Vec::new(), diagnostics };
     let program = parser.program();
     let mut diagnostics = parser.diagnostics;
     diagnostics.extend(check(&program));
     diagnostics.sort_by_key(|diagnostic| (diagnostic.span.start, diagnostic.span.end));
-    Parsed {
-        program,
-        diagnostics,
-    }
+    Parsed { program, diagnostics }
 }
 
 struct Parser {
@@ -124,8 +116,7 @@ impl Parser {
                     let rung = self.rung();
                     if program.rungs.len() == MAXIMUM_RUNGS {
                         let message = format!("a program has at most {MAXIMUM_RUNGS} rungs");
-                        self.diagnostics
-                            .push(Diagnostic::error("U0115", message, span));
+                        self.diagnostics.push(Diagnostic::error("U0115", message, span));
                         return program;
                     }
                     program.rungs.push(rung);
@@ -147,12 +138,9 @@ impl Parser {
     fn pass_to_keyword(&mut self) {
         let span = self.span();
         if *self.lexeme() != Lexeme::Faulty {
-            let mut diagnostic = Diagnostic::error(
-                "U0102",
-                format!("{} does not belong here", self.found()),
-                span,
-            )
-            .with_label("expected `program`, `input`, `output`, `memory` or `rung`");
+            let mut diagnostic =
+                Diagnostic::error("U0102", format!("{} does not belong here", self.found()), span)
+                    .with_label("expected `program`, `input`, `output`, `memory` or `rung`");
             if let Lexeme::Word(word) = self.lexeme()
                 && let Some(keyword) = nearest(word, KEYWORDS[..5].iter().copied())
             {
@@ -179,10 +167,7 @@ impl Parser {
             self.pass_line();
             return None;
         };
-        let mut signal = Signal {
-            comments,
-            ..Signal::new(name)
-        };
+        let mut signal = Signal { comments, ..Signal::new(name) };
         let sound = self.located(keyword, &mut signal) && self.initial(keyword, &mut signal);
         signal.description = self.description();
         let line_goes_on = !self.at_part() && !self.placed().starts_line;
@@ -309,8 +294,7 @@ impl Parser {
 
     fn error(&mut self, code: &'static str, message: String, label: impl Into<String>) {
         let span = self.span();
-        self.diagnostics
-            .push(Diagnostic::error(code, message, span).with_label(label));
+        self.diagnostics.push(Diagnostic::error(code, message, span).with_label(label));
     }
 
     /// Reports the present lexeme and leaves it where it is.
@@ -358,11 +342,7 @@ impl Parser {
     /// The comment behind something on its line.
     fn description(&mut self) -> Option<String> {
         match self.placed() {
-            Placed {
-                lexeme: Lexeme::Comment(comment),
-                starts_line: false,
-                ..
-            } => {
+            Placed { lexeme: Lexeme::Comment(comment), starts_line: false, .. } => {
                 let comment = comment.clone();
                 self.advance();
                 Some(comment).filter(|comment| !comment.is_empty())

@@ -181,9 +181,8 @@ impl<'a> Plan<'a> {
         for &read in reads.iter().flatten() {
             readers[read] += 1;
         }
-        let mut free: BTreeSet<usize> = (0..registers.len())
-            .filter(|&index| readers[index] == 0)
-            .collect();
+        let mut free: BTreeSet<usize> =
+            (0..registers.len()).filter(|&index| readers[index] == 0).collect();
         let mut waiting: BTreeSet<usize> = (0..registers.len()).collect();
         let mut held = Vec::new();
         while let Some(&first) = waiting.first() {

@@ -18,11 +18,8 @@ pub fn print(program: &Program) -> String {
     comments(&mut text, &program.comments);
     let _ = write!(text, "program {}", program.name);
     describe(&mut text, &program.description);
-    let groups = [
-        ("input ", &program.inputs),
-        ("output", &program.outputs),
-        ("memory", &program.memory),
-    ];
+    let groups =
+        [("input ", &program.inputs), ("output", &program.outputs), ("memory", &program.memory)];
     for (keyword, signals) in groups {
         if !signals.is_empty() {
             text.push('\n');
@@ -59,11 +56,7 @@ fn one_line(text: &str) -> String {
 }
 
 fn declarations(text: &mut String, keyword: &str, signals: &[Signal]) {
-    let width = signals
-        .iter()
-        .map(|signal| signal.name.chars().count())
-        .max()
-        .unwrap_or(0);
+    let width = signals.iter().map(|signal| signal.name.chars().count()).max().unwrap_or(0);
     for signal in signals {
         comments(text, &signal.comments);
         let mut line = format!("{keyword} {:width$}", signal.name.as_str());
@@ -106,10 +99,7 @@ fn print_rung(text: &mut String, rung: &Rung) {
 }
 
 fn one_line_title(title: &str) -> String {
-    title
-        .replace('\\', "\\\\")
-        .replace('"', "\\\"")
-        .replace(['\n', '\r'], " ")
+    title.replace('\\', "\\\\").replace('"', "\\\"").replace(['\n', '\r'], " ")
 }
 
 /// The words of a series, between which a line can be broken.
@@ -163,12 +153,9 @@ pub(crate) fn series_text(series: &Series) -> String {
 fn element_text(element: &Element) -> String {
     match element {
         Element::Contact(contact) => format!("{}{}", contact.kind.sign(), contact.operand),
-        Element::Comparison(comparison) => format!(
-            "{}.CV{}{}",
-            comparison.counter,
-            comparison.relation.sign(),
-            comparison.value
-        ),
+        Element::Comparison(comparison) => {
+            format!("{}.CV{}{}", comparison.counter, comparison.relation.sign(), comparison.value)
+        }
         Element::Branches(_) | Element::Block(_) => String::new(),
     }
 }

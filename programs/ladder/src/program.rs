@@ -52,10 +52,7 @@ pub struct Signal {
 impl Signal {
     /// A signal with a name only.
     pub fn new(name: impl Into<Name>) -> Self {
-        Self {
-            name: name.into(),
-            ..Self::default()
-        }
+        Self { name: name.into(), ..Self::default() }
     }
 }
 
@@ -259,21 +256,12 @@ impl Program {
 
     /// One more rung behind the last.
     pub fn push_rung(&mut self, network: Series, coils: Vec<Coil>) {
-        self.rungs.push(Rung {
-            network,
-            coils,
-            ..Rung::default()
-        });
+        self.rungs.push(Rung { network, coils, ..Rung::default() });
     }
 
     /// One more rung behind the last, with what it is for.
     pub fn push_titled(&mut self, title: &str, network: Series, coils: Vec<Coil>) {
-        self.rungs.push(Rung {
-            title: Some(title.to_owned()),
-            network,
-            coils,
-            ..Rung::default()
-        });
+        self.rungs.push(Rung { title: Some(title.to_owned()), network, coils, ..Rung::default() });
     }
 
     /// All blocks, in the order of the scan.
@@ -294,10 +282,8 @@ impl Program {
         let mut count = 0;
         for rung in &self.rungs {
             visit(&rung.network, &mut |element| {
-                count += usize::from(matches!(
-                    element,
-                    Element::Contact(_) | Element::Comparison(_)
-                ));
+                count +=
+                    usize::from(matches!(element, Element::Contact(_) | Element::Comparison(_)));
             });
         }
         count

@@ -68,11 +68,7 @@ fn section(text: &mut String, word: &str, lines: &[String]) {
 /// A comment. Comments do not nest everywhere, so nothing in one looks like the beginning or the end of another.
 fn comment(content: &str) -> String {
     let harmless = |character: char| {
-        if character.is_control() {
-            ' '
-        } else {
-            character
-        }
+        if character.is_control() { ' ' } else { character }
     };
     let mut content: String = content.chars().map(harmless).collect();
     // Once is not enough for `(*)`.
@@ -94,9 +90,7 @@ fn broken(text: &mut String, words: &[String]) {
     let mut line = String::from(" ");
     for (place, word) in words.iter().enumerate() {
         if is_operator(word) {
-            let behind = words[place + 1..]
-                .iter()
-                .take_while(|word| !is_operator(word));
+            let behind = words[place + 1..].iter().take_while(|word| !is_operator(word));
             let length: usize = behind.map(|word| word.len() + 1).sum();
             if line.len() + 1 + word.len() + length > LINE_WIDTH {
                 let _ = writeln!(text, "{line}");

@@ -12,12 +12,10 @@ fn main() {
 /// Rungs `[ u x' | x ] /u' /u'' ( x )`, five contacts each, of which every tenth has four.
 fn program(rungs: usize) -> Circuit {
     let mut builder = CircuitBuilder::new("program");
-    let inputs: Vec<Expression> = (0..rungs)
-        .map(|rung| builder.input(format!("u{rung}")))
-        .collect();
-    let registers: Vec<_> = (0..rungs)
-        .map(|rung| builder.register(format!("x{rung}"), rung % 5 == 0))
-        .collect();
+    let inputs: Vec<Expression> =
+        (0..rungs).map(|rung| builder.input(format!("u{rung}"))).collect();
+    let registers: Vec<_> =
+        (0..rungs).map(|rung| builder.register(format!("x{rung}"), rung % 5 == 0)).collect();
     let mut state: Vec<Expression> = registers.iter().map(|register| register.1).collect();
     for rung in 0..rungs {
         let [first, second, third] = [1, 7, 31].map(|step| (rung * step + step) % rungs);
@@ -48,14 +46,12 @@ fn one_state(bencher: divan::Bencher, rungs: usize) {
     let mut state = scan.initial().to_vec();
     let mut inputs = vec![0x0123_4567_89ab_cdef_u64; scan.input_count().div_ceil(64)];
     let mut outputs = vec![0; scan.output_count().div_ceil(64)];
-    bencher
-        .counter(ItemsCount::new(rungs * 49 / 10))
-        .bench_local(|| {
-            for word in &mut inputs {
-                *word = word.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1);
-            }
-            scan.step(&mut scratch, &mut state, &inputs, &mut outputs);
-        });
+    bencher.counter(ItemsCount::new(rungs * 49 / 10)).bench_local(|| {
+        for word in &mut inputs {
+            *word = word.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1);
+        }
+        scan.step(&mut scratch, &mut state, &inputs, &mut outputs);
+    });
 }
 
 #[divan::bench(args = [9, 100, 1_000])]
@@ -67,9 +63,7 @@ fn sixty_four_states(bencher: divan::Bencher, rungs: usize) {
         .map(|place| place.wrapping_mul(0x9e37_79b9_7f4a_7c15))
         .collect();
     let mut outputs = vec![0; scan.output_count()];
-    bencher
-        .counter(ItemsCount::new(64 * rungs * 49 / 10))
-        .bench_local(|| {
-            scan.step_lanes(&mut scratch, &mut state, &inputs, &mut outputs);
-        });
+    bencher.counter(ItemsCount::new(64 * rungs * 49 / 10)).bench_local(|| {
+        scan.step_lanes(&mut scratch, &mut state, &inputs, &mut outputs);
+    });
 }

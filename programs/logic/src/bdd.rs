@@ -86,13 +86,7 @@ impl Diagrams {
         let cache = (limit / 8).clamp(1 << 8, 1 << 17);
         let manager = new_manager(room, cache, 1);
         manager.with_manager_exclusive(|manager| manager.add_vars(variables.len() as VarNo));
-        Self {
-            manager,
-            variables,
-            numbers,
-            limit,
-            need: None,
-        }
+        Self { manager, variables, numbers, limit, need: None }
     }
 
     /// The same without any diagram yet, but the order changes between operations when the diagrams have grown, and when there is no node left; within an
@@ -123,12 +117,7 @@ impl Diagrams {
         graph: &'a Graph,
         place: impl Fn(Variable) -> Variable + Send + 'a,
     ) -> Builder<'a> {
-        Builder {
-            diagrams: self,
-            graph,
-            place: Box::new(place),
-            made: HashMap::new(),
-        }
+        Builder { diagrams: self, graph, place: Box::new(place), made: HashMap::new() }
     }
 
     /// The diagram of one expression of `graph`.
@@ -142,11 +131,7 @@ impl Diagrams {
     /// 0 or 1.
     pub fn constant(&self, value: bool) -> Diagram {
         self.manager.with_manager_shared(|manager| {
-            Diagram(if value {
-                BDDFunction::t(manager)
-            } else {
-                BDDFunction::f(manager)
-            })
+            Diagram(if value { BDDFunction::t(manager) } else { BDDFunction::f(manager) })
         })
     }
 
@@ -155,14 +140,8 @@ impl Diagrams {
     /// # Errors
     /// It is not declared, or there is no node left.
     pub fn variable(&self, variable: Variable) -> Result<Diagram, BddError> {
-        let number = *self
-            .numbers
-            .get(&variable)
-            .ok_or(BddError::UnknownVariable(variable))?;
-        self.made(|| {
-            self.manager
-                .with_manager_shared(|manager| BDDFunction::var(manager, number))
-        })
+        let number = *self.numbers.get(&variable).ok_or(BddError::UnknownVariable(variable))?;
+        self.made(|| self.manager.with_manager_shared(|manager| BDDFunction::var(manager, number)))
     }
 
     /// Negation.
@@ -215,9 +194,9 @@ impl Diagrams {
         variables: impl IntoIterator<Item = Variable>,
     ) -> Result<Diagram, BddError> {
         let one = self.constant(true);
-        variables.into_iter().try_fold(one, |product, variable| {
-            self.and(&product, &self.variable(variable)?)
-        })
+        variables
+            .into_iter()
+            .try_fold(one, |product, variable| self.and(&product, &self.variable(variable)?))
     }
 
     /// Puts each function in the place of its variable.
@@ -298,17 +277,14 @@ impl Diagrams {
 
     /// The place of the top variable in the order; `None` for a constant.
     pub fn top(&self, diagram: &Diagram) -> Option<usize> {
-        let level = diagram
-            .0
-            .with_manager_shared(|manager, edge| manager.get_node(edge).level());
+        let level = diagram.0.with_manager_shared(|manager, edge| manager.get_node(edge).level());
         Some(level as usize).filter(|&level| level < self.variables.len())
     }
 
     /// The variable at a place of the order.
     pub fn variable_at(&self, place: usize) -> Variable {
-        let number = self
-            .manager
-            .with_manager_shared(|manager| manager.level_to_var(place as VarNo));
+        let number =
+            self.manager.with_manager_shared(|manager| manager.level_to_var(place as VarNo));
         self.variables[number as usize]
     }
 
@@ -325,8 +301,7 @@ impl Diagrams {
         if self.variables.len() <= SHALLOW {
             return work();
         }
-        self.manager
-            .with_manager_shared(|manager| manager.workers().install(work))
+        self.manager.with_manager_shared(|manager| manager.workers().install(work))
     }
 
     /// What `operation` makes; where it finds no free node, once more without the dead ones, or in a better order if it may change.
@@ -346,8 +321,7 @@ impl Diagrams {
         } else if made.is_err() && self.makes_room() {
             made = self.deep(&operation);
         }
-        made.map(Diagram)
-            .map_err(|_| BddError::TooManyNodes { limit: self.limit })
+        made.map(Diagram).map_err(|_| BddError::TooManyNodes { limit: self.limit })
     }
 
     /// Removes dead nodes; whether they were an eighth of all, so that another try is worth while.
@@ -357,9 +331,7 @@ impl Diagrams {
             return false;
         }
         self.collect_garbage();
-        let nodes = self
-            .manager
-            .with_manager_shared(|manager| manager.num_inner_nodes());
+        let nodes = self.manager.with_manager_shared(|manager| manager.num_inner_nodes());
         nodes < self.limit / 8 * 7
     }
 
@@ -372,11 +344,7 @@ impl Diagrams {
 impl Diagram {
     /// Whether it is 1 (or 0) under every assignment.
     pub fn is_constant(&self, value: bool) -> bool {
-        if value {
-            self.0.valid()
-        } else {
-            !self.0.satisfiable()
-        }
+        if value { self.0.valid() } else { !self.0.satisfiable() }
     }
 
     /// Its nodes, the terminal included.
@@ -421,11 +389,7 @@ impl Builder<'_> {
             }
             let operation = self.graph.operation(expression);
             let waiting = pending.len();
-            pending.extend(
-                operation
-                    .operands()
-                    .filter(|operand| !made.contains_key(operand)),
-            );
+            pending.extend(operation.operands().filter(|operand| !made.contains_key(operand)));
             if pending.len() > waiting {
                 continue;
             }

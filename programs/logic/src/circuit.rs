@@ -125,10 +125,7 @@ pub struct CircuitBuilder {
 impl CircuitBuilder {
     /// A circuit without inputs, registers and outputs.
     pub fn new(name: impl Into<String>) -> Self {
-        Self {
-            name: name.into(),
-            ..Self::default()
-        }
+        Self { name: name.into(), ..Self::default() }
     }
 
     /// Where its expressions are made.
@@ -147,10 +144,7 @@ impl CircuitBuilder {
     pub fn register(&mut self, name: impl Into<String>, initial: bool) -> (RegisterId, Expression) {
         let index = u32::try_from(self.registers.len()).expect("fewer than 2^32 registers");
         self.registers.push((name.into(), initial, None));
-        (
-            RegisterId(index),
-            self.graph.variable(Variable::Register(index)),
-        )
+        (RegisterId(index), self.graph.variable(Variable::Register(index)))
     }
 
     /// Sets f of a register; the last call counts.
@@ -160,10 +154,7 @@ impl CircuitBuilder {
 
     /// Declares the next output.
     pub fn output(&mut self, name: impl Into<String>, value: Expression) {
-        self.outputs.push(Output {
-            name: name.into(),
-            value,
-        });
+        self.outputs.push(Output { name: name.into(), value });
     }
 
     /// Checks the invariant.
@@ -173,35 +164,18 @@ impl CircuitBuilder {
             let mut seen = HashSet::new();
             let twice = names.into_iter().find(|name| !seen.insert(*name));
             twice.map_or(Ok(()), |name| {
-                Err(CircuitError::Duplicate {
-                    circuit: circuit.clone(),
-                    kind,
-                    name: name.clone(),
-                })
+                Err(CircuitError::Duplicate { circuit: circuit.clone(), kind, name: name.clone() })
             })
         };
         duplicate("input", self.inputs.iter().collect())?;
-        duplicate(
-            "register",
-            self.registers.iter().map(|register| &register.0).collect(),
-        )?;
-        duplicate(
-            "output",
-            self.outputs.iter().map(|output| &output.name).collect(),
-        )?;
+        duplicate("register", self.registers.iter().map(|register| &register.0).collect())?;
+        duplicate("output", self.outputs.iter().map(|output| &output.name).collect())?;
         let registers = self
             .registers
             .into_iter()
             .map(|(name, initial, next)| match next {
-                Some(next) => Ok(Register {
-                    name,
-                    initial,
-                    next,
-                }),
-                None => Err(CircuitError::NoNext {
-                    circuit: circuit.clone(),
-                    name,
-                }),
+                Some(next) => Ok(Register { name, initial, next }),
+                None => Err(CircuitError::NoNext { circuit: circuit.clone(), name }),
             })
             .collect::<Result<_, _>>()?;
         Ok(Circuit {

@@ -75,11 +75,8 @@ impl Cover {
 
     /// The two-level formula.
     pub fn sum_of_products(&self, graph: &mut Graph) -> Expression {
-        let products: Vec<Expression> = self
-            .0
-            .iter()
-            .map(|product| conjunction(graph, product))
-            .collect();
+        let products: Vec<Expression> =
+            self.0.iter().map(|product| conjunction(graph, product)).collect();
         graph.any(products)
     }
 
@@ -121,10 +118,8 @@ impl Search<'_> {
         let (zero, zero_function) =
             self.between(&without(&lower_zero, &upper_one)?, &upper_zero)?;
         let (one, one_function) = self.between(&without(&lower_one, &upper_zero)?, &upper_one)?;
-        let rest = diagrams.or(
-            &without(&lower_zero, &zero_function)?,
-            &without(&lower_one, &one_function)?,
-        )?;
+        let rest = diagrams
+            .or(&without(&lower_zero, &zero_function)?, &without(&lower_one, &one_function)?)?;
         let (both, both_function) = self.between(&rest, &diagrams.and(&upper_zero, &upper_one)?)?;
         let variable = diagrams.variable_at(top);
         let literal = |negated| Literal { negated, variable };
@@ -151,11 +146,7 @@ fn conjunction(graph: &mut Graph, literals: &[Literal]) -> Expression {
         .iter()
         .map(|literal| {
             let variable = graph.variable(literal.variable);
-            if literal.negated {
-                graph.not(variable)
-            } else {
-                variable
-            }
+            if literal.negated { graph.not(variable) } else { variable }
         })
         .collect();
     graph.all(factors)
@@ -176,10 +167,8 @@ fn factor(graph: &mut Graph, products: &[Product]) -> Expression {
     let Some((&best, _)) = counts.iter().find(|(_, count)| **count == most) else {
         return graph.constant(false);
     };
-    let (with, without): (Vec<Product>, Vec<Product>) = products
-        .iter()
-        .cloned()
-        .partition(|product| product.contains(&best));
+    let (with, without): (Vec<Product>, Vec<Product>) =
+        products.iter().cloned().partition(|product| product.contains(&best));
     let common: Product = with[0]
         .iter()
         .copied()

@@ -158,25 +158,19 @@ impl Graph {
     /// Logical product of any number; 1 for none.
     pub fn all(&mut self, operands: impl IntoIterator<Item = Expression>) -> Expression {
         let one = self.constant(true);
-        operands
-            .into_iter()
-            .fold(one, |left, right| self.and(left, right))
+        operands.into_iter().fold(one, |left, right| self.and(left, right))
     }
 
     /// Logical sum of any number; 0 for none.
     pub fn any(&mut self, operands: impl IntoIterator<Item = Expression>) -> Expression {
         let zero = self.constant(false);
-        operands
-            .into_iter()
-            .fold(zero, |left, right| self.or(left, right))
+        operands.into_iter().fold(zero, |left, right| self.or(left, right))
     }
 
     /// Sum over GF(2) of any number; 0 for none.
     pub fn sum(&mut self, operands: impl IntoIterator<Item = Expression>) -> Expression {
         let zero = self.constant(false);
-        operands
-            .into_iter()
-            .fold(zero, |left, right| self.xor(left, right))
+        operands.into_iter().fold(zero, |left, right| self.xor(left, right))
     }
 
     /// Copies `roots` of `other` into this graph, with each variable replaced by what `place` gives for it.
@@ -206,10 +200,7 @@ impl Graph {
                 Operation::Xor(left, right) => self.xor(copy_of(left), copy_of(right)),
             });
         }
-        roots
-            .iter()
-            .map(|root| copies[root.index()].expect("roots are reached"))
-            .collect()
+        roots.iter().map(|root| copies[root.index()].expect("roots are reached")).collect()
     }
 
     /// For each operation, whether one of `roots` depends on it.

@@ -81,12 +81,7 @@ impl Lanes {
         self.outputs.resize(self.scan.output_count(), 0);
         spread(runs, |run| &run.state, &mut self.state);
         spread(runs, |run| &run.signals, &mut self.inputs);
-        self.scan.step_lanes(
-            &mut self.scratch,
-            &mut self.state,
-            &self.inputs,
-            &mut self.outputs,
-        );
+        self.scan.step_lanes(&mut self.scratch, &mut self.state, &self.inputs, &mut self.outputs);
         for run in runs.iter_mut() {
             run.signals.clear();
             run.signals.resize(self.outputs.len().div_ceil(64), 0);

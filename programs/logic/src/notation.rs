@@ -27,10 +27,7 @@ impl FormulaTooLarge {
 }
 
 /// Bounds of a printed formula; they bound the recursion, too.
-const LIMIT: FormulaTooLarge = FormulaTooLarge {
-    leaves: 2_000,
-    depth: 200,
-};
+const LIMIT: FormulaTooLarge = FormulaTooLarge { leaves: 2_000, depth: 200 };
 
 /// Refuses an expression whose formula is beyond the bounds. Chains of one operation count as one level.
 pub(crate) fn check_size(graph: &Graph, root: Expression) -> Result<(), FormulaTooLarge> {

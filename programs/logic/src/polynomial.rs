@@ -50,16 +50,14 @@ impl Polynomial {
         match self {
             Self::Constant(value) => Some(NormalForm::constant(*value)),
             Self::Variable(variable) => Some(NormalForm::variable(*variable)),
-            Self::Sum(terms) => terms
-                .iter()
-                .try_fold(NormalForm::constant(false), |sum, term| {
-                    sum.add(&term.normal_form(limit)?, limit).ok()
-                }),
-            Self::Product(factors) => factors
-                .iter()
-                .try_fold(NormalForm::constant(true), |product, factor| {
+            Self::Sum(terms) => terms.iter().try_fold(NormalForm::constant(false), |sum, term| {
+                sum.add(&term.normal_form(limit)?, limit).ok()
+            }),
+            Self::Product(factors) => {
+                factors.iter().try_fold(NormalForm::constant(true), |product, factor| {
                     product.multiply(&factor.normal_form(limit)?, limit).ok()
-                }),
+                })
+            }
         }
     }
 
@@ -68,9 +66,9 @@ impl Polynomial {
         match self {
             Self::Constant(value) => *value,
             Self::Variable(variable) => assignment(*variable),
-            Self::Sum(terms) => terms
-                .iter()
-                .fold(false, |sum, term| sum ^ term.evaluate(assignment)),
+            Self::Sum(terms) => {
+                terms.iter().fold(false, |sum, term| sum ^ term.evaluate(assignment))
+            }
             Self::Product(factors) => factors.iter().all(|factor| factor.evaluate(assignment)),
         }
     }
@@ -87,11 +85,7 @@ impl Polynomial {
             Self::Constant(value) => text.push(if *value { '1' } else { '0' }),
             Self::Variable(variable) => text.push_str(&name(*variable)),
             Self::Sum(terms) => {
-                let plus = if self.complemented().is_some() {
-                    "+"
-                } else {
-                    " + "
-                };
+                let plus = if self.complemented().is_some() { "+" } else { " + " };
                 for (place, term) in terms.iter().enumerate() {
                     if place > 0 {
                         text.push_str(plus);
@@ -167,12 +161,7 @@ impl Polynomial {
 impl From<&NormalForm> for Polynomial {
     fn from(form: &NormalForm) -> Self {
         sum(form.monomials().map(|monomial| {
-            product(
-                monomial
-                    .variables()
-                    .iter()
-                    .map(|&variable| Self::Variable(variable)),
-            )
+            product(monomial.variables().iter().map(|&variable| Self::Variable(variable)))
         }))
     }
 }
@@ -278,11 +267,7 @@ fn either(a: Polynomial, b: Polynomial) -> Polynomial {
         {
             return all;
         }
-        let alone = if b.is_product_of_literals() {
-            b.clone()
-        } else {
-            multiplied.clone()
-        };
+        let alone = if b.is_product_of_literals() { b.clone() } else { multiplied.clone() };
         return sum([alone, product([a.clone(), complement(multiplied)])]);
     }
     none([a, b])

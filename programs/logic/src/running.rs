@@ -37,17 +37,9 @@ impl Running {
     /// # Panics
     /// If there are fewer inputs than the circuit has.
     pub fn step(&mut self, inputs: &[bool]) -> Vec<bool> {
-        assert!(
-            inputs.len() >= self.scan.input_count(),
-            "inputs are missing"
-        );
+        assert!(inputs.len() >= self.scan.input_count(), "inputs are missing");
         let packed = pack(inputs.iter().copied());
-        self.scan.step(
-            &mut self.scratch,
-            &mut self.state,
-            &packed,
-            &mut self.outputs,
-        );
+        self.scan.step(&mut self.scratch, &mut self.state, &packed, &mut self.outputs);
         unpack(&self.outputs, self.scan.output_count())
     }
 

@@ -50,17 +50,11 @@ const SUM: u32 = 1 << 31;
 
 impl Instruction {
     fn product(left: Operand, right: Operand) -> Self {
-        Self {
-            left: left.0,
-            right,
-        }
+        Self { left: left.0, right }
     }
 
     fn sum(left: Operand, right: Operand) -> Self {
-        Self {
-            left: left.0 | SUM,
-            right,
-        }
+        Self { left: left.0 | SUM, right }
     }
 
     #[inline]
@@ -119,11 +113,9 @@ impl Scan {
                 }
                 Operation::Not(operand) => of(operand).negated(),
                 Operation::And(left, right) => push(Instruction::product(of(left), of(right))),
-                Operation::Or(left, right) => push(Instruction::product(
-                    of(left).negated(),
-                    of(right).negated(),
-                ))
-                .negated(),
+                Operation::Or(left, right) => {
+                    push(Instruction::product(of(left).negated(), of(right).negated())).negated()
+                }
                 Operation::Xor(left, right) => push(Instruction::sum(of(left), of(right))),
             };
         }
@@ -257,8 +249,9 @@ fn unpack(image: &[u64], values: &mut [[u64; 1]]) {
 /// Packs the low bit of each operand into words; bits past the last are 0.
 fn pack(values: &[[u64; 1]], operands: &[Operand], image: &mut [u64]) {
     for (word, operands) in image.iter_mut().zip(operands.chunks(64)) {
-        *word = operands.iter().enumerate().fold(0, |word, (bit, operand)| {
-            word | (operand.value(values)[0] & 1) << bit
-        });
+        *word = operands
+            .iter()
+            .enumerate()
+            .fold(0, |word, (bit, operand)| word | (operand.value(values)[0] & 1) << bit);
     }
 }

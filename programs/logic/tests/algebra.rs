@@ -15,10 +15,7 @@ fn check(graph: &Graph, root: Expression) {
     let form = NormalForm::of(graph, root, 1_000).expect("at most 32 monomials");
     let factored = Polynomial::of(graph, root).expect("small");
     assert_eq!(factored.normal_form(1_000).as_ref(), Some(&form));
-    assert_eq!(
-        Polynomial::from(&form).normal_form(1_000).as_ref(),
-        Some(&form)
-    );
+    assert_eq!(Polynomial::from(&form).normal_form(1_000).as_ref(), Some(&form));
 
     let variables = variables(INPUTS, REGISTERS);
     let diagrams = Diagrams::new(variables.clone(), 10_000);
@@ -60,11 +57,7 @@ fn irredundant(diagrams: &Diagrams, cover: &Cover) {
                 .iter()
                 .map(|literal| {
                     let variable = graph.variable(literal.variable);
-                    if literal.negated {
-                        graph.not(variable)
-                    } else {
-                        variable
-                    }
+                    if literal.negated { graph.not(variable) } else { variable }
                 })
                 .collect();
             let product = graph.all(literals);
@@ -133,14 +126,12 @@ fn every_small_expression() {
     let mut builder = diagrams.builder(&graph, |variable| variable);
     let mut functions = std::collections::HashMap::new();
     for &root in &level {
-        let table: Vec<bool> = assignments(&names)
-            .map(|assignment| graph.evaluate(root, assignment))
-            .collect();
+        let table: Vec<bool> =
+            assignments(&names).map(|assignment| graph.evaluate(root, assignment)).collect();
         let form = NormalForm::of(&graph, root, 100).expect("at most 4 monomials");
         let diagram = builder.diagram(root).expect("small");
-        let (known_form, known_diagram) = functions
-            .entry(table)
-            .or_insert_with(|| (form.clone(), diagram.clone()));
+        let (known_form, known_diagram) =
+            functions.entry(table).or_insert_with(|| (form.clone(), diagram.clone()));
         assert_eq!(*known_form, form);
         assert!(*known_diagram == diagram);
     }
@@ -220,16 +211,11 @@ fn bounds_hold() {
     assert_eq!((error.limit, error.code()), (1_000, "U0410"));
 
     // The order that keeps the halves of the pairs apart needs 2^20 nodes; the one that keeps them together 40.
-    let apart = (0..20)
-        .map(|pair| 2 * pair)
-        .chain((0..20).map(|pair| 2 * pair + 1));
+    let apart = (0..20).map(|pair| 2 * pair).chain((0..20).map(|pair| 2 * pair + 1));
     let diagrams = Diagrams::new(apart.map(Variable::Input), 5_000);
     let error = diagrams.of(&graph, all).err().expect("too many nodes");
     assert_eq!(error.code(), "U0412");
-    assert!(
-        diagrams.of(&graph, pairs[0]).is_ok(),
-        "it can still be used"
-    );
+    assert!(diagrams.of(&graph, pairs[0]).is_ok(), "it can still be used");
     let diagrams = Diagrams::for_roots(&graph, &[all], 5_000);
     let diagram = diagrams.of(&graph, all).expect("few nodes");
     assert_eq!(diagrams.count(&diagram), Some(3_u128.pow(20)));
@@ -271,9 +257,7 @@ fn a_bad_order_is_changed_by_need() {
         .collect();
     let any = graph.any(terms.clone());
     let sum = graph.sum(terms.clone());
-    let apart = (0..pairs)
-        .map(|pair| 2 * pair)
-        .chain((0..pairs).map(|pair| 2 * pair + 1));
+    let apart = (0..pairs).map(|pair| 2 * pair).chain((0..pairs).map(|pair| 2 * pair + 1));
     let apart: Vec<Variable> = apart.map(Variable::Input).collect();
     let fixed = Diagrams::new(apart.clone(), 40_000);
     assert!(fixed.of(&graph, any).is_err(), "2^18 nodes");
@@ -284,10 +268,7 @@ fn a_bad_order_is_changed_by_need() {
     let first = diagrams.of(&graph, terms[0]).expect("few nodes");
     assert!(diagrams.and(&first, &found).expect("few nodes") == first);
     // 4^18 assignments, and three of four values of each pair give no term.
-    assert_eq!(
-        diagrams.count(&found),
-        Some(4_u128.pow(pairs) - 3_u128.pow(pairs))
-    );
+    assert_eq!(diagrams.count(&found), Some(4_u128.pow(pairs) - 3_u128.pow(pairs)));
     let summed = diagrams.of(&graph, sum).expect("linear");
     // The same two functions in an order that was good from the start.
     let good = Diagrams::for_roots(&graph, &[any, sum], 40_000);
@@ -299,21 +280,16 @@ fn a_bad_order_is_changed_by_need() {
         assert!(diagrams.value(function, value) && good.value(&same, value));
     }
     // Quantification and substitution know where the variables went.
-    let right = diagrams
-        .product((0..pairs).map(|pair| Variable::Input(2 * pair + 1)))
-        .expect("few nodes");
+    let right =
+        diagrams.product((0..pairs).map(|pair| Variable::Input(2 * pair + 1))).expect("few nodes");
     let some = diagrams.exists(&found, &right).expect("few nodes");
-    let lefts: Vec<Expression> = (0..pairs)
-        .map(|pair| graph.variable(Variable::Input(2 * pair)))
-        .collect();
+    let lefts: Vec<Expression> =
+        (0..pairs).map(|pair| graph.variable(Variable::Input(2 * pair))).collect();
     let any_left = graph.any(lefts);
     assert!(some == diagrams.of(&graph, any_left).expect("few nodes"));
     let twins = (0..pairs).map(|pair| {
         let left = diagrams.variable(Variable::Input(2 * pair));
-        (
-            Variable::Input(2 * pair + 1),
-            left.expect("a variable that is there"),
-        )
+        (Variable::Input(2 * pair + 1), left.expect("a variable that is there"))
     });
     let twins = diagrams.substitution(twins).expect("declared");
     assert!(diagrams.substitute(&found, &twins).expect("few nodes") == some);

@@ -16,10 +16,7 @@ fn expected(circuit: &Circuit, state: &[u64], inputs: &[u64]) -> (Vec<bool>, Vec
             Variable::Register(place) => bit(state, place as usize),
         })
     };
-    let next = circuit
-        .registers()
-        .iter()
-        .map(|register| value(register.next));
+    let next = circuit.registers().iter().map(|register| value(register.next));
     let outputs = circuit.outputs().iter().map(|output| value(output.value));
     (next.collect(), outputs.collect())
 }
@@ -27,17 +24,11 @@ fn expected(circuit: &Circuit, state: &[u64], inputs: &[u64]) -> (Vec<bool>, Vec
 /// Steps through `samples` in one state; and in 64, each with the samples rotated by its lane; and in twice 64, of which the second half is one sample ahead.
 fn check(circuit: &Circuit, samples: &[Vec<u64>]) {
     let scan = Scan::new(circuit);
-    let initial: Vec<bool> = circuit
-        .registers()
-        .iter()
-        .map(|register| register.initial)
-        .collect();
+    let initial: Vec<bool> = circuit.registers().iter().map(|register| register.initial).collect();
     assert_eq!(scan.initial(), pack(initial.iter().copied()));
     let mut scratch = Scratch::default();
-    let mut lane_states: Vec<u64> = initial
-        .iter()
-        .map(|&bit| u64::from(bit).wrapping_neg())
-        .collect();
+    let mut lane_states: Vec<u64> =
+        initial.iter().map(|&bit| u64::from(bit).wrapping_neg()).collect();
     let mut lane_outputs = vec![0; scan.output_count()];
     let mut halves = [lane_states.clone(), lane_states.clone()];
     let mut wide_states: Vec<[u64; 2]> = lane_states.iter().map(|&word| [word; 2]).collect();
@@ -49,23 +40,13 @@ fn check(circuit: &Circuit, samples: &[Vec<u64>]) {
         let lanes_from = |first: usize| -> Vec<u64> {
             let of_lane = |lane, place| u64::from(bit(sample(first + lane), place)) << lane;
             let places = 0..scan.input_count();
-            places
-                .map(|place| (0..64).fold(0, |word, lane| word | of_lane(lane, place)))
-                .collect()
+            places.map(|place| (0..64).fold(0, |word, lane| word | of_lane(lane, place))).collect()
         };
         let lane_inputs = lanes_from(0);
         let ahead = lanes_from(1);
-        let wide_inputs: Vec<[u64; 2]> = lane_inputs
-            .iter()
-            .zip(&ahead)
-            .map(|(&now, &ahead)| [now, ahead])
-            .collect();
-        scan.step_wide(
-            &mut scratch,
-            &mut wide_states,
-            &wide_inputs,
-            &mut wide_outputs,
-        );
+        let wide_inputs: Vec<[u64; 2]> =
+            lane_inputs.iter().zip(&ahead).map(|(&now, &ahead)| [now, ahead]).collect();
+        scan.step_wide(&mut scratch, &mut wide_states, &wide_inputs, &mut wide_outputs);
         for (half, inputs) in [&lane_inputs, &ahead].into_iter().enumerate() {
             scan.step_lanes(&mut scratch, &mut halves[half], inputs, &mut lane_outputs);
             let of_half = |words: &[[u64; 2]]| -> Vec<u64> {
@@ -74,12 +55,7 @@ fn check(circuit: &Circuit, samples: &[Vec<u64>]) {
             assert_eq!(of_half(&wide_states), halves[half]);
             assert_eq!(of_half(&wide_outputs), lane_outputs);
         }
-        scan.step_lanes(
-            &mut scratch,
-            &mut lane_states,
-            &lane_inputs,
-            &mut lane_outputs,
-        );
+        scan.step_lanes(&mut scratch, &mut lane_states, &lane_inputs, &mut lane_outputs);
         for (lane, state) in states.iter_mut().enumerate() {
             let (next, values) = expected(circuit, state, sample(lane));
             scan.step(&mut scratch, state, sample(lane), &mut outputs);
@@ -144,12 +120,9 @@ proptest! {
 #[test]
 fn wide_images() {
     let mut builder = CircuitBuilder::new("wide");
-    let inputs: Vec<Expression> = (0..70)
-        .map(|place| builder.input(format!("u{place}")))
-        .collect();
-    let registers: Vec<_> = (0..130)
-        .map(|place| builder.register(format!("x{place}"), place % 3 == 0))
-        .collect();
+    let inputs: Vec<Expression> = (0..70).map(|place| builder.input(format!("u{place}"))).collect();
+    let registers: Vec<_> =
+        (0..130).map(|place| builder.register(format!("x{place}"), place % 3 == 0)).collect();
     for place in 0..130 {
         let before = registers[(place + 129) % 130].1;
         let input = inputs[place % 70];
@@ -166,12 +139,5 @@ fn wide_images() {
     let zero = builder.graph().constant(false);
     builder.output("zero", zero);
     let circuit = builder.finish().expect("names are numbered");
-    check(
-        &circuit,
-        &[
-            vec![0x5555_0000_ffff_1234, 0x2a],
-            vec![u64::MAX, 0x3f],
-            vec![0, 0],
-        ],
-    );
+    check(&circuit, &[vec![0x5555_0000_ffff_1234, 0x2a], vec![u64::MAX, 0x3f], vec![0, 0]]);
 }

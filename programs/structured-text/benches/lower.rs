@@ -35,10 +35,7 @@ fn ten_thousand_statements(bencher: divan::Bencher<'_, '_>) {
     bencher.bench(|| {
         let (file, found) = parse(&text);
         assert!(found.is_empty());
-        let options = Options {
-            text: &text,
-            ..Options::default()
-        };
+        let options = Options { text: &text, ..Options::default() };
         let lowered = lower(&file, &options);
         Machine::new(&lowered.program.expect("a program"))
     });

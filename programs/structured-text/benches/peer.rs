@@ -35,24 +35,16 @@ pub(crate) struct Case {
 }
 
 fn main() {
-    let wanted: Vec<String> = std::env::args()
-        .skip(1)
-        .filter(|it| !it.starts_with('-'))
-        .collect();
+    let wanted: Vec<String> = std::env::args().skip(1).filter(|it| !it.starts_with('-')).collect();
     let cases = numbers().into_iter().chain(examples());
     let mut out = std::io::stdout().lock();
-    writeln!(
-        out,
-        "program            operations  ns a scan   ns each   gcc, ns   ratio"
-    )
-    .expect("standard output");
+    writeln!(out, "program            operations  ns a scan   ns each   gcc, ns   ratio")
+        .expect("standard output");
     for case in cases.filter(|case| wanted.is_empty() || wanted.contains(&case.name)) {
         let peer = matiec::Peer::new(&case);
         let (mut ours, mut theirs) = (f64::MAX, f64::MAX);
         for _ in 0..TURNS {
-            theirs = peer
-                .as_ref()
-                .map_or(theirs, |peer| peer.nanoseconds().min(theirs));
+            theirs = peer.as_ref().map_or(theirs, |peer| peer.nanoseconds().min(theirs));
             ours = machine(&case).min(ours);
         }
         let cost = Cost::new(&case.program);
@@ -75,22 +67,13 @@ fn machine(case: &Case) -> f64 {
     let mut scratch = Scratch::default();
     let mut state = machine.initial().to_vec();
     let mut outputs = vec![0; machine.output_count().div_ceil(64)];
-    let inputs: Vec<Vec<u64>> = case
-        .scans
-        .iter()
-        .map(|scan| image(&case.program, scan))
-        .collect();
+    let inputs: Vec<Vec<u64>> = case.scans.iter().map(|scan| image(&case.program, scan)).collect();
     let mut best = f64::MAX;
     for _ in 0..ROUNDS {
         #[allow(clippy::disallowed_methods, reason = "a measurement")]
         let start = std::time::Instant::now();
         for inputs in &inputs {
-            machine.step(
-                &mut scratch,
-                std::hint::black_box(&mut state),
-                inputs,
-                &mut outputs,
-            );
+            machine.step(&mut scratch, std::hint::black_box(&mut state), inputs, &mut outputs);
         }
         best = best.min(start.elapsed().as_secs_f64());
     }
@@ -109,14 +92,9 @@ fn image(program: &Program, values: &[u64]) -> Vec<u64> {
 
 fn program(text: &str) -> Program {
     let (file, _) = parse(text);
-    let options = Options {
-        text,
-        ..Options::default()
-    };
+    let options = Options { text, ..Options::default() };
     let lowered = lower(&file, &options);
-    lowered
-        .program
-        .unwrap_or_else(|| panic!("{:?}", lowered.diagnostics))
+    lowered.program.unwrap_or_else(|| panic!("{:?}", lowered.diagnostics))
 }
 
 fn read(path: &Path) -> String {
@@ -143,9 +121,7 @@ fn numbers() -> Vec<Case> {
         let scans = vector["scans"].as_array().expect("scans").iter();
         Case {
             name: name.clone(),
-            scans: scans
-                .map(|line| scan(line).expect("inputs -> outputs"))
-                .collect(),
+            scans: scans.map(|line| scan(line).expect("inputs -> outputs")).collect(),
             program,
             text,
         }
@@ -181,9 +157,7 @@ fn examples() -> Vec<Case> {
         let program = program(&text);
         let mut random = 1_u64;
         let mut wander = |of: understudy_typed::Elementary| {
-            random = random
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             let value = 40.0 + (random >> 33) as f64 / 2_f64.powi(28);
             match of {
                 understudy_typed::Elementary::Real => u64::from((value as f32).to_bits()),
@@ -191,21 +165,10 @@ fn examples() -> Vec<Case> {
                 _ => random >> 60 & 1,
             }
         };
-        let declared: Vec<_> = program
-            .inputs
-            .iter()
-            .filter(|point| point.slot != 0)
-            .map(|point| point.of)
-            .collect();
-        let scans = (0..300)
-            .map(|_| declared.iter().map(|&of| wander(of)).collect())
-            .collect();
-        Case {
-            name,
-            text,
-            program,
-            scans,
-        }
+        let declared: Vec<_> =
+            program.inputs.iter().filter(|point| point.slot != 0).map(|point| point.of).collect();
+        let scans = (0..300).map(|_| declared.iter().map(|&of| wander(of)).collect()).collect();
+        Case { name, text, program, scans }
     };
     paths.into_iter().map(case).collect()
 }

@@ -69,18 +69,11 @@ struct Made<'a> {
 
 impl Made<'_> {
     fn statement(&self, kind: StatementKind) -> Statement {
-        Statement {
-            kind,
-            span: self.span.clone(),
-            comments: Vec::new(),
-        }
+        Statement { kind, span: self.span.clone(), comments: Vec::new() }
     }
 
     fn expression(&self, kind: ExpressionKind) -> Expression {
-        Expression {
-            kind,
-            span: self.span.clone(),
-        }
+        Expression { kind, span: self.span.clone() }
     }
 
     fn path(&self, name: &str) -> Path {
@@ -104,9 +97,6 @@ impl Made<'_> {
 
     fn compare(&self, name: &str, comparison: Comparison, with: usize) -> Expression {
         let right = (Operator::Compare(comparison), self.integer(with));
-        self.expression(ExpressionKind::Chain(
-            Box::new(self.variable(name)),
-            vec![right],
-        ))
+        self.expression(ExpressionKind::Chain(Box::new(self.variable(name)), vec![right]))
     }
 }

@@ -87,13 +87,8 @@ const MAXIMUM_LEXEMES: usize = 4 << 20;
 
 /// All lexemes of `text`, and what was wrong.
 pub(crate) fn lex(text: &str) -> Lexemes<'_> {
-    let mut lexer = Lexer {
-        text,
-        place: 0,
-        nests: true,
-        has_local_marks: false,
-        diagnostics: Vec::new(),
-    };
+    let mut lexer =
+        Lexer { text, place: 0, nests: true, has_local_marks: false, diagnostics: Vec::new() };
     let mut placed: Vec<Placed> = Vec::new();
     let mut above = Vec::new();
     let mut line_broken = true;
@@ -105,9 +100,7 @@ pub(crate) fn lex(text: &str) -> Lexemes<'_> {
         if placed.len() >= MAXIMUM_LEXEMES {
             let message = format!("the text has more than {MAXIMUM_LEXEMES} words and signs");
             let place = lexer.place..lexer.place;
-            lexer
-                .diagnostics
-                .push(Diagnostic::error("U1033", message, place));
+            lexer.diagnostics.push(Diagnostic::error("U1033", message, place));
             break;
         }
         if character.is_whitespace() || character == '\u{feff}' {
@@ -115,11 +108,7 @@ pub(crate) fn lex(text: &str) -> Lexemes<'_> {
             lexer.place += character.len_utf8();
         } else if let Some(name) = lexer.current_time() {
             let start = lexer.place - name.within.len();
-            let words = [
-                Lexeme::Word(name.variable),
-                Lexeme::Sign(":="),
-                Lexeme::Word("TIME"),
-            ];
+            let words = [Lexeme::Word(name.variable), Lexeme::Sign(":="), Lexeme::Word("TIME")];
             let signs = ["(", ")", ";"].map(Lexeme::Sign);
             for lexeme in words.into_iter().chain(signs) {
                 placed.push(Placed {
@@ -170,11 +159,7 @@ pub(crate) fn lex(text: &str) -> Lexemes<'_> {
         starts_line: true,
         comments: boxed(&mut above),
     });
-    Lexemes {
-        placed,
-        has_local_marks: lexer.has_local_marks,
-        diagnostics: lexer.diagnostics,
-    }
+    Lexemes { placed, has_local_marks: lexer.has_local_marks, diagnostics: lexer.diagnostics }
 }
 
 /// The pragma by which the standard blocks of matiec read the time.
@@ -184,12 +169,7 @@ struct CurrentTime<'a> {
 }
 
 fn boxed(above: &mut Vec<String>) -> Option<Box<Comments>> {
-    (!above.is_empty()).then(|| {
-        Box::new(Comments {
-            above: std::mem::take(above),
-            behind: None,
-        })
-    })
+    (!above.is_empty()).then(|| Box::new(Comments { above: std::mem::take(above), behind: None }))
 }
 
 struct Lexer<'a> {
@@ -220,15 +200,13 @@ impl<'a> Lexer<'a> {
 
     fn error(&mut self, code: &'static str, message: String, start: usize) -> Lexeme<'a> {
         let span = start..self.place;
-        self.diagnostics
-            .push(Diagnostic::error(code, message, span));
+        self.diagnostics.push(Diagnostic::error(code, message, span));
         Lexeme::Faulty
     }
 
     fn warn(&mut self, message: String, start: usize) {
         let span = start..self.place;
-        self.diagnostics
-            .push(Diagnostic::warning("U1055", message, span));
+        self.diagnostics.push(Diagnostic::warning("U1055", message, span));
     }
 
     /// `{__SET_VAR(data__->,CURRENT_TIME,,__CURRENT_TIME)}`, which is `CURRENT_TIME := TIME();`.
@@ -238,10 +216,7 @@ impl<'a> Lexer<'a> {
         let length = content.find(|next: char| !next.is_ascii_alphanumeric() && next != '_')?;
         let (variable, behind) = content.split_at(length);
         let behind = behind.strip_prefix(",,__CURRENT_TIME)")?;
-        let behind = behind
-            .strip_prefix(';')
-            .unwrap_or(behind)
-            .strip_prefix('}')?;
+        let behind = behind.strip_prefix(';').unwrap_or(behind).strip_prefix('}')?;
         let within = &rest[..rest.len() - behind.len()];
         self.place += within.len();
         Some(CurrentTime { within, variable })
@@ -250,15 +225,10 @@ impl<'a> Lexer<'a> {
     /// Takes a comment or a pragma; the inner option is what it says, if anything.
     fn comment(&mut self) -> Option<Option<String>> {
         let rest = self.rest();
-        let (opening, closing) = [
-            ("(*", "*)"),
-            ("/*", "*/"),
-            ("//", "\n"),
-            ("{{", "}}"),
-            ("{", "}"),
-        ]
-        .into_iter()
-        .find(|(opening, _)| rest.starts_with(opening))?;
+        let (opening, closing) =
+            [("(*", "*)"), ("/*", "*/"), ("//", "\n"), ("{{", "}}"), ("{", "}")]
+                .into_iter()
+                .find(|(opening, _)| rest.starts_with(opening))?;
         let start = self.place;
         let content = &rest[opening.len()..];
         let length = match self.comment_length(content, opening, closing) {

@@ -5,11 +5,8 @@ use std::sync::OnceLock;
 use crate::syntax::{File, Unit};
 
 /// The whole library as one text.
-pub(crate) const TEXT: &str = concat!(
-    include_str!("library/standard.st"),
-    "\n",
-    include_str!("library/control.st"),
-);
+pub(crate) const TEXT: &str =
+    concat!(include_str!("library/standard.st"), "\n", include_str!("library/control.st"),);
 
 /// Where the standard blocks end and those for control begin.
 const CONTROL: usize = include_str!("library/standard.st").len();

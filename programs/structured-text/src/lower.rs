@@ -181,11 +181,7 @@ impl<'a> Lowering<'a> {
                 continue;
             }
             unit_names.entry(key).or_insert(units.len());
-            units.push(UnitEntry {
-                unit,
-                is_library,
-                block: BlockState::New,
-            });
+            units.push(UnitEntry { unit, is_library, block: BlockState::New });
         }
         Self {
             lines: Lines::new(text),
@@ -216,8 +212,7 @@ impl<'a> Lowering<'a> {
     }
 
     fn finish(mut self, checked: Vec<String>) -> Lowered {
-        self.diagnostics
-            .sort_by_key(|found| (found.span.start, found.span.end));
+        self.diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
         self.diagnostics.dedup();
         if self.diagnostics.len() > MAXIMUM_FINDINGS {
             self.diagnostics.truncate(MAXIMUM_FINDINGS);
@@ -291,11 +286,7 @@ impl<'a> Lowering<'a> {
 
     /// The line of a place, from 1.
     fn line(&self, span: &Range<usize>) -> u32 {
-        let lines = if self.in_library() {
-            &self.library_lines
-        } else {
-            &self.lines
-        };
+        let lines = if self.in_library() { &self.library_lines } else { &self.lines };
         u32::try_from(lines.index(span.start) + 1).unwrap_or(u32::MAX)
     }
 
@@ -349,10 +340,7 @@ impl<'a> Lowering<'a> {
             }
             Type::Text(capacity) => format!("STRING[{capacity}]"),
             Type::Array(array) => {
-                let ranges = array
-                    .ranges
-                    .iter()
-                    .map(|(low, high)| format!("{low}..{high}"));
+                let ranges = array.ranges.iter().map(|(low, high)| format!("{low}..{high}"));
                 let ranges: Vec<String> = ranges.collect();
                 let element = self.describe(&array.element);
                 format!("ARRAY [{}] OF {element}", ranges.join(", "))

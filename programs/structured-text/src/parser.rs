@@ -180,10 +180,8 @@ fn read_at<T: Absent>(
     read: impl FnOnce(&mut Parser<'_>) -> T,
 ) -> (T, Vec<Diagnostic>) {
     if text.len() > MAXIMUM_TEXT_BYTES {
-        let message = format!(
-            "the text has {} bytes; at most {MAXIMUM_TEXT_BYTES} are read",
-            text.len()
-        );
+        let message =
+            format!("the text has {} bytes; at most {MAXIMUM_TEXT_BYTES} are read", text.len());
         return (T::absent(), vec![Diagnostic::error("U1033", message, 0..0)]);
     }
     let mut parser = Parser::new(text, places);
@@ -223,11 +221,7 @@ struct Parser<'a> {
 
 impl<'a> Parser<'a> {
     fn new(text: &'a str, places: Places<'_>) -> Self {
-        let Lexemes {
-            mut placed,
-            has_local_marks,
-            mut diagnostics,
-        } = lex(text);
+        let Lexemes { mut placed, has_local_marks, mut diagnostics } = lex(text);
         for lexeme in &mut placed {
             lexeme.span = places(lexeme.within.clone());
         }
@@ -299,9 +293,7 @@ impl<'a> Parser<'a> {
     /// The comments above the lexeme.
     fn comments(&self) -> Vec<String> {
         let comments = self.placed().comments.as_deref();
-        comments
-            .map(|comments| comments.above.clone())
-            .unwrap_or_default()
+        comments.map(|comments| comments.above.clone()).unwrap_or_default()
     }
 
     /// The comment behind what was read last.
@@ -356,8 +348,7 @@ impl<'a> Parser<'a> {
     }
 
     fn error(&mut self, code: &'static str, message: impl Into<String>, span: Span) {
-        self.diagnostics
-            .push(Diagnostic::error(code, message, span));
+        self.diagnostics.push(Diagnostic::error(code, message, span));
     }
 
     /// A construct that is understood and not supported.
@@ -371,8 +362,7 @@ impl<'a> Parser<'a> {
 
     /// A part of a declaration that is read past.
     fn read_past(&mut self, message: impl Into<String>, span: Span) {
-        self.diagnostics
-            .push(Diagnostic::warning("U1055", message, span));
+        self.diagnostics.push(Diagnostic::warning("U1055", message, span));
     }
 
     /// Reports the lexeme found in place of `what`; a lexeme that was reported already is not reported again.

@@ -29,9 +29,7 @@ pub fn statements(statements: &[crate::syntax::Statement]) -> String {
 /// Instructions, each on its line.
 pub fn instructions(instructions: &[Instruction]) -> String {
     let mut printer = Printer::default();
-    instructions
-        .iter()
-        .for_each(|instruction| printer.instruction(instruction));
+    instructions.iter().for_each(|instruction| printer.instruction(instruction));
     printer.text
 }
 
@@ -133,11 +131,7 @@ impl Printer {
 
     fn chart(&mut self, chart: &Chart) {
         for step in &chart.steps {
-            let word = if step.is_initial {
-                "INITIAL_STEP"
-            } else {
-                "STEP"
-            };
+            let word = if step.is_initial { "INITIAL_STEP" } else { "STEP" };
             self.line(&format!("{word} {}:", step.name));
             self.within(|printer| {
                 for association in &step.associations {

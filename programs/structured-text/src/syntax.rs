@@ -26,10 +26,7 @@ pub struct Name {
 impl Name {
     /// A name at a place.
     pub fn new(text: impl Into<String>, span: Span) -> Self {
-        Self {
-            text: text.into(),
-            span,
-        }
+        Self { text: text.into(), span }
     }
 
     /// As written.

@@ -84,10 +84,7 @@ fn manual_automatic_and_cascade_change_without_a_bump() {
 
 #[test]
 fn lags_and_leads_are_exact_for_steps() {
-    let mut lag = running(
-        "c : LAG1;",
-        "c(RUN := b, XIN := x, TAU := T#500ms); y := c.XOUT;",
-    );
+    let mut lag = running("c : LAG1;", "c(RUN := b, XIN := x, TAU := T#500ms); y := c.XOUT;");
     scan(&mut lag, 0.0, false);
     for at in 1..500 {
         let expected = 1.0 - (-(at as f64) * PERIOD / 0.5).exp();
@@ -112,19 +109,11 @@ fn rates_ramps_and_integrals_are_straight_lines() {
     );
     assert_eq!(scan(&mut rate, 1.0, false), (1.0, false));
     for at in 1..100 {
-        near(
-            scan(&mut rate, 9.0, false).0,
-            1.0 + 2.0 * at as f64 * PERIOD,
-            at,
-        );
+        near(scan(&mut rate, 9.0, false).0, 1.0 + 2.0 * at as f64 * PERIOD, at);
     }
     let top = 1.0 + 2.0 * 99.0 * PERIOD;
     for at in 1..20 {
-        near(
-            scan(&mut rate, -9.0, false).0,
-            top - 5.0 * at as f64 * PERIOD,
-            at,
-        );
+        near(scan(&mut rate, -9.0, false).0, top - 5.0 * at as f64 * PERIOD, at);
     }
     let mut ramp = running(
         "c : RAMP;",
@@ -138,17 +127,11 @@ fn rates_ramps_and_integrals_are_straight_lines() {
         // The sum of 200 periods may be one digit below 2 s.
         assert!(busy == (at < 200) || at == 200);
     }
-    let mut integral = running(
-        "c : INTEGRAL;",
-        "c(RUN := TRUE, R1 := b, XIN := x, X0 := 7.0); y := c.XOUT;",
-    );
+    let mut integral =
+        running("c : INTEGRAL;", "c(RUN := TRUE, R1 := b, XIN := x, X0 := 7.0); y := c.XOUT;");
     assert_eq!(scan(&mut integral, 3.0, true).0, 7.0);
     for at in 1..200 {
-        near(
-            scan(&mut integral, 3.0, false).0,
-            7.0 + 3.0 * at as f64 * PERIOD,
-            at,
-        );
+        near(scan(&mut integral, 3.0, false).0, 7.0 + 3.0 * at as f64 * PERIOD, at);
     }
     let mut total = running("c : TOTALISER;", "c(XIN := x, RESET := b); y := c.TOTAL;");
     for at in 0..5_000 {
@@ -174,26 +157,12 @@ fn a_derivative_is_the_slope_of_a_line() {
 #[test]
 fn bands_scales_alarms_and_means_are_as_defined() {
     let mut band = running("c : DEADBAND;", "c(XIN := x, WIDTH := 2.0); y := c.XOUT;");
-    for (x, y) in [
-        (0.0, 0.0),
-        (2.0, 0.0),
-        (-2.0, 0.0),
-        (5.0, 3.0),
-        (-3.5, -1.5),
-    ] {
+    for (x, y) in [(0.0, 0.0), (2.0, 0.0), (-2.0, 0.0), (5.0, 3.0), (-3.5, -1.5)] {
         assert_eq!(scan(&mut band, x, false).0, y);
     }
-    let mut hysteresis = running(
-        "c : HYSTERESIS;",
-        "c(XIN1 := x, XIN2 := 10.0, EPS := 1.0); q := c.Q;",
-    );
-    for (x, q) in [
-        (10.5, false),
-        (11.5, true),
-        (9.5, true),
-        (8.9, false),
-        (10.9, false),
-    ] {
+    let mut hysteresis =
+        running("c : HYSTERESIS;", "c(XIN1 := x, XIN2 := 10.0, EPS := 1.0); q := c.Q;");
+    for (x, q) in [(10.5, false), (11.5, true), (9.5, true), (8.9, false), (10.9, false)] {
         assert_eq!(scan(&mut hysteresis, x, false).1, q, "{x}");
     }
     let body = "c(XIN := x, IN_LOW := 4.0, IN_HIGH := 20.0, OUT_LOW := 0.0, OUT_HIGH := 100.0, CLAMP := b); y := c.XOUT; q := c.OUTSIDE;";
@@ -221,14 +190,7 @@ fn bands_scales_alarms_and_means_are_as_defined() {
         "c : MOVING_AVERAGE;",
         "c(XIN := x, N := 4, RESET := b); y := c.XOUT; q := c.FILLED;",
     );
-    let expected = [
-        (4.0, 4.0),
-        (8.0, 6.0),
-        (0.0, 4.0),
-        (4.0, 4.0),
-        (12.0, 6.0),
-        (0.0, 4.0),
-    ];
+    let expected = [(4.0, 4.0), (8.0, 6.0), (0.0, 4.0), (4.0, 4.0), (12.0, 6.0), (0.0, 4.0)];
     for (at, (x, y)) in expected.into_iter().enumerate() {
         assert_eq!(scan(&mut mean, x, false), (y, at >= 3));
     }

@@ -22,10 +22,7 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
         let path = entry.path();
         if path.is_dir() {
             sources(&path, found);
-        } else if path
-            .extension()
-            .is_some_and(|extension| extension.eq_ignore_ascii_case("st"))
-        {
+        } else if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("st")) {
             found.push(path);
         }
     }
@@ -47,9 +44,7 @@ fn the_corpus_is_read() {
         let (_, found) = parse(&text);
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let is_refused = REFUSED.iter().any(|(refused, _)| name.starts_with(refused));
-        let mut errors = found
-            .iter()
-            .filter(|found| found.severity == Severity::Error);
+        let mut errors = found.iter().filter(|found| found.severity == Severity::Error);
         match errors.next() {
             Some(error) if !is_refused => {
                 let place = Lines::new(&text).position(error.span.start);

@@ -110,10 +110,7 @@ fn other_pointers_are_refused_by_name() {
     for (variables, statements) in [
         ("p : POINTER TO INT;", "p := ADR(x); p := ADR(y);"),
         ("p : POINTER TO INT;", "IF p = 0 THEN x := 1; END_IF;"),
-        (
-            "p : POINTER TO INT; q : POINTER TO INT;",
-            "p := ADR(x); q := p;",
-        ),
+        ("p : POINTER TO INT; q : POINTER TO INT;", "p := ADR(x); q := p;"),
         ("p : POINTER TO INT;", "p := ADR(x); x := SIZEOF(p);"),
     ] {
         refused(&body(variables, statements), &["U1040", "pointers"]);
@@ -126,12 +123,7 @@ fn other_pointers_are_refused_by_name() {
 
 #[test]
 fn narrower_types_keep_the_low_bits_with_a_warning() {
-    once(
-        "x : SINT; y : BYTE;",
-        "d : DINT := 70000;",
-        "x := a + 300; y := d;",
-        "51 112",
-    );
+    once("x : SINT; y : BYTE;", "d : DINT := 70000;", "x := a + 300; y := d;", "51 112");
     warned(
         "PROGRAM main VAR x : INT; y : DINT; END_VAR x := y; END_PROGRAM",
         "DINT becomes INT, which is narrower",
@@ -167,10 +159,7 @@ fn memory_at_addresses_that_overlap_is_refused() {
         ("%MW0 : ARRAY[0..3] OF INT", "%MW2 : INT"),
         ("%ML1 : LREAL", "%MD3 : REAL"),
     ] {
-        refused(
-            &two(first, second),
-            &["U1083", "share a part of the memory"],
-        );
+        refused(&two(first, second), &["U1083", "share a part of the memory"]);
     }
     for (first, second) in [
         ("%MW0 : WORD", "%MW1 : WORD"),
@@ -281,13 +270,7 @@ fn results_of_lists_go_on_behind_labels() {
              {list}
              END_PROGRAM"
         ),
-        &[
-            (&[0], "1 0"),
-            (&[0], "2 0"),
-            (&[0], "3 0"),
-            (&[0], "4 1"),
-            (&[1], "0 0"),
-        ],
+        &[(&[0], "1 0"), (&[0], "2 0"), (&[0], "3 0"), (&[0], "4 1"), (&[1], "0 0")],
     );
     refused(
         "PROGRAM main VAR a : BOOL; n : INT; r : REAL; END_VAR

@@ -12,19 +12,9 @@ fn literals_take_the_type_of_what_stands_beside_them() {
     once("x : LREAL;", "", "x := 1.0 / 3.0;", "0.3333333333333333");
     once("x : LREAL;", "", "x := a * 0.5 + b;", "0.5");
     once("x : DINT;", "", "x := 70000 + a;", "70007");
-    once(
-        "x : WORD; y : BYTE;",
-        "",
-        "x := 16#FF00 OR 3; y := NOT 16#F0;",
-        "65283 15",
-    );
+    once("x : WORD; y : BYTE;", "", "x := 16#FF00 OR 3; y := NOT 16#F0;", "65283 15");
     once("x : LREAL;", "", "x := 1 / 2 + 1.0 / 2;", "0.5");
-    once(
-        "x : BOOL; y : BOOL;",
-        "",
-        "x := 3 > 2.5; y := a = 7 AND b <> 7;",
-        "1 1",
-    );
+    once("x : BOOL; y : BOOL;", "", "x := 3 > 2.5; y := a = 7 AND b <> 7;", "1 1");
     once("x : REAL;", "", "x := SQRT(2.0);", "1.4142135");
 }
 
@@ -32,31 +22,11 @@ fn literals_take_the_type_of_what_stands_beside_them() {
 fn integers_are_promoted_and_compared_by_their_values() {
     once("x : DINT;", "d : DINT := 100000;", "x := a * d;", "700000");
     once("x : BOOL;", "u : UINT := 65535;", "x := b < u;", "1");
-    once(
-        "x : BOOL;",
-        "u : USINT := 200; s : SINT := -1;",
-        "x := s < u;",
-        "1",
-    );
+    once("x : BOOL;", "u : USINT := 200; s : SINT := -1;", "x := s < u;", "1");
     once("x : INT;", "u : UINT := 3;", "x := a + u;", "10");
-    once(
-        "x : INT; y : INT;",
-        "",
-        "x := b / 2; y := b MOD 2;",
-        "-1 -1",
-    );
-    once(
-        "x : WORD;",
-        "w : WORD := 16#00F0;",
-        "x := SHL(w, 4) OR SHR(w, 4);",
-        "3855",
-    );
-    once(
-        "x : INT; y : UINT;",
-        "",
-        "x := -a; y := INT_TO_UINT(b);",
-        "-7 65533",
-    );
+    once("x : INT; y : INT;", "", "x := b / 2; y := b MOD 2;", "-1 -1");
+    once("x : WORD;", "w : WORD := 16#00F0;", "x := SHL(w, 4) OR SHR(w, 4);", "3855");
+    once("x : INT; y : UINT;", "", "x := -a; y := INT_TO_UINT(b);", "-7 65533");
 }
 
 #[test]
@@ -125,30 +95,15 @@ fn standard_functions_take_what_they_are_given() {
         "x := MAX(a, b, 5); y := MIN(IN1 := a, IN2 := b); z := LIMIT(MN := 0, IN := b, MX := 10);",
         "7 -3 0",
     );
-    once(
-        "x : INT; y : INT;",
-        "",
-        "x := SEL(a > b, 1, 2); y := MUX(1, a, b, 3);",
-        "2 -3",
-    );
+    once("x : INT; y : INT;", "", "x := SEL(a > b, 1, 2); y := MUX(1, a, b, 3);", "2 -3");
     once(
         "x : INT; y : BOOL; z : BOOL;",
         "",
         "x := ADD(a, b, 1); y := GT(a, 5, b); z := AND(a = 7, TRUE, b < 0);",
         "5 1 1",
     );
-    once(
-        "x : LREAL; y : LREAL;",
-        "",
-        "x := EXPT(2.0, a); y := 2.0 ** 3;",
-        "128 8",
-    );
-    once(
-        "x : LREAL;",
-        "",
-        "x := ATAN2(1.0, -1.0);",
-        "2.356194490192345",
-    );
+    once("x : LREAL; y : LREAL;", "", "x := EXPT(2.0, a); y := 2.0 ** 3;", "128 8");
+    once("x : LREAL;", "", "x := ATAN2(1.0, -1.0);", "2.356194490192345");
     once(
         "x : INT; y : INT; z : BOOL;",
         "s : STRING[20] := 'abcdef';",
@@ -180,10 +135,7 @@ fn en_and_eno_permit_a_call() {
     let text = "PROGRAM main VAR_INPUT e : BOOL; a : INT; END_VAR VAR_OUTPUT x : INT; ok : BOOL; n : INT; END_VAR
         VAR c : CTU_INT; END_VAR
         x := ADD(EN := e, IN1 := a, IN2 := 1, ENO => ok); c(EN := e, CU := a > 0, PV := 3, CV => n); END_PROGRAM";
-    check(
-        text,
-        &[(&[0, 5], "0 0 0"), (&[1, 5], "6 1 1"), (&[0, 9], "6 0 1")],
-    );
+    check(text, &[(&[0, 5], "0 0 0"), (&[1, 5], "6 1 1"), (&[0, 9], "6 0 1")]);
 }
 
 #[test]
@@ -211,12 +163,7 @@ fn arrays_structures_and_bits_are_memory() {
         "y := w.15; w.1 := a > 0; x := w; d.%B2 := 16#AB; z := d.%B2;",
         "32771 1 171",
     );
-    once(
-        "x : INT;",
-        "i : INT;",
-        "i.0 := TRUE; i.3 := TRUE; x := i;",
-        "9",
-    );
+    once("x : INT;", "i : INT;", "i.0 := TRUE; i.3 := TRUE; x := i;", "9");
 }
 
 #[test]
@@ -244,30 +191,15 @@ fn loops_and_cases_end_where_they_must() {
         "FOR i := 3 TO 1 BY -1 DO x := x * 10 + i; IF i = 2 THEN EXIT; END_IF; END_FOR; y := i;",
         "32 2",
     );
-    once(
-        "x : INT;",
-        "i : BYTE;",
-        "FOR i := 250 TO 255 DO x := x + 1; END_FOR;",
-        "6",
-    );
-    once(
-        "x : INT;",
-        "",
-        "CASE a OF 1..3, 9: x := 1; 4..8: x := 2; ELSE x := 3; END_CASE;",
-        "2",
-    );
+    once("x : INT;", "i : BYTE;", "FOR i := 250 TO 255 DO x := x + 1; END_FOR;", "6");
+    once("x : INT;", "", "CASE a OF 1..3, 9: x := 1; 4..8: x := 2; ELSE x := 3; END_CASE;", "2");
     once(
         "x : INT;",
         "",
         "REPEAT x := x + 1; UNTIL x >= a END_REPEAT; WHILE x > 5 DO x := x - 1; END_WHILE;",
         "5",
     );
-    once(
-        "x : BOOL;",
-        "t : ARRAY [0..1] OF BOOL;",
-        "x := a > 9 AND_THEN t[a] OR_ELSE TRUE;",
-        "1",
-    );
+    once("x : BOOL;", "t : ARRAY [0..1] OF BOOL;", "x := a > 9 AND_THEN t[a] OR_ELSE TRUE;", "1");
 }
 
 #[test]
@@ -300,16 +232,7 @@ fn blocks_are_extended_and_have_methods() {
           IF c THEN n := n + 1; END_IF; IF d THEN m := m + 1; END_IF; END_FUNCTION_BLOCK
         PROGRAM main VAR_INPUT a : BOOL; END_VAR VAR_OUTPUT x : INT; y : INT; END_VAR VAR f : ARRAY [0..1] OF count; END_VAR
         f[1](c := a, d := a, n => x, m => y); END_PROGRAM";
-    check(
-        text,
-        &[
-            (&[0], "0 1"),
-            (&[1], "1 1"),
-            (&[1], "1 1"),
-            (&[0], "1 2"),
-            (&[1], "2 2"),
-        ],
-    );
+    check(text, &[(&[0], "0 1"), (&[1], "1 1"), (&[1], "1 1"), (&[0], "1 2"), (&[1], "2 2")]);
 }
 
 #[test]
@@ -321,11 +244,7 @@ fn globals_addresses_and_tasks() {
         PROGRAM p WITH a : fast; PROGRAM s WITH b : slow; END_RESOURCE END_CONFIGURATION";
     check(text, &[(&[1], "7 106"), (&[1], "8 106"), (&[1], "9 206")]);
     let program = program(text);
-    let names: Vec<&str> = program
-        .inputs
-        .iter()
-        .map(|point| point.name.as_str())
-        .collect();
+    let names: Vec<&str> = program.inputs.iter().map(|point| point.name.as_str()).collect();
     assert_eq!(names, ["p.i", "program.reset"]);
     assert_eq!(program.period, 10_000_000);
     let text = "PROGRAM main VAR a AT %IX0.1 : BOOL; q AT %QW0 : WORD; END_VAR q.0 := a OR %IX0.2; q.1 := %IX0.1; END_PROGRAM";
@@ -377,21 +296,9 @@ fn charts_diverge_by_priority_and_in_parallel() {
         END_PROGRAM";
     check(
         text,
-        &[
-            (&[1, 1], "0 1 1 0"),
-            (&[0, 0], "0 1 1 0"),
-            (&[1, 0], "0 0 0 1"),
-            (&[1, 1], "0 0 0 1"),
-        ],
+        &[(&[1, 1], "0 1 1 0"), (&[0, 0], "0 1 1 0"), (&[1, 0], "0 0 0 1"), (&[1, 1], "0 0 0 1")],
     );
-    check(
-        text,
-        &[
-            (&[1, 0], "1 0 0 0"),
-            (&[0, 1], "0 0 0 0"),
-            (&[0, 1], "0 1 1 0"),
-        ],
-    );
+    check(text, &[(&[1, 0], "1 0 0 0"), (&[0, 1], "0 0 0 0"), (&[0, 1], "0 1 1 0")]);
 }
 
 #[test]
@@ -402,30 +309,14 @@ fn stored_and_delayed_actions_last() {
         ACTION leave: p0 := p0 + 1; END_ACTION END_PROGRAM";
     let text = text.replace("sd(R); sl(R); ds(R);", "ds(N);");
     let on: (&[i64], &str) = (&[1], "0 1 0 0");
-    check(
-        &text,
-        &[
-            on,
-            on,
-            (&[1], "1 0 1 0"),
-            (&[0], "1 0 1 1"),
-            (&[0], "1 0 1 1"),
-        ],
-    );
+    check(&text, &[on, on, (&[1], "1 0 1 0"), (&[0], "1 0 1 1"), (&[0], "1 0 1 1")]);
 }
 
 #[test]
 fn instruction_lists_calculate_call_and_jump() {
     let text = "PROGRAM main VAR_INPUT a : INT; b : INT; END_VAR VAR_OUTPUT x : INT; y : BOOL; z : INT; n : INT; END_VAR VAR c : CTU; k : INT; END_VAR
         LD a\nADD( b\nMUL 2\n)\nST x\nGT 3\nANDN y\nST y\nCAL c(CU := y, PV := 9)\nLD c.CV\nST n\nLD 0\nST z\nST k\nagain:\nLD z\nADD k\nST z\nLD k\nADD 1\nST k\nLE 4\nJMPC again\nLD z\nMAX 3, a\nST z\nEND_PROGRAM";
-    check(
-        text,
-        &[
-            (&[2, 3], "8 1 10 1"),
-            (&[2, 0], "2 0 10 1"),
-            (&[20, 0], "20 1 20 2"),
-        ],
-    );
+    check(text, &[(&[2, 3], "8 1 10 1"), (&[2, 0], "2 0 10 1"), (&[20, 0], "20 1 20 2")]);
 }
 
 #[test]
@@ -433,10 +324,7 @@ fn several_tasks_at_odd_intervals_are_refused() {
     let text = "PROGRAM a END_PROGRAM CONFIGURATION c RESOURCE r ON plc TASK f(INTERVAL := T#10ms, PRIORITY := 1); TASK s(INTERVAL := T#15ms, PRIORITY := 2);
         PROGRAM p WITH f : a; PROGRAM q WITH s : a; END_RESOURCE END_CONFIGURATION";
     let found = read(text, None).1;
-    assert!(
-        shown(text, &found, Severity::Error).starts_with("U1084"),
-        "{found:?}"
-    );
+    assert!(shown(text, &found, Severity::Error).starts_with("U1084"), "{found:?}");
 }
 
 #[test]
@@ -467,26 +355,15 @@ fn a_value_of_case_has_one_label() {
     let warnings = |body: &str| findings("", body, Severity::Warning);
     for (body, words) in [
         ("CASE a OF 1: y := 1; 1: y := 2; END_CASE;", "the value 1"),
-        (
-            "CASE a OF 2..4, 7: y := 1; 3..9: y := 2; END_CASE;",
-            "a value of 3..9",
-        ),
-        (
-            "CASE a OF 5: y := 1; 1..9: y := 2; END_CASE;",
-            "a value of 1..9",
-        ),
+        ("CASE a OF 2..4, 7: y := 1; 3..9: y := 2; END_CASE;", "a value of 3..9"),
+        ("CASE a OF 5: y := 1; 1..9: y := 2; END_CASE;", "a value of 1..9"),
     ] {
         let found = warnings(body);
         assert!(found.contains("U1036") && found.contains(words), "{found}");
     }
     let found = warnings("CASE a OF 2..4, 7: y := 1; 1, 5..6, 8: y := 2; END_CASE;");
     assert!(!found.contains("U1036"), "{found}");
-    once(
-        "x : INT;",
-        "",
-        "CASE a OF 7: x := 1; 5..9: x := 2; END_CASE;",
-        "1",
-    );
+    once("x : INT;", "", "CASE a OF 7: x := 1; 5..9: x := 2; END_CASE;", "1");
 }
 
 #[test]

@@ -64,10 +64,7 @@ fn files_of_other_people_are_taken_or_refused_with_a_reason() {
         };
         // Of several programs without a CONFIGURATION, each is chosen.
         let (file, _) = understudy_structured_text::parse(&text);
-        let programs = file
-            .units
-            .iter()
-            .filter(|unit| unit.kind == UnitKind::Program);
+        let programs = file.units.iter().filter(|unit| unit.kind == UnitKind::Program);
         let mut choices: Vec<Option<&str>> =
             programs.map(|unit| Some(unit.name.as_str())).collect();
         if choices.len() < 2 || !file.instances.is_empty() {
@@ -77,9 +74,7 @@ fn files_of_other_people_are_taken_or_refused_with_a_reason() {
         for choice in choices {
             let (lowered, found) = running::read(&text, choice);
             errors.push_str(&running::shown(&text, &found, Severity::Error));
-            warnings += running::shown(&text, &found, Severity::Warning)
-                .lines()
-                .count();
+            warnings += running::shown(&text, &found, Severity::Warning).lines().count();
             if let Some(program) = lowered.program {
                 exercise(program);
                 is_program = true;

@@ -32,10 +32,7 @@ fn every_conversion_is_there() {
     for from in all() {
         for to in all().filter(|to| *to != from) {
             let variables = format!("a : {from}; b : {to};");
-            for body in [
-                format!("b := {from}_TO_{to}(a);"),
-                format!("b := TO_{to}(a);"),
-            ] {
+            for body in [format!("b := {from}_TO_{to}(a);"), format!("b := TO_{to}(a);")] {
                 table += &wrong(&variables, &body);
             }
         }
@@ -72,12 +69,7 @@ fn every_conversion_is_there() {
             table += &wrong(&variables, &format!("b := {text}_TO_{number}(a);"));
         }
     }
-    for (short, long) in [
-        ("TIME", "LTIME"),
-        ("DATE", "LDATE"),
-        ("TOD", "LTOD"),
-        ("DT", "LDT"),
-    ] {
+    for (short, long) in [("TIME", "LTIME"), ("DATE", "LDATE"), ("TOD", "LTOD"), ("DT", "LDT")] {
         let variables = format!("a : {short}; b : {long};");
         table += &wrong(&variables, &format!("b := {short}_TO_{long}(a);"));
         table += &wrong(&variables, &format!("a := {long}_TO_{short}(b);"));
@@ -112,9 +104,8 @@ fn every_function_of_the_tables_is_there() {
         }
     };
     let reals = ["REAL", "LREAL"];
-    for function in [
-        "ABS", "SQRT", "LN", "LOG", "EXP", "SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN",
-    ] {
+    for function in ["ABS", "SQRT", "LN", "LOG", "EXP", "SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN"]
+    {
         each(&reals, &format!("a := {function}(b);"));
         each(&reals, &format!("a := {function}(IN := b);"));
         each(&reals, &format!("a := {function}_TYPE(b);"));
@@ -122,10 +113,7 @@ fn every_function_of_the_tables_is_there() {
     each(&NUMBERS[..8], "a := ABS(b);");
     each(&reals, "a := ATAN2(b, c); a := ATAN2(Y := b, X := c);");
     for function in ["ADD", "MUL", "MAX", "MIN"] {
-        each(
-            &NUMBERS,
-            &format!("a := {function}(a, b, c); a := {function}(IN1 := a, IN2 := b);"),
-        );
+        each(&NUMBERS, &format!("a := {function}(a, b, c); a := {function}(IN1 := a, IN2 := b);"));
         each(&NUMBERS[..8], &format!("a := {function}_TYPE(a, b);"));
     }
     for function in ["SUB", "DIV"] {
@@ -135,31 +123,12 @@ fn every_function_of_the_tables_is_there() {
     each(&NUMBERS[..8], "a := MOD(a, b); a := a MOD b;");
     each(&reals, "a := EXPT(a, b); a := EXPT(a, n); a := a ** n;");
     let bits = ["BYTE", "WORD", "DWORD", "LWORD"];
-    each(
-        &bits,
-        "a := SHL(b, n); a := SHR(IN := b, N := n); a := ROL(b, 3); a := ROR(b, n);",
-    );
-    each(
-        &bits,
-        "a := AND(a, b, c); a := OR(a, b); a := XOR(a, b, c); a := NOT(a); a := a & b;",
-    );
-    each(
-        &["BOOL"],
-        "a := AND(a, b, c); a := OR(a, b); a := XOR(a, b); a := NOT a;",
-    );
-    let every: Vec<&str> = NUMBERS
-        .into_iter()
-        .chain(TIMES)
-        .chain(["BOOL", "STRING"])
-        .collect();
-    each(
-        &every,
-        "a := MOVE(b); a := SEL(g, a, b); a := SEL(G := g, IN0 := a, IN1 := b);",
-    );
-    each(
-        &every,
-        "a := MUX(n, a, b, c); a := MUX(K := n, IN0 := a, IN1 := b);",
-    );
+    each(&bits, "a := SHL(b, n); a := SHR(IN := b, N := n); a := ROL(b, 3); a := ROR(b, n);");
+    each(&bits, "a := AND(a, b, c); a := OR(a, b); a := XOR(a, b, c); a := NOT(a); a := a & b;");
+    each(&["BOOL"], "a := AND(a, b, c); a := OR(a, b); a := XOR(a, b); a := NOT a;");
+    let every: Vec<&str> = NUMBERS.into_iter().chain(TIMES).chain(["BOOL", "STRING"]).collect();
+    each(&every, "a := MOVE(b); a := SEL(g, a, b); a := SEL(G := g, IN0 := a, IN1 := b);");
+    each(&every, "a := MUX(n, a, b, c); a := MUX(K := n, IN0 := a, IN1 := b);");
     each(
         &every,
         "a := MAX(a, b, c); a := MIN(a, b); a := LIMIT(a, b, c); a := LIMIT(MN := a, IN := b, MX := c);",
@@ -193,14 +162,8 @@ fn every_block_of_the_tables_is_there() {
     for of in ["", "_INT", "_DINT", "_LINT", "_UINT", "_UDINT", "_ULINT"] {
         let number = of.strip_prefix('_').unwrap_or("INT");
         for (block, body) in [
-            (
-                "CTU",
-                "b(CU := TRUE, R := FALSE, PV := v); q := b.Q; v := b.CV;",
-            ),
-            (
-                "CTD",
-                "b(CD := TRUE, LD := FALSE, PV := v); q := b.Q; v := b.CV;",
-            ),
+            ("CTU", "b(CU := TRUE, R := FALSE, PV := v); q := b.Q; v := b.CV;"),
+            ("CTD", "b(CD := TRUE, LD := FALSE, PV := v); q := b.Q; v := b.CV;"),
             (
                 "CTUD",
                 "b(CU := TRUE, CD := q, R := q, LD := q, PV := v); q := b.QU OR b.QD; v := b.CV;",

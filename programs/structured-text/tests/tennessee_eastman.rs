@@ -176,10 +176,7 @@ fn process() -> Running {
         let _ = write!(body, "p.VALVE[{valve}] := {position:?}; ");
     }
     for (valve, position) in moved {
-        let _ = write!(
-            body,
-            "IF moved THEN p.VALVE[{valve}] := {position:?}; END_IF; "
-        );
+        let _ = write!(body, "IF moved THEN p.VALVE[{valve}] := {position:?}; END_IF; ");
     }
     body += "p(STEP_TIME := 0.9); slope := p.GREATEST_SLOPE; ";
     for measurement in 1..=41 {

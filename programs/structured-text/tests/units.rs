@@ -31,10 +31,7 @@ fn nine_of_ten_units_of_oscat_are_taken() {
     let (_, found) = read(&text, None);
     let lines = Lines::new(&text);
     let mut refused: BTreeMap<&str, BTreeSet<String>> = BTreeMap::new();
-    for error in found
-        .iter()
-        .filter(|found| found.severity == Severity::Error)
-    {
+    for error in found.iter().filter(|found| found.severity == Severity::Error) {
         let place = error.span.start;
         let mut units = file.units.iter();
         if let Some(unit) = units.find(|unit| unit.span.contains(&place)) {

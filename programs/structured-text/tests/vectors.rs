@@ -33,12 +33,7 @@ fn numbers_are_those_of_another_compiler() {
     for (name, vector) in vectors.as_object().expect("an object") {
         let mut running = Running::new(program(&text(folder.join(format!("{name}.st")))));
         let (inputs, outputs) = (running.inputs(), running.outputs());
-        for (scan, line) in vector["scans"]
-            .as_array()
-            .expect("scans")
-            .iter()
-            .enumerate()
-        {
+        for (scan, line) in vector["scans"].as_array().expect("scans").iter().enumerate() {
             let line = line.as_str().expect("a line");
             let (given, expected) = line.split_once(" -> ").expect("inputs -> outputs");
             let given: Vec<&str> = given.split(' ').collect();
@@ -55,11 +50,7 @@ fn numbers_are_those_of_another_compiler() {
                     false => written(point.of, found) == expected,
                 };
                 let shown = written(point.of, found);
-                assert!(
-                    is_equal,
-                    "{name} scan {scan} {}: {shown} is not {expected}",
-                    point.name
-                );
+                assert!(is_equal, "{name} scan {scan} {}: {shown} is not {expected}", point.name);
             }
             scans += 1;
         }

@@ -32,10 +32,7 @@ pub struct InvalidDuration {
 
 impl InvalidDuration {
     fn new(text: &str, expected: impl Into<String>) -> Self {
-        Self {
-            text: text.to_owned(),
-            expected: expected.into(),
-        }
+        Self { text: text.to_owned(), expected: expected.into() }
     }
 }
 
@@ -79,10 +76,7 @@ pub fn parse_positive(text: &str) -> Result<Duration, InvalidDuration> {
 pub fn parse_up_to(text: &str, most: Duration) -> Result<Duration, InvalidDuration> {
     let duration = parse(text)?;
     if duration > most {
-        return Err(InvalidDuration::new(
-            text,
-            format!("at most {}", self::text(most)),
-        ));
+        return Err(InvalidDuration::new(text, format!("at most {}", self::text(most))));
     }
     Ok(duration)
 }

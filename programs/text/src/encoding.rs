@@ -27,11 +27,7 @@ pub enum NotText {
 impl fmt::Display for NotText {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Invalid {
-                encoding,
-                offset,
-                line,
-            } => write!(
+            Self::Invalid { encoding, offset, line } => write!(
                 formatter,
                 "byte {offset}, in line {line}, is not {encoding}; save the file as UTF-8"
             ),
@@ -128,9 +124,7 @@ fn declared(bytes: &[u8]) -> Result<Encoding, NotText> {
     let blank = bytes.iter().take_while(|byte| byte.is_ascii_whitespace());
     let start = &bytes[blank.count()..];
     let start = String::from_utf8_lossy(&start[..start.len().min(400)]);
-    let Some((declaration, _)) = start
-        .strip_prefix("<?xml")
-        .and_then(|rest| rest.split_once("?>"))
+    let Some((declaration, _)) = start.strip_prefix("<?xml").and_then(|rest| rest.split_once("?>"))
     else {
         return Ok(Encoding::Utf8);
     };
@@ -146,9 +140,7 @@ fn declared(bytes: &[u8]) -> Result<Encoding, NotText> {
         "us-ascii" | "ascii" => Ok(Encoding::Ascii),
         "iso-8859-1" | "iso_8859-1" | "iso8859-1" | "latin1" | "latin-1" => Ok(Encoding::Latin1),
         "windows-1252" | "cp1252" => Ok(Encoding::Windows1252),
-        _ => Err(NotText::Unknown {
-            declared: name.to_owned(),
-        }),
+        _ => Err(NotText::Unknown { declared: name.to_owned() }),
     }
 }
 
@@ -175,11 +167,7 @@ mod tests {
 
     fn utf_16(text: &str, big: bool) -> Vec<u8> {
         let bytes = |unit: u16| {
-            if big {
-                unit.to_be_bytes()
-            } else {
-                unit.to_le_bytes()
-            }
+            if big { unit.to_be_bytes() } else { unit.to_le_bytes() }
         };
         text.encode_utf16().flat_map(bytes).collect()
     }

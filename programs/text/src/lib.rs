@@ -77,15 +77,7 @@ impl Diagnostic {
     }
 
     fn new(severity: Severity, code: &'static str, message: String, span: Range<usize>) -> Self {
-        Self {
-            code,
-            severity,
-            message,
-            span,
-            label: None,
-            related: Vec::new(),
-            help: None,
-        }
+        Self { code, severity, message, span, label: None, related: Vec::new(), help: None }
     }
 
     /// Adds the short text at the span.
@@ -98,10 +90,7 @@ impl Diagnostic {
     /// Adds a second place.
     #[must_use]
     pub fn with_related(mut self, span: Range<usize>, message: impl Into<String>) -> Self {
-        self.related.push(Related {
-            span,
-            message: message.into(),
-        });
+        self.related.push(Related { span, message: message.into() });
         self
     }
 
@@ -138,9 +127,7 @@ impl Report {
 
 /// True where at least one of `diagnostics` is an error.
 pub fn has_errors(diagnostics: &[Diagnostic]) -> bool {
-    diagnostics
-        .iter()
-        .any(|diagnostic| diagnostic.severity == Severity::Error)
+    diagnostics.iter().any(|diagnostic| diagnostic.severity == Severity::Error)
 }
 
 /// A place in a text, both counted from 1.

@@ -16,10 +16,7 @@ impl<'t> Lines<'t> {
     /// The lines of `text`.
     pub fn new(text: &'t str) -> Self {
         let behind = text.match_indices('\n').map(|(newline, _)| newline + 1);
-        Self {
-            text,
-            starts: std::iter::once(0).chain(behind).collect(),
-        }
+        Self { text, starts: std::iter::once(0).chain(behind).collect() }
     }
 
     /// The nearest byte at or before `offset` where a character begins, or the end of the text.

@@ -49,12 +49,7 @@ pub fn pages() -> impl Iterator<Item = Page> {
         sections.map(move |section| {
             let (heading, text) = section.split_once('\n').unwrap_or((section, ""));
             let (code, title) = heading.split_once(": ").unwrap_or((heading, ""));
-            Page {
-                code,
-                title,
-                text: text.trim(),
-                group,
-            }
+            Page { code, title, text: text.trim(), group }
         })
     })
 }
@@ -73,12 +68,7 @@ mod tests {
         let all: Vec<Page> = pages().collect();
         assert!(all.len() > 200, "{}", all.len());
         for pair in all.windows(2) {
-            assert!(
-                pair[0].code < pair[1].code,
-                "{} is before {}",
-                pair[0].code,
-                pair[1].code
-            );
+            assert!(pair[0].code < pair[1].code, "{} is before {}", pair[0].code, pair[1].code);
         }
         for page in all {
             let digits = page.code.strip_prefix('U').unwrap_or_default();
@@ -89,11 +79,7 @@ mod tests {
             );
             let group = format!("# {}: ", &page.code[..3]);
             assert!(page.group.starts_with(&group), "{}", page.code);
-            assert!(
-                !page.title.is_empty() && !page.title.ends_with('.'),
-                "{}",
-                page.code
-            );
+            assert!(!page.title.is_empty() && !page.title.ends_with('.'), "{}", page.code);
             assert!(!page.text.is_empty(), "{}", page.code);
         }
     }

@@ -63,10 +63,7 @@ impl Diagnostic {
                     message: label(&related.message),
                 })
                 .collect(),
-            help: self
-                .help
-                .as_ref()
-                .map(|help| shortened(help, MAXIMUM_MESSAGE).into_owned()),
+            help: self.help.as_ref().map(|help| shortened(help, MAXIMUM_MESSAGE).into_owned()),
         }
     }
 }
@@ -84,9 +81,7 @@ impl Report {
         chosen.sort_by_key(|(place, _)| *place);
         let mut shown: Vec<Diagnostic> = chosen.iter().map(|(_, found)| found.bounded()).collect();
         let left = |severity| {
-            let kept = chosen
-                .iter()
-                .filter(|(_, found)| found.severity == severity);
+            let kept = chosen.iter().filter(|(_, found)| found.severity == severity);
             of(severity).count() - kept.count()
         };
         let (errors, warnings) = (left(Severity::Error), left(Severity::Warning));
@@ -95,18 +90,10 @@ impl Report {
             (errors, 0) => number(errors, "error"),
             (0, warnings) => number(warnings, "warning"),
             (errors, warnings) => {
-                format!(
-                    "{} and {}",
-                    number(errors, "error"),
-                    number(warnings, "warning")
-                )
+                format!("{} and {}", number(errors, "error"), number(warnings, "warning"))
             }
         };
-        let severity = if errors > 0 {
-            Severity::Error
-        } else {
-            Severity::Warning
-        };
+        let severity = if errors > 0 { Severity::Error } else { Severity::Warning };
         let verb = if errors + warnings == 1 { "is" } else { "are" };
         let message = format!("{message} of this file {verb} not shown");
         let rest = Diagnostic::new(severity, LEFT_OUT, message, 0..0);
@@ -162,13 +149,7 @@ mod tests {
             assert_eq!(last.map(|found| found.message.as_str()), rest);
         };
         check(3, 2, 5, [3, 2], None);
-        check(
-            3,
-            2,
-            4,
-            [3, 1],
-            Some("1 more warning of this file is not shown"),
-        );
+        check(3, 2, 4, [3, 1], Some("1 more warning of this file is not shown"));
         check(
             3,
             2,
@@ -177,20 +158,8 @@ mod tests {
             Some("2 more errors and 2 more warnings of this file are not shown"),
         );
         check(0, 0, 0, [0, 0], None);
-        check(
-            2,
-            0,
-            0,
-            [0, 0],
-            Some("2 more errors of this file are not shown"),
-        );
-        check(
-            500,
-            0,
-            1_000,
-            [100, 0],
-            Some("400 more errors of this file are not shown"),
-        );
+        check(2, 0, 0, [0, 0], Some("2 more errors of this file are not shown"));
+        check(500, 0, 1_000, [100, 0], Some("400 more errors of this file are not shown"));
     }
 
     #[test]

@@ -42,10 +42,8 @@ pub fn parse<'t>(
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<Spanned<DeTable<'t>>> {
     if text.len() > MAXIMUM_TEXT_BYTES {
-        let message = format!(
-            "the file has {} bytes; at most {MAXIMUM_TEXT_BYTES} are read",
-            text.len()
-        );
+        let message =
+            format!("the file has {} bytes; at most {MAXIMUM_TEXT_BYTES} are read", text.len());
         diagnostics.push(Diagnostic::error(codes.no_toml, message, 0..0));
         return None;
     }

@@ -6,13 +6,10 @@ use std::process::{Command, Stdio};
 
 use understudy_text::duration::{parse, pattern};
 
-const NUMBERS: [&str; 11] = [
-    "", "0", "7", "10", "007", "1.5", "0.25", "1.", ".5", "-1", "1e3",
-];
+const NUMBERS: [&str; 11] = ["", "0", "7", "10", "007", "1.5", "0.25", "1.", ".5", "-1", "1e3"];
 
-const UNITS: [&str; 14] = [
-    "", "d", "h", "m", "min", "s", "ms", "us", "ns", "S", "sec", "y", "µs", "%",
-];
+const UNITS: [&str; 14] =
+    ["", "d", "h", "m", "min", "s", "ms", "us", "ns", "S", "sec", "y", "µs", "%"];
 
 /// Each number with each unit, with and without a blank, and pairs of such parts.
 fn spellings() -> BTreeSet<String> {
@@ -64,15 +61,9 @@ fn matched(spellings: &BTreeSet<String>) -> BTreeSet<&String> {
     let mut stdin = grep.stdin.take().expect("a pipe");
     let writer = std::thread::spawn(move || stdin.write_all(input.as_bytes()));
     let output = grep.wait_with_output().expect("grep ends");
-    writer
-        .join()
-        .expect("no panic")
-        .expect("grep reads all lines");
+    writer.join().expect("no panic").expect("grep reads all lines");
     let output = String::from_utf8(output.stdout).expect("text");
-    let number = |line: &str| {
-        line.split_once(':')
-            .and_then(|(number, _)| number.parse().ok())
-    };
+    let number = |line: &str| line.split_once(':').and_then(|(number, _)| number.parse().ok());
     let found: Vec<usize> = output.lines().filter_map(number).collect();
     found.into_iter().map(|number| lines[number - 1]).collect()
 }

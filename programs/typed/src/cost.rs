@@ -42,9 +42,7 @@ impl Cost {
         let tasks = program.tasks.iter();
         let of_tasks: Vec<Each> = tasks.map(|task| costs.of(task.routine)).collect();
         Self {
-            straight: of_tasks
-                .iter()
-                .fold(0, |sum, each| sum.saturating_add(each.straight)),
+            straight: of_tasks.iter().fold(0, |sum, each| sum.saturating_add(each.straight)),
             loops: sum(of_tasks.iter().map(|each| each.loops)),
             budget: program.budget,
             dearest_turn: costs.dearest_turn(program),
@@ -74,22 +72,14 @@ struct Each {
     loops: Option<u64>,
 }
 
-const NOTHING: Each = Each {
-    straight: 0,
-    loops: Some(0),
-};
+const NOTHING: Each = Each { straight: 0, loops: Some(0) };
 
 fn straight(operations: u64) -> Each {
-    Each {
-        straight: operations,
-        loops: Some(0),
-    }
+    Each { straight: operations, loops: Some(0) }
 }
 
 fn sum(costs: impl IntoIterator<Item = Option<u64>>) -> Option<u64> {
-    costs
-        .into_iter()
-        .try_fold(0_u64, |sum, cost| Some(sum.saturating_add(cost?)))
+    costs.into_iter().try_fold(0_u64, |sum, cost| Some(sum.saturating_add(cost?)))
 }
 
 impl Each {
@@ -118,9 +108,7 @@ pub(crate) struct Costs {
 
 impl Costs {
     pub(crate) fn new(program: &Program) -> Self {
-        let mut costs = Self {
-            routines: vec![None; program.routines.len()],
-        };
+        let mut costs = Self { routines: vec![None; program.routines.len()] };
         for index in 0..program.routines.len() {
             costs.add(program, index);
         }
@@ -167,9 +155,7 @@ impl Costs {
         let turn = match statement {
             StatementKind::For(each) => straight(2).and(self.statements(&each.body)),
             StatementKind::While(condition, body) | StatementKind::Repeat(body, condition) => {
-                straight(1)
-                    .and(self.expression(condition))
-                    .and(self.statements(body))
+                straight(1).and(self.expression(condition)).and(self.statements(body))
             }
             _ => return None,
         };
@@ -183,9 +169,9 @@ impl Costs {
 
     fn statement(&self, statement: &StatementKind) -> Each {
         match statement {
-            StatementKind::Assign(place, value) => straight(copied(&place.of))
-                .and(self.place(place))
-                .and(self.expression(value)),
+            StatementKind::Assign(place, value) => {
+                straight(copied(&place.of)).and(self.place(place)).and(self.expression(value))
+            }
             StatementKind::Bind(slot, place) => {
                 straight(1).and(self.place(slot)).and(self.place(place))
             }
@@ -214,16 +200,10 @@ impl Costs {
             }
             StatementKind::For(each) => self.repeated(each),
             StatementKind::While(condition, _) => {
-                let unknown = Each {
-                    straight: 1,
-                    loops: None,
-                };
+                let unknown = Each { straight: 1, loops: None };
                 unknown.and(self.expression(condition))
             }
-            StatementKind::Repeat(..) => Each {
-                straight: 1,
-                loops: None,
-            },
+            StatementKind::Repeat(..) => Each { straight: 1, loops: None },
             StatementKind::Exit | StatementKind::Continue | StatementKind::Return => straight(1),
         }
     }
@@ -240,17 +220,12 @@ impl Costs {
         once.into_iter()
             .map(|expression| self.expression(expression))
             .fold(self.place(&each.counter), Each::and)
-            .and(Each {
-                straight: 2,
-                loops: loops.map(|(turns, turn)| turns.saturating_mul(turn)),
-            })
+            .and(Each { straight: 2, loops: loops.map(|(turns, turn)| turns.saturating_mul(turn)) })
     }
 
     fn place(&self, place: &Place) -> Each {
         let indices = place.indices.iter();
-        indices.fold(NOTHING, |sum, index| {
-            sum.and(straight(1)).and(self.expression(&index.value))
-        })
+        indices.fold(NOTHING, |sum, index| sum.and(straight(1)).and(self.expression(&index.value)))
     }
 
     fn expression(&self, expression: &Expression) -> Each {
@@ -322,11 +297,7 @@ fn turns(each: &For) -> Option<u64> {
         ExpressionKind::Constant(stored) => Some(of.signed(stored)),
         _ => None,
     };
-    let (from, to, by) = (
-        constant(&each.from)?,
-        constant(&each.to)?,
-        constant(&each.by)?,
-    );
+    let (from, to, by) = (constant(&each.from)?, constant(&each.to)?, constant(&each.by)?);
     if !each.counter.indices.is_empty()
         || each.counter.is_by_reference()
         || by == 0
@@ -335,11 +306,7 @@ fn turns(each: &For) -> Option<u64> {
         return None;
     }
     let distance = if by > 0 { to - from } else { from - to };
-    let turns = if distance < 0 {
-        0
-    } else {
-        distance / by.abs() + 1
-    };
+    let turns = if distance < 0 { 0 } else { distance / by.abs() + 1 };
     Some(u64::try_from(turns).unwrap_or(u64::MAX))
 }
 

@@ -101,23 +101,11 @@ impl Cause {
                     .and_then(|index| Elementary::ALL.get(index))
                     .unwrap_or(&Elementary::Ulint),
             },
-            2 => Self::IndexOutOfRange {
-                index: first as i64,
-                bound: second as i64,
-            },
-            3 => Self::NoSuchOperand {
-                number: first as i64,
-                count: second,
-            },
-            4 => Self::TextTooLong {
-                length: first,
-                capacity: second,
-            },
+            2 => Self::IndexOutOfRange { index: first as i64, bound: second as i64 },
+            3 => Self::NoSuchOperand { number: first as i64, count: second },
+            4 => Self::TextTooLong { length: first, capacity: second },
             5 => Self::BudgetExceeded { budget: first },
-            6 => Self::OutputNotFinite {
-                output: first,
-                value: second,
-            },
+            6 => Self::OutputNotFinite { output: first, value: second },
             7 => Self::UnboundReference { address: first },
             other => Self::Unknown(other),
         }
@@ -158,9 +146,7 @@ impl Fault {
     /// # Panics
     /// If the state is shorter than [`Program::HEADER`].
     pub fn write(&self, state: &mut [u64]) {
-        let routine = self
-            .routine
-            .map_or(0, |routine| u64::from(routine.0 & 0xff_ffff) + 1);
+        let routine = self.routine.map_or(0, |routine| u64::from(routine.0 & 0xff_ffff) + 1);
         state[0] =
             u64::from(self.cause.code()) | (routine & 0xff_ffff) << 8 | u64::from(self.line) << 32;
         let [first, second] = self.cause.values();
@@ -169,9 +155,7 @@ impl Fault {
 
     /// What an operator reads: where, what, the values.
     pub fn describe(&self, program: &Program) -> String {
-        let routine = self
-            .routine
-            .and_then(|routine| program.routines.get(routine.0 as usize));
+        let routine = self.routine.and_then(|routine| program.routines.get(routine.0 as usize));
         let what = self.what(program);
         match routine {
             Some(routine) if self.line > 0 => {
@@ -209,9 +193,8 @@ impl Fault {
                 let point = usize::try_from(output)
                     .ok()
                     .and_then(|output| program.outputs.iter().nth(output));
-                let (name, of) = point.map_or(("?", Elementary::Lreal), |point| {
-                    (point.name.as_str(), point.of)
-                });
+                let (name, of) =
+                    point.map_or(("?", Elementary::Lreal), |point| (point.name.as_str(), point.of));
                 format!(
                     "output {name} is {}, which is not a finite number",
                     number_text::write(of, value)
@@ -232,27 +215,12 @@ mod tests {
     #[test]
     fn a_fault_is_read_as_it_was_written() {
         let causes = [
-            Cause::DivisionByZero {
-                dividend: 0xfff9,
-                of: Elementary::Int,
-            },
-            Cause::IndexOutOfRange {
-                index: -3,
-                bound: 1,
-            },
-            Cause::NoSuchOperand {
-                number: 7,
-                count: 3,
-            },
-            Cause::TextTooLong {
-                length: 81,
-                capacity: 80,
-            },
+            Cause::DivisionByZero { dividend: 0xfff9, of: Elementary::Int },
+            Cause::IndexOutOfRange { index: -3, bound: 1 },
+            Cause::NoSuchOperand { number: 7, count: 3 },
+            Cause::TextTooLong { length: 81, capacity: 80 },
             Cause::BudgetExceeded { budget: 1_000 },
-            Cause::OutputNotFinite {
-                output: 0,
-                value: f64::INFINITY.to_bits(),
-            },
+            Cause::OutputNotFinite { output: 0, value: f64::INFINITY.to_bits() },
             Cause::UnboundReference { address: 0 },
         ];
         let mut program = Program::default();
@@ -260,11 +228,8 @@ mod tests {
         let told: Vec<String> = causes
             .into_iter()
             .map(|cause| {
-                let fault = Fault {
-                    cause,
-                    routine: Some(RoutineId(0xff_fffd)),
-                    line: 4_000_000_000,
-                };
+                let fault =
+                    Fault { cause, routine: Some(RoutineId(0xff_fffd)), line: 4_000_000_000 };
                 let mut state = [0; 4];
                 fault.write(&mut state);
                 assert_eq!(Fault::read(&state), Some(fault));

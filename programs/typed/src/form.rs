@@ -268,14 +268,7 @@ pub struct Place {
 impl Place {
     /// A variable.
     pub fn new(root: Root, of: Type) -> Self {
-        Self {
-            root,
-            offset: 0,
-            bit: 0,
-            is_packed: false,
-            indices: Vec::new(),
-            of,
-        }
+        Self { root, offset: 0, bit: 0, is_packed: false, indices: Vec::new(), of }
     }
 
     /// Bits from its root to the end of what it may mean, whatever the values of its indices; saturates.
@@ -294,10 +287,7 @@ impl Place {
 
     /// The slot at the place, for an address that it holds.
     pub(crate) fn holder(&self) -> Self {
-        Self {
-            of: Type::Elementary(Elementary::Lword),
-            ..self.clone()
-        }
+        Self { of: Type::Elementary(Elementary::Lword), ..self.clone() }
     }
 
     /// Whether it is found through an address that is stored.

@@ -52,12 +52,7 @@ impl Points {
     pub fn push(&mut self, name: impl Into<String>, of: Elementary, slot: u32) {
         let bit = self.width.next_multiple_of(of.bits());
         self.width = bit + of.bits();
-        self.points.push(Point {
-            name: name.into(),
-            of,
-            bit,
-            slot,
-        });
+        self.points.push(Point { name: name.into(), of, bit, slot });
     }
 
     /// The point of a name.
@@ -76,10 +71,7 @@ impl Points {
         let mut names = vec![String::new(); self.width()];
         for point in &self.points {
             let first = point.bit as usize;
-            for (place, name) in names[first..][..point.of.bits() as usize]
-                .iter_mut()
-                .enumerate()
-            {
+            for (place, name) in names[first..][..point.of.bits() as usize].iter_mut().enumerate() {
                 *name = match point.of {
                     Elementary::Bool => point.name.clone(),
                     _ => format!("{}.{place}", point.name),

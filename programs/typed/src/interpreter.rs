@@ -51,11 +51,7 @@ struct Context {
 impl Interpreter {
     /// Takes a valid program.
     pub fn new(program: &Program) -> Self {
-        Self {
-            program: program.clone(),
-            costs: Costs::new(program),
-            frame: Frame::new(program),
-        }
+        Self { program: program.clone(), costs: Costs::new(program), frame: Frame::new(program) }
     }
 
     /// Width of u in bits.
@@ -117,10 +113,7 @@ impl Interpreter {
         let scans = run.memory.slots()[crate::scan::SCANS];
         for task in self.frame.tasks() {
             if scans.is_multiple_of(u64::from(task.every.max(1))) {
-                let context = Context {
-                    routine: task.routine,
-                    own: u64::from(task.own),
-                };
+                let context = Context { routine: task.routine, own: u64::from(task.own) };
                 run.clear_frame(task.routine);
                 run.body(context)?;
             }
@@ -160,11 +153,7 @@ impl Run<'_> {
 
     fn statement(&mut self, context: Context, statement: &Statement) -> Result<Flow, Fault> {
         let line = statement.line;
-        let fault = |cause| Fault {
-            cause,
-            routine: Some(context.routine),
-            line,
-        };
+        let fault = |cause| Fault { cause, routine: Some(context.routine), line };
         match &statement.kind {
             StatementKind::Assign(place, value) => {
                 let reads = self.mark();
@@ -182,10 +171,7 @@ impl Run<'_> {
             StatementKind::Invoke(routine, place) => {
                 let Address(address) = self.address(context, line, place)?;
                 self.clear_frame(*routine);
-                self.body(Context {
-                    routine: *routine,
-                    own: address / 64,
-                })?;
+                self.body(Context { routine: *routine, own: address / 64 })?;
             }
             StatementKind::Evaluate(expression) => {
                 self.value(context, line, expression)?;
@@ -287,9 +273,7 @@ impl Run<'_> {
     fn charge(&mut self, statement: &Statement) -> Result<(), Cause> {
         let turn = self.costs.turn(&statement.kind).unwrap_or(0);
         let rest = self.budget.checked_sub(turn);
-        self.budget = rest.ok_or(Cause::BudgetExceeded {
-            budget: self.program.budget,
-        })?;
+        self.budget = rest.ok_or(Cause::BudgetExceeded { budget: self.program.budget })?;
         Ok(())
     }
 }

@@ -182,14 +182,8 @@ impl Compiled {
         *row.slot(self.memory as u32) = self.frame.elapsed(state);
         self.frame.unpack(inputs, row);
         let scans = row.get(SCANS as u32);
-        let mut run = Run {
-            code,
-            tables: &self.tables,
-            row,
-            texts,
-            returns,
-            budget: self.tables.budget,
-        };
+        let mut run =
+            Run { code, tables: &self.tables, row, texts, returns, budget: self.tables.budget };
         for (task, &start) in self.frame.tasks().iter().zip(&self.tasks) {
             if task.every <= 1 || scans.is_multiple_of(u64::from(task.every)) {
                 let run = run.run::<OWN>(start, 0);
@@ -203,9 +197,7 @@ impl Compiled {
 impl Tables {
     /// Where the statement of an instruction stands.
     fn fault(&self, stop: &execute::Stop) -> Fault {
-        let behind = self
-            .lines
-            .partition_point(|&(first, ..)| first as usize <= stop.at);
+        let behind = self.lines.partition_point(|&(first, ..)| first as usize <= stop.at);
         let statement = behind.checked_sub(1).map(|index| self.lines[index]);
         Fault {
             cause: stop.cause,

@@ -53,11 +53,7 @@ impl Program {
                     let fields = &self.structures.get(id.0 as usize)?.fields;
                     let field = fields.iter().find(|field| {
                         let first = u64::from(field.slot);
-                        let slots = if field.is_reference {
-                            1
-                        } else {
-                            field.of.slots()
-                        };
+                        let slots = if field.is_reference { 1 } else { field.of.slots() };
                         (first..first.saturating_add(slots)).contains(&(within / 64))
                     })?;
                     // What lies there is an address, and the variable elsewhere.
@@ -152,10 +148,8 @@ fn indices(array: &Array, element: u64) -> Option<String> {
 
 /// The element of indices such as `3` or `1, 2`.
 fn element(array: &Array, indices: &str) -> Option<u64> {
-    let indices: Vec<i64> = indices
-        .split(',')
-        .map(|index| index.trim().parse().ok())
-        .collect::<Option<_>>()?;
+    let indices: Vec<i64> =
+        indices.split(',').map(|index| index.trim().parse().ok()).collect::<Option<_>>()?;
     if indices.len() != array.ranges.len() {
         return None;
     }
@@ -163,9 +157,7 @@ fn element(array: &Array, indices: &str) -> Option<u64> {
     for (&index, &(low, high)) in indices.iter().zip(&array.ranges) {
         let is_inside = (low..=high).contains(&index);
         let length = high.abs_diff(low).saturating_add(1);
-        element = element
-            .checked_mul(length)?
-            .checked_add(index.abs_diff(low))?;
+        element = element.checked_mul(length)?.checked_add(index.abs_diff(low))?;
         if !is_inside {
             return None;
         }

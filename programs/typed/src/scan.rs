@@ -73,9 +73,7 @@ impl Frame {
             given: stored.map(Wire::new).collect(),
             taken: words(&program.outputs),
             faults: faults.map(Wire::new).collect(),
-            reals: reals
-                .map(|(point, output)| (output, point.slot, point.of))
-                .collect(),
+            reals: reals.map(|(point, output)| (output, point.slot, point.of)).collect(),
             inputs: program.inputs.clone(),
             outputs: program.outputs.clone(),
             initial: program.initial_state(),
@@ -161,9 +159,9 @@ impl Frame {
     pub(crate) fn pack<R: Row + ?Sized>(&self, memory: &R, outputs: &mut [u64]) {
         let outputs = &mut outputs[..self.taken.len()];
         for (output, wires) in outputs.iter_mut().zip(&self.taken) {
-            *output = wires.iter().fold(0, |word, wire| {
-                word | (memory.get(wire.slot) & wire.mask) << wire.shift
-            });
+            *output = wires
+                .iter()
+                .fold(0, |word, wire| word | (memory.get(wire.slot) & wire.mask) << wire.shift);
         }
     }
 

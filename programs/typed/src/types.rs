@@ -142,18 +142,12 @@ impl Elementary {
 
     /// BOOL, BYTE … LWORD.
     pub fn is_bit_string(self) -> bool {
-        matches!(
-            self,
-            Self::Bool | Self::Byte | Self::Word | Self::Dword | Self::Lword
-        )
+        matches!(self, Self::Bool | Self::Byte | Self::Word | Self::Dword | Self::Lword)
     }
 
     /// TIME, DATE and their like.
     pub fn is_time(self) -> bool {
-        matches!(
-            self,
-            Self::Time | Self::Date | Self::TimeOfDay | Self::DateAndTime
-        )
+        matches!(self, Self::Time | Self::Date | Self::TimeOfDay | Self::DateAndTime)
     }
 
     /// The number that a stored integer or time stands for; bit strings count as unsigned.
@@ -240,10 +234,7 @@ pub struct Array {
 impl Array {
     /// How many elements there are; saturates.
     pub fn length(&self) -> u64 {
-        let lengths = self
-            .ranges
-            .iter()
-            .map(|&(low, high)| high.abs_diff(low).saturating_add(1));
+        let lengths = self.ranges.iter().map(|&(low, high)| high.abs_diff(low).saturating_add(1));
         lengths.fold(1, u64::saturating_mul)
     }
 

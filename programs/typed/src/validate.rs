@@ -50,11 +50,7 @@ impl Program {
         check.memory();
         check.routines();
         check.nesting();
-        if check.found.is_empty() {
-            Ok(())
-        } else {
-            Err(check.found)
-        }
+        if check.found.is_empty() { Ok(()) } else { Err(check.found) }
     }
 }
 
@@ -84,23 +80,13 @@ impl<'a> Check<'a> {
                 end
             })
             .collect();
-        Self {
-            program,
-            found: Vec::new(),
-            own,
-            routine: None,
-            line: 0,
-        }
+        Self { program, found: Vec::new(), own, routine: None, line: 0 }
     }
 
     /// Notes a violation where something does not hold.
     fn expect(&mut self, holds: bool, what: impl FnOnce() -> String) {
         if !holds && self.found.len() < BOUND {
-            self.found.push(Violation {
-                routine: self.routine,
-                line: self.line,
-                what: what(),
-            });
+            self.found.push(Violation { routine: self.routine, line: self.line, what: what() });
         }
     }
 
@@ -124,15 +110,11 @@ impl<'a> Check<'a> {
         }
         for variable in &program.variables {
             let fits = self.is_state(variable.slot.into(), variable.of.slots());
-            self.expect(fits, || {
-                format!("variable {} is outside the state", variable.name)
-            });
+            self.expect(fits, || format!("variable {} is outside the state", variable.name));
         }
         for initial in &program.initial {
             let fits = self.is_state(initial.slot.into(), 1);
-            self.expect(fits, || {
-                format!("initial slot {} is outside the state", initial.slot)
-            });
+            self.expect(fits, || format!("initial slot {} is outside the state", initial.slot));
         }
         for task in &program.tasks {
             let index = task.routine.0 as usize;
@@ -143,9 +125,7 @@ impl<'a> Check<'a> {
             });
             let slots = self.own.get(index).copied().unwrap_or(0);
             let fits = slots == 0 || self.is_state(task.own.into(), slots);
-            self.expect(fits, || {
-                format!("variables of routine {index} are outside the state")
-            });
+            self.expect(fits, || format!("variables of routine {index} are outside the state"));
         }
     }
 
@@ -222,8 +202,6 @@ impl<'a> Check<'a> {
             format!("routine {} calls itself", self.program.routines[index].name)
         });
         let deepest = depth.into_iter().max().unwrap_or(0);
-        self.expect(deepest <= Program::NESTING, || {
-            format!("calls are nested {deepest} deep")
-        });
+        self.expect(deepest <= Program::NESTING, || format!("calls are nested {deepest} deep"));
     }
 }

@@ -81,10 +81,7 @@ fn random_programs_fault_in_every_way_and_run_besides() {
     }
     let faults: u64 = account.faults.iter().sum();
     assert!(faults < account.scans / 2, "{account:?}");
-    assert!(
-        account.faults[1..].iter().all(|&count| count > 0),
-        "{account:?}"
-    );
+    assert!(account.faults[1..].iter().all(|&count| count > 0), "{account:?}");
     assert!(account.resets > 20, "{account:?}");
 }
 
@@ -116,10 +113,7 @@ fn working_memory_is_shared_by_programs() {
     let mut shared = Scratch::default();
     for _ in 0..2 {
         for machine in &machines {
-            assert_eq!(
-                run(machine, &mut shared),
-                run(machine, &mut Scratch::default())
-            );
+            assert_eq!(run(machine, &mut shared), run(machine, &mut Scratch::default()));
         }
     }
 }

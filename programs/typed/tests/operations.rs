@@ -28,11 +28,7 @@ fn wrapped(of: Elementary, number: i128) -> u64 {
 fn number(of: Elementary, stored: u64) -> i128 {
     let number = i128::from(stored);
     let half = 1_i128 << (of.bits() - 1);
-    if of.is_signed() && number >= half {
-        number - 2 * half
-    } else {
-        number
-    }
+    if of.is_signed() && number >= half { number - 2 * half } else { number }
 }
 
 /// What arithmetic without bounds gives; `None` for a fault.
@@ -67,11 +63,7 @@ fn check(of: Elementary, a: u64, b: u64) {
     ] {
         let expected =
             expected(operation, of, left, right).ok_or(Cause::DivisionByZero { dividend: a, of });
-        assert_eq!(
-            operation.apply(&[a, b]),
-            expected,
-            "{operation:?} {left} {right}"
-        );
+        assert_eq!(operation.apply(&[a, b]), expected, "{operation:?} {left} {right}");
     }
     let less = O::Compare(Comparison::Less, of).apply(&[a, b]);
     assert_eq!(less, Ok(u64::from(left < right)));
@@ -117,22 +109,10 @@ fn shifts_and_rotations_move_bit_by_bit() {
             };
             let is_shift = by >= 0;
             let cases = [
-                (
-                    Operation::ShiftLeft(of),
-                    moved(&|bit| is_shift.then_some(bit - by)),
-                ),
-                (
-                    Operation::ShiftRight(of),
-                    moved(&|bit| is_shift.then_some(bit + by)),
-                ),
-                (
-                    Operation::RotateLeft(of),
-                    moved(&|bit| Some((bit - by).rem_euclid(width))),
-                ),
-                (
-                    Operation::RotateRight(of),
-                    moved(&|bit| Some((bit + by).rem_euclid(width))),
-                ),
+                (Operation::ShiftLeft(of), moved(&|bit| is_shift.then_some(bit - by))),
+                (Operation::ShiftRight(of), moved(&|bit| is_shift.then_some(bit + by))),
+                (Operation::RotateLeft(of), moved(&|bit| Some((bit - by).rem_euclid(width)))),
+                (Operation::RotateRight(of), moved(&|bit| Some((bit + by).rem_euclid(width)))),
             ];
             for (operation, expected) in cases {
                 let found = operation.apply(&[a, by as u64]);
@@ -161,11 +141,7 @@ fn an_integer_becomes_the_nearest_real() {
         let of = *random.pick(&[Elementary::Dint, Elementary::Lint, Elementary::Ulint]);
         let stored = random.next() >> random.below(40) & of.mask();
         // What a double rounds already may not be rounded a second time.
-        let stored = if random.percent(50) {
-            stored | 1 << 24 & of.mask()
-        } else {
-            stored
-        };
+        let stored = if random.percent(50) { stored | 1 << 24 & of.mask() } else { stored };
         let expected = nearest_single(number(of, stored));
         let found = Operation::Convert(of, Elementary::Real).apply(&[stored]);
         assert_eq!(found, Ok(u64::from(expected.to_bits())), "{of} {stored}");
@@ -200,18 +176,8 @@ fn a_real_becomes_the_nearest_integer() {
         (-3.0, Elementary::Usint, 0, 0),
         (255.5, Elementary::Usint, 255, 255),
         (f64::NAN, Elementary::Dint, 0, 0),
-        (
-            f64::INFINITY,
-            Elementary::Lint,
-            i128::from(i64::MAX),
-            i128::from(i64::MAX),
-        ),
-        (
-            1e30,
-            Elementary::Ulint,
-            i128::from(u64::MAX),
-            i128::from(u64::MAX),
-        ),
+        (f64::INFINITY, Elementary::Lint, i128::from(i64::MAX), i128::from(i64::MAX)),
+        (1e30, Elementary::Ulint, i128::from(u64::MAX), i128::from(u64::MAX)),
         (1.6, Elementary::Time, 2, 1),
     ];
     for (value, to, nearest, towards_zero) in cases {
@@ -246,11 +212,7 @@ fn every_nan_is_the_canonical_one() {
                 O::Real(RealFunction::Floor, of),
                 O::Real(RealFunction::Round, of),
             ] {
-                assert_eq!(
-                    operation.apply(&[nan, other]),
-                    Ok(quiet),
-                    "{operation:?} {nan:#x}"
-                );
+                assert_eq!(operation.apply(&[nan, other]), Ok(quiet), "{operation:?} {nan:#x}");
             }
             // NaN is taken only where it stands first.
             let one = O::Convert(Elementary::Int, of).apply(&[1]).expect("1.0");
@@ -269,10 +231,7 @@ fn every_nan_is_the_canonical_one() {
     let zero = 0.0_f64.to_bits();
     let infinity = O::Divide(Lreal).apply(&[1.0_f64.to_bits(), zero]);
     assert_eq!(infinity, Ok(f64::INFINITY.to_bits()));
-    assert_eq!(
-        O::Divide(Lreal).apply(&[zero, zero]),
-        Ok(0x7ff8_0000_0000_0000)
-    );
+    assert_eq!(O::Divide(Lreal).apply(&[zero, zero]), Ok(0x7ff8_0000_0000_0000));
 }
 
 /// Whether a + b, of binary64, is the real nearest to the exact sum: no neighbour is nearer, and at half the even one is taken.
@@ -311,16 +270,8 @@ fn binary_coded_decimals_and_parts_of_words() {
     }
     assert_eq!(apply(Operation::ToBcd(uint, word), &[12_345]), 0x2345);
     let byte = Elementary::Byte;
-    let extract = Operation::Extract {
-        from: word,
-        to: byte,
-        at: 8,
-    };
-    let insert = Operation::Insert {
-        of: word,
-        part: byte,
-        at: 8,
-    };
+    let extract = Operation::Extract { from: word, to: byte, at: 8 };
+    let insert = Operation::Insert { of: word, part: byte, at: 8 };
     assert_eq!(apply(extract, &[0xabcd]), 0xab);
     assert_eq!(apply(insert, &[0xabcd, 0x12]), 0x12cd);
     let multiplex = Operation::Multiplex(uint);
@@ -360,11 +311,7 @@ fn operations_on_texts() {
         (O::LowerCase, &[T(b"Valve 1")], "valve 1"),
     ];
     for (operation, operands, expected) in cases {
-        assert_eq!(
-            text(operation, operands),
-            expected,
-            "{operation:?} {operands:?}"
-        );
+        assert_eq!(text(operation, operands), expected, "{operation:?} {operands:?}");
     }
     let number =
         |operation: O, operands: &[TextOperand<'_>]| operation.apply(operands, &mut Vec::new());
@@ -375,14 +322,8 @@ fn operations_on_texts() {
     assert_eq!(number(O::Find, &[T(b"valve"), T(b"")]), 0);
     assert_eq!(number(O::Byte, &[T(b"valve"), N(1)]), u64::from(b'v'));
     assert_eq!(number(O::Byte, &[T(b"valve"), N(6)]), 0);
-    assert_eq!(
-        number(O::Compare(Comparison::Less), &[T(b"ab"), T(b"b")]),
-        1
-    );
-    assert_eq!(
-        number(O::Compare(Comparison::Less), &[T(b"ab"), T(b"a")]),
-        0
-    );
+    assert_eq!(number(O::Compare(Comparison::Less), &[T(b"ab"), T(b"b")]), 1);
+    assert_eq!(number(O::Compare(Comparison::Less), &[T(b"ab"), T(b"a")]), 0);
 }
 
 #[test]
@@ -403,20 +344,11 @@ fn numbers_are_written_for_people() {
         (lreal(f64::NAN), "NAN"),
         (real(0.1), "0.1"),
         (write(Elementary::Time, 1_500_000_000), "T#1s500ms"),
-        (
-            write(Elementary::Time, (-3_600_000_000_000_i64) as u64),
-            "T#-1h",
-        ),
+        (write(Elementary::Time, (-3_600_000_000_000_i64) as u64), "T#-1h"),
         (write(Elementary::Time, 0), "T#0s"),
         (write(Elementary::Date, 19_782 * day), "D#2024-02-29"),
-        (
-            write(Elementary::TimeOfDay, 45_296_500_000_000),
-            "TOD#12:34:56.5",
-        ),
-        (
-            write(Elementary::DateAndTime, 19_782 * day + 1_000_000_000),
-            "DT#2024-02-29-00:00:01",
-        ),
+        (write(Elementary::TimeOfDay, 45_296_500_000_000), "TOD#12:34:56.5"),
+        (write(Elementary::DateAndTime, 19_782 * day + 1_000_000_000), "DT#2024-02-29-00:00:01"),
     ];
     for (found, expected) in cases {
         assert_eq!(found, expected);
@@ -436,9 +368,7 @@ fn numbers_are_read_as_they_were_written() {
             stored = (stored as i64 / 86_400_000_000_000 * 86_400_000_000_000) as u64;
         }
         // Of several NaNs one is written.
-        let convert = Operation::Convert(of, of)
-            .apply(&[stored])
-            .expect("no fault");
+        let convert = Operation::Convert(of, of).apply(&[stored]).expect("no fault");
         let written = text(TextOperation::From(of), &[TextOperand::Number(stored)]);
         let padded = format!("  {written} m");
         let operand = TextOperand::Text(padded.as_bytes());

@@ -30,10 +30,7 @@ fn the_cost_of_a_loop_with_constant_bounds_is_exact() {
     let turns = cost.loops.expect("constant bounds");
     assert_eq!(turns % 1_000, 0);
     let turn = turns / 1_000;
-    assert!(
-        (programs::INTEGER_OPERATIONS as u64..20).contains(&turn),
-        "{turn}"
-    );
+    assert!((programs::INTEGER_OPERATIONS as u64..20).contains(&turn), "{turn}");
     assert!(!cost.is_bounded_by_budget());
     assert_eq!(cost.worst_case(), cost.straight + turns);
     assert_eq!(cost.state_bytes, 8 * u64::from(program.state));
@@ -59,10 +56,7 @@ fn a_loop_whose_counter_is_changed_is_bounded_by_the_budget_alone() {
         of: Type::Elementary(Elementary::Dint),
         kind: ExpressionKind::Load(Box::new(counter.clone())),
     };
-    each.body.push(Statement {
-        line: 2,
-        kind: StatementKind::Assign(counter, value),
-    });
+    each.body.push(Statement { line: 2, kind: StatementKind::Assign(counter, value) });
     let cost = Cost::new(&program);
     assert_eq!(cost.loops, None);
     assert!(cost.is_bounded_by_budget());
@@ -103,10 +97,7 @@ fn a_value_that_no_actuator_can_follow_is_a_fault_that_names_the_output() {
     let mut outputs = [0; 2];
     machine.step(&mut Scratch::default(), &mut state, &[0], &mut outputs);
     let fault = Fault::read(&state).expect("a fault");
-    assert_eq!(
-        fault.describe(&program),
-        "output valve is INF, which is not a finite number"
-    );
+    assert_eq!(fault.describe(&program), "output valve is INF, which is not a finite number");
     // The output holds what it was, and the fault is visible.
     assert_eq!(outputs, [0, 1]);
     assert_eq!(state[4..], machine.initial()[4..]);
@@ -119,10 +110,7 @@ fn validation_names_what_is_wrong() {
     let broken: [(Breaks, &str); 6] = [
         (|program| program.tasks[0].every = 0, "task of routine 0"),
         (|program| program.state = 5, "outside the state"),
-        (
-            |program| program.routines[0].frame = (0, 9),
-            "its frame is outside the frames",
-        ),
+        (|program| program.routines[0].frame = (0, 9), "its frame is outside the frames"),
         (
             |program| program.routines[0].body[0].kind = StatementKind::Exit,
             "EXIT or CONTINUE outside a loop",
@@ -160,9 +148,7 @@ fn validation_names_what_is_wrong() {
         breaks(&mut program);
         let found = program.validate().expect_err(expected);
         assert!(
-            found
-                .iter()
-                .any(|violation| violation.to_string().contains(expected)),
+            found.iter().any(|violation| violation.to_string().contains(expected)),
             "{expected}: {found:?}"
         );
     }
@@ -207,11 +193,7 @@ fn no_source_calls_a_function_of_the_platform() {
     ];
     for source in sources {
         for name in banned {
-            for call in [
-                format!(".{name}("),
-                format!("f32::{name}"),
-                format!("f64::{name}"),
-            ] {
+            for call in [format!(".{name}("), format!("f32::{name}"), format!("f64::{name}")] {
                 assert!(!source.contains(&call), "{call}");
             }
         }

@@ -120,10 +120,7 @@ mod tests {
     fn a_condition_holds_until_the_hysteresis_is_passed() {
         let real = |value: f32| u64::from(value.to_bits());
         let of = Elementary::Real;
-        let above = AlarmCondition::Above {
-            limit: real(90.0),
-            over: real(85.0),
-        };
+        let above = AlarmCondition::Above { limit: real(90.0), over: real(85.0) };
         assert_eq!(above.holds(of, real(90.0), Some(false)), Some(false));
         assert_eq!(above.holds(of, real(90.5), Some(false)), Some(true));
         assert_eq!(above.holds(of, real(86.0), Some(true)), Some(true));
@@ -131,10 +128,7 @@ mod tests {
         assert_eq!(above.holds(of, real(85.0), Some(true)), Some(false));
         assert_eq!(above.holds(of, real(f32::NAN), Some(true)), None);
         let of = Elementary::Int;
-        let below = AlarmCondition::Below {
-            limit: (-3i16) as u16 as u64,
-            over: 2,
-        };
+        let below = AlarmCondition::Below { limit: (-3i16) as u16 as u64, over: 2 };
         assert_eq!(below.holds(of, (-4i16) as u16 as u64, None), Some(true));
         assert_eq!(below.holds(of, 1, Some(true)), Some(true));
         assert_eq!(below.holds(of, 2, Some(true)), Some(false));

@@ -145,10 +145,7 @@ mod tests {
     #[test]
     fn the_text_depends_on_behaviour_alone() {
         let text = circuit_text(&circuit(false, true));
-        assert_eq!(
-            text,
-            "input a\nregister x 1\nu 0\nx 0\nnot 1\nand 0 2\nnext 3\noutput y 1\n"
-        );
+        assert_eq!(text, "input a\nregister x 1\nu 0\nx 0\nnot 1\nand 0 2\nnext 3\noutput y 1\n");
         assert_eq!(circuit_text(&circuit(true, true)), text);
         assert_ne!(circuit_text(&circuit(true, false)), text);
     }

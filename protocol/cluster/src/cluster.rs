@@ -307,8 +307,7 @@ impl Cluster {
 
     /// The member of a name.
     pub fn member(&self, name: &str) -> Option<Member> {
-        self.members()
-            .find(|&member| self.member_name(member) == Some(name))
+        self.members().find(|&member| self.member_name(member) == Some(name))
     }
 
     /// Where a member listens; nothing where the file does not say so.
@@ -379,10 +378,7 @@ impl Cluster {
                 &controller.interface.inputs.bit_names(),
             ),
             stop: controller.stop_points(),
-            diagnosis: remote_io
-                .diagnosis
-                .as_ref()
-                .map(|it| Arc::clone(&it.compiled)),
+            diagnosis: remote_io.diagnosis.as_ref().map(|it| Arc::clone(&it.compiled)),
             hold_cycles: remote_io.hold_cycles,
             fail_safe: remote_io.fail_safe.clone(),
             ramps: remote_io.ramps.clone(),
@@ -394,10 +390,8 @@ impl Cluster {
 
     /// The programs whose signals a remote I/O reads.
     fn signal_sources(&self, remote_io: &RemoteIo) -> Vec<SignalSource> {
-        let programs: BTreeSet<ProgramId> = remote_io
-            .signals()
-            .map(|signal| signal.input.from)
-            .collect();
+        let programs: BTreeSet<ProgramId> =
+            remote_io.signals().map(|signal| signal.input.from).collect();
         let sources = programs.into_iter().map(|program| {
             let controller = &self.controllers[program.index()];
             SignalSource {

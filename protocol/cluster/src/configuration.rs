@@ -97,10 +97,7 @@ pub(crate) fn plant_text(
             parameters.horizontal_cycles, parameters.vertical_cycles, parameters.feed_cycles
         ),
         ModelKind::Press(parameters) => {
-            format!(
-                "press {} {}\n",
-                parameters.ram_cycles, parameters.feed_cycles
-            )
+            format!("press {} {}\n", parameters.ram_cycles, parameters.feed_cycles)
         }
         ModelKind::Program(_) => {
             format!("program\n{}", code.map(Code::text).unwrap_or_default())
@@ -112,15 +109,7 @@ pub(crate) fn plant_text(
     if let Some(feeder) = fed_by {
         writeln!(text, "fed by {}", feeder.0).expect("a string takes everything");
     }
-    for (
-        terminal,
-        Followed {
-            from,
-            sensor,
-            bits: _,
-        },
-    ) in follows
-    {
+    for (terminal, Followed { from, sensor, bits: _ }) in follows {
         writeln!(text, "follows {terminal} {} {sensor}", from.0)
             .expect("a string takes everything");
     }

@@ -48,9 +48,8 @@ pub struct SerialLine {
 }
 
 /// Rates of a serial line.
-pub const BAUD_RATES: [u32; 11] = [
-    1200, 2400, 4800, 9600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800, 921_600,
-];
+pub const BAUD_RATES: [u32; 11] =
+    [1200, 2400, 4800, 9600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800, 921_600];
 
 /// Parity bit of a serial line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -84,9 +84,7 @@ impl Draft {
             ("cluster.toml".to_owned(), self.cluster_file(&stubs)),
             ("kill.toml".to_owned(), self.scenario()),
         ];
-        let plants = stubs
-            .iter()
-            .map(|stub| (stub.file(), stub.text(self.period)));
+        let plants = stubs.iter().map(|stub| (stub.file(), stub.text(self.period)));
         files.extend(plants);
         files
     }
@@ -111,9 +109,7 @@ period = \"{period}\"
             self.name
         );
         for program in &self.programs {
-            let DraftProgram {
-                name, file, origin, ..
-            } = program;
+            let DraftProgram { name, file, origin, .. } = program;
             let origin = comment(origin);
             let _ = write!(
                 text,
@@ -137,19 +133,13 @@ period = \"{period}\"
     /// Each station is killed once, and started again before the next.
     fn scenario(&self) -> String {
         let cycles = |time: Duration, least: u128| {
-            let count = time
-                .as_nanos()
-                .div_ceil(self.period.as_nanos().max(1))
-                .max(least);
+            let count = time.as_nanos().div_ceil(self.period.as_nanos().max(1)).max(least);
             u64::try_from(count).unwrap_or(u64::MAX)
         };
         // Long enough for a process to start, and for a station to be synchronised again.
         let down = cycles(Duration::from_millis(500), 20);
         let up = cycles(Duration::from_secs(1), 30);
-        let programs = self
-            .programs
-            .iter()
-            .map(|program| Some(program.name.as_str()));
+        let programs = self.programs.iter().map(|program| Some(program.name.as_str()));
         let mut steps = String::new();
         let mut during = String::new();
         let mut at = up;
@@ -171,10 +161,7 @@ period = \"{period}\"
             }
             at = restart + up;
         }
-        let plants = self
-            .programs
-            .iter()
-            .map(|program| format!("{:?}", program.plant()));
+        let plants = self.programs.iter().map(|program| format!("{:?}", program.plant()));
         let plants = plants.collect::<Vec<_>>().join(", ");
         format!(
             "\
@@ -242,11 +229,7 @@ ladder = {file:?}
 /// A key of TOML.
 fn key(name: &str) -> String {
     let bare = |letter: char| letter.is_ascii_alphanumeric() || "-_".contains(letter);
-    if name.chars().all(bare) {
-        name.to_owned()
-    } else {
-        format!("{name:?}")
-    }
+    if name.chars().all(bare) { name.to_owned() } else { format!("{name:?}") }
 }
 
 /// What a program says about a signal: its address and its comment.

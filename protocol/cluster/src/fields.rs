@@ -86,11 +86,7 @@ pub(crate) enum SourceText {
     /// Operators write it.
     Operator(OperatorText),
     /// It is an output of another program.
-    Signal {
-        from: Option<Placed<String>>,
-        default: Option<Placed<Constant>>,
-        stale_after: u32,
-    },
+    Signal { from: Option<Placed<String>>, default: Option<Placed<Constant>>, stale_after: u32 },
 }
 
 /// An input that operators write, as it is written.
@@ -154,11 +150,7 @@ impl<'a, 't> Fields<'a, 't> {
                 );
             }
         }
-        Self {
-            section,
-            table,
-            span,
-        }
+        Self { section, table, span }
     }
 
     pub(crate) fn has(&self, name: &str) -> bool {
@@ -214,10 +206,7 @@ impl<'a, 't> Fields<'a, 't> {
                     diagnostics.push(Diagnostic::error("U0210", message, span).with_help(help));
                     return None;
                 }
-                Some(Placed {
-                    value: address,
-                    span,
-                })
+                Some(Placed { value: address, span })
             }
             Err(_) => {
                 let message = format!("invalid address {value:?}");
@@ -268,9 +257,9 @@ impl<'a, 't> Fields<'a, 't> {
                     ));
                 None
             }
-            None => self
-                .address(name, diagnostics)
-                .map(|address| ConnectionText::Tcp(address.value)),
+            None => {
+                self.address(name, diagnostics).map(|address| ConnectionText::Tcp(address.value))
+            }
         }
     }
 
@@ -311,12 +300,7 @@ impl<'a, 't> Fields<'a, 't> {
     /// A whole number in its bounds; its default where absent or wrong.
     pub(crate) fn count(&self, name: &'static str, diagnostics: &mut Vec<Diagnostic>) -> u32 {
         let (key, value) = self.get(name);
-        let Kind::Count {
-            least,
-            most,
-            default,
-        } = key.kind
-        else {
+        let Kind::Count { least, most, default } = key.kind else {
             unreachable!("`{name}` is a count in its table");
         };
         let bounds = u64::from(least)..=u64::from(most);
@@ -327,12 +311,7 @@ impl<'a, 't> Fields<'a, 't> {
     /// A time in its bounds; its default where absent or wrong.
     pub(crate) fn time(&self, name: &'static str, diagnostics: &mut Vec<Diagnostic>) -> Duration {
         let (key, value) = self.get(name);
-        let Kind::Time {
-            least,
-            most,
-            default,
-        } = key.kind
-        else {
+        let Kind::Time { least, most, default } = key.kind else {
             unreachable!("`{name}` is a time in its table");
         };
         let time = value.and_then(|value| value.time(least..=most, diagnostics));
@@ -419,13 +398,10 @@ impl<'a, 't> Fields<'a, 't> {
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Vec<(Placed<String>, Value<'a, 't>)> {
         let (key, value) = self.get(name);
-        let entries = value.map_or_else(Vec::new, |value| {
-            value.entries(&key.kind.expected(), diagnostics)
-        });
+        let entries =
+            value.map_or_else(Vec::new, |value| value.entries(&key.kind.expected(), diagnostics));
         let entries = entries.into_iter();
-        entries
-            .map(|(name, value)| (name.map(str::to_owned), value))
-            .collect()
+        entries.map(|(name, value)| (name.map(str::to_owned), value)).collect()
     }
 
     /// A table with keys of its own; an empty one where absent or wrong.
@@ -438,10 +414,7 @@ impl<'a, 't> Fields<'a, 't> {
     ) -> Fields<'a, 't> {
         let (key, value) = self.get(name);
         let table = value.and_then(|value| value.table(&key.kind.expected(), diagnostics));
-        let empty = Placed {
-            value: empty,
-            span: self.span.clone(),
-        };
+        let empty = Placed { value: empty, span: self.span.clone() };
         Fields::new(section, table.unwrap_or(empty), diagnostics)
     }
 }

@@ -217,14 +217,7 @@ pub(crate) fn read(text: &str, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
             action: fields.text("action", diagnostics).map(|text| text.value),
         })
         .collect();
-    Some(ClusterFile {
-        cluster: cluster?,
-        controllers,
-        understudies,
-        remote_ios,
-        plants,
-        alarms,
-    })
+    Some(ClusterFile { cluster: cluster?, controllers, understudies, remote_ios, plants, alarms })
 }
 
 fn missing(section: &Section) -> Diagnostic {
@@ -264,11 +257,7 @@ fn tables<'a, 't>(
     let value = root.get(section.name)?;
     let tables = Value::new(section.name, value, &CODES).tables(diagnostics);
     let tables = tables.into_iter();
-    Some(
-        tables
-            .map(|table| Fields::new(section, table, diagnostics))
-            .collect(),
-    )
+    Some(tables.map(|table| Fields::new(section, table, diagnostics)).collect())
 }
 
 fn field<'a, 't>(
@@ -348,12 +337,9 @@ fn model<'a, 't>(
     let either = "a plant is either a built-in `model` or a `ladder`";
     match (fields.has("model"), fields.has("ladder")) {
         (true, true) | (false, false) => {
-            diagnostics.push(
-                Diagnostic::error("U0214", either, fields.span.clone()).with_help(format!(
-                    "models are {}; a ladder is named by its file",
-                    MODELS.join(", ")
-                )),
-            );
+            diagnostics.push(Diagnostic::error("U0214", either, fields.span.clone()).with_help(
+                format!("models are {}; a ladder is named by its file", MODELS.join(", ")),
+            ));
             None
         }
         (false, true) => {

@@ -48,16 +48,9 @@ pub(crate) enum Kind {
     /// A number with or without a fraction; at most so large, with either sign.
     Number { most: f64, default: f64 },
     /// A number with its unit.
-    Time {
-        least: Duration,
-        most: Duration,
-        default: Duration,
-    },
+    Time { least: Duration, most: Duration, default: Duration },
     /// One of these; the first is the default where the key is not required and `default` is true.
-    Word {
-        words: &'static [&'static str],
-        default: bool,
-    },
+    Word { words: &'static [&'static str], default: bool },
     /// A table from names to `true` or `false`.
     Values,
     /// A table from names to names.
@@ -81,37 +74,19 @@ pub(crate) enum Kind {
 }
 
 const fn key(name: &'static str, kind: Kind, meaning: &'static str) -> Key {
-    Key {
-        name,
-        required: false,
-        kind,
-        meaning,
-    }
+    Key { name, required: false, kind, meaning }
 }
 
 const fn required(name: &'static str, kind: Kind, meaning: &'static str) -> Key {
-    Key {
-        name,
-        required: true,
-        kind,
-        meaning,
-    }
+    Key { name, required: true, kind, meaning }
 }
 
 const fn count(least: u32, most: u32, default: u32) -> Kind {
-    Kind::Count {
-        least,
-        most,
-        default,
-    }
+    Kind::Count { least, most, default }
 }
 
 const fn time(least: Duration, most: Duration, default: Duration) -> Kind {
-    Kind::Time {
-        least,
-        most,
-        default,
-    }
+    Kind::Time { least, most, default }
 }
 
 const fn word(words: &'static [&'static str]) -> Kind {
@@ -300,14 +275,8 @@ pub(crate) static ALARM: Section = Section {
 const LONGEST_DELAY: Duration = Duration::from_hours(24);
 
 /// In the order of the documentation.
-pub(crate) static SECTIONS: [&Section; 6] = [
-    &CLUSTER,
-    &CONTROLLER,
-    &UNDERSTUDY,
-    &REMOTE_IO,
-    &PLANT,
-    &ALARM,
-];
+pub(crate) static SECTIONS: [&Section; 6] =
+    [&CLUSTER, &CONTROLLER, &UNDERSTUDY, &REMOTE_IO, &PLANT, &ALARM];
 
 pub(crate) static ROBOT_PARAMETERS: Section = Section {
     name: "plant.parameters",
@@ -344,8 +313,7 @@ impl Section {
     /// Where it is not in the table; the names in the reader are constants.
     pub(crate) fn key(&'static self, name: &str) -> &'static Key {
         let mut keys = self.keys.iter();
-        keys.find(|key| key.name == name)
-            .expect("the reader asks for keys of the table only")
+        keys.find(|key| key.name == name).expect("the reader asks for keys of the table only")
     }
 
     /// What holds where a count is absent; 0 for a key that is none.
@@ -358,11 +326,7 @@ impl Section {
 
     /// `[name]` or `[[name]]`.
     pub(crate) fn header(&self) -> String {
-        if self.repeated {
-            format!("[[{}]]", self.name)
-        } else {
-            format!("[{}]", self.name)
-        }
+        if self.repeated { format!("[[{}]]", self.name) } else { format!("[{}]", self.name) }
     }
 }
 
@@ -411,10 +375,7 @@ impl Kind {
             Self::Count { default, .. } => Some(default.to_string()),
             Self::Number { default, .. } => Some(format!("{default:?}")),
             Self::Time { default, .. } => Some(format!("\"{}\"", duration::text(*default))),
-            Self::Word {
-                words,
-                default: true,
-            } => Some(format!("\"{}\"", words[0])),
+            Self::Word { words, default: true } => Some(format!("\"{}\"", words[0])),
             Self::Flag => Some("false".into()),
             _ => None,
         }
@@ -429,14 +390,8 @@ mod tests {
     #[test]
     fn the_documentation_has_every_key_with_its_bounds() {
         let page = include_str!("../../../docs/reference/cluster-file.md");
-        let parameters = [
-            &ROBOT_PARAMETERS,
-            &PRESS_PARAMETERS,
-            &FIELD,
-            &POINT,
-            &OPERATOR_INPUT,
-            &SIGNAL_INPUT,
-        ];
+        let parameters =
+            [&ROBOT_PARAMETERS, &PRESS_PARAMETERS, &FIELD, &POINT, &OPERATOR_INPUT, &SIGNAL_INPUT];
         for section in SECTIONS.into_iter().chain(parameters) {
             assert!(page.contains(&section.header()), "{}", section.header());
             for key in section.keys {
@@ -446,14 +401,8 @@ mod tests {
                     (false, None) => "—".into(),
                 };
                 let expected = key.kind.expected();
-                let row = format!(
-                    "| `{}` | {expected} | {default} | {} |",
-                    key.name, key.meaning
-                );
-                assert!(
-                    page.contains(&row),
-                    "docs/reference/cluster-file.md lacks the row\n{row}"
-                );
+                let row = format!("| `{}` | {expected} | {default} | {} |", key.name, key.meaning);
+                assert!(page.contains(&row), "docs/reference/cluster-file.md lacks the row\n{row}");
             }
         }
     }

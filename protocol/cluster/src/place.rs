@@ -101,9 +101,8 @@ impl Registers {
     ];
 
     /// [`Self::TYPES`] as the cluster file writes them.
-    pub(crate) const TYPE_WORDS: [&str; 8] = [
-        "int", "uint", "dint", "udint", "lint", "ulint", "real", "lreal",
-    ];
+    pub(crate) const TYPE_WORDS: [&str; 8] =
+        ["int", "uint", "dint", "udint", "lint", "ulint", "real", "lreal"];
 
     /// Number of registers: 1, 2 or 4.
     pub fn count(&self) -> u16 {

@@ -119,16 +119,9 @@ pub fn read_with(
     };
     let cluster = file.and_then(|file| build(file, overrides, &mut ladders, &mut diagnostics));
     diagnostics.sort_by_key(|diagnostic| (diagnostic.span.start, diagnostic.span.end));
-    let mut reports = vec![Report {
-        name: name.to_owned(),
-        text: text.to_owned(),
-        diagnostics,
-    }];
+    let mut reports = vec![Report { name: name.to_owned(), text: text.to_owned(), diagnostics }];
     reports.extend(ladders.into_reports());
-    Loaded {
-        cluster: cluster.filter(|_| !reports.iter().any(Report::has_errors)),
-        reports,
-    }
+    Loaded { cluster: cluster.filter(|_| !reports.iter().any(Report::has_errors)), reports }
 }
 
 /// A controller that was read as far as possible.
@@ -149,12 +142,7 @@ fn build(
     let period = overrides.period.unwrap_or(file.cluster.period);
     let cluster = &file.cluster;
     let understudy_count = file.understudies.as_ref().map_or(1, Vec::len);
-    let schedule = Schedule::new(
-        period,
-        file.controllers.len(),
-        understudy_count,
-        cluster.copies,
-    );
+    let schedule = Schedule::new(period, file.controllers.len(), understudy_count, cluster.copies);
     // Where there is no controller at all, that was said already.
     if let Err(error) = &schedule
         && !file.controllers.is_empty()
@@ -166,42 +154,22 @@ fn build(
     let mut names = Names::default();
     let members = members(file.controllers, period, ladders, &mut names, diagnostics);
     let understudies = understudies(file.understudies, &mut names, diagnostics);
-    let remote_ios = remote_ios(
-        file.remote_ios,
-        period,
-        &members,
-        ladders,
-        &mut names,
-        diagnostics,
-    );
-    let simulated: Vec<_> = file
-        .plants
-        .iter()
-        .filter_map(|plant| plant.controller.clone())
-        .collect();
+    let remote_ios =
+        remote_ios(file.remote_ios, period, &members, ladders, &mut names, diagnostics);
+    let simulated: Vec<_> =
+        file.plants.iter().filter_map(|plant| plant.controller.clone()).collect();
     devices::check_simulated(&simulated, &members, &remote_ios, diagnostics);
-    let plants = plants::place(
-        file.plants,
-        period,
-        &members,
-        &remote_ios,
-        ladders,
-        &mut names,
-        diagnostics,
-    );
+    let plants =
+        plants::place(file.plants, period, &members, &remote_ios, ladders, &mut names, diagnostics);
     // What an error left out could be the source of an input.
     if !diagnostics.iter().any(is_error) {
         undriven::check(&members, &remote_ios, &simulated, diagnostics);
     }
     let alarms = alarms::resolve(file.alarms, &members, period, diagnostics);
     limits::check(&members, &remote_ios, cluster.history, diagnostics);
-    let mode = overrides
-        .mode
-        .unwrap_or([Mode::Full, Mode::Paper][cluster.mode]);
+    let mode = overrides.mode.unwrap_or([Mode::Full, Mode::Paper][cluster.mode]);
     check_understudies(understudy_count, mode, &cluster.span, diagnostics);
-    let link = overrides
-        .link
-        .unwrap_or([Link::Udp, Link::Zenoh][cluster.link]);
+    let link = overrides.link.unwrap_or([Link::Udp, Link::Zenoh][cluster.link]);
 
     let controllers: Option<Vec<Controller>> = members.into_iter().map(controller).collect();
     let (controllers, name) = (controllers?, cluster.name.as_ref()?.value.clone());
@@ -239,9 +207,7 @@ fn build(
         name,
         link,
         multicast: cluster.multicast,
-        security: overrides
-            .security
-            .unwrap_or([Security::Keys, Security::Off][cluster.security]),
+        security: overrides.security.unwrap_or([Security::Keys, Security::Off][cluster.security]),
         agreement: Arc::new(agreement.clone()),
         canonical_text: String::new(),
         controllers,
@@ -254,10 +220,7 @@ fn build(
     };
     cluster.canonical_text = configuration_text(&cluster, &plants.texts);
     let configuration = ConfigurationHash::of(cluster.canonical_text.as_bytes());
-    cluster.agreement = Arc::new(Agreement {
-        configuration,
-        ..agreement
-    });
+    cluster.agreement = Arc::new(Agreement { configuration, ..agreement });
     Some(cluster)
 }
 
@@ -278,10 +241,8 @@ fn members(
             None => String::new(),
         };
         names.listen(section.address.as_ref(), diagnostics);
-        let code = section
-            .ladder
-            .as_ref()
-            .and_then(|file| ladders.code(file, &name, period, diagnostics));
+        let code =
+            section.ladder.as_ref().and_then(|file| ladders.code(file, &name, period, diagnostics));
         members.push(Member {
             section,
             name,
@@ -314,10 +275,7 @@ fn understudies(
     let Some(sections) = sections else {
         let name = "understudy".to_owned();
         names.declare(&name, 0..0, diagnostics);
-        return vec![Understudy {
-            name,
-            address: None,
-        }];
+        return vec![Understudy { name, address: None }];
     };
     let mut understudies = Vec::new();
     for section in sections {

@@ -36,17 +36,10 @@ pub fn schema() -> Schema {
 }
 
 fn table(section: &Section) -> Value {
-    let properties: Map<String, Value> = section
-        .keys
-        .iter()
-        .map(|key| (key.name.to_owned(), property(key)))
-        .collect();
-    let required: Vec<&str> = section
-        .keys
-        .iter()
-        .filter(|key| key.required)
-        .map(|key| key.name)
-        .collect();
+    let properties: Map<String, Value> =
+        section.keys.iter().map(|key| (key.name.to_owned(), property(key))).collect();
+    let required: Vec<&str> =
+        section.keys.iter().filter(|key| key.required).map(|key| key.name).collect();
     json!({
         "type": "object",
         "description": section.meaning,
@@ -72,11 +65,7 @@ fn property(key: &Key) -> Value {
             "maxLength": MAXIMUM_NAME_LENGTH,
         }),
         Kind::Text | Kind::Address | Kind::Connection => json!({ "type": "string" }),
-        Kind::Count {
-            least,
-            most,
-            default,
-        } => {
+        Kind::Count { least, most, default } => {
             json!({ "type": "integer", "minimum": least, "maximum": most, "default": default })
         }
         Kind::Time { .. } => {

@@ -58,8 +58,7 @@ pub fn stored_value(value: &Constant, of: Elementary) -> Result<u64, String> {
         (_, Constant::Number(number)) if of.is_real() && number.is_finite() => real(*number),
         (Elementary::Time, Constant::Text(text)) => {
             let time = understudy_text::duration::parse(text).ok();
-            time.and_then(|time| i64::try_from(time.as_nanos()).ok())
-                .map(|time| time as u64)
+            time.and_then(|time| i64::try_from(time.as_nanos()).ok()).map(|time| time as u64)
         }
         (Elementary::Bool, _) => None,
         (_, Constant::Whole(number)) if !of.is_time() => whole(*number),
@@ -72,16 +71,8 @@ pub fn stored_value(value: &Constant, of: Elementary) -> Result<u64, String> {
         _ if of.is_time() => "dates have no value here".to_owned(),
         _ => format!(
             "write a whole number from {} to {}",
-            if of.is_signed() {
-                -(1i128 << (of.bits() - 1))
-            } else {
-                0
-            },
-            of.signed(if of.is_signed() {
-                of.mask() >> 1
-            } else {
-                of.mask()
-            })
+            if of.is_signed() { -(1i128 << (of.bits() - 1)) } else { 0 },
+            of.signed(if of.is_signed() { of.mask() >> 1 } else { of.mask() })
         ),
     })
 }

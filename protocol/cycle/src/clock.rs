@@ -82,11 +82,7 @@ impl CycleClock {
             (true, true) if !self.founder => true,
             (true, true) | (false, false) => header.moment.epoch > moment.epoch,
         };
-        if binds {
-            Arrival::Begins(now)
-        } else {
-            Arrival::Stale
-        }
+        if binds { Arrival::Begins(now) } else { Arrival::Stale }
     }
 
     /// Enters a cycle that a frame has started, which arrived at `now`.
@@ -102,10 +98,7 @@ impl CycleClock {
     pub fn pace(&mut self, now: Time, founded: Epoch, anchor: Time, period: Duration) -> Moment {
         let next = match self.moment {
             Some(moment) => moment.plus(1),
-            None => Moment {
-                epoch: founded,
-                ..Moment::default()
-            },
+            None => Moment { epoch: founded, ..Moment::default() },
         };
         self.look_around(now, period);
         self.moment = Some(next);
@@ -125,10 +118,6 @@ impl CycleClock {
         let expected = self.anchor + period;
         let consecutive = frame.header.moment == moment.plus(1);
         let fits = consecutive && expected <= now && now.since(expected) < period / 2;
-        if fits && frame.body != Body::Sync {
-            expected
-        } else {
-            now
-        }
+        if fits && frame.body != Body::Sync { expected } else { now }
     }
 }

@@ -272,13 +272,7 @@ impl<Event: From<Refusal> + From<Notice>> Participant<Event> {
 impl<Event> Hash for Participant<Event> {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
         let Self {
-            endpoint:
-                Endpoint {
-                    own: _,
-                    agreement: _,
-                    reception,
-                    outbox: _,
-                },
+            endpoint: Endpoint { own: _, agreement: _, reception, outbox: _ },
             clock,
             attendance,
             copies,

@@ -63,10 +63,6 @@ impl Reception {
                 Admission::Dropped
             };
         }
-        if known {
-            Admission::Admitted
-        } else {
-            Admission::Dropped
-        }
+        if known { Admission::Admitted } else { Admission::Dropped }
     }
 }

@@ -83,10 +83,7 @@ impl Schedule {
         if !(1..=MAXIMUM_PROGRAMS).contains(&controllers)
             || controllers + understudies > MAXIMUM_STATIONS
         {
-            return Err(ScheduleError::Stations {
-                controllers,
-                understudies,
-            });
+            return Err(ScheduleError::Stations { controllers, understudies });
         }
         if !(1..=4).contains(&copies) {
             return Err(ScheduleError::Copies { copies });

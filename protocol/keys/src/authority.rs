@@ -34,10 +34,7 @@ pub struct People<'a> {
 
 impl<'a> From<&'a [(String, understudy_wire::Role)]> for People<'a> {
     fn from(holders: &'a [(String, understudy_wire::Role)]) -> Self {
-        Self {
-            holders,
-            address: None,
-        }
+        Self { holders, address: None }
     }
 }
 
@@ -67,9 +64,7 @@ impl Authority {
     pub fn init(folder: &Path, cluster: &Cluster, now: Date) -> Result<Self, KeysError> {
         let own = folder.join("authority");
         if own.exists() {
-            return Err(KeysError::Exists {
-                folder: folder.to_owned(),
-            });
+            return Err(KeysError::Exists { folder: folder.to_owned() });
         }
         let name = format!("{} authority", cluster.name());
         let pair = certificate::authority(&Subject {
@@ -80,10 +75,7 @@ impl Authority {
             expires: now.plus_days(AUTHORITY_DAYS),
         })?;
         let secret = ClusterSecret::new(certificate::random(&name)?);
-        let register = Register {
-            cluster: cluster.name().to_owned(),
-            holders: Vec::new(),
-        };
+        let register = Register { cluster: cluster.name().to_owned(), holders: Vec::new() };
         files::make_folder(folder)?;
         files::make_folder(&own)?;
         files::make_folder(&folder.join("members"))?;
@@ -110,17 +102,13 @@ impl Authority {
     pub fn open(folder: &Path) -> Result<Self, Vec<KeysError>> {
         let own = folder.join("authority");
         if !own.exists() {
-            return Err(vec![KeysError::NoAuthority {
-                folder: folder.to_owned(),
-            }]);
+            return Err(vec![KeysError::NoAuthority { folder: folder.to_owned() }]);
         }
         let secret_file = own.join("cluster-secret");
         let key_file = own.join("private-key.pem");
         let mut errors = Vec::new();
         let mut kept = |result: Result<String, KeysError>| {
-            result
-                .map_err(|error| errors.push(error))
-                .unwrap_or_default()
+            result.map_err(|error| errors.push(error)).unwrap_or_default()
         };
         let certificate = kept(files::read(&own.join("certificate.pem")));
         let key = kept(files::private(&key_file).and_then(|()| files::read(&key_file)));
@@ -137,13 +125,9 @@ impl Authority {
         });
         let issuer = certificate::issuer(&certificate, &key);
         match (register, secret, issuer) {
-            (Some(register), Ok(secret), Ok(issuer)) => Ok(Self {
-                folder: folder.to_owned(),
-                certificate,
-                issuer,
-                secret,
-                register,
-            }),
+            (Some(register), Ok(secret), Ok(issuer)) => {
+                Ok(Self { folder: folder.to_owned(), certificate, issuer, secret, register })
+            }
             (_, secret, issuer) => Err(secret.err().into_iter().chain(issuer.err()).collect()),
         }
     }
@@ -192,10 +176,7 @@ impl Authority {
         self.keep().map_err(|error| vec![error])?;
         let holders = self.register.holders.iter();
         Ok(Issued {
-            holders: holders
-                .filter(|holder| renewed.contains(&holder.name))
-                .cloned()
-                .collect(),
+            holders: holders.filter(|holder| renewed.contains(&holder.name)).cloned().collect(),
             folders,
         })
     }
@@ -208,16 +189,13 @@ impl Authority {
         let mut errors = Vec::new();
         for name in names {
             match self.register.find(name) {
-                None => errors.push(KeysError::NoHolder {
-                    name: name.clone(),
-                    known: self.register.known(),
-                }),
-                Some(holder) => {
-                    errors.extend(holder.revoked.map(|since| KeysError::AlreadyRevoked {
-                        name: name.clone(),
-                        since,
-                    }))
-                }
+                None => errors
+                    .push(KeysError::NoHolder { name: name.clone(), known: self.register.known() }),
+                Some(holder) => errors.extend(
+                    holder
+                        .revoked
+                        .map(|since| KeysError::AlreadyRevoked { name: name.clone(), since }),
+                ),
             }
         }
         if !errors.is_empty() {
@@ -227,19 +205,14 @@ impl Authority {
         for holder in &mut self.register.holders {
             if names.contains(&holder.name) {
                 holder.revoked = Some(now);
-                holder.revoked_through = Some(Revoked {
-                    generation: holder.generation,
-                    since: now,
-                });
+                holder.revoked_through =
+                    Some(Revoked { generation: holder.generation, since: now });
                 revoked.push(holder.clone());
             }
         }
         let folders = self.distribute_revoked().map_err(|error| vec![error])?;
         self.keep().map_err(|error| vec![error])?;
-        Ok(Issued {
-            holders: revoked,
-            folders,
-        })
+        Ok(Issued { holders: revoked, folders })
     }
 
     fn check(
@@ -256,13 +229,9 @@ impl Authority {
                 wanted: format!("the cluster {}", cluster.name()),
             });
         }
-        let members: Vec<&str> = cluster
-            .members()
-            .filter_map(|member| cluster.member_name(member))
-            .collect();
-        let unknown = names
-            .iter()
-            .filter(|name| !members.contains(&name.as_str()));
+        let members: Vec<&str> =
+            cluster.members().filter_map(|member| cluster.member_name(member)).collect();
+        let unknown = names.iter().filter(|name| !members.contains(&name.as_str()));
         errors.extend(unknown.map(|name| KeysError::NoHolder {
             name: name.clone(),
             known: format!("the cluster has {}", members.join(", ")),
@@ -283,11 +252,7 @@ impl Authority {
                         .into(),
             }
         }));
-        if errors.is_empty() {
-            Ok(())
-        } else {
-            Err(errors)
-        }
+        if errors.is_empty() { Ok(()) } else { Err(errors) }
     }
 
     fn renew(
@@ -325,12 +290,7 @@ impl Authority {
             revoked: None,
             revoked_through: known.and_then(|holder| holder.revoked_through),
         };
-        match self
-            .register
-            .holders
-            .iter_mut()
-            .find(|known| known.name == name)
-        {
+        match self.register.holders.iter_mut().find(|known| known.name == name) {
             Some(known) => *known = holder,
             None => self.register.holders.push(holder),
         }
@@ -403,12 +363,8 @@ impl Authority {
             if let (Member::Station(_), Member::Station(_)) = (own, member)
                 && own != member
             {
-                let to = self
-                    .secret
-                    .transfer_key(self.title(holder), self.title(other));
-                let from = self
-                    .secret
-                    .transfer_key(self.title(other), self.title(holder));
+                let to = self.secret.transfer_key(self.title(holder), self.title(other));
+                let from = self.secret.transfer_key(self.title(other), self.title(holder));
                 file.shared.push(Shared {
                     name: other.name.clone(),
                     to: files::to_hexadecimal(to.bytes()),

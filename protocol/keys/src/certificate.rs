@@ -69,10 +69,8 @@ pub(crate) fn holder(
     parameters.is_ca = IsCa::ExplicitNoCa;
     parameters.use_authority_key_identifier_extension = true;
     parameters.key_usages = vec![KeyUsagePurpose::DigitalSignature];
-    parameters.extended_key_usages = vec![
-        ExtendedKeyUsagePurpose::ServerAuth,
-        ExtendedKeyUsagePurpose::ClientAuth,
-    ];
+    parameters.extended_key_usages =
+        vec![ExtendedKeyUsagePurpose::ServerAuth, ExtendedKeyUsagePurpose::ClientAuth];
     // A laboratory's members are all at home.
     let address = subject.address.filter(|address| !address.is_unspecified());
     let address = address.unwrap_or(IpAddr::from([127, 0, 0, 1]));
@@ -113,10 +111,7 @@ fn key(subject: &Subject<'_>) -> Result<KeyPair, KeysError> {
 }
 
 fn pair(parameters: &CertificateParams, certificate: String, key: &KeyPair) -> Pair {
-    let serial = parameters
-        .serial_number
-        .as_ref()
-        .map(SerialNumber::to_bytes);
+    let serial = parameters.serial_number.as_ref().map(SerialNumber::to_bytes);
     Pair {
         certificate,
         private_key: key.serialize_pem(),
@@ -126,8 +121,5 @@ fn pair(parameters: &CertificateParams, certificate: String, key: &KeyPair) -> P
 
 fn failed<E: ToString>(name: &str) -> impl Fn(E) -> KeysError {
     let name = name.to_owned();
-    move |reason| KeysError::Certificate {
-        name: name.clone(),
-        reason: reason.to_string(),
-    }
+    move |reason| KeysError::Certificate { name: name.clone(), reason: reason.to_string() }
 }

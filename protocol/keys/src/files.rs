@@ -19,10 +19,7 @@ pub(crate) fn make_folder(path: &Path) -> Result<(), KeysError> {
         .recursive(true)
         .mode(0o700)
         .create(path)
-        .map_err(|source| KeysError::Write {
-            path: path.to_owned(),
-            source,
-        })
+        .map_err(|source| KeysError::Write { path: path.to_owned(), source })
 }
 
 /// Replaces a file as a whole; at no time can anybody else read it, or see half of it.
@@ -34,20 +31,13 @@ pub(crate) fn write(path: &Path, text: &str) -> Result<(), KeysError> {
             Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
             _ => {}
         }
-        let mut file = OpenOptions::new()
-            .write(true)
-            .create_new(true)
-            .mode(0o600)
-            .open(&new)?;
+        let mut file = OpenOptions::new().write(true).create_new(true).mode(0o600).open(&new)?;
         file.write_all(text.as_bytes())?;
         file.sync_all()?;
         fs::rename(&new, path)?;
         File::open(path.parent().unwrap_or(Path::new(".")))?.sync_all()
     };
-    written().map_err(|source| KeysError::Write {
-        path: path.to_owned(),
-        source,
-    })
+    written().map_err(|source| KeysError::Write { path: path.to_owned(), source })
 }
 
 pub(crate) fn write_toml(
@@ -55,10 +45,8 @@ pub(crate) fn write_toml(
     title: &str,
     value: &impl Serialize,
 ) -> Result<(), KeysError> {
-    let text = toml::to_string(value).map_err(|error| KeysError::Damaged {
-        path: path.to_owned(),
-        reason: error.to_string(),
-    })?;
+    let text = toml::to_string(value)
+        .map_err(|error| KeysError::Damaged { path: path.to_owned(), reason: error.to_string() })?;
     write(path, &format!("# {title}\n{text}"))
 }
 
@@ -72,10 +60,7 @@ pub(crate) fn read(path: &Path) -> Result<String, KeysError> {
         }
         fs::read_to_string(path)
     };
-    text().map_err(|source| KeysError::Read {
-        path: path.to_owned(),
-        source,
-    })
+    text().map_err(|source| KeysError::Read { path: path.to_owned(), source })
 }
 
 pub(crate) fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, KeysError> {
@@ -88,18 +73,13 @@ pub(crate) fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, KeysError
 
 /// Refuses what others than its owner may read or change.
 pub(crate) fn private(path: &Path) -> Result<(), KeysError> {
-    let metadata = fs::metadata(path).map_err(|source| KeysError::Read {
-        path: path.to_owned(),
-        source,
-    })?;
+    let metadata =
+        fs::metadata(path).map_err(|source| KeysError::Read { path: path.to_owned(), source })?;
     let mode = metadata.permissions().mode() & 0o777;
     if mode & 0o077 == 0 {
         Ok(())
     } else {
-        Err(KeysError::Permissions {
-            path: path.to_owned(),
-            mode,
-        })
+        Err(KeysError::Permissions { path: path.to_owned(), mode })
     }
 }
 

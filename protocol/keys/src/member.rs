@@ -128,10 +128,7 @@ impl MemberKeys {
         let roster = cluster.roster();
         let damaged = |whose: &str| KeysError::Damaged {
             path: folder.join("keys.toml"),
-            reason: format!(
-                "the key of {whose} is not {} hexadecimal digits",
-                2 * KEY_BYTES
-            ),
+            reason: format!("the key of {whose} is not {} hexadecimal digits", 2 * KEY_BYTES),
         };
         let key = |text: &str, whose: &str, errors: &mut Vec<KeysError>| {
             files::from_hexadecimal(text).unwrap_or_else(|| {
@@ -147,10 +144,7 @@ impl MemberKeys {
             if !roster.is_received(member, own) {
                 continue;
             }
-            let no_key = || KeysError::NoKey {
-                folder: folder.to_owned(),
-                name: other.to_owned(),
-            };
+            let no_key = || KeysError::NoKey { folder: folder.to_owned(), name: other.to_owned() };
             match file.heard.iter().find(|heard| heard.name == other) {
                 Some(found) => {
                     heard_keys.push((member, FrameKey::new(key(&found.key, other, &mut errors))));
@@ -326,24 +320,15 @@ fn read(
         }
         let begins = file.issued.map(certificate::begins);
         if let Some(begins) = begins.filter(|begins| now < *begins) {
-            errors.push(KeysError::NotYetValid {
-                name: file.name.clone(),
-                begins,
-                now,
-            });
+            errors.push(KeysError::NotYetValid { name: file.name.clone(), begins, now });
         }
         if now >= file.expires {
-            errors.push(KeysError::Expired {
-                name: file.name.clone(),
-                expires: file.expires,
-            });
+            errors.push(KeysError::Expired { name: file.name.clone(), expires: file.expires });
         }
         let is_revoked = |list: &RevokedFile| list.holds(&file.name, file.generation);
         if revoked.as_ref().is_some_and(is_revoked) {
-            errors.push(KeysError::Revoked {
-                name: file.name.clone(),
-                generation: file.generation,
-            });
+            errors
+                .push(KeysError::Revoked { name: file.name.clone(), generation: file.generation });
         }
     }
     match (file, revoked) {

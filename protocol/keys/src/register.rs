@@ -76,8 +76,7 @@ impl From<understudy_wire::Role> for Role {
 impl Role {
     /// Its name.
     pub fn word(self) -> &'static str {
-        self.of_person()
-            .map_or("member", understudy_wire::Role::word)
+        self.of_person().map_or("member", understudy_wire::Role::word)
     }
 
     /// The rights of a person; `None` for a member.
@@ -110,11 +109,7 @@ impl Register {
 
     /// Who there is, in words.
     pub(crate) fn known(&self) -> String {
-        let names: Vec<&str> = self
-            .holders
-            .iter()
-            .map(|holder| holder.name.as_str())
-            .collect();
+        let names: Vec<&str> = self.holders.iter().map(|holder| holder.name.as_str()).collect();
         match names.as_slice() {
             [] => "nothing was issued yet".to_owned(),
             names => format!("there are {}", names.join(", ")),

@@ -46,9 +46,7 @@ impl RevokedFile {
                 since: revoked.since,
             })
         });
-        Self {
-            revoked: revoked.collect(),
-        }
+        Self { revoked: revoked.collect() }
     }
 
     pub(crate) fn read(path: &Path) -> Result<Self, KeysError> {
@@ -99,10 +97,7 @@ impl RevocationWatch {
             .spawn(move || {
                 // The file may have changed since the keys were loaded: the first look always reads it.
                 let mut seen = None;
-                while matches!(
-                    stopped.recv_timeout(LOOK_EVERY),
-                    Err(RecvTimeoutError::Timeout)
-                ) {
+                while matches!(stopped.recv_timeout(LOOK_EVERY), Err(RecvTimeoutError::Timeout)) {
                     let now = changed(&path);
                     if now == seen {
                         continue;
@@ -113,14 +108,8 @@ impl RevocationWatch {
                     }
                 }
             })
-            .map_err(|source| KeysError::Read {
-                path: failed,
-                source,
-            })?;
-        Ok(Self {
-            stop: Some(stop),
-            thread: Some(thread),
-        })
+            .map_err(|source| KeysError::Read { path: failed, source })?;
+        Ok(Self { stop: Some(stop), thread: Some(thread) })
     }
 }
 

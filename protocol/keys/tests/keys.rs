@@ -33,9 +33,7 @@ fn now() -> Date {
 }
 
 fn empty(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
-        .join("keys")
-        .join(name);
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("keys").join(name);
     if folder.exists() {
         fs::remove_dir_all(&folder).expect("an old folder goes");
     }
@@ -81,9 +79,9 @@ fn datagram(cluster: &Cluster, keys: &MemberKeys, sender: Member) -> Vec<u8> {
     let agreement = cluster.agreement();
     let body = match sender {
         Member::Station(_) => Body::Sync,
-        Member::RemoteIo(_) => Body::Actuation(understudy_wire::Actuation {
-            outputs: understudy_wire::Image::zero(1),
-        }),
+        Member::RemoteIo(_) => {
+            Body::Actuation(understudy_wire::Actuation { outputs: understudy_wire::Image::zero(1) })
+        }
         Member::Plant(_) => Body::Field(understudy_wire::Field {
             sensors: understudy_wire::Image::zero(1),
             handed_over: 0,
@@ -105,8 +103,7 @@ fn datagram(cluster: &Cluster, keys: &MemberKeys, sender: Member) -> Vec<u8> {
     let (mut encoded, mut datagram) = (Vec::new(), Vec::new());
     encode(&frame, &mut encoded).expect("a sensible frame");
     let mut seal = keys.begin_life(now()).expect("a folder of its own");
-    seal.seal(&frame, &encoded, &mut datagram)
-        .expect("its own frame");
+    seal.seal(&frame, &encoded, &mut datagram).expect("its own frame");
     datagram
 }
 
@@ -118,14 +115,9 @@ fn each_member_hears_whom_it_has_to_hear_and_has_no_other_key() {
         let keys = loaded(&authority, &cluster, speaker);
         for listener in cluster.members() {
             let mut said = datagram(&cluster, &keys, speaker);
-            let found = loaded(&authority, &cluster, listener)
-                .opener()
-                .open(&mut said);
+            let found = loaded(&authority, &cluster, listener).opener().open(&mut said);
             if roster.is_received(speaker, listener) {
-                assert!(
-                    matches!(found, Ok(Some(_))),
-                    "{listener:?} of {speaker:?}: {found:?}"
-                );
+                assert!(matches!(found, Ok(Some(_))), "{listener:?} of {speaker:?}: {found:?}");
             } else {
                 assert_eq!(found, Err(Refusal::Foreign { sender: speaker }));
             }
@@ -137,17 +129,11 @@ fn each_member_hears_whom_it_has_to_hear_and_has_no_other_key() {
 fn nobody_but_the_owner_may_read_any_of_it() {
     let (_, authority) = issued("owner");
     let root = authority.folder_of("robot");
-    let root = root
-        .parent()
-        .and_then(Path::parent)
-        .expect("keys/members/robot");
+    let root = root.parent().and_then(Path::parent).expect("keys/members/robot");
     let mut folders = vec![root.to_owned()];
     let mut files = 0;
     while let Some(folder) = folders.pop() {
-        let mode = fs::metadata(&folder)
-            .expect("it is there")
-            .permissions()
-            .mode();
+        let mode = fs::metadata(&folder).expect("it is there").permissions().mode();
         assert_eq!(mode & 0o777, 0o700, "{}", folder.display());
         for entry in fs::read_dir(&folder).expect("it is ours") {
             let path = entry.expect("it is ours").path();
@@ -155,19 +141,12 @@ fn nobody_but_the_owner_may_read_any_of_it() {
                 folders.push(path);
                 continue;
             }
-            let mode = fs::metadata(&path)
-                .expect("it is there")
-                .permissions()
-                .mode();
+            let mode = fs::metadata(&path).expect("it is there").permissions().mode();
             assert_eq!(mode & 0o777, 0o600, "{}", path.display());
             files += 1;
         }
     }
-    assert_eq!(
-        files,
-        4 + 8 * 5,
-        "of the authority, of seven members and of an operator"
-    );
+    assert_eq!(files, 4 + 8 * 5, "of the authority, of seven members and of an operator");
 }
 
 #[test]
@@ -181,14 +160,9 @@ fn a_life_never_comes_again() {
         text.trim().parse().expect("a number")
     };
     let mut lives = Vec::new();
-    let clocks = [
-        "2026-11-21T18:00:00Z",
-        "2026-11-21T18:00:00Z",
-        "1970-01-02T00:00:00Z",
-    ];
+    let clocks = ["2026-11-21T18:00:00Z", "2026-11-21T18:00:00Z", "1970-01-02T00:00:00Z"];
     for clock in clocks {
-        keys.begin_life(clock.parse().expect("a date"))
-            .expect("it can be noted");
+        keys.begin_life(clock.parse().expect("a date")).expect("it can be noted");
         lives.push(life());
     }
     // A folder that comes back from a copy has forgotten; the clock has not.
@@ -196,20 +170,13 @@ fn a_life_never_comes_again() {
     let clock = "2026-11-21T18:00:09Z".parse().expect("a date");
     keys.begin_life(clock).expect("it can be noted");
     lives.push(life());
-    assert!(
-        lives.is_sorted_by(|earlier, later| earlier < later),
-        "{lives:?}"
-    );
+    assert!(lives.is_sorted_by(|earlier, later| earlier < later), "{lives:?}");
 
     for text in ["", "many", "4294967295"] {
         fs::write(&file, text).expect("it is ours");
         let refused = keys.begin_life(now()).expect_err("it is no life");
         assert_eq!(refused.code(), "U0906", "{text:?}");
-        assert_eq!(
-            fs::read_to_string(&file).expect("it is ours"),
-            text,
-            "nothing is lost"
-        );
+        assert_eq!(fs::read_to_string(&file).expect("it is ours"), text, "nothing is lost");
     }
 }
 
@@ -221,10 +188,7 @@ fn learns_revocation(
 ) {
     let started = Instant::now();
     while listening.open(&mut datagram()) != Err(Refusal::Revoked { sender }) {
-        assert!(
-            started.elapsed() < Duration::from_secs(30),
-            "it never learns it"
-        );
+        assert!(started.elapsed() < Duration::from_secs(30), "it never learns it");
         std::thread::yield_now();
     }
 }
@@ -237,9 +201,7 @@ fn a_revocation_between_loading_and_watching_is_learned() {
     let stolen = loaded(&authority, &cluster, robot);
     let witness = loaded(&authority, &cluster, press);
     let mut listening = witness.opener();
-    authority
-        .revoke(&["robot".to_owned()], now())
-        .expect("it was issued");
+    authority.revoke(&["robot".to_owned()], now()).expect("it was issued");
     let _watch = witness.watch().expect("a thread");
     learns_revocation(&mut listening, || datagram(&cluster, &stolen, robot), robot);
 }
@@ -253,47 +215,26 @@ fn what_is_revoked_no_longer_counts_and_new_keys_do() {
     let witness = loaded(&authority, &cluster, press);
     let mut listening = witness.opener();
     let _watch = witness.watch().expect("a thread");
-    assert!(
-        listening
-            .open(&mut datagram(&cluster, &stolen, robot))
-            .is_ok()
-    );
+    assert!(listening.open(&mut datagram(&cluster, &stolen, robot)).is_ok());
 
-    let done = authority
-        .revoke(&["robot".to_owned()], now())
-        .expect("it was issued");
+    let done = authority.revoke(&["robot".to_owned()], now()).expect("it was issued");
     assert_eq!(done.folders.len(), 8);
     let refused = load(&authority, &cluster, robot).expect_err("they are revoked");
     assert_eq!(codes(&refused), ["U0909"]);
     // One that starts now knows it, and one that runs learns it.
     let mut starting = loaded(&authority, &cluster, press).opener();
     let is_revoked = |found| found == Err(Refusal::Revoked { sender: robot });
-    assert!(is_revoked(
-        starting.open(&mut datagram(&cluster, &stolen, robot))
-    ));
+    assert!(is_revoked(starting.open(&mut datagram(&cluster, &stolen, robot))));
     learns_revocation(&mut listening, || datagram(&cluster, &stolen, robot), robot);
     let again = authority.revoke(&["robot".into(), "nobody".into()], now());
-    assert_eq!(
-        codes(&again.expect_err("there is nothing to revoke")),
-        ["U0913", "U0907"]
-    );
+    assert_eq!(codes(&again.expect_err("there is nothing to revoke")), ["U0913", "U0907"]);
 
     authority
-        .issue(
-            &cluster,
-            &["robot".to_owned()],
-            People::default(),
-            DAYS,
-            now(),
-        )
+        .issue(&cluster, &["robot".to_owned()], People::default(), DAYS, now())
         .expect("a name of the cluster");
     let fresh = loaded(&authority, &cluster, robot);
     let mut listening = loaded(&authority, &cluster, press).opener();
-    assert!(
-        listening
-            .open(&mut datagram(&cluster, &fresh, robot))
-            .is_ok()
-    );
+    assert!(listening.open(&mut datagram(&cluster, &fresh, robot)).is_ok());
     assert_eq!(
         listening.open(&mut datagram(&cluster, &stolen, robot)),
         Err(Refusal::Forged { sender: robot })
@@ -312,34 +253,20 @@ fn what_is_revoked_no_longer_counts_and_new_keys_do() {
 #[test]
 fn the_book_is_kept() {
     let (cluster, mut authority) = issued("book");
-    authority
-        .revoke(&["arm".to_owned()], now())
-        .expect("it was issued");
+    authority.revoke(&["arm".to_owned()], now()).expect("it was issued");
     let folder = authority.folder_of("robot");
-    let root = folder
-        .parent()
-        .and_then(Path::parent)
-        .expect("keys/members/robot");
+    let root = folder.parent().and_then(Path::parent).expect("keys/members/robot");
     let again = Authority::open(root).expect("it was made here");
     assert_eq!(again.register(), authority.register());
     let holders = &again.register().holders;
     assert_eq!(holders.len(), 8);
-    assert!(
-        holders
-            .iter()
-            .all(|holder| holder.expires == now().plus_days(DAYS))
-    );
-    let engineers = holders
-        .iter()
-        .filter(|holder| holder.role == Role::Engineer);
+    assert!(holders.iter().all(|holder| holder.expires == now().plus_days(DAYS)));
+    let engineers = holders.iter().filter(|holder| holder.role == Role::Engineer);
     assert_eq!(engineers.count(), 1);
     let made = Authority::init(root, &cluster, now());
     assert_eq!(made.err().map(|error| error.code()), Some("U0904"));
     let nowhere = Authority::open(&empty("nowhere"));
-    assert_eq!(
-        nowhere.err().map(|errors| codes(&errors)),
-        Some(vec!["U0905"])
-    );
+    assert_eq!(nowhere.err().map(|errors| codes(&errors)), Some(vec!["U0905"]));
 }
 
 #[test]
@@ -379,12 +306,7 @@ fn everything_that_is_wrong_is_said_at_once() {
     let text = fs::read_to_string(&keys).expect("it is ours");
     let key = text.lines().find_map(|line| line.strip_prefix("own = "));
     let key = key.expect("it has one").trim_matches('"').to_owned();
-    assert!(
-        refused
-            .iter()
-            .all(|error| !error.to_string().contains(&key)),
-        "a secret is shown"
-    );
+    assert!(refused.iter().all(|error| !error.to_string().contains(&key)), "a secret is shown");
 
     let nobody = ["robot".to_owned(), "nobody".into(), "no one".into()];
     let refused = authority.issue(

@@ -23,9 +23,7 @@ fn cluster() -> Cluster {
 /// The folders of the robot and of an operator. Certificates are judged by the real clock, so they are made by it.
 #[allow(clippy::disallowed_methods, reason = "rustls looks at the clock too")]
 fn issued(name: &str) -> (PathBuf, PathBuf) {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
-        .join("tls")
-        .join(name);
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("tls").join(name);
     if folder.exists() {
         fs::remove_dir_all(&folder).expect("an old folder goes");
     }
@@ -36,36 +34,26 @@ fn issued(name: &str) -> (PathBuf, PathBuf) {
     authority
         .issue(&cluster, &["robot".to_owned()], people[..].into(), 1, now)
         .expect("a name of the cluster");
-    (
-        authority.folder_of("robot"),
-        authority.folder_of(DEFAULT_PERSON),
-    )
+    (authority.folder_of("robot"), authority.folder_of(DEFAULT_PERSON))
 }
 
 fn chain(folder: &Path) -> (Vec<CertificateDer<'static>>, PrivateKeyDer<'static>) {
     let certificate = CertificateDer::from_pem_file(folder.join("certificate.pem"));
     let key = PrivateKeyDer::from_pem_file(folder.join("private-key.pem"));
-    (
-        vec![certificate.expect("a certificate")],
-        key.expect("a key"),
-    )
+    (vec![certificate.expect("a certificate")], key.expect("a key"))
 }
 
 fn roots(folder: &Path) -> Arc<RootCertStore> {
     let mut roots = RootCertStore::empty();
     let authority = CertificateDer::from_pem_file(folder.join("authority.pem"));
-    roots
-        .add(authority.expect("a certificate"))
-        .expect("it is an authority's");
+    roots.add(authority.expect("a certificate")).expect("it is an authority's");
     Arc::new(roots)
 }
 
 fn shake_hands(server: &Path, client: &Path, name: &str) -> Result<(), rustls::Error> {
     let _ = rustls::crypto::ring::default_provider().install_default();
     let (certificates, key) = chain(server);
-    let verifier = WebPkiClientVerifier::builder(roots(server))
-        .build()
-        .expect("it has roots");
+    let verifier = WebPkiClientVerifier::builder(roots(server)).build().expect("it has roots");
     let settings = ServerConfig::builder()
         .with_client_cert_verifier(verifier)
         .with_single_cert(certificates, key)?;
@@ -81,17 +69,13 @@ fn shake_hands(server: &Path, client: &Path, name: &str) -> Result<(), rustls::E
         while client.wants_write() {
             client.write_tls(&mut flight).expect("it is memory");
         }
-        server
-            .read_tls(&mut flight.as_slice())
-            .expect("it is memory");
+        server.read_tls(&mut flight.as_slice()).expect("it is memory");
         server.process_new_packets()?;
         let mut flight = Vec::new();
         while server.wants_write() {
             server.write_tls(&mut flight).expect("it is memory");
         }
-        client
-            .read_tls(&mut flight.as_slice())
-            .expect("it is memory");
+        client.read_tls(&mut flight.as_slice()).expect("it is memory");
         client.process_new_packets()?;
     }
     Ok(())
@@ -103,10 +87,7 @@ fn holders_shake_hands_and_strangers_do_not() {
     let (their_robot, their_operator) = issued("theirs");
     assert_eq!(shake_hands(&robot, &operator, "127.0.0.1"), Ok(()));
     assert_eq!(shake_hands(&operator, &robot, "127.0.0.1"), Ok(()));
-    assert!(
-        shake_hands(&robot, &operator, "127.0.0.2").is_err(),
-        "not its address"
-    );
+    assert!(shake_hands(&robot, &operator, "127.0.0.2").is_err(), "not its address");
     assert!(shake_hands(&robot, &their_operator, "127.0.0.1").is_err());
     assert!(shake_hands(&their_robot, &operator, "127.0.0.1").is_err());
 }

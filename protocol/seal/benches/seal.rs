@@ -20,10 +20,7 @@ fn main() {
 
 /// A controller's turn with a word of 64 bits.
 fn turn() -> (Frame, Vec<u8>) {
-    let moment = Moment {
-        epoch: Epoch(1_700_000_000_000_000),
-        cycle: Cycle(1_000_000),
-    };
+    let moment = Moment { epoch: Epoch(1_700_000_000_000_000), cycle: Cycle(1_000_000) };
     let holding = Holding {
         program: ProgramId(0),
         born: moment,
@@ -58,11 +55,7 @@ fn turn() -> (Frame, Vec<u8>) {
 }
 
 fn key() -> FrameKey {
-    ClusterSecret::new([7; 32]).frame_key(Title {
-        cluster: "cell",
-        member: "robot",
-        generation: 1,
-    })
+    ClusterSecret::new([7; 32]).frame_key(Title { cluster: "cell", member: "robot", generation: 1 })
 }
 
 #[divan::bench]
@@ -90,9 +83,7 @@ fn seal(bencher: Bencher<'_, '_>) {
 #[divan::bench]
 fn decode_alone(bencher: Bencher<'_, '_>) {
     let (_, bytes) = turn();
-    bencher
-        .counter(BytesCount::new(bytes.len()))
-        .bench_local(move || decode(&bytes));
+    bencher.counter(BytesCount::new(bytes.len())).bench_local(move || decode(&bytes));
 }
 
 /// With the decoding.
@@ -101,12 +92,7 @@ fn open(bencher: Bencher<'_, '_>) {
     let (frame, bytes) = turn();
     let mut seal = Seal::new(OWN, key(), 1, []);
     let listener = Member::Station(StationId(1));
-    let mut opener = Opener::new(
-        listener,
-        [(OWN, key())],
-        [],
-        Arc::new(Revocations::default()),
-    );
+    let mut opener = Opener::new(listener, [(OWN, key())], [], Arc::new(Revocations::default()));
     bencher
         .counter(BytesCount::new(bytes.len()))
         .with_inputs(|| {

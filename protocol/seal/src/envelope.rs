@@ -84,12 +84,8 @@ mod tests {
         ];
         for sender in senders {
             for to in [None, Some(StationId(0)), Some(StationId(63))] {
-                let envelope = Envelope {
-                    sender,
-                    to,
-                    life: 0x0102_0304,
-                    number: 0x0506_0708_090a_0b0c,
-                };
+                let envelope =
+                    Envelope { sender, to, life: 0x0102_0304, number: 0x0506_0708_090a_0b0c };
                 assert_eq!(Envelope::read(&envelope.to_bytes()), Some(envelope));
             }
         }

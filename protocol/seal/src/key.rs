@@ -118,11 +118,7 @@ mod tests {
     use super::*;
 
     fn title<'a>(cluster: &'a str, member: &'a str, generation: u32) -> Title<'a> {
-        Title {
-            cluster,
-            member,
-            generation,
-        }
+        Title { cluster, member, generation }
     }
 
     #[test]

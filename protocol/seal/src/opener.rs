@@ -89,14 +89,10 @@ impl Opener {
         revoked: Arc<Revocations>,
     ) -> Self {
         let senders = senders.into_iter();
-        let ciphers = transfers
-            .into_iter()
-            .map(|(from, key)| (from, key.cipher()));
+        let ciphers = transfers.into_iter().map(|(from, key)| (from, key.cipher()));
         Self {
             own,
-            senders: senders
-                .map(|(member, key)| (member, (key, Window::default())))
-                .collect(),
+            senders: senders.map(|(member, key)| (member, (key, Window::default()))).collect(),
             transfers: ciphers.collect(),
             revoked,
             agreed: None,
@@ -132,10 +128,7 @@ impl Opener {
         let header: [u8; HEADER_BYTES] = *datagram.first_chunk().ok_or_else(nothing)?;
         let envelope = Envelope::read(&header).ok_or_else(nothing)?;
         let sender = envelope.sender;
-        let (key, window) = self
-            .senders
-            .get_mut(&sender)
-            .ok_or(Refusal::Foreign { sender })?;
+        let (key, window) = self.senders.get_mut(&sender).ok_or(Refusal::Foreign { sender })?;
         let (sealed, authenticator) = datagram.split_at_mut(length - AUTHENTICATOR_BYTES);
         let computed = blake3::keyed_hash(key.bytes(), sealed);
         if !same(&computed.as_bytes()[..AUTHENTICATOR_BYTES], authenticator) {
@@ -166,14 +159,8 @@ impl Opener {
                 "sender and receiver are those of its envelope",
             )));
         }
-        let Header {
-            cluster,
-            configuration,
-            ..
-        } = frame.header;
-        let agrees = self
-            .agreed
-            .is_none_or(|agreed| agreed == (cluster, configuration));
+        let Header { cluster, configuration, .. } = frame.header;
+        let agrees = self.agreed.is_none_or(|agreed| agreed == (cluster, configuration));
         // A frame of another configuration is refused by its receiver, and does not begin a life.
         if begins && agrees {
             take(window, envelope)?;

@@ -46,13 +46,7 @@ impl Seal {
         transfers: impl IntoIterator<Item = (StationId, TransferKey)>,
     ) -> Self {
         let ciphers = transfers.into_iter().map(|(to, key)| (to, key.cipher()));
-        Self {
-            own,
-            key,
-            transfers: ciphers.collect(),
-            life,
-            number: 0,
-        }
+        Self { own, key, transfers: ciphers.collect(), life, number: 0 }
     }
 
     /// Life in which it seals.
@@ -74,10 +68,7 @@ impl Seal {
         datagram.clear();
         let sender = frame.header.sender;
         if sender != self.own {
-            return Err(SealError::NotOwn {
-                own: self.own,
-                sender,
-            });
+            return Err(SealError::NotOwn { own: self.own, sender });
         }
         let to = match &frame.body {
             Body::Transfer(transfer) => Some(transfer.to),
@@ -91,12 +82,7 @@ impl Seal {
             None => None,
         };
         self.number += 1;
-        let envelope = Envelope {
-            sender,
-            to,
-            life: self.life,
-            number: self.number,
-        };
+        let envelope = Envelope { sender, to, life: self.life, number: self.number };
         let header = envelope.to_bytes();
         datagram.extend_from_slice(&header);
         datagram.extend_from_slice(encoded);

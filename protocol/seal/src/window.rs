@@ -61,11 +61,7 @@ impl Window {
         }
         if number > self.newest {
             let ahead = number - self.newest;
-            self.taken = if ahead < WINDOW_FRAMES {
-                (self.taken << ahead) | 1
-            } else {
-                1
-            };
+            self.taken = if ahead < WINDOW_FRAMES { (self.taken << ahead) | 1 } else { 1 };
             self.newest = number;
             return Verdict::Taken;
         }
@@ -80,10 +76,7 @@ impl Window {
 
 impl Earlier {
     fn ends(life: u32, number: u64) -> Self {
-        Self {
-            life,
-            until: number.saturating_add(WINDOW_FRAMES),
-        }
+        Self { life, until: number.saturating_add(WINDOW_FRAMES) }
     }
 
     fn goes_on(&mut self, life: u32, number: u64) -> Verdict {

@@ -26,11 +26,7 @@ fn secret() -> ClusterSecret {
 
 fn title(member: Member, name: &mut String) -> Title<'_> {
     *name = format!("{member:?}");
-    Title {
-        cluster: "cell",
-        member: name,
-        generation: 1,
-    }
+    Title { cluster: "cell", member: name, generation: 1 }
 }
 
 fn frame_key(member: Member) -> FrameKey {
@@ -85,10 +81,7 @@ fn framed(sender: Member, cycle: u64, body: Body) -> Frame {
         header: Header {
             cluster: ClusterHash(1),
             configuration: ConfigurationHash(2),
-            moment: Moment {
-                epoch: Epoch(3),
-                cycle: Cycle(cycle),
-            },
+            moment: Moment { epoch: Epoch(3), cycle: Cycle(cycle) },
             sender,
             alone: false,
         },
@@ -113,8 +106,7 @@ fn transfer(from: Member, to: StationId, state: Image) -> Frame {
 fn sealed(seal: &mut Seal, frame: &Frame) -> Vec<u8> {
     let (mut encoded, mut datagram) = (Vec::new(), Vec::new());
     encode(frame, &mut encoded).expect("a sensible frame");
-    seal.seal(frame, &encoded, &mut datagram)
-        .expect("its own frame");
+    seal.seal(frame, &encoded, &mut datagram).expect("its own frame");
     assert!(datagram.len() <= encoded.len() + OVERHEAD_BYTES);
     datagram
 }
@@ -151,10 +143,7 @@ fn no_changed_bit_is_taken() {
             assert!(open(&mut opener, &changed).is_err(), "bit {bit}");
         }
         for length in 0..datagram.len() {
-            assert!(
-                open(&mut opener, &datagram[..length]).is_err(),
-                "{length} bytes"
-            );
+            assert!(open(&mut opener, &datagram[..length]).is_err(), "{length} bytes");
         }
         assert_eq!(
             open(&mut opener, &datagram),
@@ -167,17 +156,12 @@ fn no_changed_bit_is_taken() {
 #[test]
 fn a_frame_counts_once() {
     let (mut seal, mut opener) = (seal(ROBOT, 1), listener());
-    let said: Vec<Vec<u8>> = (0..3)
-        .map(|cycle| sealed(&mut seal, &frame(ROBOT, cycle)))
-        .collect();
+    let said: Vec<Vec<u8>> = (0..3).map(|cycle| sealed(&mut seal, &frame(ROBOT, cycle))).collect();
     for datagram in [&said[1], &said[0], &said[2]] {
         assert!(matches!(open(&mut opener, datagram), Ok(Some(_))));
     }
     for datagram in &said {
-        assert_eq!(
-            open(&mut opener, datagram),
-            Err(Refusal::Replayed { sender: ROBOT })
-        );
+        assert_eq!(open(&mut opener, datagram), Err(Refusal::Replayed { sender: ROBOT }));
     }
 }
 
@@ -190,10 +174,7 @@ fn a_frame_of_an_earlier_life_never_counts() {
     assert!(open(&mut opener, &sealed(&mut restarted, &frame(ROBOT, 4))).is_ok());
     let unheard = sealed(&mut seal(ROBOT, 1), &frame(ROBOT, 901));
     for datagram in [old, unheard] {
-        assert_eq!(
-            open(&mut opener, &datagram),
-            Err(Refusal::Replayed { sender: ROBOT })
-        );
+        assert_eq!(open(&mut opener, &datagram), Err(Refusal::Replayed { sender: ROBOT }));
     }
 }
 
@@ -205,10 +186,7 @@ fn a_later_life_of_another_configuration_shuts_nobody_out() {
     let (mut rightful, mut copy) = (seal(ROBOT, 1), seal(ROBOT, 9));
     for cycle in 0..200 {
         let said = frame(ROBOT, cycle);
-        assert_eq!(
-            open(&mut opener, &sealed(&mut rightful, &said)),
-            Ok(Some(said.clone()))
-        );
+        assert_eq!(open(&mut opener, &sealed(&mut rightful, &said)), Ok(Some(said.clone())));
         let mut other = said;
         other.header.configuration = ConfigurationHash(3);
         assert_eq!(
@@ -246,9 +224,8 @@ fn two_lives_at_once_are_told_from_late_frames() {
 #[test]
 fn a_frame_that_is_too_late_does_not_count() {
     let (mut seal, mut opener) = (seal(ROBOT, 1), listener());
-    let said: Vec<Vec<u8>> = (0..=WINDOW_FRAMES)
-        .map(|cycle| sealed(&mut seal, &frame(ROBOT, cycle)))
-        .collect();
+    let said: Vec<Vec<u8>> =
+        (0..=WINDOW_FRAMES).map(|cycle| sealed(&mut seal, &frame(ROBOT, cycle))).collect();
     let newest = said.last().expect("there are some");
     assert!(open(&mut opener, newest).is_ok());
     assert!(open(&mut opener, &said[0]).is_err());
@@ -325,13 +302,7 @@ fn a_state_is_for_the_station_that_asked() {
 fn a_sender_seals_its_own_frames_only() {
     let mut datagram = Vec::new();
     let refused = seal(ROBOT, 1).seal(&frame(PRESS, 1), &[], &mut datagram);
-    assert_eq!(
-        refused,
-        Err(SealError::NotOwn {
-            own: ROBOT,
-            sender: PRESS
-        })
-    );
+    assert_eq!(refused, Err(SealError::NotOwn { own: ROBOT, sender: PRESS }));
     let nobody = transfer(ROBOT, StationId(9), Image::zero(1));
     let refused = seal(ROBOT, 1).seal(&nobody, &[], &mut datagram);
     assert_eq!(refused, Err(SealError::NoKey { to: StationId(9) }));
@@ -341,24 +312,13 @@ fn a_sender_seals_its_own_frames_only() {
 /// A frame under an envelope that says something else about it.
 #[test]
 fn the_envelope_and_the_frame_agree() {
-    let actuation = framed(
-        ROBOT_IO,
-        1,
-        Body::Actuation(Actuation {
-            outputs: Image::zero(1),
-        }),
-    );
+    let actuation = framed(ROBOT_IO, 1, Body::Actuation(Actuation { outputs: Image::zero(1) }));
     let (mut encoded, mut datagram) = (Vec::new(), Vec::new());
     encode(&frame(PRESS, 1), &mut encoded).expect("a sensible frame");
-    seal(ROBOT_IO, 1)
-        .seal(&actuation, &encoded, &mut datagram)
-        .expect("its own envelope");
+    seal(ROBOT_IO, 1).seal(&actuation, &encoded, &mut datagram).expect("its own envelope");
     assert!(matches!(
         open(&mut listener(), &datagram),
-        Err(Refusal::Broken {
-            sender: ROBOT_IO,
-            error: FrameError::Promise(_)
-        })
+        Err(Refusal::Broken { sender: ROBOT_IO, error: FrameError::Promise(_) })
     ));
 }
 

@@ -39,13 +39,8 @@ pub enum Topic {
 
 impl Topic {
     /// All topics; the place of each is `topic as usize`.
-    pub const ALL: [Self; 5] = [
-        Self::Cycle,
-        Self::Turn,
-        Self::Sample,
-        Self::Field,
-        Self::Actuation,
-    ];
+    pub const ALL: [Self; 5] =
+        [Self::Cycle, Self::Turn, Self::Sample, Self::Field, Self::Actuation];
 }
 
 /// The receivers of a frame.
@@ -87,11 +82,7 @@ impl Roster {
     /// A cluster of `controllers`, each with a remote I/O and a plant, among `stations`. A pair (i, j) in `neighbours` means that plant or
     /// remote I/O j also receives from plant or remote I/O i.
     pub fn new(controllers: usize, stations: usize, neighbours: Vec<(Member, Member)>) -> Self {
-        Self {
-            controllers,
-            stations,
-            neighbours,
-        }
+        Self { controllers, stations, neighbours }
     }
 
     /// Whether a member is an understudy.
@@ -104,11 +95,7 @@ impl Roster {
         match (&frame.body, frame.header.sender) {
             (Body::Turn(turn), Member::Station(station)) => {
                 let is_understudy = self.is_understudy(Member::Station(station));
-                if !is_understudy && turn.relayed.is_empty() {
-                    Topic::Turn
-                } else {
-                    Topic::Cycle
-                }
+                if !is_understudy && turn.relayed.is_empty() { Topic::Turn } else { Topic::Cycle }
             }
             (Body::Sync | Body::Turn(_) | Body::Join(_) | Body::Transfer(_), _) => Topic::Cycle,
             (Body::Sample(_), _) => Topic::Sample,
@@ -123,11 +110,9 @@ impl Roster {
         let stations = StationSet::first(self.stations);
         let understudies = stations.without(StationSet::first(self.controllers));
         let mut audience = match (topic, sender) {
-            (Topic::Cycle, Member::Station(_)) => Audience {
-                stations,
-                remote_ios: programs,
-                ..Audience::default()
-            },
+            (Topic::Cycle, Member::Station(_)) => {
+                Audience { stations, remote_ios: programs, ..Audience::default() }
+            }
             (Topic::Turn, Member::Station(station)) if station.index() < self.controllers => {
                 Audience {
                     stations: understudies.or(self.following(station.index(), FOLLOWERS)),
@@ -147,10 +132,9 @@ impl Roster {
                 plants: self.neighbours_of(sender),
                 ..Audience::default()
             },
-            (Topic::Actuation, Member::RemoteIo(program)) => Audience {
-                plants: ProgramSet::only(program),
-                ..Audience::default()
-            },
+            (Topic::Actuation, Member::RemoteIo(program)) => {
+                Audience { plants: ProgramSet::only(program), ..Audience::default() }
+            }
             _ => Audience::default(),
         };
         match sender {

@@ -109,9 +109,7 @@ pub fn decode(bytes: &[u8]) -> Result<Frame, FrameError> {
         return Err(FrameError::Magic);
     }
     if bytes[MAGIC.len()] != VERSION {
-        return Err(FrameError::Version {
-            found: bytes[MAGIC.len()],
-        });
+        return Err(FrameError::Version { found: bytes[MAGIC.len()] });
     }
     let (before, checksum) = bytes.split_at(length - CHECKSUM_BYTES);
     let found = u32::from_le_bytes(checksum.try_into().expect("four bytes"));
@@ -132,11 +130,7 @@ pub fn decode(bytes: &[u8]) -> Result<Frame, FrameError> {
 /// Rules that types alone cannot express.
 fn keeps_promises(frame: &Frame) -> Result<(), FrameError> {
     let kept = |holds: bool, promise: &'static str| {
-        if holds {
-            Ok(())
-        } else {
-            Err(FrameError::Promise(promise))
-        }
+        if holds { Ok(()) } else { Err(FrameError::Promise(promise)) }
     };
     let sender = frame.header.sender;
     kept(
@@ -152,10 +146,7 @@ fn keeps_promises(frame: &Frame) -> Result<(), FrameError> {
     match &frame.body {
         Body::Sync => kept(station, "only a station paces"),
         Body::Sample(sample) => {
-            kept(
-                matches!(sender, Member::RemoteIo(_)),
-                "only a remote I/O samples",
-            )?;
+            kept(matches!(sender, Member::RemoteIo(_)), "only a remote I/O samples")?;
             kept_sample(sample)
         }
         Body::Turn(turn) => {
@@ -163,15 +154,9 @@ fn keeps_promises(frame: &Frame) -> Result<(), FrameError> {
             let held = kept_holdings(&turn.holdings)?;
             kept_recalled(&turn.recalled)?;
             kept_relayed(&turn.relayed)?;
-            kept(
-                turn.words.len() <= MAXIMUM_PROGRAMS + 1,
-                "a turn has at most 65 words",
-            )?;
+            kept(turn.words.len() <= MAXIMUM_PROGRAMS + 1, "a turn has at most 65 words")?;
             let covered = |word: &Word| !word.mask.is_empty() && word.mask.without(held).is_empty();
-            kept(
-                turn.words.iter().all(covered),
-                "a word is over states that are held",
-            )
+            kept(turn.words.iter().all(covered), "a word is over states that are held")
         }
         Body::Join(join) => {
             kept(station, "only a station joins")?;
@@ -197,19 +182,12 @@ fn keeps_promises(frame: &Frame) -> Result<(), FrameError> {
             )
         }
         Body::Field(field) => {
-            kept(
-                matches!(sender, Member::Plant(_)),
-                "only a plant has a field",
-            )?;
-            kept(
-                field.positions.len() <= MAXIMUM_POSITIONS,
-                "a plant shows at most 16 positions",
-            )
+            kept(matches!(sender, Member::Plant(_)), "only a plant has a field")?;
+            kept(field.positions.len() <= MAXIMUM_POSITIONS, "a plant shows at most 16 positions")
         }
-        Body::Actuation(_) => kept(
-            matches!(sender, Member::RemoteIo(_)),
-            "only a remote I/O drives",
-        ),
+        Body::Actuation(_) => {
+            kept(matches!(sender, Member::RemoteIo(_)), "only a remote I/O drives")
+        }
     }
 }
 
@@ -222,9 +200,7 @@ fn kept_sample(sample: &Sample) -> Result<(), FrameError> {
     if sample.history.iter().all(|image| image.width() == width) {
         Ok(())
     } else {
-        Err(FrameError::Promise(
-            "all samples of a program are of one width",
-        ))
+        Err(FrameError::Promise("all samples of a program are of one width"))
     }
 }
 
@@ -250,16 +226,12 @@ fn kept_writes(writes: &[WriteId]) -> Result<(), FrameError> {
 }
 
 fn kept_recalled(recalled: &[Recalled]) -> Result<(), FrameError> {
-    recalled
-        .iter()
-        .try_for_each(|one| kept_writes(&one.writes))?;
+    recalled.iter().try_for_each(|one| kept_writes(&one.writes))?;
     let programs: ProgramSet = recalled.iter().map(|one| one.program).collect();
     if programs.len() == recalled.len() {
         Ok(())
     } else {
-        Err(FrameError::Promise(
-            "a program is recalled once, with an index below 64",
-        ))
+        Err(FrameError::Promise("a program is recalled once, with an index below 64"))
     }
 }
 

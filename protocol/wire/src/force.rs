@@ -54,10 +54,7 @@ impl PointValue {
     pub fn new(width: u32, stored: u64) -> Self {
         match width {
             1 => Self::Bit(stored & 1 == 1),
-            _ => Self::Number {
-                width: u8::try_from(width).unwrap_or(u8::MAX),
-                stored,
-            },
+            _ => Self::Number { width: u8::try_from(width).unwrap_or(u8::MAX), stored },
         }
     }
 
@@ -233,11 +230,7 @@ mod tests {
         check(3, "true", Ok(()));
         check(64, r#"{"width":32,"stored":4294967295}"#, Ok(()));
         check(64, r#"{"width":64,"stored":18446744073709551615}"#, Ok(()));
-        check(
-            64,
-            r#"{"width":32,"stored":4294967296}"#,
-            Err(ForceError::Value),
-        );
+        check(64, r#"{"width":32,"stored":4294967296}"#, Err(ForceError::Value));
         check(16, r#"{"width":32,"stored":0}"#, Err(ForceError::Value));
         check(0, r#"{"width":1,"stored":0}"#, Err(ForceError::Value));
         check(0, r#"{"width":0,"stored":0}"#, Err(ForceError::Value));
@@ -252,10 +245,7 @@ mod tests {
             owner: "anna".to_owned(),
             reason: "why".to_owned(),
         };
-        let number = PointValue::Number {
-            width: 32,
-            stored: 0,
-        };
+        let number = PointValue::Number { width: 32, stored: 0 };
         let wide = force(SignalPlace::Input(32), number);
         for (signal, expected) in [
             (SignalPlace::Input(31), false),
@@ -265,10 +255,7 @@ mod tests {
             (SignalPlace::Output(32), false),
         ] {
             let bit = force(signal, true.into());
-            assert_eq!(
-                (wide.overlaps(&bit), bit.overlaps(&wide)),
-                (expected, expected)
-            );
+            assert_eq!((wide.overlaps(&bit), bit.overlaps(&wide)), (expected, expected));
         }
         assert!(wide.fits(64) && !wide.fits(63));
     }

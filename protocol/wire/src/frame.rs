@@ -156,12 +156,10 @@ impl Holding {
     pub fn of(holdings: &[Self], program: ProgramId) -> Option<&Self> {
         // An understudy that holds all states has each at the index of its program.
         let at_index = holdings.get(program.index());
-        at_index
-            .filter(|holding| holding.program == program)
-            .or_else(|| {
-                let place = holdings.binary_search_by_key(&program, |holding| holding.program);
-                place.ok().map(|place| &holdings[place])
-            })
+        at_index.filter(|holding| holding.program == program).or_else(|| {
+            let place = holdings.binary_search_by_key(&program, |holding| holding.program);
+            place.ok().map(|place| &holdings[place])
+        })
     }
 }
 

@@ -76,10 +76,7 @@ impl Moment {
     /// The moment `cycles` later in the same epoch, at most the last cycle that can be numbered.
     #[must_use]
     pub fn plus(self, cycles: u64) -> Self {
-        Self {
-            epoch: self.epoch,
-            cycle: Cycle(self.cycle.0.saturating_add(cycles)),
-        }
+        Self { epoch: self.epoch, cycle: Cycle(self.cycle.0.saturating_add(cycles)) }
     }
 }
 

@@ -55,10 +55,7 @@ impl Image {
     /// If wider than [`MAXIMUM_STATE_BITS`]; widths are checked where a cluster is configured.
     pub fn zero(width: usize) -> Self {
         assert!(width <= MAXIMUM_STATE_BITS, "an image of {width} bits");
-        Self {
-            width: width as u32,
-            words: SmallVec::from_elem(0, width.div_ceil(64)),
-        }
+        Self { width: width as u32, words: SmallVec::from_elem(0, width.div_ceil(64)) }
     }
 
     /// An image from packed words, bit k of word k / 64 being element k + 1.
@@ -66,22 +63,12 @@ impl Image {
         if width > MAXIMUM_STATE_BITS {
             return Err(ImageError::TooWide { width });
         }
-        let unused = if width.is_multiple_of(64) {
-            0
-        } else {
-            u64::MAX << (width % 64)
-        };
+        let unused = if width.is_multiple_of(64) { 0 } else { u64::MAX << (width % 64) };
         if words.len() != width.div_ceil(64) || words.last().is_some_and(|last| last & unused != 0)
         {
-            return Err(ImageError::Malformed {
-                width,
-                words: words.len(),
-            });
+            return Err(ImageError::Malformed { width, words: words.len() });
         }
-        Ok(Self {
-            width: width as u32,
-            words: SmallVec::from_slice(words),
-        })
+        Ok(Self { width: width as u32, words: SmallVec::from_slice(words) })
     }
 
     /// An image from its bits in order.
@@ -167,10 +154,7 @@ impl Image {
 impl Clone for Image {
     #[inline]
     fn clone(&self) -> Self {
-        Self {
-            width: self.width,
-            words: SmallVec::from_slice(&self.words),
-        }
+        Self { width: self.width, words: SmallVec::from_slice(&self.words) }
     }
 
     fn clone_from(&mut self, other: &Self) {
@@ -190,10 +174,7 @@ impl TryFrom<RawImage> for Image {
 
 impl From<Image> for RawImage {
     fn from(image: Image) -> Self {
-        Self {
-            width: image.width,
-            words: image.words,
-        }
+        Self { width: image.width, words: image.words }
     }
 }
 

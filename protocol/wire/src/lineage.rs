@@ -20,9 +20,7 @@ pub struct Lineage(pub u64);
 impl Lineage {
     /// L(i)(0): the initial state of a program that its remote I/O started cold at `born`.
     pub fn genesis(program: ProgramHash, born: Moment) -> Self {
-        [program.0, born.epoch.0, born.cycle.0]
-            .into_iter()
-            .fold(Self(0), Self::fold)
+        [program.0, born.epoch.0, born.cycle.0].into_iter().fold(Self(0), Self::fold)
     }
 
     /// L(i)(t+1), from L(i)(t) and u(i)(t).
@@ -47,9 +45,7 @@ impl Digest {
     /// The digest of x(i).
     pub fn of(state: &Image) -> Self {
         let words = state.words().iter();
-        Self(words.fold(0, |digest, word| {
-            xxh3_64_with_seed(&word.to_le_bytes(), digest)
-        }))
+        Self(words.fold(0, |digest, word| xxh3_64_with_seed(&word.to_le_bytes(), digest)))
     }
 }
 
@@ -74,13 +70,9 @@ mod tests {
 
     #[test]
     fn every_history_of_four_two_bit_inputs_has_its_own_name() {
-        let inputs: Vec<Image> = (0..4)
-            .map(|word| Image::from_words(2, &[word]).expect("two bits"))
-            .collect();
-        let born = Moment {
-            epoch: Epoch(1),
-            cycle: Cycle(0),
-        };
+        let inputs: Vec<Image> =
+            (0..4).map(|word| Image::from_words(2, &[word]).expect("two bits")).collect();
+        let born = Moment { epoch: Epoch(1), cycle: Cycle(0) };
         let mut generation = vec![Lineage::genesis(ProgramHash(7), born)];
         let mut seen: HashSet<Lineage> = generation.iter().copied().collect();
         let mut expected = 1;
@@ -99,10 +91,7 @@ mod tests {
     fn a_second_birth_is_another_lineage() {
         let born = Moment::default();
         let again = born.plus(1);
-        assert_ne!(
-            Lineage::genesis(ProgramHash(7), born),
-            Lineage::genesis(ProgramHash(7), again)
-        );
+        assert_ne!(Lineage::genesis(ProgramHash(7), born), Lineage::genesis(ProgramHash(7), again));
         assert_ne!(Lineage(3).after(&Image::zero(0)), Lineage(3));
     }
 }

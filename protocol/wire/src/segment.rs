@@ -92,10 +92,7 @@ mod tests {
     #[test]
     fn segments_make_the_state() {
         let edges = [0, 1, 64, SEGMENT_BITS - 1, SEGMENT_BITS, SEGMENT_BITS + 1];
-        for width in edges
-            .into_iter()
-            .chain([MAXIMUM_STATE_BITS - 63, MAXIMUM_STATE_BITS])
-        {
+        for width in edges.into_iter().chain([MAXIMUM_STATE_BITS - 63, MAXIMUM_STATE_BITS]) {
             let state = Image::from_bits((0..width).map(|bit| bit % 7 == 0 || bit % 11 == 0));
             let whole = Digest::of(&state);
             let count = Segment::count(width);
@@ -105,10 +102,7 @@ mod tests {
                 let segment = Segment::of(&state, whole, place).expect("it is one");
                 assert!(segment.fits());
                 segment.put(&mut put);
-                let moved = Segment {
-                    place: segment.place + 1,
-                    ..segment.clone()
-                };
+                let moved = Segment { place: segment.place + 1, ..segment.clone() };
                 assert_eq!(
                     moved.fits(),
                     place + 1 < count

@@ -233,13 +233,8 @@ mod tests {
 
     #[test]
     fn a_set_holds_what_was_put_in_in_order() {
-        let set: ProgramSet = [ProgramId(63), ProgramId(0), ProgramId(5)]
-            .into_iter()
-            .collect();
-        assert_eq!(
-            set.iter().map(|program| program.0).collect::<Vec<_>>(),
-            [0, 5, 63]
-        );
+        let set: ProgramSet = [ProgramId(63), ProgramId(0), ProgramId(5)].into_iter().collect();
+        assert_eq!(set.iter().map(|program| program.0).collect::<Vec<_>>(), [0, 5, 63]);
         assert_eq!(set.without(ProgramSet::only(ProgramId(5))).len(), 2);
         assert_eq!(ProgramSet::first(64).len(), 64);
         assert_eq!(StationSet::first(65).len(), 65);
@@ -253,10 +248,7 @@ mod tests {
         set.insert(StationId(MAXIMUM_STATIONS as u8));
         assert!(set.is_empty());
         assert!(!StationSet::first(128).contains(StationId(200)));
-        assert_eq!(
-            ProgramSet::from_bits(u128::MAX),
-            ProgramSet::first(MAXIMUM_PROGRAMS)
-        );
+        assert_eq!(ProgramSet::from_bits(u128::MAX), ProgramSet::first(MAXIMUM_PROGRAMS));
     }
 
     #[test]
@@ -271,14 +263,7 @@ mod tests {
             assert_eq!(serde_json::to_string(&set).unwrap(), text);
             assert_eq!(serde_json::from_str::<StationSet>(text).unwrap(), set);
         }
-        for text in [
-            "-1",
-            "\"\"",
-            "\"g\"",
-            "\"1000000000000000000\"",
-            "1.5",
-            "[]",
-        ] {
+        for text in ["-1", "\"\"", "\"g\"", "\"1000000000000000000\"", "1.5", "[]"] {
             assert!(serde_json::from_str::<StationSet>(text).is_err(), "{text}");
         }
     }

@@ -181,10 +181,7 @@ mod tests {
 
     #[test]
     fn an_answer_is_flat_json() {
-        let id = WriteId {
-            session: 7,
-            number: 1,
-        };
+        let id = WriteId { session: 7, number: 1 };
         let check = |outcome, expected: &str| {
             let answer = WriteAnswer { id, outcome };
             let text = serde_json::to_string(&answer).expect("JSON");

@@ -10,10 +10,7 @@ use understudy_wire::{
 };
 
 fn moment(epoch: u64, cycle: u64) -> Moment {
-    Moment {
-        epoch: Epoch(epoch),
-        cycle: Cycle(cycle),
-    }
+    Moment { epoch: Epoch(epoch), cycle: Cycle(cycle) }
 }
 
 fn image(width: usize, word: u64) -> Image {
@@ -76,17 +73,11 @@ fn every_kind() -> Vec<(&'static str, Frame)> {
         drives: true,
         writes: smallvec![write(7, 1), write(9, 4)],
     };
-    let relayed = Relayed {
-        program: ProgramId(1),
-        sample: sample.clone(),
-    };
+    let relayed = Relayed { program: ProgramId(1), sample: sample.clone() };
     let turn = Turn {
         heard: StationSet::from_bits(0b11),
         holdings: smallvec![holding(0), holding(1)],
-        words: smallvec![Word {
-            mask: ProgramSet::from_bits(0b11),
-            sum: image(5, 0b10101),
-        }],
+        words: smallvec![Word { mask: ProgramSet::from_bits(0b11), sum: image(5, 0b10101) }],
         recalled: vec![recalled(0)],
         lacks: ProgramSet::from_bits(0b1),
         relayed: vec![relayed],
@@ -120,9 +111,7 @@ fn every_kind() -> Vec<(&'static str, Frame)> {
         plant_faults: 0,
         positions: smallvec![0, 500, 1000],
     };
-    let actuation = Actuation {
-        outputs: image(5, 0b1),
-    };
+    let actuation = Actuation { outputs: image(5, 0b1) };
     vec![
         ("sync", frame(station, Body::Sync)),
         ("sample", frame(remote_io, Body::Sample(sample))),
@@ -146,10 +135,8 @@ fn golden_vectors() {
     let text: String = every_kind()
         .iter()
         .map(|(kind, frame)| {
-            let hexadecimal: String = bytes_of(frame)
-                .iter()
-                .map(|byte| format!("{byte:02x}"))
-                .collect();
+            let hexadecimal: String =
+                bytes_of(frame).iter().map(|byte| format!("{byte:02x}")).collect();
             format!("{kind} {hexadecimal}\n")
         })
         .collect();
@@ -183,10 +170,7 @@ fn check_refused(sender: Member, body: Body) {
     let frame = frame(sender, body);
     let mut bytes = Vec::new();
     let refused = encode(&frame, &mut bytes);
-    assert!(
-        matches!(refused, Err(FrameError::Promise(_))),
-        "{refused:?}"
-    );
+    assert!(matches!(refused, Err(FrameError::Promise(_))), "{refused:?}");
     assert!(bytes.is_empty());
 }
 
@@ -195,10 +179,7 @@ fn a_frame_that_breaks_a_promise_never_leaves() {
     let station = Member::Station(StationId(2));
     let remote_io = Member::RemoteIo(ProgramId(0));
     check_refused(remote_io, Body::Sync);
-    check_refused(
-        Member::Station(StationId(MAXIMUM_STATIONS as u8)),
-        Body::Sync,
-    );
+    check_refused(Member::Station(StationId(MAXIMUM_STATIONS as u8)), Body::Sync);
     let empty = Sample {
         born: Moment::default(),
         base: Lineage(0),
@@ -212,26 +193,16 @@ fn a_frame_that_breaks_a_promise_never_leaves() {
         writes: smallvec![],
     };
     check_refused(remote_io, Body::Sample(empty.clone()));
-    for writes in [
-        vec![write(1, 1), write(1, 2)],
-        (0..17).map(|session| write(session, 1)).collect(),
-    ] {
-        let sample = Sample {
-            history: smallvec![image(1, 0)],
-            writes: writes.into(),
-            ..empty.clone()
-        };
+    for writes in
+        [vec![write(1, 1), write(1, 2)], (0..17).map(|session| write(session, 1)).collect()]
+    {
+        let sample =
+            Sample { history: smallvec![image(1, 0)], writes: writes.into(), ..empty.clone() };
         check_refused(remote_io, Body::Sample(sample));
     }
-    let uneven = Sample {
-        history: smallvec![image(1, 0), image(2, 0)],
-        ..empty.clone()
-    };
+    let uneven = Sample { history: smallvec![image(1, 0), image(2, 0)], ..empty.clone() };
     check_refused(remote_io, Body::Sample(uneven));
-    let word = |members| Word {
-        mask: ProgramSet::from_bits(members),
-        sum: Image::default(),
-    };
+    let word = |members| Word { mask: ProgramSet::from_bits(members), sum: Image::default() };
     let turn = |members, programs: &[u8]| Turn {
         heard: StationSet::EMPTY,
         holdings: programs.iter().map(|&program| holding(program)).collect(),
@@ -244,19 +215,11 @@ fn a_frame_that_breaks_a_promise_never_leaves() {
     check_refused(station, Body::Turn(turn(0b10, &[0])));
     check_refused(station, Body::Turn(turn(0b1, &[0, 0])));
     check_refused(station, Body::Turn(turn(0b1, &[1, 0])));
-    let sample = Sample {
-        history: smallvec![image(1, 0)],
-        ..empty.clone()
-    };
+    let sample = Sample { history: smallvec![image(1, 0)], ..empty.clone() };
     let relaying = |programs: [u8; 2], sample: &Sample| {
-        let relayed = programs.map(|program| Relayed {
-            program: ProgramId(program),
-            sample: sample.clone(),
-        });
-        Body::Turn(Turn {
-            relayed: relayed.to_vec(),
-            ..turn(0b1, &[0])
-        })
+        let relayed =
+            programs.map(|program| Relayed { program: ProgramId(program), sample: sample.clone() });
+        Body::Turn(Turn { relayed: relayed.to_vec(), ..turn(0b1, &[0]) })
     };
     check_refused(station, relaying([1, 1], &sample));
     check_refused(station, relaying([1, 64], &sample));

@@ -36,10 +36,7 @@ pub(super) struct Wrong {
 
 impl Wrong {
     fn new(code: &'static str, message: String, span: Range<usize>) -> Box<Self> {
-        Box::new(Self {
-            diagnostic: Diagnostic::error(code, message, span),
-            unknown: None,
-        })
+        Box::new(Self { diagnostic: Diagnostic::error(code, message, span), unknown: None })
     }
 }
 
@@ -52,23 +49,14 @@ pub(super) fn evaluate(
     offset: usize,
     constant: impl FnMut(&str) -> Option<Option<Value>>,
 ) -> Parsed {
-    let mut parser = Parser {
-        text: text.trim_end(),
-        at: 0,
-        offset,
-        constant,
-    };
+    let mut parser = Parser { text: text.trim_end(), at: 0, offset, constant };
     let value = parser.sum(0)?;
     parser.blank();
     match parser.peek() {
         None => Ok(value),
         Some(character) => {
             let span = parser.here(character.len_utf8());
-            Err(Wrong::new(
-                "U0721",
-                format!("{character} is not expected here"),
-                span,
-            ))
+            Err(Wrong::new("U0721", format!("{character} is not expected here"), span))
         }
     }
 }
@@ -106,10 +94,9 @@ impl<Constant: FnMut(&str) -> Option<Option<Value>>> Parser<'_, Constant> {
                     let message = format!("{} and {} cannot be added", a.said(), b.said());
                     return Err(Wrong::new("U0725", message, span));
                 }
-                (Some(a), Some(b)) => Some(Value {
-                    number: a.number + sign * b.number,
-                    dimension: a.dimension,
-                }),
+                (Some(a), Some(b)) => {
+                    Some(Value { number: a.number + sign * b.number, dimension: a.dimension })
+                }
                 _ => None,
             };
         }
@@ -127,11 +114,7 @@ impl<Constant: FnMut(&str) -> Option<Option<Value>>> Parser<'_, Constant> {
             self.at += 1;
             let right = self.factor(depth)?;
             left = left.zip(right).map(|(a, b)| Value {
-                number: if over {
-                    a.number / b.number
-                } else {
-                    a.number * b.number
-                },
+                number: if over { a.number / b.number } else { a.number * b.number },
                 dimension: a
                     .dimension
                     .saturating_add(if over { -b.dimension } else { b.dimension })
@@ -160,20 +143,13 @@ impl<Constant: FnMut(&str) -> Option<Option<Value>>> Parser<'_, Constant> {
             Some('-') => {
                 self.at += 1;
                 let value = self.factor(depth + 1)?;
-                Ok(value.map(|value| Value {
-                    number: -value.number,
-                    ..value
-                }))
+                Ok(value.map(|value| Value { number: -value.number, ..value }))
             }
             Some(first) if first.is_ascii_digit() || first == '.' => self.number().map(Some),
             Some(first) if first.is_alphabetic() || first == '_' => self.name(),
             Some(other) => {
                 let span = self.here(other.len_utf8());
-                Err(Wrong::new(
-                    "U0721",
-                    format!("expected a value and found {other}"),
-                    span,
-                ))
+                Err(Wrong::new("U0721", format!("expected a value and found {other}"), span))
             }
             None => Err(Wrong::new("U0721", "expected a value".into(), self.here(0))),
         }
@@ -183,12 +159,8 @@ impl<Constant: FnMut(&str) -> Option<Option<Value>>> Parser<'_, Constant> {
     fn number(&mut self) -> Result<Value, Box<Wrong>> {
         let rest = &self.text[self.at..];
         let bytes = rest.as_bytes();
-        let digits = |from: usize| {
-            bytes[from..]
-                .iter()
-                .take_while(|byte| byte.is_ascii_digit())
-                .count()
-        };
+        let digits =
+            |from: usize| bytes[from..].iter().take_while(|byte| byte.is_ascii_digit()).count();
         let mut length = digits(0);
         if bytes.get(length) == Some(&b'.') {
             length += 1 + digits(length + 1);
@@ -202,11 +174,7 @@ impl<Constant: FnMut(&str) -> Option<Option<Value>>> Parser<'_, Constant> {
         }
         let span = self.here(length);
         let Ok(number) = rest[..length].parse::<f64>() else {
-            return Err(Wrong::new(
-                "U0721",
-                format!("{} is not a number", &rest[..length]),
-                span,
-            ));
+            return Err(Wrong::new("U0721", format!("{} is not a number", &rest[..length]), span));
         };
         self.at += length;
         let spaces =
@@ -214,19 +182,13 @@ impl<Constant: FnMut(&str) -> Option<Option<Value>>> Parser<'_, Constant> {
         let unit_at = self.at + spaces;
         let unit = word(&self.text[unit_at..]);
         if unit.is_empty() {
-            return Ok(Value {
-                number,
-                dimension: 0,
-            });
+            return Ok(Value { number, dimension: 0 });
         }
         self.at = unit_at;
         let span = self.here(unit.len());
         self.at += unit.len();
         match unit_length(unit) {
-            Some(length) => Ok(Value {
-                number: number * length,
-                dimension: 1,
-            }),
+            Some(length) => Ok(Value { number: number * length, dimension: 1 }),
             None => {
                 let mut wrong = Wrong::new("U0725", format!("{unit} is not a unit of time"), span);
                 wrong.diagnostic.help = Some(

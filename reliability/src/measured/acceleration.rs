@@ -39,10 +39,7 @@ pub fn acceleration_bias(
         }]);
     }
     if factor > MAXIMUM_ACCELERATION && !forced {
-        return Err(vec![ReliabilityError::Acceleration {
-            factor,
-            maximum: MAXIMUM_ACCELERATION,
-        }]);
+        return Err(vec![ReliabilityError::Acceleration { factor, maximum: MAXIMUM_ACCELERATION }]);
     }
     let mean = |hours: f64| -> Result<f64, Vec<ReliabilityError>> {
         let mut system = system.clone();

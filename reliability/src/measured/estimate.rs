@@ -52,10 +52,7 @@ pub fn mean_time(
 ) -> Result<Interval, ReliabilityError> {
     let alpha = significance(confidence)?;
     if !(hours > 0.0 && hours.is_finite()) {
-        return Err(ReliabilityError::Time {
-            what: "the time of observation".into(),
-            hours,
-        });
+        return Err(ReliabilityError::Time { what: "the time of observation".into(), hours });
     }
     if failures == 0 {
         if stopped == Stopped::AtFailure {
@@ -91,18 +88,11 @@ pub fn times_to_failure(
 ) -> Result<Interval, ReliabilityError> {
     for &hours in failed_hours.iter().chain(censored_hours) {
         if !(hours >= 0.0 && hours.is_finite()) {
-            return Err(ReliabilityError::Time {
-                what: "the time of a run".into(),
-                hours,
-            });
+            return Err(ReliabilityError::Time { what: "the time of a run".into(), hours });
         }
     }
     let hours = failed_hours.iter().chain(censored_hours).sum();
-    let stopped = if censored_hours.is_empty() {
-        Stopped::AtFailure
-    } else {
-        Stopped::AtTime
-    };
+    let stopped = if censored_hours.is_empty() { Stopped::AtFailure } else { Stopped::AtTime };
     mean_time(failed_hours.len() as u64, hours, stopped, confidence)
 }
 
@@ -133,12 +123,7 @@ pub fn proportion(
         _ if successes == trials => 1.0,
         _ => beta(1.0 - alpha / 2.0, k + 1.0, n - k)?,
     };
-    Ok(Interval {
-        estimate: Some(k / n),
-        lower,
-        upper: Some(upper),
-        confidence,
-    })
+    Ok(Interval { estimate: Some(k / n), lower, upper: Some(upper), confidence })
 }
 
 /// α of a confidence 1 - α.
@@ -160,22 +145,16 @@ pub(crate) fn normal_quantile(confidence: f64) -> Result<f64, ReliabilityError> 
 
 /// The quantile of the chi-squared law.
 pub(crate) fn chi_squared(probability: f64, freedom: f64) -> Result<f64, ReliabilityError> {
-    let law = ChiSquared::new(freedom).map_err(|error| ReliabilityError::Measurement {
-        why: error.to_string(),
-    })?;
-    Ok(polished(law.inverse_cdf(probability), probability, |x| {
-        (law.cdf(x), density(&law, x))
-    }))
+    let law = ChiSquared::new(freedom)
+        .map_err(|error| ReliabilityError::Measurement { why: error.to_string() })?;
+    Ok(polished(law.inverse_cdf(probability), probability, |x| (law.cdf(x), density(&law, x))))
 }
 
 /// The quantile of the beta law.
 pub(crate) fn beta(probability: f64, a: f64, b: f64) -> Result<f64, ReliabilityError> {
-    let law = Beta::new(a, b).map_err(|error| ReliabilityError::Measurement {
-        why: error.to_string(),
-    })?;
-    Ok(polished(law.inverse_cdf(probability), probability, |x| {
-        (law.cdf(x), density(&law, x))
-    }))
+    let law = Beta::new(a, b)
+        .map_err(|error| ReliabilityError::Measurement { why: error.to_string() })?;
+    Ok(polished(law.inverse_cdf(probability), probability, |x| (law.cdf(x), density(&law, x))))
 }
 
 fn density(law: &impl statrs::distribution::Continuous<f64, f64>, x: f64) -> f64 {

@@ -56,10 +56,7 @@ pub fn fit(
 ) -> Result<Fit, ReliabilityError> {
     if hours.len() < 5 {
         return Err(ReliabilityError::Measurement {
-            why: format!(
-                "{} times are too few for a test of fit; it takes 5",
-                hours.len()
-            ),
+            why: format!("{} times are too few for a test of fit; it takes 5", hours.len()),
         });
     }
     if bootstrap < 100 {
@@ -69,10 +66,7 @@ pub fn fit(
     }
     for &hours in hours {
         if !(hours > 0.0 && hours.is_finite()) {
-            return Err(ReliabilityError::Time {
-                what: "a time to failure".into(),
-                hours,
-            });
+            return Err(ReliabilityError::Time { what: "a time to failure".into(), hours });
         }
     }
     let measured = statistics(&mut hours.to_vec(), law, null);
@@ -117,19 +111,14 @@ fn statistics(hours: &mut [f64], law: &Law, null: Null) -> (f64, f64) {
     };
     let shares: Vec<f64> = hours
         .iter()
-        .map(|hours| {
-            law.unreliability(hours * scale)
-                .clamp(1e-300, 1.0 - f64::EPSILON)
-        })
+        .map(|hours| law.unreliability(hours * scale).clamp(1e-300, 1.0 - f64::EPSILON))
         .collect();
     let (mut sum, mut distance) = (0.0, 0.0_f64);
     for (place, &share) in shares.iter().enumerate() {
         let rank = place as f64;
         let opposite = shares[shares.len() - 1 - place];
         sum += (2.0 * rank + 1.0) * (share.ln() + (-opposite).ln_1p());
-        distance = distance
-            .max(share - rank / count)
-            .max((rank + 1.0) / count - share);
+        distance = distance.max(share - rank / count).max((rank + 1.0) / count - share);
     }
     (-count - sum / count, distance)
 }

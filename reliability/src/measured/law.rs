@@ -28,11 +28,7 @@ impl Law {
         let hours = times(mean);
         let found = chain.transients(&hours, AfterFailure::Final)?;
         let exposure = found.iter().map(|at| -at.log_working()).collect();
-        Ok(Self {
-            mean,
-            hours,
-            exposure,
-        })
+        Ok(Self { mean, hours, exposure })
     }
 
     /// Mean, in hours.
@@ -66,14 +62,8 @@ fn between(from: &[f64], to: &[f64], x: f64) -> f64 {
     if x <= 0.0 {
         return 0.0;
     }
-    let after = from
-        .partition_point(|entry| *entry < x)
-        .clamp(1, from.len() - 1);
+    let after = from.partition_point(|entry| *entry < x).clamp(1, from.len() - 1);
     let (x0, x1) = (from[after - 1], from[after]);
     let (y0, y1) = (to[after - 1], to[after]);
-    if x1 > x0 {
-        y0 + (y1 - y0) * (x - x0) / (x1 - x0)
-    } else {
-        y1
-    }
+    if x1 > x0 { y0 + (y1 - y0) * (x - x0) / (x1 - x0) } else { y1 }
 }

@@ -76,10 +76,8 @@ pub fn outlook(
     let alpha = significance(confidence).map_err(one)?;
     check(observed, draws).map_err(one)?;
     let failures = observed.failures_at.len() as f64;
-    let (masked, unmasked) = (
-        observed.masked as f64,
-        observed.asked.saturating_sub(observed.masked) as f64,
-    );
+    let (masked, unmasked) =
+        (observed.masked as f64, observed.asked.saturating_sub(observed.masked) as f64);
     let detections = observed.detection_hours.len() as f64;
     let detecting: f64 = observed.detection_hours.iter().sum();
     let detected = detections > 0.0 && detecting > 0.0;
@@ -103,11 +101,7 @@ pub fn outlook(
     };
     let failing = law(failures, observed.working_hours).map_err(one)?;
     let repairing = law(observed.repairs as f64, observed.repairing_hours).map_err(one)?;
-    let noticing = if detected {
-        Some(law(detections, detecting).map_err(one)?)
-    } else {
-        None
-    };
+    let noticing = if detected { Some(law(detections, detecting).map_err(one)?) } else { None };
     let covering = Beta::new(masked + 0.5, unmasked + 0.5)
         .map_err(|error| vec![contradiction(error.to_string())])?;
     let mut reliabilities = Vec::with_capacity(draws);
@@ -120,18 +114,11 @@ pub fn outlook(
         let mut drawn = system.clone();
         let mtbf = time(failing.sample(random)).map_err(one)?;
         let mttr = time(repairing.sample(random)).map_err(one)?;
-        for kind in drawn
-            .controllers
-            .iter_mut()
-            .chain([&mut drawn.understudies])
-        {
+        for kind in drawn.controllers.iter_mut().chain([&mut drawn.understudies]) {
             (kind.mtbf, kind.mttr) = (mtbf, mttr);
         }
         drawn.coverage = Probability::new("the coverage", covering.sample(random)).map_err(one)?;
-        drawn.detection = noticing
-            .map(|law| time(law.sample(random)))
-            .transpose()
-            .map_err(one)?;
+        drawn.detection = noticing.map(|law| time(law.sample(random))).transpose().map_err(one)?;
         let at = drawn.chain()?.transient(ahead.get(), AfterFailure::Final);
         reliabilities.push(at.map_err(one)?.working);
     }
@@ -168,29 +155,14 @@ fn contradiction(why: String) -> ReliabilityError {
 }
 
 fn check(observed: &Observed, draws: usize) -> Result<(), ReliabilityError> {
-    let times = [
-        observed.hours,
-        observed.working_hours,
-        observed.repairing_hours,
-    ];
-    if let Some(&hours) = times
-        .iter()
-        .find(|hours| !(**hours > 0.0 && hours.is_finite()))
-    {
-        return Err(ReliabilityError::Time {
-            what: "a time of observation".into(),
-            hours,
-        });
+    let times = [observed.hours, observed.working_hours, observed.repairing_hours];
+    if let Some(&hours) = times.iter().find(|hours| !(**hours > 0.0 && hours.is_finite())) {
+        return Err(ReliabilityError::Time { what: "a time of observation".into(), hours });
     }
-    if let Some(&hours) = observed
-        .detection_hours
-        .iter()
-        .find(|hours| !(**hours >= 0.0 && hours.is_finite()))
+    if let Some(&hours) =
+        observed.detection_hours.iter().find(|hours| !(**hours >= 0.0 && hours.is_finite()))
     {
-        return Err(ReliabilityError::Time {
-            what: "a time to detect".into(),
-            hours,
-        });
+        return Err(ReliabilityError::Time { what: "a time to detect".into(), hours });
     }
     let failures = &observed.failures_at;
     if observed.masked > observed.asked || observed.asked > failures.len() as u64 {
@@ -201,13 +173,9 @@ fn check(observed: &Observed, draws: usize) -> Result<(), ReliabilityError> {
             failures.len()
         )));
     }
-    let inside = failures
-        .iter()
-        .all(|at| (0.0..=observed.hours).contains(at));
+    let inside = failures.iter().all(|at| (0.0..=observed.hours).contains(at));
     if !inside || failures.windows(2).any(|pair| pair[1] < pair[0]) {
-        return Err(contradiction(
-            "failures must ascend within the time of observation".into(),
-        ));
+        return Err(contradiction("failures must ascend within the time of observation".into()));
     }
     if draws < MINIMUM_DRAWS {
         return Err(ReliabilityError::Count {
@@ -235,9 +203,7 @@ fn doubts(observed: &Observed, random: &mut impl Rng) -> Vec<String> {
     let bunching = |at: &[f64], hours: f64| {
         let ends = at.iter().copied().chain([hours]);
         let starts = [0.0].into_iter().chain(at.iter().copied());
-        ends.zip(starts)
-            .map(|(end, start)| ((end - start) / hours).powi(2))
-            .sum::<f64>()
+        ends.zip(starts).map(|(end, start)| ((end - start) / hours).powi(2)).sum::<f64>()
     };
     let found = (
         drift(&observed.failures_at, observed.hours),
@@ -255,11 +221,7 @@ fn doubts(observed: &Observed, random: &mut impl Rng) -> Vec<String> {
     if p(as_drifting) < UNLIKELY {
         doubts.push(format!(
             "The rate of failure is not constant: failures {} over {} h (p = {:.4}).",
-            if early {
-                "became rarer"
-            } else {
-                "became more frequent"
-            },
+            if early { "became rarer" } else { "became more frequent" },
             grouped(observed.hours),
             p(as_drifting)
         ));

@@ -135,11 +135,8 @@ fn places(chain: &Chain) -> Vec<Place> {
             let leaving = chain.leaving(state);
             let fails = |to: usize| chain.is_failure(to) || levels[to] > levels[state];
             let failures = chain.successors(state).filter(|(to, _)| fails(*to)).count() as f64;
-            let repairing: f64 = chain
-                .successors(state)
-                .filter(|(to, _)| !fails(*to))
-                .map(|(_, rate)| rate)
-                .sum();
+            let repairing: f64 =
+                chain.successors(state).filter(|(to, _)| !fails(*to)).map(|(_, rate)| rate).sum();
             let exits = chain.successors(state).map(|(to, rate)| Exit {
                 to,
                 probability: rate / leaving,
@@ -153,10 +150,7 @@ fn places(chain: &Chain) -> Vec<Place> {
                     (1.0 - BIAS) * rate / repairing
                 },
             });
-            Place {
-                mean_hours: 1.0 / leaving,
-                exits: exits.collect(),
-            }
+            Place { mean_hours: 1.0 / leaving, exits: exits.collect() }
         })
         .collect()
 }

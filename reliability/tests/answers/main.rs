@@ -22,10 +22,7 @@ fn options(controllers: u32) -> Options {
 
 fn check(found: impl Into<Option<f64>>, expected: f64, what: &str) {
     let found = found.into().expect(what);
-    assert!(
-        (found / expected - 1.0).abs() < 1e-12,
-        "{what}: {found} instead of {expected}"
-    );
+    assert!((found / expected - 1.0).abs() < 1e-12, "{what}: {found} instead of {expected}");
 }
 
 #[test]
@@ -38,21 +35,10 @@ fn twenty_controllers() {
     let mission = answer.mission.expect("a mission");
     let paper = |controllers| {
         let answer = calculate(&options(controllers)).expect("an answer");
-        answer
-            .mission
-            .and_then(|at| at.reliability_paper)
-            .expect("R")
+        answer.mission.and_then(|at| at.reliability_paper).expect("R")
     };
-    check(
-        mission.reliability_duplex,
-        paper(1).powi(20),
-        "(21): (18) at N = 1",
-    );
-    check(
-        mission.reliability_tmr,
-        paper(2).powi(20),
-        "TMR: (18) at N = 2",
-    );
+    check(mission.reliability_duplex, paper(1).powi(20), "(21): (18) at N = 1");
+    check(mission.reliability_tmr, paper(2).powi(20), "TMR: (18) at N = 2");
     check(mission.reliability_simplex, (-2.0_f64).exp(), "no spare");
 }
 
@@ -76,18 +62,9 @@ fn the_json_has_the_keys_that_others_check() {
         assert!(json[key].is_f64(), "{key}: {}", json[key]);
     }
     // At full precision: reading gives back the very number.
-    assert_eq!(
-        json["mttf_paper_hours"].as_f64(),
-        Some(answer.mttf_paper_hours)
-    );
-    let without = Options {
-        mission: None,
-        ..options(3)
-    };
-    let json = calculate(&without)
-        .expect("an answer")
-        .to_json()
-        .expect("JSON");
+    assert_eq!(json["mttf_paper_hours"].as_f64(), Some(answer.mttf_paper_hours));
+    let without = Options { mission: None, ..options(3) };
+    let json = calculate(&without).expect("an answer").to_json().expect("JSON");
     assert!(!json.contains("reliability_paper") && json.contains("mttf_tmr_hours"));
 }
 
@@ -95,10 +72,7 @@ fn the_json_has_the_keys_that_others_check() {
 fn a_part_that_hardly_fails_changes_nothing() {
     let plain = calculate(&options(5)).expect("an answer");
     let mut shared = options(5);
-    shared.shared = vec![SharedPart {
-        name: "network".into(),
-        mtbf: hours("1e15h"),
-    }];
+    shared.shared = vec![SharedPart { name: "network".into(), mtbf: hours("1e15h") }];
     let shared = calculate(&shared).expect("an answer");
     let figures = |answer: &Answer| {
         let at = answer.mission.expect("a mission");
@@ -112,18 +86,9 @@ fn a_part_that_hardly_fails_changes_nothing() {
 
 #[test]
 fn everything_wrong_with_the_options_is_said_at_once() {
-    let wrong = Options {
-        controllers: 0,
-        crews: Some(0),
-        coverage: 1.5,
-        beta: -0.1,
-        ..options(1)
-    };
-    let said: Vec<String> = calculate(&wrong)
-        .expect_err("wrong")
-        .iter()
-        .map(ToString::to_string)
-        .collect();
+    let wrong = Options { controllers: 0, crews: Some(0), coverage: 1.5, beta: -0.1, ..options(1) };
+    let said: Vec<String> =
+        calculate(&wrong).expect_err("wrong").iter().map(ToString::to_string).collect();
     insta::assert_snapshot!(said.join("\n"));
 }
 
@@ -158,11 +123,7 @@ fn sensitivities_are_derivatives() {
     let found = sensitivities(&system).expect("sensitivities");
     // Where repair is fast, the MTTF goes with MTBF² and with 1/MTTR, whoever's they are.
     let sum = |what: &str| -> f64 {
-        found
-            .iter()
-            .filter(|bar| bar.parameter.starts_with(what))
-            .map(|bar| bar.elasticity)
-            .sum()
+        found.iter().filter(|bar| bar.parameter.starts_with(what)).map(|bar| bar.elasticity).sum()
     };
     assert!((sum("MTBF") - 2.0).abs() < 0.02, "{found:?}");
     assert!((sum("MTTR") + 1.0).abs() < 0.02, "{found:?}");
@@ -170,25 +131,16 @@ fn sensitivities_are_derivatives() {
     assert!((sum("MTBF") + sum("MTTR") - 1.0).abs() < 1e-6, "{found:?}");
     let changes = what_if(&system, Some(hours("1000h"))).expect("changes");
     check(changes[0].factor, 1.0, "as it is");
-    assert!(
-        changes.iter().skip(1).all(|change| change.factor > 1.5),
-        "{changes:?}"
-    );
+    assert!(changes.iter().skip(1).all(|change| change.factor > 1.5), "{changes:?}");
     let table = by_understudies(&system, 3).expect("a table");
     assert!(
-        table
-            .windows(2)
-            .all(|pair| pair[1].mttf_hours > 50.0 * pair[0].mttf_hours),
+        table.windows(2).all(|pair| pair[1].mttf_hours > 50.0 * pair[0].mttf_hours),
         "{table:?}"
     );
 }
 
 fn campaign(acceleration: f64, mttr: f64, failures: usize) -> Campaign {
-    let pair = Options::new(
-        1,
-        hours("10000h"),
-        Hours::new("mttr", mttr).expect("a time"),
-    );
+    let pair = Options::new(1, hours("10000h"), Hours::new("mttr", mttr).expect("a time"));
     let chain = pair.system().expect("a system").chain();
     let law = Law::of_chain(&chain.expect("a chain")).expect("a law");
     let mut random = Pcg64::seed_from_u64(11);
@@ -239,10 +191,7 @@ fn a_report_is_whole_and_stands_alone() {
     asked.beta = 0.01;
     asked.convention = CommonCauseConvention::Additive;
     asked.detection = Some(hours("1h"));
-    asked.shared = vec![SharedPart {
-        name: "<network & power>".into(),
-        mtbf: hours("100y"),
-    }];
+    asked.shared = vec![SharedPart { name: "<network & power>".into(), mtbf: hours("100y") }];
     let system = asked.system().expect("a system");
     let measured = assess(&campaign(100.0, 200.0, 300), &system, 0.95, 1).expect("an assessment");
     let provenance = Provenance {
@@ -254,36 +203,25 @@ fn a_report_is_whole_and_stands_alone() {
     };
     let data = report_data(&asked, provenance, Some(measured)).expect("data");
     let files = report(&data).expect("a report");
-    for outside in [
-        "http:", "https:", "src=", "href=", "<script", "url(\"", "@import",
-    ] {
+    for outside in ["http:", "https:", "src=", "href=", "<script", "url(\"", "@import"] {
         let html = files.html.replace("http://www.w3.org/2000/svg", "");
         assert!(!html.contains(outside), "{outside}");
     }
     assert!(files.html.contains("press &lt;cell&gt;") && !files.html.contains("<network"));
-    assert_eq!(
-        files.html.matches("<svg").count(),
-        9,
-        "every picture is there"
-    );
+    assert_eq!(files.html.matches("<svg").count(), 9, "every picture is there");
     for nonsense in ["NaN", "inf ", ">none<", "undefined"] {
         assert!(!files.html.contains(nonsense), "{nonsense}");
     }
     let json: serde_json::Value = serde_json::from_str(&files.json).expect("JSON");
     assert_eq!(json["figures"].as_array().map(Vec::len), Some(50));
-    assert!(
-        files.csv.lines().all(|line| line.split(',').count() == 3),
-        "three columns"
-    );
+    assert!(files.csv.lines().all(|line| line.split(',').count() == 3), "three columns");
 }
 
 #[test]
 fn a_chain_is_answered_as_far_as_it_can_be() {
     let said = |text: &str| {
         let chain = read_chain("a.chain", text).chain.expect("a chain");
-        answer_chain(&chain, Some(hours("100h")))
-            .expect("an answer")
-            .to_text()
+        answer_chain(&chain, Some(hours("100h"))).expect("an answer").to_text()
     };
     let repaired = "state up\nstate down failure\nup -> down : 1 / 1000h\ndown -> up : 1 / 10h\n";
     let last = "state up\nstate down failure\nup -> down : 1 / 1000h\n";

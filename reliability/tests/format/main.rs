@@ -48,10 +48,7 @@ fn a_chain_is_read() {
     let expected = (p + q * c) / (q * p - q * c * mu);
     let mean = chain.mttf().expect("a mean");
     assert!((mean / expected - 1.0).abs() < 1e-11, "{mean}");
-    assert_eq!(
-        (chain.states(), chain.start(), chain.name(2)),
-        (3, 0, "failed".into())
-    );
+    assert_eq!((chain.states(), chain.start(), chain.name(2)), (3, 0, "failed".into()));
 }
 
 #[test]
@@ -90,16 +87,11 @@ fn structure_is_checked_too() {
     insta::assert_snapshot!(findings(
         "state a\nstate b\nstate island\na -> b : 1/1h\nb -> a : 2/1h\n"
     ));
-    insta::assert_snapshot!(findings(
-        "x = 3\nstate a\nstate b\na -> b : 1/1h\nb -> a : 2/1h\n"
-    ));
+    insta::assert_snapshot!(findings("x = 3\nstate a\nstate b\na -> b : 1/1h\nb -> a : 2/1h\n"));
     insta::assert_snapshot!(findings(
         "state a\nstate trap\nstate f failure\na -> trap : 1/1h\na -> f : 2/1h\n"
     ));
-    let deep = format!(
-        "state a\nstate f failure\na -> f : {}1/1h\n",
-        "(".repeat(10_000)
-    );
+    let deep = format!("state a\nstate f failure\na -> f : {}1/1h\n", "(".repeat(10_000));
     assert!(findings(&deep).contains("U0730"));
 }
 

@@ -12,32 +12,22 @@ fn a_repaired_failure_is_not_the_end() {
     check(chain.mttf().expect("a mean"), 100.0, "first failure");
     let steady = chain.steady_state().expect("a steady state");
     check(steady[down], 0.01 / 0.51, "unavailability");
-    let later = chain
-        .transient(1_000.0, AfterFailure::Repaired)
-        .expect("a transient");
+    let later = chain.transient(1_000.0, AfterFailure::Repaired).expect("a transient");
     check(later.failed, 0.01 / 0.51, "point unavailability");
-    check(
-        chain.reliability(100.0).expect("R"),
-        (-1.0_f64).exp(),
-        "reliability",
-    );
+    check(chain.reliability(100.0).expect("R"), (-1.0_f64).exp(), "reliability");
 }
 
 #[test]
 fn what_is_no_chain_is_refused() {
     let mut builder = ChainBuilder::new();
     let (a, b) = (builder.state("a"), builder.state("b"));
-    builder
-        .transition(a, b, -1.0)
-        .transition(a, a, 1.0)
-        .transition(a, 7, 1.0)
-        .transition(b, a, f64::NAN);
-    let messages: Vec<_> = builder
-        .build()
-        .expect_err("wrong")
-        .iter()
-        .map(ToString::to_string)
-        .collect();
+    builder.transition(a, b, -1.0).transition(a, a, 1.0).transition(a, 7, 1.0).transition(
+        b,
+        a,
+        f64::NAN,
+    );
+    let messages: Vec<_> =
+        builder.build().expect_err("wrong").iter().map(ToString::to_string).collect();
     assert_eq!(
         messages,
         [
@@ -53,40 +43,23 @@ fn what_is_no_chain_is_refused() {
     island.transition(a, b, 1.0).transition(b, a, 1.0);
     assert_eq!(
         island.build().expect_err("an island"),
-        [ReliabilityError::Unreachable {
-            state: "island".into()
-        }]
+        [ReliabilityError::Unreachable { state: "island".into() }]
     );
-    assert_eq!(
-        ChainBuilder::new().build().expect_err("nothing")[0].code(),
-        "U0709"
-    );
+    assert_eq!(ChainBuilder::new().build().expect_err("nothing")[0].code(), "U0709");
     let mut endless = ChainBuilder::new();
     let (a, b) = (endless.state("a"), endless.state("b"));
     endless.transition(a, b, 1.0).transition(b, a, 1.0);
     let endless = endless.build().expect("a chain");
     assert_eq!(endless.mttf(), Err(ReliabilityError::NoFailureState));
     let mut out_of_reach = ChainBuilder::new();
-    let (a, b, c) = (
-        out_of_reach.state("a"),
-        out_of_reach.state("b"),
-        out_of_reach.failure("c"),
-    );
-    out_of_reach
-        .transition(a, b, 1.0)
-        .transition(b, a, 1.0)
-        .transition(c, a, 1.0);
+    let (a, b, c) = (out_of_reach.state("a"), out_of_reach.state("b"), out_of_reach.failure("c"));
+    out_of_reach.transition(a, b, 1.0).transition(b, a, 1.0).transition(c, a, 1.0);
     assert_eq!(out_of_reach.build().expect_err("c")[0].code(), "U0708");
     let mut trap = ChainBuilder::new();
     let (a, b, c) = (trap.state("a"), trap.state("trap"), trap.failure("c"));
     trap.transition(a, b, 1.0).transition(a, c, 1.0);
     let trap = trap.build().expect("a chain");
-    assert_eq!(
-        trap.mttf(),
-        Err(ReliabilityError::NeverFails {
-            state: "trap".into()
-        })
-    );
+    assert_eq!(trap.mttf(), Err(ReliabilityError::NeverFails { state: "trap".into() }));
     assert_eq!(trap.steady_state().expect_err("a trap").code(), "U0711");
 }
 
@@ -114,9 +87,8 @@ fn naive_mean(matrix: &[Vec<f64>]) -> f64 {
     let mut rows: Vec<Vec<f64>> = (0..states)
         .map(|i| {
             let out: f64 = matrix[i].iter().sum();
-            let mut row: Vec<f64> = (0..states)
-                .map(|j| if i == j { out } else { -matrix[i][j] })
-                .collect();
+            let mut row: Vec<f64> =
+                (0..states).map(|j| if i == j { out } else { -matrix[i][j] }).collect();
             row.push(1.0);
             row
         })
@@ -129,10 +101,7 @@ fn naive_mean(matrix: &[Vec<f64>]) -> f64 {
         for (index, other) in rows.iter_mut().enumerate() {
             if index != column {
                 let factor = other[column] / row[column];
-                other
-                    .iter_mut()
-                    .zip(&row)
-                    .for_each(|(value, pivot)| *value -= factor * pivot);
+                other.iter_mut().zip(&row).for_each(|(value, pivot)| *value -= factor * pivot);
             }
         }
     }
@@ -153,23 +122,16 @@ fn naive_exponential(matrix: &[Vec<f64>], hours: f64) -> Vec<f64> {
     }
     let half_square =
         |i: usize, j: usize| (0..size).map(|k| power[i][k] * power[k][j]).sum::<f64>() / 2.0;
-    power = (0..size)
-        .map(|i| (0..size).map(|j| power[i][j] + half_square(i, j)).collect())
-        .collect();
+    power =
+        (0..size).map(|i| (0..size).map(|j| power[i][j] + half_square(i, j)).collect()).collect();
     // Powers of (e^(Qh) - I), so that the small entries are not lost beside 1.
     for _ in 0..30 {
         let square = |i: usize, j: usize| (0..size).map(|k| power[i][k] * power[k][j]).sum::<f64>();
         power = (0..size)
-            .map(|i| {
-                (0..size)
-                    .map(|j| 2.0 * power[i][j] + square(i, j))
-                    .collect()
-            })
+            .map(|i| (0..size).map(|j| 2.0 * power[i][j] + square(i, j)).collect())
             .collect();
     }
-    (0..size)
-        .map(|j| power[0][j] + f64::from(u8::from(j == 0)))
-        .collect()
+    (0..size).map(|j| power[0][j] + f64::from(u8::from(j == 0))).collect()
 }
 
 proptest! {

@@ -13,9 +13,7 @@ fn law(mttr: f64) -> Law {
 
 fn sample(law: &Law, count: usize, seed: u64) -> Vec<f64> {
     let mut random = Pcg64::seed_from_u64(seed);
-    (0..count)
-        .map(|_| law.quantile(random.random::<f64>()))
-        .collect()
+    (0..count).map(|_| law.quantile(random.random::<f64>())).collect()
 }
 
 #[test]
@@ -26,23 +24,11 @@ fn critical_values_are_those_of_the_literature_where_there_are_any() {
     let hours = sample(&law, 100, 1);
     let mut random = Pcg64::seed_from_u64(2);
     let known = fit(&hours, &law, Null::Specified, 4_000, &mut random).expect("a fit");
-    assert!(
-        (known.anderson_darling_critical - 2.492).abs() < 0.2,
-        "{known:?}"
-    );
-    assert!(
-        (known.kolmogorov_smirnov_critical - 0.134).abs() < 0.006,
-        "{known:?}"
-    );
+    assert!((known.anderson_darling_critical - 2.492).abs() < 0.2, "{known:?}");
+    assert!((known.kolmogorov_smirnov_critical - 0.134).abs() < 0.006, "{known:?}");
     let fitted = fit(&hours, &law, Null::ScaleFitted, 4_000, &mut random).expect("a fit");
-    assert!(
-        (fitted.anderson_darling_critical - 1.321 / 1.006).abs() < 0.1,
-        "{fitted:?}"
-    );
-    assert!(
-        (fitted.kolmogorov_smirnov_critical - 0.1075).abs() < 0.005,
-        "{fitted:?}"
-    );
+    assert!((fitted.anderson_darling_critical - 1.321 / 1.006).abs() < 0.1, "{fitted:?}");
+    assert!((fitted.kolmogorov_smirnov_critical - 0.1075).abs() < 0.005, "{fitted:?}");
 }
 
 #[test]
@@ -53,10 +39,7 @@ fn a_true_law_is_rejected_as_often_as_promised() {
             .filter(|&seed| {
                 let mut random = Pcg64::seed_from_u64(1_000 + seed);
                 let hours = sample(&law, 30, seed);
-                fit(&hours, &law, null, 200, &mut random)
-                    .expect("a fit")
-                    .anderson_darling_p
-                    < 0.05
+                fit(&hours, &law, null, 200, &mut random).expect("a fit").anderson_darling_p < 0.05
             })
             .count();
         // 5 % of 200 with three standard errors.
@@ -70,31 +53,19 @@ fn an_exponential_law_is_told_from_a_hypoexponential_one() {
     let hypoexponential = law(5_000.0);
     let exponential = law(1e-3);
     let mut random = Pcg64::seed_from_u64(3);
-    let found = fit(
-        &sample(&hypoexponential, 1_000, 4),
-        &exponential,
-        Null::ScaleFitted,
-        500,
-        &mut random,
-    );
+    let found =
+        fit(&sample(&hypoexponential, 1_000, 4), &exponential, Null::ScaleFitted, 500, &mut random);
     assert!(found.expect("a fit").anderson_darling_p < 0.01);
 }
 
 #[test]
 fn the_table_of_a_law_is_that_of_its_chain() {
     let law = law(500.0);
-    let chain = system(3, 1, Rule::Paper, 10_000.0, 500.0)
-        .chain()
-        .expect("a chain");
-    let times: Vec<f64> = (1..100)
-        .map(|step| law.mean() * f64::from(step) / 20.0)
-        .collect();
+    let chain = system(3, 1, Rule::Paper, 10_000.0, 500.0).chain().expect("a chain");
+    let times: Vec<f64> = (1..100).map(|step| law.mean() * f64::from(step) / 20.0).collect();
     let exact = chain.transients(&times, AfterFailure::Final).expect("P(t)");
     for (hours, exact) in times.into_iter().zip(exact) {
-        assert!(
-            (law.unreliability(hours) - exact.failed).abs() < 1e-5,
-            "{hours}"
-        );
+        assert!((law.unreliability(hours) - exact.failed).abs() < 1e-5, "{hours}");
     }
     for share in (1..100).map(|step| f64::from(step) / 100.0) {
         assert!((law.unreliability(law.quantile(share)) - share).abs() < 1e-12);
@@ -106,9 +77,7 @@ fn what_allows_no_test_is_refused() {
     let law = law(24.0);
     let mut random = Pcg64::seed_from_u64(5);
     let mut code = |hours: &[f64], bootstrap| {
-        fit(hours, &law, Null::Specified, bootstrap, &mut random)
-            .expect_err("refused")
-            .code()
+        fit(hours, &law, Null::Specified, bootstrap, &mut random).expect_err("refused").code()
     };
     assert_eq!(code(&[1.0, 2.0], 1_000), "U0716");
     assert_eq!(code(&[1.0; 10], 5), "U0716");

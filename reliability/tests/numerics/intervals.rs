@@ -13,11 +13,8 @@ fn mean_times_have_the_quantiles_of_chi_squared() {
         }
         let failures = (freedom / 2.0) as u64;
         let interval = mean_time(failures, 1_000.0, Stopped::AtFailure, 0.95).expect("an interval");
-        let end = if probability == 0.025 {
-            interval.upper.expect("an end")
-        } else {
-            interval.lower
-        };
+        let end =
+            if probability == 0.025 { interval.upper.expect("an end") } else { interval.lower };
         check(end, 2_000.0 / number(row, "value"), 1e-10, &row.to_string());
     }
 }
@@ -29,16 +26,10 @@ fn proportions_have_the_quantiles_of_beta() {
         let probability = number(row, "probability");
         // Lower end: I(x; k, n - k + 1); upper end: I(x; k + 1, n - k).
         let (found, what) = if probability == 0.025 {
-            (
-                proportion(a, a + b - 1, 0.95).expect("an interval").lower,
-                "lower",
-            )
+            (proportion(a, a + b - 1, 0.95).expect("an interval").lower, "lower")
         } else {
             (
-                proportion(a - 1, a + b - 1, 0.95)
-                    .expect("an interval")
-                    .upper
-                    .expect("an end"),
+                proportion(a - 1, a + b - 1, 0.95).expect("an interval").upper.expect("an end"),
                 "upper",
             )
         };
@@ -51,20 +42,12 @@ fn censoring_is_handled() {
     let none = mean_time(0, 5_000.0, Stopped::AtTime, 0.95).expect("a bound");
     assert_eq!((none.estimate, none.upper), (None, None));
     // The rule of three.
-    check(
-        none.lower,
-        5_000.0 / 2.995_732_273_553_991,
-        1e-12,
-        "no failure",
-    );
+    check(none.lower, 5_000.0 / 2.995_732_273_553_991, 1e-12, "no failure");
     let all = times_to_failure(&[10.0, 20.0, 30.0], &[], 0.9).expect("an interval");
     assert_eq!(all.estimate, Some(20.0));
     let some = times_to_failure(&[10.0, 20.0], &[30.0], 0.9).expect("an interval");
     assert_eq!(some.estimate, Some(30.0));
-    assert!(
-        some.upper > all.upper,
-        "two failures in the same time say less"
-    );
+    assert!(some.upper > all.upper, "two failures in the same time say less");
     assert!(some.covers(20.0) && !some.covers(5.0));
 }
 
@@ -86,9 +69,8 @@ fn measurements_that_say_nothing_are_refused() {
 #[test]
 fn the_exact_interval_is_exact() {
     for trials in [1_u64, 5, 20] {
-        let intervals: Vec<Interval> = (0..=trials)
-            .map(|k| proportion(k, trials, 0.9).expect("an interval"))
-            .collect();
+        let intervals: Vec<Interval> =
+            (0..=trials).map(|k| proportion(k, trials, 0.9).expect("an interval")).collect();
         for step in 1..100 {
             let p = f64::from(step) / 100.0;
             let mut choose = 1.0;
@@ -117,10 +99,7 @@ fn acceleration_is_honest_about_detection() {
     let refused = acceleration_bias(&system, detection, 1e5, false).expect_err("too fast");
     assert_eq!(refused[0].code(), "U0717");
     assert!(
-        acceleration_bias(&system, detection, 1e5, true)
-            .expect("forced")
-            .relative
-            < fast.relative
+        acceleration_bias(&system, detection, 1e5, true).expect("forced").relative < fast.relative
     );
     assert_eq!(
         acceleration_bias(&system, detection, 0.5, true).expect_err("slower")[0].code(),

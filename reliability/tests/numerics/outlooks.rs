@@ -8,9 +8,7 @@ fn hours(value: f64) -> Hours {
 }
 
 fn system() -> System {
-    Options::new(3, hours(1.0), hours(1.0))
-        .system()
-        .expect("a system")
+    Options::new(3, hours(1.0), hours(1.0)).system().expect("a system")
 }
 
 /// A year of four boxes, with failures at `failures_at`.
@@ -29,9 +27,7 @@ fn observed(failures_at: Vec<f64>) -> Observed {
 }
 
 fn even(count: u32) -> Vec<f64> {
-    (1..=count)
-        .map(|k| 8_760.0 * f64::from(k) / f64::from(count + 1))
-        .collect()
+    (1..=count).map(|k| 8_760.0 * f64::from(k) / f64::from(count + 1)).collect()
 }
 
 #[test]
@@ -47,16 +43,8 @@ fn what_was_seen_narrows_what_is_expected() {
     let width = |outlook: &understudy_reliability::Outlook| {
         outlook.reliability.upper.expect("an end") - outlook.reliability.lower
     };
-    assert!(
-        width(&many) < 0.5 * width(&few),
-        "{} {}",
-        width(&many),
-        width(&few)
-    );
-    assert!(
-        few.failure_rate.covers(4.0 / 35_000.0) && few.coverage.covers(0.95),
-        "{few:?}"
-    );
+    assert!(width(&many) < 0.5 * width(&few), "{} {}", width(&many), width(&few));
+    assert!(few.failure_rate.covers(4.0 / 35_000.0) && few.coverage.covers(0.95), "{few:?}");
     assert_eq!(few.detection_rate, None);
     let mut slow = observed(even(4));
     slow.detection_hours = vec![500.0; 4];
@@ -80,10 +68,7 @@ fn credible_intervals_hold_the_rate_as_often_as_they_say() {
             }
             failures_at.push(at);
         }
-        let observed = Observed {
-            working_hours: 8_760.0,
-            ..observed(failures_at)
-        };
+        let observed = Observed { working_hours: 8_760.0, ..observed(failures_at) };
         let found =
             outlook(&observed, &system(), hours(1.0), 0.9, 100, &mut random).expect("an outlook");
         covered += u32::from(found.failure_rate.covers(1e-3));
@@ -96,29 +81,15 @@ fn credible_intervals_hold_the_rate_as_often_as_they_say() {
 fn an_assumption_that_fails_is_named() {
     let doubts = |failures_at: Vec<f64>| {
         let mut random = Pcg64::seed_from_u64(5);
-        let found = outlook(
-            &observed(failures_at),
-            &system(),
-            hours(10.0),
-            0.9,
-            100,
-            &mut random,
-        );
+        let found = outlook(&observed(failures_at), &system(), hours(10.0), 0.9, 100, &mut random);
         found.expect("an outlook").doubts
     };
     assert!(doubts(even(20)).is_empty());
-    let wearing: Vec<f64> = (1..=20)
-        .map(|k| 8_760.0 * (f64::from(k) / 21.0).powf(0.25))
-        .collect();
+    let wearing: Vec<f64> = (1..=20).map(|k| 8_760.0 * (f64::from(k) / 21.0).powf(0.25)).collect();
     assert!(doubts(wearing)[0].contains("became more frequent"));
-    let bunched: Vec<f64> = (0..20)
-        .map(|k| 2_000.0 * f64::from(1 + k / 6) + f64::from(k))
-        .collect();
-    assert!(
-        doubts(bunched)
-            .iter()
-            .any(|doubt| doubt.contains("clustered"))
-    );
+    let bunched: Vec<f64> =
+        (0..20).map(|k| 2_000.0 * f64::from(1 + k / 6) + f64::from(k)).collect();
+    assert!(doubts(bunched).iter().any(|doubt| doubt.contains("clustered")));
 }
 
 #[test]
@@ -131,14 +102,8 @@ fn observations_that_contradict_themselves_are_refused() {
             .code()
     };
     assert_eq!(code(&|observed| observed.masked = 5, 100), "U0716");
-    assert_eq!(
-        code(&|observed| observed.failures_at.reverse(), 100),
-        "U0716"
-    );
+    assert_eq!(code(&|observed| observed.failures_at.reverse(), 100), "U0716");
     assert_eq!(code(&|observed| observed.working_hours = 0.0, 100), "U0701");
-    assert_eq!(
-        code(&|observed| observed.detection_hours = vec![-1.0], 100),
-        "U0701"
-    );
+    assert_eq!(code(&|observed| observed.detection_hours = vec![-1.0], 100), "U0701");
     assert_eq!(code(&|_| {}, 10), "U0704");
 }

@@ -28,15 +28,8 @@ pub(crate) fn check(found: f64, expected: f64, what: &str) {
 }
 
 pub(crate) fn check_within(found: f64, expected: f64, precision: f64, what: &str) {
-    let error = if found == expected {
-        0.0
-    } else {
-        (found - expected).abs() / expected.abs()
-    };
-    assert!(
-        error <= precision,
-        "{what}: {found:e} instead of {expected:e}, wrong by {error:e}"
-    );
+    let error = if found == expected { 0.0 } else { (found - expected).abs() / expected.abs() };
+    assert!(error <= precision, "{what}: {found:e} instead of {expected:e}, wrong by {error:e}");
 }
 
 pub(crate) fn hours(value: f64) -> Hours {
@@ -44,12 +37,7 @@ pub(crate) fn hours(value: f64) -> Hours {
 }
 
 pub(crate) fn kind(name: &str, count: u32, mtbf: f64, mttr: f64) -> BoxKind {
-    BoxKind {
-        name: name.into(),
-        count,
-        mtbf: hours(mtbf),
-        mttr: hours(mttr),
-    }
+    BoxKind { name: name.into(), count, mtbf: hours(mtbf), mttr: hours(mttr) }
 }
 
 /// Alike boxes, a crew each, and nothing else that fails.

@@ -38,10 +38,7 @@ fn every_model_has_twelve_digits_at_both_ends() {
         for place in 0..rows(row, "cluster").len() {
             let expected = |model: &str, key: &str| row[model][place][key].clone();
             let time = number(&row["cluster"][place], "hours");
-            let asked = Options {
-                mission: Some(hours(time)),
-                ..options(row)
-            };
+            let asked = Options { mission: Some(hours(time)), ..options(row) };
             let found = calculate(&asked).expect("an answer");
             let at = found.mission.expect("a mission");
             for (model, works, failed) in [
@@ -66,10 +63,9 @@ fn a_chain_from_a_file_has_them_too() {
     let chain = read_chain("pair.chain", text).chain.expect("a chain");
     // mpmath, 60 digits: s = 3/10000 + 1/24, d = sqrt(s*s - 8/10000**2), a = (s + d)/2, b = (s - d)/2,
     // R = (a*exp(-b*t) - b*exp(-a*t))/(a - b)
-    for (time, works, failed) in [
-        (1e-6, 1.0, 9.999_999_860_111_113e-21),
-        (1e8, 2.007_492_796_641_722_5e-21, 1.0),
-    ] {
+    for (time, works, failed) in
+        [(1e-6, 1.0, 9.999_999_860_111_113e-21), (1e8, 2.007_492_796_641_722_5e-21, 1.0)]
+    {
         let at = chain.transient(time, AfterFailure::Final).expect("P(t)");
         check(at.working, works, "R");
         check(at.failed, failed, "F");

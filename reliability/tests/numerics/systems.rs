@@ -44,19 +44,12 @@ fn the_paper_s_model_to_twelve_digits() {
 fn lumped_groups_to_twelve_digits() {
     for row in rows(&fixture(), "degraded_groups") {
         let (lambda, mu) = (number(row, "failure_rate"), number(row, "repair_rate"));
-        let (groups, boxes, crews) = (
-            whole(row, "groups"),
-            whole(row, "boxes"),
-            whole(row, "crews"),
-        );
+        let (groups, boxes, crews) =
+            (whole(row, "groups"), whole(row, "boxes"), whole(row, "crews"));
         let mut system = groups_of(groups, boxes, 1.0 / lambda, 1.0 / mu);
         system.crews = Some(crews);
         let chain = system.chain().expect("a chain");
-        check(
-            chain.mttf().expect("a mean"),
-            number(row, "mttf"),
-            &row.to_string(),
-        );
+        check(chain.mttf().expect("a mean"), number(row, "mttf"), &row.to_string());
     }
 }
 
@@ -116,12 +109,7 @@ fn latency_of_detection_adds_to_repair() {
     let (n, l, d, m) = (3.0, 1e-4, 1.0 / 6.0, 1.0 / 24.0);
     let survive = d / (n * l + d) * (m / (n * l + m));
     let stay = 1.0 / (n * l + d) + d / (n * l + d) / (n * l + m);
-    check_within(
-        mean,
-        (1.0 / ((n + 1.0) * l) + stay) / (1.0 - survive),
-        1e-11,
-        "stages",
-    );
+    check_within(mean, (1.0 / ((n + 1.0) * l) + stay) / (1.0 - survive), 1e-11, "stages");
 }
 
 #[test]
@@ -129,48 +117,24 @@ fn shared_parts_and_common_causes_end_it_from_every_state() {
     let plain = system(5, 1, Rule::AsBuilt, 10_000.0, 24.0);
     let mut shared = plain.clone();
     shared.shared = vec![
-        SharedPart {
-            name: "network".into(),
-            mtbf: hours(50_000.0),
-        },
-        SharedPart {
-            name: "power".into(),
-            mtbf: hours(200_000.0),
-        },
+        SharedPart { name: "network".into(), mtbf: hours(50_000.0) },
+        SharedPart { name: "power".into(), mtbf: hours(200_000.0) },
     ];
     let reliability = |system: &understudy_reliability::System| {
         system.chain().unwrap().reliability(1000.0).unwrap()
     };
     let both: f64 = 1000.0 * (1.0 / 50_000.0 + 1.0 / 200_000.0);
-    check(
-        reliability(&shared),
-        reliability(&plain) * (-both).exp(),
-        "in series",
-    );
+    check(reliability(&shared), reliability(&plain) * (-both).exp(), "in series");
 
     let mut common = plain.clone();
     let beta = Probability::new("beta", 0.1).unwrap();
-    common.common_cause = Some(CommonCause {
-        beta,
-        convention: CommonCauseConvention::Additive,
-    });
-    check(
-        reliability(&common),
-        reliability(&plain) * (-0.01_f64).exp(),
-        "additive",
-    );
-    common.common_cause = Some(CommonCause {
-        beta,
-        convention: CommonCauseConvention::Split,
-    });
+    common.common_cause = Some(CommonCause { beta, convention: CommonCauseConvention::Additive });
+    check(reliability(&common), reliability(&plain) * (-0.01_f64).exp(), "additive");
+    common.common_cause = Some(CommonCause { beta, convention: CommonCauseConvention::Split });
     let mut fewer = plain.clone();
     fewer.controllers[0].mtbf = hours(10_000.0 / 0.9);
     fewer.understudies.mtbf = hours(10_000.0 / 0.9);
-    check(
-        reliability(&common),
-        reliability(&fewer) * (-0.01_f64).exp(),
-        "split",
-    );
+    check(reliability(&common), reliability(&fewer) * (-0.01_f64).exp(), "split");
 }
 
 #[test]
@@ -179,15 +143,9 @@ fn splitting_beta_can_raise_the_mean_of_a_large_system() {
     let mean = |system: &understudy_reliability::System| system.chain().unwrap().mttf().unwrap();
     let plain = mean(&large);
     let beta = Probability::new("beta", 0.1).unwrap();
-    large.common_cause = Some(CommonCause {
-        beta,
-        convention: CommonCauseConvention::Split,
-    });
+    large.common_cause = Some(CommonCause { beta, convention: CommonCauseConvention::Split });
     assert!(mean(&large) > plain);
-    large.common_cause = Some(CommonCause {
-        beta,
-        convention: CommonCauseConvention::Additive,
-    });
+    large.common_cause = Some(CommonCause { beta, convention: CommonCauseConvention::Additive });
     assert!(mean(&large) < plain);
 }
 
@@ -195,10 +153,7 @@ fn splitting_beta_can_raise_the_mean_of_a_large_system() {
 fn unequal_boxes_that_are_equal_are_one_kind() {
     let plain = system(6, 1, Rule::AsBuilt, 8_000.0, 12.0);
     let mut named = plain.clone();
-    named.controllers = vec![
-        kind("robots", 2, 8_000.0, 12.0),
-        kind("presses", 4, 8_000.0, 12.0),
-    ];
+    named.controllers = vec![kind("robots", 2, 8_000.0, 12.0), kind("presses", 4, 8_000.0, 12.0)];
     let states = |system: &understudy_reliability::System| system.chain().unwrap().states();
     assert_eq!(states(&plain), states(&named));
     named.controllers[0].mtbf = hours(8_000.0 * (1.0 + 1e-12));
@@ -224,11 +179,7 @@ fn eleven_kinds_that_are_nearly_equal_are_eleven_equal_boxes() {
         .collect();
     let chain = named.chain().unwrap();
     assert!(chain.states() > 2_000, "{}", chain.states());
-    check(
-        chain.mttf().unwrap(),
-        plain.chain().unwrap().mttf().unwrap(),
-        "nearly equal",
-    );
+    check(chain.mttf().unwrap(), plain.chain().unwrap().mttf().unwrap(), "nearly equal");
 }
 
 #[test]
@@ -259,10 +210,7 @@ fn twelve_controllers_in_groups_of_every_size() {
     odd.groups = 5;
     assert_eq!(
         odd.chain().expect_err("12 by 5"),
-        [ReliabilityError::Groups {
-            controllers: 12,
-            groups: 5
-        }]
+        [ReliabilityError::Groups { controllers: 12, groups: 5 }]
     );
 }
 
@@ -272,12 +220,8 @@ fn all_that_is_wrong_is_said_at_once() {
     wrong.groups = 7;
     wrong.crews = Some(0);
     wrong.controllers.push(kind("valves", 0, 1.0, 1.0));
-    let codes: Vec<_> = wrong
-        .check()
-        .expect_err("wrong")
-        .iter()
-        .map(ReliabilityError::code)
-        .collect();
+    let codes: Vec<_> =
+        wrong.check().expect_err("wrong").iter().map(ReliabilityError::code).collect();
     assert_eq!(codes, ["U0704", "U0704", "U0718"]);
 }
 
@@ -347,11 +291,7 @@ fn a_duplex_of_unequal_controllers_is_the_product_of_its_pairs() {
     assert!(cluster < alike.mttf().expect("a mean"));
     // TMR: two of three, and each of the three may be the first.
     let one = Options::new(1, hours(1_000.0), hours(24.0));
-    let tmr = one
-        .system()
-        .expect("a system")
-        .copies_chain(3)
-        .expect("a chain");
+    let tmr = one.system().expect("a system").copies_chain(3).expect("a chain");
     let (l, m) = (1e-3, 1.0 / 24.0);
     let expected = (5.0 * l + m) / (6.0 * l * l);
     assert!((tmr.mttf().expect("a mean") / expected - 1.0).abs() < 1e-12);
@@ -361,10 +301,7 @@ fn a_duplex_of_unequal_controllers_is_the_product_of_its_pairs() {
 fn boxes_of_their_own_are_read_or_refused() {
     let read = |text: &str| text.parse::<UnequalBoxes>();
     let boxes = read("old * 3 = 4000h, 48h").expect("boxes");
-    assert_eq!(
-        (boxes.name.as_str(), boxes.count, boxes.understudies),
-        ("old", 3, false)
-    );
+    assert_eq!((boxes.name.as_str(), boxes.count, boxes.understudies), ("old", 3, false));
     assert!(read("understudies=1y,1d").expect("boxes").understudies);
     let refused = [
         ("", "U0720"),
@@ -379,14 +316,8 @@ fn boxes_of_their_own_are_read_or_refused() {
     for (text, code) in refused {
         assert_eq!(read(text).expect_err(text).code(), code, "{text}");
     }
-    assert_eq!(
-        "power".parse::<SharedPart>().expect_err("no time").code(),
-        "U0720"
-    );
+    assert_eq!("power".parse::<SharedPart>().expect_err("no time").code(), "U0720");
     let mut options = Options::new(2, boxes.mtbf, boxes.mttr);
     options.unequal = vec![boxes];
-    assert_eq!(
-        options.system().expect_err("three of two")[0].code(),
-        "U0704"
-    );
+    assert_eq!(options.system().expect_err("three of two")[0].code(), "U0704");
 }

@@ -106,31 +106,20 @@ impl RemoteIo {
         for (syndrome, accused) in syndromes {
             self.differed.push((None, accused));
             if !before.contains(&(None, accused)) {
-                self.report(Event::Syndrome {
-                    moment,
-                    syndrome,
-                    accused,
-                });
+                self.report(Event::Syndrome { moment, syndrome, accused });
             }
         }
         for (program, accused) in states {
             self.differed.push((Some(program), accused));
             if !before.contains(&(Some(program), accused)) {
-                self.report(Event::DigestDiffers {
-                    moment,
-                    program,
-                    accused,
-                });
+                self.report(Event::DigestDiffers { moment, program, accused });
             }
         }
     }
 
     /// u(i)(t), which the sensors may have left since.
     pub(super) fn field_sampled(&self, history: &History) -> Image {
-        history
-            .newest()
-            .cloned()
-            .unwrap_or_else(|| self.field.clone())
+        history.newest().cloned().unwrap_or_else(|| self.field.clone())
     }
 
     pub(super) fn apply(&mut self, selection: Selection, sampled: Option<Image>) {
@@ -165,10 +154,7 @@ impl RemoteIo {
             self.knowledge.applied(moment);
             self.report_in_effect(moment);
         }
-        self.applied = Some(Applied {
-            source,
-            outputs: outputs.clone(),
-        });
+        self.applied = Some(Applied { source, outputs: outputs.clone() });
         let mut driven = self.forcing.outputs(&outputs);
         if let Some(stop) = self.settings.stop {
             driven.set(stop.stopped, self.program != Execution::Running);

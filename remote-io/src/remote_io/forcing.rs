@@ -25,11 +25,7 @@ struct Active {
 impl Forcing {
     fn put(&mut self, signal: SignalPlace, value: PointValue, until: Time) {
         self.remove(signal);
-        self.active.push(Active {
-            signal,
-            value,
-            until,
-        });
+        self.active.push(Active { signal, value, until });
     }
 
     fn remove(&mut self, signal: SignalPlace) -> bool {
@@ -41,11 +37,7 @@ impl Forcing {
     /// Removes a force of another signal that has a bit of this one.
     fn remove_overlapping(&mut self, force: &Force) -> Option<SignalPlace> {
         let overlaps = |active: &Active| {
-            let other = Force {
-                signal: active.signal,
-                value: active.value,
-                ..force.clone()
-            };
+            let other = Force { signal: active.signal, value: active.value, ..force.clone() };
             active.signal != force.signal && other.overlaps(force)
         };
         let place = self.active.iter().position(overlaps)?;
@@ -103,10 +95,7 @@ impl RemoteIo {
         }
         let until = now + Duration::from_secs(u64::from(force.seconds));
         self.forcing.put(force.signal, force.value, until);
-        self.report(Event::Forced {
-            moment: self.moment(),
-            force: force.clone(),
-        });
+        self.report(Event::Forced { moment: self.moment(), force: force.clone() });
     }
 
     pub(super) fn unforce(&mut self, signal: SignalPlace) {
@@ -122,11 +111,7 @@ impl RemoteIo {
     }
 
     fn report_unforced(&mut self, signal: SignalPlace, expired: bool) {
-        self.report(Event::Unforced {
-            moment: self.moment(),
-            signal,
-            expired,
-        });
+        self.report(Event::Unforced { moment: self.moment(), signal, expired });
     }
 }
 
@@ -135,21 +120,12 @@ mod tests {
     use super::*;
 
     fn force(signal: SignalPlace, value: PointValue) -> Force {
-        Force {
-            signal,
-            value,
-            seconds: 1,
-            owner: "anna".to_owned(),
-            reason: "a test".to_owned(),
-        }
+        Force { signal, value, seconds: 1, owner: "anna".to_owned(), reason: "a test".to_owned() }
     }
 
     #[test]
     fn a_number_is_forced_with_all_its_bits_and_alone() {
-        let number = PointValue::Number {
-            width: 32,
-            stored: 0x4148_0000,
-        };
+        let number = PointValue::Number { width: 32, stored: 0x4148_0000 };
         let place = SignalPlace::Output(32);
         let mut forcing = Forcing::default();
         forcing.put(SignalPlace::Output(0), true.into(), Time(1));

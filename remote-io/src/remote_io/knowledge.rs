@@ -35,11 +35,7 @@ pub(super) struct Run {
 
 impl Run {
     fn new(history: History) -> Self {
-        Self {
-            history,
-            sampled: false,
-            unfollowed: 0,
-        }
+        Self { history, sampled: false, unfollowed: 0 }
     }
 }
 
@@ -73,11 +69,7 @@ pub(super) enum Knowledge {
 
 impl Default for Knowledge {
     fn default() -> Self {
-        Self::Listening {
-            cycles: 0,
-            held: false,
-            pardons: false,
-        }
+        Self::Listening { cycles: 0, held: false, pardons: false }
     }
 }
 
@@ -117,10 +109,7 @@ impl Knowledge {
 
     /// The outputs of the sample of `moment`, the newest of the history, were applied.
     pub(super) fn applied(&mut self, moment: Moment) {
-        let floor = |run: &Run| Floor {
-            moment,
-            lineage: run.history.head(),
-        };
+        let floor = |run: &Run| Floor { moment, lineage: run.history.head() };
         match std::mem::take(self) {
             listening @ Self::Listening { .. } => *self = listening,
             Self::ColdStarted { run, .. } | Self::Known { run, .. } => {

@@ -63,11 +63,7 @@ impl RemoteIo {
         {
             protection.reported = Some(false);
             let since = protection.since;
-            self.report(Event::Unprotected {
-                moment,
-                since,
-                lacking,
-            });
+            self.report(Event::Unprotected { moment, since, lacking });
         }
     }
 

@@ -40,11 +40,7 @@ impl RemoteIo {
         }
         let waited = match &mut self.knowledge {
             Knowledge::ColdStarted { run, .. } | Knowledge::Known { run, .. } => {
-                let Run {
-                    history,
-                    unfollowed,
-                    ..
-                } = run;
+                let Run { history, unfollowed, .. } = run;
                 let on_it = |holding: &Holding| history.place(holding.lineage).is_some();
                 let follower = self
                     .holders
@@ -126,13 +122,7 @@ impl RemoteIo {
         self.question = Some(Question::StateLost);
         let applied = self.knowledge.floor().map(|floor| floor.moment);
         let asks = self.settings.stale_state == StaleState::Operator;
-        self.report(Event::StateLost {
-            moment,
-            applied,
-            newest: newest.stepped,
-            holder,
-            asks,
-        });
+        self.report(Event::StateLost { moment, applied, newest: newest.stepped, holder, asks });
         if !asks {
             self.start(moment, None);
         }
@@ -163,40 +153,26 @@ impl RemoteIo {
         let history = match state {
             Some((from, holding)) => {
                 let lineage = holding.lineage;
-                self.report(Event::AdoptedLineage {
-                    moment,
-                    lineage,
-                    from,
-                });
+                self.report(Event::AdoptedLineage { moment, lineage, from });
                 History::from(holding.born, lineage, capacity)
             }
             None => {
                 let awaits_release = self.settings.release == Release::Operator;
-                self.authority = if awaits_release {
-                    Authority::Operator
-                } else {
-                    Authority::Proof
-                };
+                self.authority =
+                    if awaits_release { Authority::Operator } else { Authority::Proof };
                 self.last_true = None;
-                self.report(Event::StartedCold {
-                    born: moment,
-                    awaits_release,
-                });
+                self.report(Event::StartedCold { born: moment, awaits_release });
                 History::genesis(self.settings.hash, moment, capacity)
             }
         };
         if self.knowledge.floor().is_none() {
             self.remember(moment, state.map(|(station, _)| station));
         }
-        let void = self
-            .writing
-            .history_replaced(&self.settings.operator_inputs, moment);
+        let void = self.writing.history_replaced(&self.settings.operator_inputs, moment);
         self.report_void(&void);
         self.question = None;
-        let adopted = state.map(|(_, holding)| Floor {
-            moment: holding.stepped,
-            lineage: holding.lineage,
-        });
+        let adopted =
+            state.map(|(_, holding)| Floor { moment: holding.stepped, lineage: holding.lineage });
         self.knowledge.start(history, adopted);
     }
 
@@ -208,8 +184,7 @@ impl RemoteIo {
             self.field = inputs.clone();
             let writes = from.map(|station| self.holders.writes(station));
             let operator_inputs = &self.settings.operator_inputs;
-            self.writing
-                .recall(operator_inputs, inputs, writes.into_iter().flatten());
+            self.writing.recall(operator_inputs, inputs, writes.into_iter().flatten());
         }
         let stations = self.holders.excluded();
         if !self.knowledge.pardons() && !stations.is_empty() {

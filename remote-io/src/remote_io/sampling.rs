@@ -51,9 +51,7 @@ impl RemoteIo {
         let mut inputs = self.field.clone();
         let operator_inputs = &self.settings.operator_inputs;
         self.writing.put(operator_inputs, &mut inputs);
-        let validity = self
-            .signals
-            .put(&self.settings.signals, moment, &mut inputs);
+        let validity = self.signals.put(&self.settings.signals, moment, &mut inputs);
         let mut inputs = self.forcing.inputs(inputs);
         if let Some(stop) = self.settings.stop
             && self.program == Execution::Restarting
@@ -66,10 +64,8 @@ impl RemoteIo {
             return;
         };
         let history = &mut run.history;
-        let places = self
-            .holders
-            .holdings()
-            .filter_map(|(_, holding)| history.place(holding.lineage));
+        let places =
+            self.holders.holdings().filter_map(|(_, holding)| history.place(holding.lineage));
         let living = places.fold(None, |range: Option<(usize, usize)>, place| {
             let (oldest, newest) = range.unwrap_or((place, place));
             Some((oldest.min(place), newest.max(place)))
@@ -77,9 +73,7 @@ impl RemoteIo {
         let before = self.writing.in_history(history);
         let void = history.push(&inputs, living, floor.map(|floor| floor.lineage));
         run.sampled = true;
-        let void_writes = self
-            .writing
-            .sampled(operator_inputs, moment, history, &before);
+        let void_writes = self.writing.sampled(operator_inputs, moment, history, &before);
         let base = history.base();
         let (born, before) = (history.born(), history.before());
         let body = Body::Sample(Sample {
@@ -97,18 +91,9 @@ impl RemoteIo {
             writes: self.writing.ids(),
         });
         if void > 0 {
-            self.report(Event::Voided {
-                moment,
-                samples: void,
-                lineage: base,
-            });
+            self.report(Event::Voided { moment, samples: void, lineage: base });
         }
-        self.report(Event::Sampled {
-            moment,
-            inputs,
-            born,
-            before,
-        });
+        self.report(Event::Sampled { moment, inputs, born, before });
         self.report_void(&void_writes);
         self.report_validity(&validity);
         self.member.send_cyclic(now, body);

@@ -59,10 +59,7 @@ impl Signals {
             age: 0,
             is_valid: false,
         });
-        Self {
-            proofs: vec![None; settings.signal_sources.len()],
-            taken: taken.collect(),
-        }
+        Self { proofs: vec![None; settings.signal_sources.len()], taken: taken.collect() }
     }
 
     /// Keeps the newest sample of a source.
@@ -123,11 +120,7 @@ impl Signals {
             if is_valid != std::mem::replace(&mut taken.is_valid, is_valid) {
                 changed.push((signal.place.bit, is_valid));
             }
-            let stored = if is_valid {
-                taken.stored
-            } else {
-                signal.default
-            };
+            let stored = if is_valid { taken.stored } else { signal.default };
             signal.place.set(image, stored);
             if let Some(valid) = signal.valid {
                 image.set(usize::from(valid), is_valid);
@@ -157,9 +150,7 @@ impl RemoteIo {
             .map(|(place, source)| self.signals.outputs(place, source, moment, received))
             .collect();
         self.age_signals(|program, sources| {
-            let place = sources
-                .iter()
-                .position(|source| source.program == program)?;
+            let place = sources.iter().position(|source| source.program == program)?;
             outputs[place].as_ref()
         });
     }
@@ -191,11 +182,7 @@ impl RemoteIo {
     pub(super) fn report_validity(&mut self, changed: &[(u16, bool)]) {
         let moment = self.moment();
         for &(input, valid) in changed {
-            self.report(Event::SignalValidity {
-                moment,
-                input,
-                valid,
-            });
+            self.report(Event::SignalValidity { moment, input, valid });
         }
     }
 }

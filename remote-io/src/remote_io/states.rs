@@ -61,10 +61,7 @@ const ALL: [(Happening, &str); 9] = [
 ];
 
 fn moment(cycle: u64) -> Moment {
-    Moment {
-        epoch: Epoch(1),
-        cycle: Cycle(cycle),
-    }
+    Moment { epoch: Epoch(1), cycle: Cycle(cycle) }
 }
 
 #[derive(Debug, Clone)]
@@ -103,10 +100,7 @@ impl Bench {
             value_fault: ValueFault::FailSafe,
             stale_state: StaleState::Operator,
         };
-        Self {
-            remote_io: RemoteIo::new(Time(0), settings),
-            cycle: 100,
-        }
+        Self { remote_io: RemoteIo::new(Time(0), settings), cycle: 100 }
     }
 
     fn happens(&mut self, happening: Happening) {
@@ -156,8 +150,7 @@ impl Bench {
             body,
         };
         let now = self.now();
-        self.remote_io
-            .handle_input(now, Input::Frame(&Arc::new(frame)));
+        self.remote_io.handle_input(now, Input::Frame(&Arc::new(frame)));
     }
 
     /// The sample that was sent; takes all other outputs away.
@@ -213,12 +206,7 @@ impl Bench {
 
     /// The name of its state.
     fn state(&self) -> String {
-        let RemoteIo {
-            knowledge,
-            question,
-            authority,
-            ..
-        } = &self.remote_io;
+        let RemoteIo { knowledge, question, authority, .. } = &self.remote_io;
         let mut name = match knowledge {
             Knowledge::Listening { .. } => "Listening",
             Knowledge::ColdStarted { .. } => "ColdStarted",
@@ -241,12 +229,9 @@ fn turn(holding: Holding, output: bool) -> Body {
     Body::Turn(Turn {
         heard: StationSet::EMPTY,
         holdings: [holding].into_iter().collect(),
-        words: [Word {
-            mask: ProgramSet::only(PROGRAM),
-            sum: Image::from_bits([output]),
-        }]
-        .into_iter()
-        .collect(),
+        words: [Word { mask: ProgramSet::only(PROGRAM), sum: Image::from_bits([output]) }]
+            .into_iter()
+            .collect(),
         recalled: Vec::new(),
         lacks: ProgramSet::EMPTY,
         relayed: Vec::new(),
@@ -266,8 +251,5 @@ fn each_state_answers_each_input() {
 fn the_drawing_is_the_table() {
     let drawing = table().drawing("remote I/O", "remote-io/src/remote_io/states.rs");
     let drawn = include_str!("../../../docs/pictures/remote-io.dot");
-    assert!(
-        drawing == drawn,
-        "docs/pictures/remote-io.dot should be\n{drawing}"
-    );
+    assert!(drawing == drawn, "docs/pictures/remote-io.dot should be\n{drawing}");
 }

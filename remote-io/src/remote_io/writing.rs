@@ -98,10 +98,7 @@ impl Writing {
             by: WriteId::default(),
             is_sampled: true,
         });
-        Self {
-            values: values.collect(),
-            sessions: Vec::new(),
-        }
+        Self { values: values.collect(), sessions: Vec::new() }
     }
 
     /// Checks a write and takes it.
@@ -111,38 +108,29 @@ impl Writing {
         write: &Write,
         (forgets_after, keeps_for): (u32, u32),
     ) -> Result<Taking, WriteRefusal> {
-        self.sessions
-            .retain(|session| session.idle < forgets_after || !session.is_decided());
+        self.sessions.retain(|session| session.idle < forgets_after || !session.is_decided());
         let id = write.id;
-        let place = self
-            .sessions
-            .binary_search_by_key(&id.session, |it| it.id.session);
+        let place = self.sessions.binary_search_by_key(&id.session, |it| it.id.session);
         let last = place.map_or(0, |place| self.sessions[place].id.number);
         if let Ok(place) = place
             && id.number == last
         {
             let session = &self.sessions[place];
             let is_same = session.value.is_none_or(|value| value == write.value)
-                && session
-                    .input
-                    .is_none_or(|input| inputs[input].place.bit == write.input);
+                && session.input.is_none_or(|input| inputs[input].place.bit == write.input);
             return match session.progress {
                 _ if !is_same => Err(WriteRefusal::Order { expected: last + 1 }),
                 Progress::InEffect { since } => Ok(Taking::InEffect(since)),
                 Progress::Taken | Progress::Sampled { .. } => Ok(Taking::Pending),
             };
         }
-        let at = inputs
-            .iter()
-            .position(|input| input.place.bit == write.input);
+        let at = inputs.iter().position(|input| input.place.bit == write.input);
         let at = at.ok_or(WriteRefusal::NotWritable)?;
         let input = &inputs[at];
-        input
-            .check(write.value)
-            .map_err(|mismatch| match mismatch {
-                ValueMismatch::Type => WriteRefusal::Type,
-                ValueMismatch::Limits => WriteRefusal::Limits,
-            })?;
+        input.check(write.value).map_err(|mismatch| match mismatch {
+            ValueMismatch::Type => WriteRefusal::Type,
+            ValueMismatch::Limits => WriteRefusal::Limits,
+        })?;
         if write.role < input.role {
             let required = input.role;
             return Err(WriteRefusal::Role { required });
@@ -169,12 +157,8 @@ impl Writing {
             Err(_) => self.add(session, keeps_for)?,
         }
         let stored = write.value.stored();
-        self.values[at] = Written {
-            stored,
-            left: input.samples(stored),
-            by: id,
-            is_sampled: false,
-        };
+        self.values[at] =
+            Written { stored, left: input.samples(stored), by: id, is_sampled: false };
         Ok(Taking::New)
     }
 
@@ -182,14 +166,10 @@ impl Writing {
         if self.sessions.len() == MAXIMUM_SESSIONS {
             let old = self.sessions.iter().enumerate();
             let old = old.filter(|(_, it)| it.idle >= keeps_for && it.is_decided());
-            let (oldest, _) = old
-                .max_by_key(|(_, it)| it.idle)
-                .ok_or(WriteRefusal::Busy)?;
+            let (oldest, _) = old.max_by_key(|(_, it)| it.idle).ok_or(WriteRefusal::Busy)?;
             self.sessions.remove(oldest);
         }
-        let place = self
-            .sessions
-            .partition_point(|it| it.id.session < session.id.session);
+        let place = self.sessions.partition_point(|it| it.id.session < session.id.session);
         self.sessions.insert(place, session);
         Ok(())
     }
@@ -211,13 +191,10 @@ impl Writing {
 
     /// Writes in samples of `history`: those that become void can be found afterwards.
     pub(super) fn in_history(&self, history: &History) -> SmallVec<[WriteId; 1]> {
-        let sampled = self
-            .sessions
-            .iter()
-            .filter(|session| match session.progress {
-                Progress::Sampled { after, .. } => history.place(after).is_some(),
-                Progress::Taken | Progress::InEffect { .. } => false,
-            });
+        let sampled = self.sessions.iter().filter(|session| match session.progress {
+            Progress::Sampled { after, .. } => history.place(after).is_some(),
+            Progress::Taken | Progress::InEffect { .. } => false,
+        });
         sampled.map(|session| session.id).collect()
     }
 
@@ -231,10 +208,7 @@ impl Writing {
         before: &[WriteId],
     ) -> SmallVec<[WriteId; 1]> {
         let after = history.head();
-        let now = Progress::Sampled {
-            first: moment,
-            after,
-        };
+        let now = Progress::Sampled { first: moment, after };
         let mut void = SmallVec::new();
         for session in &mut self.sessions {
             let is_void = match session.progress {
@@ -418,16 +392,12 @@ impl RemoteIo {
         let runs =
             self.knowledge.run().is_some() && self.sensors.is_some() && self.question.is_none();
         let taken = if runs {
-            self.writing
-                .take(&self.settings.operator_inputs, write, memory)
+            self.writing.take(&self.settings.operator_inputs, write, memory)
         } else {
             Err(WriteRefusal::NotRunning)
         };
         match taken {
-            Ok(Taking::New) => self.report(Event::Written {
-                moment,
-                write: write.clone(),
-            }),
+            Ok(Taking::New) => self.report(Event::Written { moment, write: write.clone() }),
             Ok(Taking::Pending) => {}
             Ok(Taking::InEffect(since)) => {
                 let id = write.id;
@@ -435,11 +405,7 @@ impl RemoteIo {
                 self.answer(id, WriteOutcome::InEffect { since });
             }
             Err(refusal) => {
-                self.report(Event::WriteRefused {
-                    moment,
-                    write: write.clone(),
-                    refusal,
-                });
+                self.report(Event::WriteRefused { moment, write: write.clone(), refusal });
                 self.answer(write.id, WriteOutcome::Refused { refusal });
             }
         }

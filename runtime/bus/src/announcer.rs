@@ -73,13 +73,9 @@ impl Announcer {
         let listen = |source| BusError::listen(address, source);
         let listener = TcpListener::bind(address).map_err(listen)?;
         let inner = inner_address().map_err(listen)?;
-        let failed = |error: zenoh::Error| BusError::Zenoh {
-            address,
-            reason: reason(&error),
-        };
-        let session = settings(inner)
-            .and_then(|config| zenoh::open(config).wait())
-            .map_err(failed)?;
+        let failed = |error: zenoh::Error| BusError::Zenoh { address, reason: reason(&error) };
+        let session =
+            settings(inner).and_then(|config| zenoh::open(config).wait()).map_err(failed)?;
         let newest = Newest::default();
         let known = Arc::clone(&newest);
         let queryable = session
@@ -91,10 +87,7 @@ impl Announcer {
                         .is_ok_and(|key| query.key_expr().intersects(&key));
                     if asked {
                         // Who asked is gone where this fails.
-                        let _ = query
-                            .reply(key, text)
-                            .encoding(Encoding::APPLICATION_JSON)
-                            .wait();
+                        let _ = query.reply(key, text).encoding(Encoding::APPLICATION_JSON).wait();
                     }
                 }
             })
@@ -130,18 +123,15 @@ impl Announcer {
             if query.key_expr().as_str() != own {
                 return;
             }
-            let payload = query
-                .payload()
-                .filter(|text| text.len() <= LONGEST_QUESTION);
+            let payload = query.payload().filter(|text| text.len() <= LONGEST_QUESTION);
             let text = payload.and_then(|text| text.try_to_string().ok());
             if let Some(text) = text.map(|text| text.into_owned()) {
                 take(Question { query, text });
             }
         });
-        let declared = declared.wait().map_err(|error| BusError::Zenoh {
-            address: self.address,
-            reason: reason(&error),
-        })?;
+        let declared = declared
+            .wait()
+            .map_err(|error| BusError::Zenoh { address: self.address, reason: reason(&error) })?;
         self.questions = Some(declared);
         Ok(())
     }
@@ -180,10 +170,7 @@ fn settings(address: SocketAddr) -> zenoh::Result<zenoh::Config> {
         ("connect/endpoints", "[]".to_owned()),
         ("scouting/multicast/enabled", "false".to_owned()),
         ("scouting/gossip/enabled", "false".to_owned()),
-        (
-            "transport/unicast/accept_timeout",
-            HANDSHAKE_TIMEOUT_MS.to_string(),
-        ),
+        ("transport/unicast/accept_timeout", HANDSHAKE_TIMEOUT_MS.to_string()),
     ] {
         config
             .insert_json5(setting, &value)

@@ -168,9 +168,7 @@ impl<E: Send + 'static> Channel<E> {
                 .spawn(move || {
                     run_in_background();
                     // Ends with the member.
-                    answers
-                        .into_iter()
-                        .for_each(|answer| callers.answer(answer));
+                    answers.into_iter().for_each(|answer| callers.answer(answer));
                 })
                 .map_err(|source| BusError::System {
                     what: "a thread for answers to writes",
@@ -199,10 +197,7 @@ impl<E: Send + 'static> Channel<E> {
                 member.run();
                 drop(closing);
             })
-            .map_err(|source| BusError::System {
-                what: "a thread for the channel",
-                source,
-            })?;
+            .map_err(|source| BusError::System { what: "a thread for the channel", source })?;
         Ok(RunningChannel { stop, wake, closed })
     }
 
@@ -295,9 +290,7 @@ impl<E: Send + 'static> Channel<E> {
                 self.sink.record(self.clock.now(), Noted::Host(event));
                 return Some(opened);
             }
-            Err(error) => HostEvent::ChannelFailed {
-                reason: reason(&error),
-            },
+            Err(error) => HostEvent::ChannelFailed { reason: reason(&error) },
         };
         self.sink.record(self.clock.now(), Noted::Host(event));
         None
@@ -310,11 +303,7 @@ impl<E: Send + 'static> Channel<E> {
         let inner = inner_address()?;
         let listen = format!("tls/{inner}#tls_handshake_timeout_ms={HANDSHAKE_TIMEOUT_MS}");
         let mut config = tls_config("peer", &self.settings.keys)?;
-        insert(
-            &mut config,
-            "transport/unicast/accept_timeout",
-            &json!(HANDSHAKE_TIMEOUT_MS),
-        )?;
+        insert(&mut config, "transport/unicast/accept_timeout", &json!(HANDSHAKE_TIMEOUT_MS))?;
         insert(&mut config, "listen/endpoints", &json!([listen]))?;
         let rules = access_control(&self.prefix, &hash_key(&self.name), admitted);
         insert(&mut config, "access_control", &rules)?;
@@ -364,12 +353,7 @@ impl<E: Send + 'static> Channel<E> {
             answers.push(self.answer_writes(&session, role, key)?);
         }
         let relay = Relay::start(listener, self.connections.clone(), PATIENCE, inner)?;
-        Ok(Opened {
-            session,
-            relay,
-            journal,
-            _answers: answers,
-        })
+        Ok(Opened { session, relay, journal, _answers: answers })
     }
 }
 

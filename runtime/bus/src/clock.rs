@@ -15,9 +15,7 @@ pub struct Clock {
 impl Clock {
     /// Starts at 0 now.
     pub fn start() -> Self {
-        Self {
-            start_ns: monotonic_ns(),
-        }
+        Self { start_ns: monotonic_ns() }
     }
 
     /// Nanoseconds since the start.

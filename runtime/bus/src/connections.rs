@@ -109,18 +109,12 @@ impl Connections {
         let of_address = open.by_address.get(&place).copied().unwrap_or(0);
         if open.total >= shared.most || of_address >= shared.most_of_address {
             let before = open.refused.map_or(0, |refused| refused.connections);
-            open.refused = Some(RefusedConnections {
-                connections: before + 1,
-                address,
-            });
+            open.refused = Some(RefusedConnections { connections: before + 1, address });
             return None;
         }
         open.total += 1;
         open.by_address.insert(place, of_address + 1);
-        Some(Slot {
-            shared: Arc::clone(shared),
-            address: place,
-        })
+        Some(Slot { shared: Arc::clone(shared), address: place })
     }
 
     /// What was refused since the last call.
@@ -190,12 +184,7 @@ impl Connection {
     pub fn new(stream: TcpStream, slot: Slot, patience: Duration) -> Self {
         // Answers are small, and wanted at once; it fails only where the caller has gone already.
         let _ = stream.set_nodelay(true);
-        Self {
-            stream,
-            patience,
-            deadline: Box::pin(sleep(patience)),
-            _slot: slot,
-        }
+        Self { stream, patience, deadline: Box::pin(sleep(patience)), _slot: slot }
     }
 
     fn in_time(&mut self, context: &mut Context<'_>) -> io::Result<()> {
@@ -257,11 +246,7 @@ impl Listener {
     pub fn new(listener: TcpListener, connections: Connections, patience: Duration) -> Self {
         // Where it fails, fewer wait.
         let _ = Backlog::new(WAITING).and_then(|waiting| listen(&listener, waiting));
-        Self {
-            listener,
-            connections,
-            patience,
-        }
+        Self { listener, connections, patience }
     }
 
     /// Where it listens.
@@ -342,10 +327,8 @@ mod tests {
     }
 
     fn within<T>(work: impl Future<Output = T>) -> T {
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build()
-            .expect("a runtime");
+        let runtime =
+            tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
         runtime.block_on(async {
             let deadline = Duration::from_secs(60);
             tokio::time::timeout(deadline, work).await.expect("in time")

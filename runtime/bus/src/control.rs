@@ -32,9 +32,7 @@ pub(crate) const LINE_BYTES: usize = 1024;
 /// # Errors
 /// [`BusError::System`].
 pub fn hold_back_signals() -> Result<(), BusError> {
-    ending_signal_set()
-        .thread_block()
-        .map_err(BusError::system("to hold back SIGINT and SIGTERM"))
+    ending_signal_set().thread_block().map_err(BusError::system("to hold back SIGINT and SIGTERM"))
 }
 
 pub(crate) fn ending_signal_set() -> SigSet {
@@ -47,11 +45,8 @@ pub(crate) fn ending_signal_set() -> SigSet {
 /// SIGINT and SIGTERM as a file descriptor.
 pub(crate) fn ending_signals() -> Result<SignalFd, BusError> {
     hold_back_signals()?;
-    SignalFd::with_flags(
-        &ending_signal_set(),
-        SfdFlags::SFD_CLOEXEC | SfdFlags::SFD_NONBLOCK,
-    )
-    .map_err(BusError::system("a signalfd"))
+    SignalFd::with_flags(&ending_signal_set(), SfdFlags::SFD_CLOEXEC | SfdFlags::SFD_NONBLOCK)
+        .map_err(BusError::system("a signalfd"))
 }
 
 /// SIGINT and SIGTERM to a command that has something to save: they do not end the process any more.
@@ -97,10 +92,8 @@ pub(crate) fn watch(
             Err(Errno::EINTR) => continue,
             Err(error) => return Err(BusError::system("to wait for commands")(error)),
         }
-        let ready: Vec<bool> = descriptors
-            .iter()
-            .map(|descriptor| descriptor.any().unwrap_or(false))
-            .collect();
+        let ready: Vec<bool> =
+            descriptors.iter().map(|descriptor| descriptor.any().unwrap_or(false)).collect();
         if ready[0] {
             return Ok(());
         }
@@ -224,10 +217,7 @@ mod tests {
         check("release now", None);
         check(&format!("force {line}"), Some(Order::Force(force)));
         check(&format!("force {}", line.replace("60", "0")), None);
-        check(
-            r#"unforce {"input":0}"#,
-            Some(Order::Unforce(SignalPlace::Input(0))),
-        );
+        check(r#"unforce {"input":0}"#, Some(Order::Unforce(SignalPlace::Input(0))));
         check(r#"unforce {"input":70000}"#, None);
         check("unforce", None);
         check(r#"choose "cold""#, Some(Order::Choose(StateChoice::Cold)));

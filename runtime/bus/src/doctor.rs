@@ -53,13 +53,7 @@ pub struct Finding {
 impl Finding {
     /// As it should be.
     pub fn good(check: &'static str, found: impl Into<String>) -> Self {
-        Self {
-            check,
-            health: Health::Good,
-            found: found.into(),
-            remedy: None,
-            repair: None,
-        }
+        Self { check, health: Health::Good, found: found.into(), remedy: None, repair: None }
     }
 
     /// Not as it should be.
@@ -69,13 +63,7 @@ impl Finding {
         found: impl Into<String>,
         remedy: impl Into<String>,
     ) -> Self {
-        Self {
-            check,
-            health,
-            found: found.into(),
-            remedy: Some(remedy.into()),
-            repair: None,
-        }
+        Self { check, health, found: found.into(), remedy: Some(remedy.into()), repair: None }
     }
 
     /// The same, with a command that repairs it.
@@ -102,10 +90,7 @@ pub fn examine_ports(endpoints: &Endpoints, link: LinkKind) -> Vec<Finding> {
         LinkKind::Udp => ("UDP", frames, UdpSocket::bind(frames).map(drop)),
         LinkKind::Zenoh => ("TCP", frames, TcpListener::bind(frames).map(drop)),
     };
-    let bound = [
-        bound,
-        ("TCP", operators, TcpListener::bind(operators).map(drop)),
-    ];
+    let bound = [bound, ("TCP", operators, TcpListener::bind(operators).map(drop))];
     let finding = |(protocol, address, bound): (&str, SocketAddr, std::io::Result<()>)| match bound
     {
         Ok(()) => Finding::good("ports", format!("{address} is free ({protocol})")),
@@ -172,12 +157,10 @@ pub fn examine_peers(
         }
         let mut descriptors = [PollFd::new(opened.readiness(), PollFlags::POLLIN)];
         let left = TimeSpec::from_duration(end.since(clock.now()));
-        ppoll(&mut descriptors, Some(left), None)
-            .map(drop)
-            .or_else(|error| match error {
-                nix::errno::Errno::EINTR => Ok(()),
-                error => Err(BusError::system("to wait for frames")(error)),
-            })?;
+        ppoll(&mut descriptors, Some(left), None).map(drop).or_else(|error| match error {
+            nix::errno::Errno::EINTR => Ok(()),
+            error => Err(BusError::system("to wait for frames")(error)),
+        })?;
     }
     Ok(endpoints
         .senders()

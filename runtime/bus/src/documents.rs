@@ -56,10 +56,7 @@ impl Documents {
             }
             Ok(config)
         };
-        let failed = |error: zenoh::Error| BusError::Zenoh {
-            address,
-            reason: reason(&error),
-        };
+        let failed = |error: zenoh::Error| BusError::Zenoh { address, reason: reason(&error) };
         let session = zenoh::open(config().map_err(failed)?).wait();
         session.map(|session| Self { session }).map_err(failed)
     }

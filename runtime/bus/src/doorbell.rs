@@ -134,10 +134,7 @@ mod tests {
             outbox.put(item);
         }
         assert!(readable(&inbox, PollTimeout::ZERO));
-        assert_eq!(
-            [inbox.take(), inbox.take(), inbox.take()],
-            [Some(0), Some(1), None]
-        );
+        assert_eq!([inbox.take(), inbox.take(), inbox.take()], [Some(0), Some(1), None]);
         assert_eq!(inbox.dropped(), 3);
         assert!(!readable(&inbox, PollTimeout::ZERO));
     }
@@ -182,10 +179,9 @@ mod tests {
                         assert_eq!(item, expected);
                         expected += 1;
                     }
-                    None => assert!(
-                        readable(&inbox, PollTimeout::from(5_000_u16)),
-                        "slept for ever"
-                    ),
+                    None => {
+                        assert!(readable(&inbox, PollTimeout::from(5_000_u16)), "slept for ever")
+                    }
                 }
             }
         });

@@ -52,22 +52,13 @@ impl Endpoints {
         let (mut own_peers, others): (Vec<Peer>, Vec<Peer>) =
             members.into_iter().partition(|peer| peer.member == own);
         let own = own_peers.pop().ok_or(BusError::NoAddress { member: own })?;
-        Ok(Self {
-            cluster,
-            own,
-            others,
-            roster,
-            multicast: None,
-        })
+        Ok(Self { cluster, own, others, roster, multicast: None })
     }
 
     /// The same with the address of the first multicast group, where the network between the members has multicast.
     #[must_use]
     pub fn with_multicast(self, first: Option<SocketAddrV4>) -> Self {
-        Self {
-            multicast: first,
-            ..self
-        }
+        Self { multicast: first, ..self }
     }
 
     /// The first multicast group.
@@ -130,9 +121,7 @@ impl Endpoints {
     /// one pair can end as two halves that never meet.
     pub(crate) fn called(&self) -> impl Iterator<Item = &Peer> {
         let own = self.own.member;
-        self.others
-            .iter()
-            .filter(move |peer| self.talks_with(peer.member) && peer.member < own)
+        self.others.iter().filter(move |peer| self.talks_with(peer.member) && peer.member < own)
     }
 }
 
@@ -166,31 +155,16 @@ mod tests {
 
     fn check(own: Member, topic: Topic, expected: &[&str]) {
         let endpoints = endpoints(own);
-        let names: Vec<&str> = endpoints
-            .audience(topic)
-            .map(|peer| peer.name.as_str())
-            .collect();
+        let names: Vec<&str> = endpoints.audience(topic).map(|peer| peer.name.as_str()).collect();
         assert_eq!(names, expected, "{own:?} on {topic:?}");
     }
 
     #[test]
     fn everybody_concerned_is_told_and_nobody_else() {
-        check(
-            Member::Station(StationId(1)),
-            Topic::Cycle,
-            &["0", "2", "3", "4"],
-        );
+        check(Member::Station(StationId(1)), Topic::Cycle, &["0", "2", "3", "4"]);
         check(Member::Station(StationId(1)), Topic::Field, &[]);
-        check(
-            Member::Station(StationId(1)),
-            Topic::Turn,
-            &["0", "2", "3", "4"],
-        );
-        check(
-            Member::RemoteIo(ProgramId(0)),
-            Topic::Sample,
-            &["0", "1", "2"],
-        );
+        check(Member::Station(StationId(1)), Topic::Turn, &["0", "2", "3", "4"]);
+        check(Member::RemoteIo(ProgramId(0)), Topic::Sample, &["0", "1", "2"]);
         check(Member::RemoteIo(ProgramId(0)), Topic::Actuation, &["5"]);
         check(Member::Plant(ProgramId(0)), Topic::Field, &["3", "6"]);
         check(Member::Plant(ProgramId(1)), Topic::Field, &["4"]);
@@ -218,12 +192,8 @@ mod tests {
     #[test]
     fn a_stranger_and_a_shared_address_are_refused() {
         let stranger = Member::Station(StationId(9));
-        let refused = Endpoints::new(
-            ClusterHash(1),
-            stranger,
-            cell(),
-            Roster::new(2, 3, Vec::new()),
-        );
+        let refused =
+            Endpoints::new(ClusterHash(1), stranger, cell(), Roster::new(2, 3, Vec::new()));
         assert!(matches!(refused, Err(BusError::NoAddress { .. })));
         let mut members = cell();
         members[1].address = members[4].address;

@@ -135,10 +135,7 @@ impl BusError {
     }
 
     pub(crate) fn system(what: &'static str) -> impl FnOnce(nix::Error) -> Self {
-        move |error| Self::System {
-            what,
-            source: error.into(),
-        }
+        move |error| Self::System { what, source: error.into() }
     }
 }
 

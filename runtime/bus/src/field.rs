@@ -71,9 +71,7 @@ impl FieldDriver for SimulatedField {
                 sender: Member::RemoteIo(self.program),
                 alone: false,
             },
-            body: Body::Actuation(Actuation {
-                outputs: outputs.clone(),
-            }),
+            body: Body::Actuation(Actuation { outputs: outputs.clone() }),
         })
     }
 

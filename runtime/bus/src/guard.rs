@@ -80,13 +80,11 @@ impl Guard {
             return;
         };
         let (sender, awaited) = channel();
-        let begun = std::thread::Builder::new()
-            .name("new-life".into())
-            .spawn(move || {
-                run_in_background();
-                // The member may have ended meanwhile.
-                let _ = sender.send(new_life());
-            });
+        let begun = std::thread::Builder::new().name("new-life".into()).spawn(move || {
+            run_in_background();
+            // The member may have ended meanwhile.
+            let _ = sender.send(new_life());
+        });
         if begun.is_ok() {
             keys.awaited = Some(awaited);
         }
@@ -132,11 +130,7 @@ impl Guard {
 
 impl From<FrameError> for Refused {
     fn from(error: FrameError) -> Self {
-        Self {
-            kind: RefusedAs::NoFrame,
-            sender: None,
-            reason: error.to_string(),
-        }
+        Self { kind: RefusedAs::NoFrame, sender: None, reason: error.to_string() }
     }
 }
 
@@ -152,10 +146,6 @@ impl From<Refusal> for Refused {
             Refusal::Revoked { sender } => (RefusedAs::Revoked, Some(sender)),
             Refusal::Broken { sender, .. } => (RefusedAs::NoFrame, Some(sender)),
         };
-        Self {
-            kind,
-            sender,
-            reason: refusal.to_string(),
-        }
+        Self { kind, sender, reason: refusal.to_string() }
     }
 }

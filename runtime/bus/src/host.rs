@@ -186,11 +186,8 @@ impl<M: Machine> Host<'_, M> {
     /// Tells the member what its field shows, where that comes by another way than the link.
     fn look(&mut self, round: &mut Round) {
         if let Some(contested) = self.field.contested() {
-            let event = if contested {
-                HostEvent::FieldContested
-            } else {
-                HostEvent::FieldUncontested
-            };
+            let event =
+                if contested { HostEvent::FieldContested } else { HostEvent::FieldUncontested };
             self.sink.record(self.clock.now(), Noted::Host(event));
         }
         let Some(look) = self.field.look() else {
@@ -198,16 +195,12 @@ impl<M: Machine> Host<'_, M> {
         };
         let now = self.clock.now();
         let (input, event) = match &look {
-            Look::Sensors(sensors) => (
-                Input::RemoteIo(RemoteIoInput::Field(sensors)),
-                HostEvent::FieldRegained,
-            ),
+            Look::Sensors(sensors) => {
+                (Input::RemoteIo(RemoteIoInput::Field(sensors)), HostEvent::FieldRegained)
+            }
             Look::Lost(reason) => {
                 let reason = reason.clone();
-                (
-                    Input::RemoteIo(RemoteIoInput::FieldLost),
-                    HostEvent::FieldLost { reason },
-                )
+                (Input::RemoteIo(RemoteIoInput::FieldLost), HostEvent::FieldLost { reason })
             }
         };
         let lost = matches!(look, Look::Lost(_));
@@ -285,9 +278,7 @@ impl<M: Machine> Host<'_, M> {
     fn say(&mut self, frame: &Frame, round: &mut Round) {
         // Who sends for the first time says by it who it is.
         let sender = frame.header.sender;
-        round
-            .unreceived
-            .get_or_insert_with(|| Unreceived::new(sender));
+        round.unreceived.get_or_insert_with(|| Unreceived::new(sender));
         round.encoded.clear();
         let encoded = encode(frame, &mut round.encoded).map_err(|error| error.to_string());
         let datagram = encoded.and_then(|()| self.guard.close(frame, &round.encoded));
@@ -321,19 +312,11 @@ impl<M: Machine> Host<'_, M> {
 
     fn report_reopenings(&mut self, now: Time) {
         while let Some(reopening) = self.link.reopening() {
-            let Reopening {
-                silence,
-                peer,
-                failure,
-            } = reopening;
+            let Reopening { silence, peer, failure } = reopening;
             let silence_ms = u64::try_from(silence.as_millis()).unwrap_or(u64::MAX);
             let event = match failure {
                 None => HostEvent::LinkReopened { silence_ms, peer },
-                Some(reason) => HostEvent::LinkFailed {
-                    silence_ms,
-                    peer,
-                    reason,
-                },
+                Some(reason) => HostEvent::LinkFailed { silence_ms, peer, reason },
             };
             self.sink.record(now, Noted::Host(event));
         }
@@ -356,8 +339,7 @@ impl<M: Machine> Host<'_, M> {
         let writes = self.orders.take_refused_writes();
         if writes > 0 {
             round.reported = now;
-            self.sink
-                .record(now, Noted::Host(HostEvent::RefusedWrites { writes }));
+            self.sink.record(now, Noted::Host(HostEvent::RefusedWrites { writes }));
         }
         let unsendable = round.unsendable.take();
         if !round.refused.is_empty() || unsendable.is_some() {

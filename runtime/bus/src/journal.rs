@@ -217,10 +217,7 @@ pub struct JournalSender<E> {
 
 impl<E> Clone for JournalSender<E> {
     fn clone(&self) -> Self {
-        Self {
-            sender: self.sender.clone(),
-            lost: Arc::clone(&self.lost),
-        }
+        Self { sender: self.sender.clone(), lost: Arc::clone(&self.lost) }
     }
 }
 
@@ -292,10 +289,7 @@ impl Journal {
                 );
                 unwritten + left.load(Ordering::Relaxed)
             })
-            .map_err(|source| BusError::System {
-                what: "a thread for the journal",
-                source,
-            })?;
+            .map_err(|source| BusError::System { what: "a thread for the journal", source })?;
         Ok((JournalSender { sender, lost }, Self { thread }))
     }
 
@@ -357,10 +351,7 @@ mod tests {
     impl Write for Held {
         fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
             let _ = self.let_go.recv();
-            self.written
-                .lock()
-                .expect("no panic")
-                .extend_from_slice(bytes);
+            self.written.lock().expect("no panic").extend_from_slice(bytes);
             Ok(bytes.len())
         }
         fn flush(&mut self) -> io::Result<()> {
@@ -374,11 +365,7 @@ mod tests {
         let whole = &written[..whole.map_or(0, |end| end + 1)];
         let lines = std::str::from_utf8(whole).expect("text").lines();
         lines
-            .map(|line| {
-                serde_json::from_str::<Record<'_, u32>>(line)
-                    .expect("a record")
-                    .event
-            })
+            .map(|line| serde_json::from_str::<Record<'_, u32>>(line).expect("a record").event)
             .collect()
     }
 
@@ -387,10 +374,7 @@ mod tests {
         const RECORDS: u32 = 1000;
         let (let_go, held) = channel();
         let written = Arc::new(Mutex::new(Vec::new()));
-        let output = Held {
-            let_go: held,
-            written: Arc::clone(&written),
-        };
+        let output = Held { let_go: held, written: Arc::clone(&written) };
         let member = Member::Station(StationId(0));
         let (mut sender, journal) =
             Journal::start::<u32>(8, Clock::start(), member, "robot".into(), output)
@@ -406,10 +390,7 @@ mod tests {
             .iter()
             .any(|event| matches!(event, Noted::Host(HostEvent::JournalLost { .. })))
         {
-            assert!(
-                clock.now() < Time(0) + Duration::from_secs(20),
-                "nothing is said"
-            );
+            assert!(clock.now() < Time(0) + Duration::from_secs(20), "nothing is said");
             sender.record(Time(0), Noted::Member(number));
             number += 1;
             std::thread::yield_now();
@@ -417,10 +398,7 @@ mod tests {
         drop(sender);
         let unsaid = journal.finish();
         let events = events(&written.lock().expect("no panic"));
-        let kept = events
-            .iter()
-            .filter(|event| matches!(event, Noted::Member(_)))
-            .count() as u64;
+        let kept = events.iter().filter(|event| matches!(event, Noted::Member(_))).count() as u64;
         let lost: u64 = events
             .iter()
             .map(|event| match event {
@@ -430,10 +408,7 @@ mod tests {
             .sum();
         // A thread that began late may have said the first of them before it was held.
         let in_all = lost + unsaid;
-        assert!(
-            in_all >= u64::from(RECORDS) - 8 - 1 - BURST,
-            "{in_all} of {number}"
-        );
+        assert!(in_all >= u64::from(RECORDS) - 8 - 1 - BURST, "{in_all} of {number}");
         assert_eq!(kept + lost + unsaid, u64::from(number));
     }
 
@@ -459,11 +434,7 @@ mod tests {
                 process: 4711,
                 address: ([127, 0, 0, 1], 7450).into(),
                 link: LinkKind::Zenoh,
-                rights: Rights {
-                    real_time: true,
-                    locked_memory: true,
-                    lacking: Vec::new(),
-                },
+                rights: Rights { real_time: true, locked_memory: true, lacking: Vec::new() },
             })),
             record(Noted::Member(Event::BecameCycleMaster { cycle: 3 })),
             record(Noted::Host(HostEvent::JournalLost { records: 5 })),

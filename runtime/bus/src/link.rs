@@ -122,8 +122,6 @@ impl FromStr for LinkKind {
 
     fn from_str(text: &str) -> Result<Self, NoSuchLink> {
         let known = Self::NAMES.iter().find(|(name, _)| *name == text);
-        known.map(|(_, kind)| *kind).ok_or_else(|| NoSuchLink {
-            found: text.to_owned(),
-        })
+        known.map(|(_, kind)| *kind).ok_or_else(|| NoSuchLink { found: text.to_owned() })
     }
 }

@@ -74,9 +74,8 @@ where
         real_time,
     } = settings;
     if ends_with_parent {
-        set_pdeathsig(Signal::SIGKILL).map_err(BusError::system(
-            "to end with the process that started this one",
-        ))?;
+        set_pdeathsig(Signal::SIGKILL)
+            .map_err(BusError::system("to end with the process that started this one"))?;
     }
     let signals = ending_signals()?;
     let finished = EventFd::from_flags(EfdFlags::EFD_CLOEXEC)
@@ -92,11 +91,7 @@ where
     // The journal's thread starts before the rights are claimed, so that it inherits none.
     let (mut sink, journal) =
         Journal::start::<M::Event>(JOURNAL_RECORDS, clock, own.member, own.name, output)?;
-    let mut rights = if real_time {
-        Rights::claim()
-    } else {
-        Rights::unclaimed()
-    };
+    let mut rights = if real_time { Rights::claim() } else { Rights::unclaimed() };
     let raises = rights.real_time;
     let mut link = kind.open(&endpoints)?;
     if real_time {
@@ -118,9 +113,7 @@ where
     let (control, orders) = orders()?;
     let channel = telemetry.map(|(settings, telemetry)| {
         let (control, sink) = (control.clone(), sink.clone());
-        Channel::start(
-            settings, &endpoints, status, control, telemetry, sink, clock,
-        )
+        Channel::start(settings, &endpoints, status, control, telemetry, sink, clock)
     });
     let channel = channel.transpose()?;
     let mut noted = sink.clone();
@@ -143,10 +136,7 @@ where
                 }
                 .run()
             })
-            .map_err(|source| BusError::System {
-                what: "a thread for the cycle",
-                source,
-            })?;
+            .map_err(|source| BusError::System { what: "a thread for the cycle", source })?;
         let watched = watch(commands, &signals, finished.as_fd(), &control, |line| {
             let event = HostEvent::UnknownCommand { line };
             noted.record(clock.now(), Noted::Host(event));
@@ -154,11 +144,9 @@ where
         if watched.is_err() {
             control.give(Order::Stop);
         }
-        let ran = cycle.join().unwrap_or_else(|panic| {
-            Err(BusError::Panicked {
-                message: said(panic.as_ref()),
-            })
-        });
+        let ran = cycle
+            .join()
+            .unwrap_or_else(|panic| Err(BusError::Panicked { message: said(panic.as_ref()) }));
         watched.and(ran)
     });
     drop(noted);

@@ -98,9 +98,7 @@ impl Groups {
         sender: &UdpSocket,
     ) -> io::Result<(Vec<UdpSocket>, Epoll)> {
         let IpAddr::V4(interface) = endpoints.own().address.ip() else {
-            return Err(io::Error::other(
-                "the address of this member is not of IPv4",
-            ));
+            return Err(io::Error::other("the address of this member is not of IPv4"));
         };
         let topics = [Topic::Cycle, Topic::Turn, Topic::Sample];
         let heard = topics.into_iter().flat_map(|topic| {
@@ -109,9 +107,7 @@ impl Groups {
         });
         let mut turns: BTreeSet<u8> = heard.collect();
         let samples = turns.split_off(&FIRST_OF_SAMPLES);
-        let received = [turns, samples]
-            .into_iter()
-            .filter(|groups| !groups.is_empty());
+        let received = [turns, samples].into_iter().filter(|groups| !groups.is_empty());
         let sockets = received.map(|groups| {
             let addresses = groups.into_iter().map(|group| address_of(first, group));
             listen(first.port(), interface, addresses)

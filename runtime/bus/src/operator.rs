@@ -94,16 +94,8 @@ impl Call {
         };
         let config = || -> zenoh::Result<zenoh::Config> {
             let mut config = tls_config("client", keys)?;
-            insert(
-                &mut config,
-                "connect/endpoints",
-                &json!([format!("tls/{address}")]),
-            )?;
-            insert(
-                &mut config,
-                "connect/timeout_ms",
-                &json!(PATIENCE.as_millis() as u64),
-            )?;
+            insert(&mut config, "connect/endpoints", &json!([format!("tls/{address}")]))?;
+            insert(&mut config, "connect/timeout_ms", &json!(PATIENCE.as_millis() as u64))?;
             insert(&mut config, "connect/exit_on_failure", &json!(true))?;
             Ok(config)
         };

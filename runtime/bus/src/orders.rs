@@ -110,12 +110,7 @@ pub fn orders() -> Result<(Control, Orders), BusError> {
         limiter: Arc::clone(&limiter),
         answers: Arc::new(Mutex::new(Some(given))),
     };
-    let orders = Orders {
-        inbox,
-        standing,
-        limiter,
-        answers,
-    };
+    let orders = Orders { inbox, standing, limiter, answers };
     Ok((control, orders))
 }
 

@@ -58,16 +58,10 @@ mod tests {
     #[test]
     fn free_addresses_differ_and_are_left_alone_by_the_system() {
         let both = [free_addresses(20), free_addresses(20)];
-        let addresses: BTreeSet<SocketAddr> = both
-            .into_iter()
-            .flat_map(|addresses| addresses.expect("20 free ports"))
-            .collect();
+        let addresses: BTreeSet<SocketAddr> =
+            both.into_iter().flat_map(|addresses| addresses.expect("20 free ports")).collect();
         assert_eq!(addresses.len(), 40);
-        assert!(
-            addresses
-                .iter()
-                .all(|address| PORTS.contains(&address.port()))
-        );
+        assert!(addresses.iter().all(|address| PORTS.contains(&address.port())));
     }
 
     #[test]
@@ -77,10 +71,8 @@ mod tests {
             .into_iter()
             .map(|address| UdpSocket::bind(address).expect("found free"))
             .collect();
-        let used: Vec<SocketAddr> = taken
-            .iter()
-            .map(|socket| socket.local_addr().expect("bound"))
-            .collect();
+        let used: Vec<SocketAddr> =
+            taken.iter().map(|socket| socket.local_addr().expect("bound")).collect();
         let others = free_addresses(50).expect("free ports");
         assert!(others.iter().all(|address| !used.contains(address)));
     }

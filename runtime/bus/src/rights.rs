@@ -56,11 +56,7 @@ impl Rights {
             }
         };
         LINK_IN_REAL_TIME.store(real_time, Ordering::Relaxed);
-        Self {
-            real_time,
-            locked_memory: false,
-            lacking,
-        }
+        Self { real_time, locked_memory: false, lacking }
     }
 
     /// Locks the memory, once what the process needs is there.
@@ -97,15 +93,11 @@ pub(crate) fn raise_link_thread() {
 pub(crate) fn run_in_real_time(priority: u8) -> Result<(), String> {
     let value = ThreadPriorityValue::try_from(priority)?;
     let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
-    set_thread_priority_and_policy(
-        thread_native_id(),
-        ThreadPriority::Crossplatform(value),
-        policy,
-    )
-    .map_err(|error| match error {
-        thread_priority::Error::OS(code) => std::io::Error::from_raw_os_error(code).to_string(),
-        error => error.to_string(),
-    })
+    set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Crossplatform(value), policy)
+        .map_err(|error| match error {
+            thread_priority::Error::OS(code) => std::io::Error::from_raw_os_error(code).to_string(),
+            error => error.to_string(),
+        })
 }
 
 /// Takes the calling thread out of real time: what it does has time.

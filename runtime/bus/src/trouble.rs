@@ -27,9 +27,7 @@ pub(crate) struct Duplicates {
 impl Duplicates {
     /// The event where it is new.
     pub(crate) fn note(&mut self, now: Time, refused: &Refused) -> Option<HostEvent> {
-        let member = refused
-            .sender
-            .filter(|_| refused.kind == RefusedAs::OfAnotherLife)?;
+        let member = refused.sender.filter(|_| refused.kind == RefusedAs::OfAnotherLife)?;
         let is_new = self.seen.insert(member, now).is_none();
         is_new.then_some(HostEvent::DuplicateFound { member })
     }
@@ -38,8 +36,7 @@ impl Duplicates {
     pub(crate) fn over(&mut self, now: Time) -> impl Iterator<Item = HostEvent> + use<> {
         let gone = |_: &Member, seen: &mut Time| now.since(*seen) >= DUPLICATE_GONE_AFTER;
         let gone: Vec<(Member, Time)> = self.seen.extract_if(.., gone).collect();
-        gone.into_iter()
-            .map(|(member, _)| HostEvent::DuplicateGone { member })
+        gone.into_iter().map(|(member, _)| HostEvent::DuplicateGone { member })
     }
 }
 
@@ -59,11 +56,7 @@ struct Entry {
 
 impl Refusals {
     pub(crate) fn note(&mut self, refused: Refused) {
-        let Refused {
-            kind,
-            mut sender,
-            reason,
-        } = refused;
+        let Refused { kind, mut sender, reason } = refused;
         if self.place(kind, sender).is_none() && self.entries.len() >= MAXIMUM_ENTRIES {
             sender = None;
         }
@@ -72,12 +65,7 @@ impl Refusals {
                 self.entries[place].datagrams += 1;
                 self.entries[place].reason = reason;
             }
-            None => self.entries.push(Entry {
-                kind,
-                sender,
-                datagrams: 1,
-                reason,
-            }),
+            None => self.entries.push(Entry { kind, sender, datagrams: 1, reason }),
         }
     }
 
@@ -93,10 +81,9 @@ impl Refusals {
     /// One event for each entry.
     pub(crate) fn take(&mut self) -> impl Iterator<Item = HostEvent> + '_ {
         self.entries.drain(..).map(|entry| match entry.kind {
-            RefusedAs::NoFrame => HostEvent::RefusedBytes {
-                datagrams: entry.datagrams,
-                reason: entry.reason,
-            },
+            RefusedAs::NoFrame => {
+                HostEvent::RefusedBytes { datagrams: entry.datagrams, reason: entry.reason }
+            }
             refused_as => HostEvent::RefusedFrames {
                 datagrams: entry.datagrams,
                 refused_as,
@@ -131,12 +118,7 @@ mod tests {
         assert!(refusals.entries.len() <= MAXIMUM_ENTRIES + kinds.len());
         let mut datagrams = 0;
         for event in refusals.take() {
-            let HostEvent::RefusedFrames {
-                datagrams: these,
-                reason,
-                ..
-            } = event
-            else {
+            let HostEvent::RefusedFrames { datagrams: these, reason, .. } = event else {
                 panic!("{event:?}");
             };
             assert_eq!(reason, "9", "the last one is shown");

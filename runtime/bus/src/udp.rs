@@ -67,10 +67,7 @@ impl Link for UdpLink {
         };
         let topic = self.roster.topic(frame);
         let audience = &self.audiences[topic as usize];
-        let group = self
-            .groups
-            .as_ref()
-            .and_then(|groups| groups.address(topic));
+        let group = self.groups.as_ref().and_then(|groups| groups.address(topic));
         if let Some(group) = group.filter(|_| only.is_none() && audience.len() > 1) {
             if self.socket.send_to(bytes, group).is_err() {
                 self.unsent += 1;
@@ -107,9 +104,6 @@ impl Link for UdpLink {
     }
 
     fn counters(&self) -> LinkCounters {
-        LinkCounters {
-            unsent: self.unsent,
-            ..LinkCounters::default()
-        }
+        LinkCounters { unsent: self.unsent, ..LinkCounters::default() }
     }
 }

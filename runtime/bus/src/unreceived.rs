@@ -32,11 +32,7 @@ pub(crate) struct Unreceived {
 
 impl Unreceived {
     pub(crate) fn new(own: Member) -> Self {
-        Self {
-            own,
-            patience: FIRST_PATIENCE,
-            since: BTreeMap::new(),
-        }
+        Self { own, patience: FIRST_PATIENCE, since: BTreeMap::new() }
     }
 
     /// Takes a frame of another member; true where it is time for a new life.
@@ -108,11 +104,8 @@ mod tests {
         let mut began = Vec::new();
         for second in 0..seconds {
             for of in [0, 1] {
-                let set = if gone(second, of) {
-                    [own].into_iter().collect()
-                } else {
-                    StationSet::EMPTY
-                };
+                let set =
+                    if gone(second, of) { [own].into_iter().collect() } else { StationSet::EMPTY };
                 let now = Time(0) + Duration::from_secs(second);
                 if unreceived.shown_by(now, &sample(of, set)) {
                     began.push(second);

@@ -45,9 +45,8 @@ pub struct Wakefulness {
 impl Wakefulness {
     /// Measures for `span`, with the real-time rights that a member would have here where `real_time` is wanted.
     pub fn measure(span: Duration, real_time: bool) -> Self {
-        let sleepers: Vec<_> = (0..SLEEPERS)
-            .map(|_| std::thread::spawn(move || sleep_for(span, real_time)))
-            .collect();
+        let sleepers: Vec<_> =
+            (0..SLEEPERS).map(|_| std::thread::spawn(move || sleep_for(span, real_time))).collect();
         let (mut late, mut granted) = (Vec::new(), real_time);
         for sleeper in sleepers {
             let (measured, rights) = sleeper.join().unwrap_or_default();
@@ -121,13 +120,8 @@ mod tests {
     fn the_period_grows_with_the_latest_wake_up() {
         let late = |milliseconds| {
             let latest = Duration::from_millis(milliseconds);
-            let wakefulness = Wakefulness {
-                sleeps: 1,
-                median: latest,
-                p99: latest,
-                latest,
-                real_time: false,
-            };
+            let wakefulness =
+                Wakefulness { sleeps: 1, median: latest, p99: latest, latest, real_time: false };
             wakefulness.period().as_millis()
         };
         let periods: Vec<u128> = [0, 2, 3, 4, 5, 10, 11, 20, 500].map(late).into();

@@ -43,11 +43,7 @@ impl Watchdog {
         socket.connect_addr(&address)?;
         // A systemd that does not read must not stop a cycle.
         socket.set_nonblocking(true)?;
-        Ok(Self {
-            socket,
-            timeout: timeout.filter(|timeout| !timeout.is_zero()),
-            last: None,
-        })
+        Ok(Self { socket, timeout: timeout.filter(|timeout| !timeout.is_zero()), last: None })
     }
 
     /// It listens, and its cycle starts.
@@ -65,10 +61,7 @@ impl Watchdog {
         let Some(timeout) = self.timeout else {
             return;
         };
-        if self
-            .last
-            .is_none_or(|last| now.since(last) >= timeout / SIGNS)
-        {
+        if self.last.is_none_or(|last| now.since(last) >= timeout / SIGNS) {
             self.last = Some(now);
             self.say("WATCHDOG=1");
         }
@@ -76,10 +69,7 @@ impl Watchdog {
 
     /// The member has nothing left to do, and sleeps until its own next time, `until`, or until something comes.
     pub(crate) fn rests(&mut self, now: Time, until: Time) {
-        if self
-            .timeout
-            .is_some_and(|timeout| until.since(now) < timeout)
-        {
+        if self.timeout.is_some_and(|timeout| until.since(now) < timeout) {
             self.woken(now);
         }
     }

@@ -115,9 +115,8 @@ impl Callers {
     /// Sends an answer to all who wait for it.
     pub(crate) fn answer(&self, answer: WriteAnswer) {
         let mut callers = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let (answered, waiting) = std::mem::take(&mut *callers)
-            .into_iter()
-            .partition(|caller| caller.id == answer.id);
+        let (answered, waiting) =
+            std::mem::take(&mut *callers).into_iter().partition(|caller| caller.id == answer.id);
         *callers = waiting;
         drop(callers);
         let answered: Vec<Caller> = answered;

@@ -92,14 +92,9 @@ impl ZenohLink {
             doorbell(QUEUE_FRAMES).map_err(BusError::system("an eventfd for what arrives"))?;
         let senders = endpoints.senders().map(|peer| peer.member);
         let heard = senders.map(|member| (name(member), (member, AtomicBool::new(false))));
-        let ears = Ears {
-            outbox,
-            heard: Arc::new(heard.collect()),
-        };
-        let session = Session::open(endpoints, &ears).map_err(|error| BusError::Zenoh {
-            address: frames,
-            reason: reason(&error),
-        })?;
+        let ears = Ears { outbox, heard: Arc::new(heard.collect()) };
+        let session = Session::open(endpoints, &ears)
+            .map_err(|error| BusError::Zenoh { address: frames, reason: reason(&error) })?;
         let publishers = Arc::new(Mutex::new(Arc::clone(&session.publishers)));
         let reopened = Arc::new(AtomicU64::new(0));
         let published = Arc::new(Published::default());
@@ -158,12 +153,8 @@ impl Link for ZenohLink {
 
     fn send(&mut self, frame: &Frame, bytes: &[u8]) {
         // Held only to take what is there, never while something is sent.
-        let publishers = Arc::clone(
-            &self
-                .publishers
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner),
-        );
+        let publishers =
+            Arc::clone(&self.publishers.lock().unwrap_or_else(PoisonError::into_inner));
         let topic = self.roster.topic(frame) as usize;
         if let Some(publisher) = &publishers[topic] {
             match publisher.put(bytes).wait() {
@@ -289,13 +280,8 @@ impl Session {
 
     /// Those of `peers` to which it is connected.
     fn connected(&self, endpoints: &Endpoints, mut peers: BTreeSet<Member>) -> BTreeSet<Member> {
-        let identities: Vec<String> = self
-            .session
-            .info()
-            .peers_zid()
-            .wait()
-            .map(|id| id.to_string())
-            .collect();
+        let identities: Vec<String> =
+            self.session.info().peers_zid().wait().map(|id| id.to_string()).collect();
         peers.retain(|member| {
             let own = identity(endpoints.cluster(), *member);
             identities.iter().any(|id| id.starts_with(&own))
@@ -369,10 +355,8 @@ impl Keeper {
         }
         let failure = match Session::open(&self.endpoints, &self.ears) {
             Ok(session) => {
-                *self
-                    .publishers
-                    .lock()
-                    .unwrap_or_else(PoisonError::into_inner) = Arc::clone(&session.publishers);
+                *self.publishers.lock().unwrap_or_else(PoisonError::into_inner) =
+                    Arc::clone(&session.publishers);
                 self.session = Some(session);
                 self.reopened.fetch_add(1, Ordering::Relaxed);
                 None
@@ -383,11 +367,8 @@ impl Keeper {
         self.failed = failure.is_some();
         if !again {
             // A link that is dropped asks no more.
-            let _ = self.report.send(Reopening {
-                silence: silent.lasts,
-                peer: silent.peer,
-                failure,
-            });
+            let _ =
+                self.report.send(Reopening { silence: silent.lasts, peer: silent.peer, failure });
         }
     }
 }
@@ -459,11 +440,7 @@ mod tests {
         ];
         let addresses = free_addresses(members.len()).expect("there are ports");
         let peers = members.iter().zip(addresses);
-        let peers = peers.map(|(&member, address)| Peer {
-            member,
-            name: name(member),
-            address,
-        });
+        let peers = peers.map(|(&member, address)| Peer { member, name: name(member), address });
         let peers: Vec<Peer> = peers.collect();
         let endpoints = |own| {
             let roster = Roster::new(1, 2, Vec::new());

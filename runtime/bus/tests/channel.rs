@@ -47,9 +47,7 @@ fn issued() -> PathBuf {
     ];
     let people = people.map(|(name, role)| (name.to_owned(), role));
     let people = People::from(&people[..]);
-    authority
-        .issue(&cluster, &["robot".to_owned()], people, 1, now)
-        .expect("names of the cluster");
+    authority.issue(&cluster, &["robot".to_owned()], people, 1, now).expect("names of the cluster");
     folder.join("members")
 }
 
@@ -72,26 +70,12 @@ fn router(folder: &Path, member: SocketAddr, own: SocketAddr) -> zenoh::Session 
         ("connect/endpoints", json!([format!("tls/{member}")])),
         ("listen/endpoints", json!([format!("tls/{own}")])),
         (&format!("{tls}/root_ca_certificate"), json!(keys.authority)),
-        (
-            &format!("{tls}/connect_certificate"),
-            json!(keys.certificate),
-        ),
-        (
-            &format!("{tls}/connect_private_key"),
-            json!(keys.private_key),
-        ),
-        (
-            &format!("{tls}/listen_certificate"),
-            json!(keys.certificate),
-        ),
-        (
-            &format!("{tls}/listen_private_key"),
-            json!(keys.private_key),
-        ),
+        (&format!("{tls}/connect_certificate"), json!(keys.certificate)),
+        (&format!("{tls}/connect_private_key"), json!(keys.private_key)),
+        (&format!("{tls}/listen_certificate"), json!(keys.certificate)),
+        (&format!("{tls}/listen_private_key"), json!(keys.private_key)),
     ] {
-        config
-            .insert_json5(setting, &value.to_string())
-            .expect("it is a setting");
+        config.insert_json5(setting, &value.to_string()).expect("it is a setting");
     }
     zenoh::open(config).wait().expect("a free port")
 }
@@ -140,9 +124,7 @@ fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
     let call = |address, who: &str| Call::to(address, hash, "robot", &keys(&folder, who));
     let asked = |address, who: &str, request| call(address, who)?.ask(&request);
 
-    let text = until("the member itself", || {
-        asked(member, "shift-leader", Request::Configuration)
-    });
+    let text = until("the member itself", || asked(member, "shift-leader", Request::Configuration));
     assert_eq!(text, "what everybody has to agree on");
     let hash_there = asked(member, "shift-leader", Request::Cluster);
     let expected = ConfigurationHash::of(text.as_bytes()).to_string();
@@ -155,10 +137,7 @@ fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
         reason: "to see it".to_owned(),
     });
     let refused = asked(member, "shift-leader", force);
-    assert!(
-        refused.as_ref().is_ok_and(|answer| answer != DONE),
-        "no time: {refused:?}"
-    );
+    assert!(refused.as_ref().is_ok_and(|answer| answer != DONE), "no time: {refused:?}");
     let unforce = Request::Unforce(SignalPlace::Output(0));
     let taken = asked(member, "shift-leader", unforce.clone());
     assert_eq!(taken.ok().as_deref(), Some(DONE));
@@ -170,34 +149,20 @@ fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
         "an operator does not force: {denied:?}"
     );
     let denied = asked(member, "passer-by", unforce);
-    assert!(
-        matches!(denied, Err(BusError::Unanswered { .. })),
-        "{denied:?}"
-    );
+    assert!(matches!(denied, Err(BusError::Unanswered { .. })), "{denied:?}");
     let denied = asked(member, "passer-by", Request::Status);
-    assert!(
-        matches!(denied, Err(BusError::Unanswered { .. })),
-        "{denied:?}"
-    );
+    assert!(matches!(denied, Err(BusError::Unanswered { .. })), "{denied:?}");
 
     let listener = TcpListener::bind(("127.0.0.1", 0)).expect("a free port");
     let site = listener.local_addr().expect("bound");
     drop(listener);
     let router = router(&folder, member, site);
-    let status = until("the router", || {
-        asked(site, "control-room", Request::Status)
-    });
+    let status = until("the router", || asked(site, "control-room", Request::Status));
     assert!(status.contains("\"event\":\"ready\""), "{status}");
     let denied = asked(site, "control-room", Request::Stop);
-    assert!(
-        matches!(denied, Err(BusError::Unanswered { .. })),
-        "{denied:?}"
-    );
+    assert!(matches!(denied, Err(BusError::Unanswered { .. })), "{denied:?}");
     let denied = asked(site, "passer-by", Request::Status);
-    assert!(
-        matches!(denied, Err(BusError::Unanswered { .. })),
-        "{denied:?}"
-    );
+    assert!(matches!(denied, Err(BusError::Unanswered { .. })), "{denied:?}");
     let started = Instant::now();
     while !running.is_finished() {
         // Where the answer is lost, the member ends all the same.

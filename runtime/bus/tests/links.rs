@@ -69,10 +69,7 @@ impl Running {
         let mut link = link.open(&endpoints).expect("a free port");
         let mut guard = guard(own, life, peers);
         let (control, orders) = orders().expect("an eventfd");
-        let mut sink = Sink {
-            own,
-            reports: reports.clone(),
-        };
+        let mut sink = Sink { own, reports: reports.clone() };
         let thread = std::thread::spawn(move || {
             let mut field: Box<dyn FieldDriver> = match own {
                 Member::RemoteIo(program) => Box::new(SimulatedField::new(program, agreement())),
@@ -230,10 +227,9 @@ fn restarts(link: LinkKind, count: u64, busy: usize) -> Vec<Duration> {
         };
         let again = expected(own, 0).into_iter().filter_map(|(listener, chat)| {
             let chat = match chat {
-                Chat::Heard { speaker, .. } if listener == own || speaker == own => Chat::Heard {
-                    speaker,
-                    life: life_of(speaker),
-                },
+                Chat::Heard { speaker, .. } if listener == own || speaker == own => {
+                    Chat::Heard { speaker, life: life_of(speaker) }
+                }
                 Chat::Sensed if listener == own => chat,
                 _ => return None,
             };
@@ -313,10 +309,7 @@ fn a_session_without_peers_is_opened_anew_over_zenoh() {
         let (member, event) = reports.recv_timeout(DEADLINE).expect("it is reported");
         if let Noted::Host(event) = event {
             match event {
-                HostEvent::LinkReopened {
-                    silence_ms,
-                    peer: None,
-                } => {
+                HostEvent::LinkReopened { silence_ms, peer: None } => {
                     assert!(silence_ms >= 1000, "after {silence_ms} ms");
                     missing.remove(&member);
                 }
@@ -324,9 +317,7 @@ fn a_session_without_peers_is_opened_anew_over_zenoh() {
             }
         }
     }
-    let others = cell()
-        .into_iter()
-        .filter(|own| ![first, plant].contains(own));
+    let others = cell().into_iter().filter(|own| ![first, plant].contains(own));
     running.extend(others.map(start));
     wait_for(&reports, expected(station(0), 1), "at last");
     let summaries = running.into_iter().map(Running::stop);
@@ -338,9 +329,7 @@ fn a_session_without_peers_is_opened_anew_over_zenoh() {
 fn garbage(target: SocketAddr) {
     let socket = UdpSocket::bind(("127.0.0.1", 0)).expect("a free port");
     for length in LENGTHS {
-        socket
-            .send_to(&noise(length), target)
-            .expect("it is loopback");
+        socket.send_to(&noise(length), target).expect("it is loopback");
     }
 }
 
@@ -356,9 +345,7 @@ fn streams_of_garbage(target: SocketAddr) {
 const LENGTHS: [usize; 6] = [0, 1, 9, 60, 1400, 40_000];
 
 fn noise(length: usize) -> Vec<u8> {
-    (0..length)
-        .map(|place| (place * 31 + length) as u8)
-        .collect()
+    (0..length).map(|place| (place * 31 + length) as u8).collect()
 }
 
 fn garbage_changes_nothing(link: LinkKind) {
@@ -415,10 +402,7 @@ fn a_port_in_use_is_said_with_its_number() {
         let frames = link.frames_address(peers[0].address).expect("a port");
         let _datagrams = UdpSocket::bind(frames).expect("a free port");
         let _streams = TcpListener::bind(frames).expect("a free port");
-        let error = link
-            .open(&endpoints(station(0), &peers))
-            .err()
-            .expect("the port is in use");
+        let error = link.open(&endpoints(station(0), &peers)).err().expect("the port is in use");
         assert_eq!(error.code(), "U0501");
         assert!(error.to_string().contains(&frames.port().to_string()));
     }
@@ -459,12 +443,9 @@ impl LossyWire {
                     out.connect(target).expect("it is loopback");
                     let back = out.try_clone().expect("a descriptor");
                     let front = socket.try_clone().expect("a descriptor");
-                    let (over, mut loss) = (
-                        Arc::clone(&over),
-                        Loss(seed ^ 0x5555 ^ u64::from(client.port())),
-                    );
-                    back.set_read_timeout(Some(Duration::from_millis(100)))
-                        .expect("a timeout");
+                    let (over, mut loss) =
+                        (Arc::clone(&over), Loss(seed ^ 0x5555 ^ u64::from(client.port())));
+                    back.set_read_timeout(Some(Duration::from_millis(100))).expect("a timeout");
                     std::thread::spawn(move || {
                         let mut bytes = vec![0; 65536];
                         while !over.load(Ordering::Relaxed) {
@@ -503,10 +484,8 @@ impl Loss {
     }
 
     fn below(&mut self, bound: u64) -> u64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 33) % bound
     }
 }
@@ -516,11 +495,7 @@ fn all_hear_all_by(link: LinkKind, peers: &[Peer], addresses: &[SocketAddr]) {
     let (sender, reports) = channel();
     let seen_by = |own: Member| -> Vec<Peer> {
         let seen = peers.iter().zip(addresses).map(|(peer, &address)| Peer {
-            address: if peer.member == own {
-                peer.address
-            } else {
-                address
-            },
+            address: if peer.member == own { peer.address } else { address },
             ..peer.clone()
         });
         seen.collect()
@@ -538,11 +513,8 @@ fn all_hear_all_by(link: LinkKind, peers: &[Peer], addresses: &[SocketAddr]) {
 #[test]
 fn all_hear_all_where_one_of_ten_is_lost_on_udp() {
     let peers = peers(&cell());
-    let wires: Vec<LossyWire> = peers
-        .iter()
-        .zip(1..)
-        .map(|(peer, seed)| LossyWire::to(peer.address, seed))
-        .collect();
+    let wires: Vec<LossyWire> =
+        peers.iter().zip(1..).map(|(peer, seed)| LossyWire::to(peer.address, seed)).collect();
     let addresses: Vec<SocketAddr> = wires.iter().map(|wire| wire.address).collect();
     all_hear_all_by(LinkKind::Udp, &peers, &addresses);
 }
@@ -607,11 +579,8 @@ impl Drop for BreakingWire {
 #[test]
 fn all_hear_all_where_streams_break_on_zenoh() {
     let peers = peers(&cell());
-    let wires: Vec<BreakingWire> = peers
-        .iter()
-        .zip(1..)
-        .map(|(peer, seed)| BreakingWire::to(peer.address, seed))
-        .collect();
+    let wires: Vec<BreakingWire> =
+        peers.iter().zip(1..).map(|(peer, seed)| BreakingWire::to(peer.address, seed)).collect();
     let addresses: Vec<SocketAddr> = wires.iter().map(|wire| wire.address).collect();
     all_hear_all_by(LinkKind::Zenoh, &peers, &addresses);
 }

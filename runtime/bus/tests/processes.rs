@@ -5,11 +5,7 @@
     clippy::disallowed_methods,
     reason = "real links take real time, and a test that waits has a deadline"
 )]
-#![allow(
-    clippy::print_stdout,
-    clippy::print_stderr,
-    reason = "it reports what it tests"
-)]
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "it reports what it tests")]
 
 mod members;
 
@@ -43,33 +39,16 @@ fn main() -> ExitCode {
         return act(&serde_json::from_str(part).expect("a part"));
     }
     let tests: [(&str, fn()); 8] = [
-        ("one_who_is_killed_is_heard_again_over_udp", || {
-            killed(LinkKind::Udp)
-        }),
-        ("one_who_is_killed_is_heard_again_over_zenoh", || {
-            killed(LinkKind::Zenoh)
-        }),
-        ("one_who_was_stopped_is_heard_again_over_udp", || {
-            stopped(LinkKind::Udp)
-        }),
-        ("one_who_was_stopped_is_heard_again_over_zenoh", || {
-            stopped(LinkKind::Zenoh)
-        }),
-        (
-            "a_member_says_that_it_is_ready_and_that_it_has_stopped",
-            ready_and_stopped,
-        ),
-        (
-            "a_member_ends_with_its_input_where_it_is_told_to",
-            ends_with_input,
-        ),
+        ("one_who_is_killed_is_heard_again_over_udp", || killed(LinkKind::Udp)),
+        ("one_who_is_killed_is_heard_again_over_zenoh", || killed(LinkKind::Zenoh)),
+        ("one_who_was_stopped_is_heard_again_over_udp", || stopped(LinkKind::Udp)),
+        ("one_who_was_stopped_is_heard_again_over_zenoh", || stopped(LinkKind::Zenoh)),
+        ("a_member_says_that_it_is_ready_and_that_it_has_stopped", ready_and_stopped),
+        ("a_member_ends_with_its_input_where_it_is_told_to", ends_with_input),
         ("commands_are_obeyed", commands_are_obeyed),
         ("a_port_in_use_is_said", port_in_use),
     ];
-    let filters: Vec<&String> = arguments
-        .iter()
-        .filter(|one| !one.starts_with('-'))
-        .collect();
+    let filters: Vec<&String> = arguments.iter().filter(|one| !one.starts_with('-')).collect();
     for (name, test) in tests {
         if filters.is_empty() || filters.iter().any(|filter| name.contains(filter.as_str())) {
             println!("test {name}");
@@ -100,19 +79,11 @@ fn act(part: &Part) -> ExitCode {
         endpoints: endpoints(part.own, &part.peers),
         link: part.link,
         field,
-        commands: if part.ends_with_input {
-            Commands::ReadAndEndWithInput
-        } else {
-            Commands::Read
-        },
+        commands: if part.ends_with_input { Commands::ReadAndEndWithInput } else { Commands::Read },
         ends_with_parent: true,
         real_time: true,
     };
-    match run_member(
-        Chatter::new(part.own, part.life),
-        settings,
-        std::io::stdout(),
-    ) {
+    match run_member(Chatter::new(part.own, part.life), settings, std::io::stdout()) {
         Ok(_) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("{error}");
@@ -204,8 +175,7 @@ fn talkers() -> impl Iterator<Item = Member> {
 /// Every listener with every speaker.
 fn pairs() -> BTreeSet<(Member, Member)> {
     let all = talkers().flat_map(|listener| talkers().map(move |speaker| (listener, speaker)));
-    all.filter(|(listener, speaker)| listener != speaker)
-        .collect()
+    all.filter(|(listener, speaker)| listener != speaker).collect()
 }
 
 fn started(
@@ -214,17 +184,9 @@ fn started(
 ) -> (impl Fn(Member, u64) -> Part, HashMap<Member, Process>) {
     let members: Vec<Member> = talkers().chain([plant(0)]).collect();
     let peers = peers(&members);
-    let part = move |own, life| Part {
-        own,
-        life,
-        link,
-        peers: peers.clone(),
-        ends_with_input: true,
-    };
-    let running = members
-        .iter()
-        .map(|&own| (own, Process::start(&part(own, 1), sender)))
-        .collect();
+    let part =
+        move |own, life| Part { own, life, link, peers: peers.clone(), ends_with_input: true };
+    let running = members.iter().map(|&own| (own, Process::start(&part(own, 1), sender))).collect();
     (part, running)
 }
 
@@ -272,10 +234,7 @@ fn stopped(link: LinkKind) {
         // The one who was stopped is behind the others by as many frames as it did not say.
         let after = |speaker, hundreds| speaker == own || hundreds > newest + 2;
         wait_for_pairs(&reports, "after the stop", its, after);
-        println!(
-            "  {own:?} hears and is heard again {:?} after its stop",
-            continued.elapsed()
-        );
+        println!("  {own:?} hears and is heard again {:?} after its stop", continued.elapsed());
     }
 }
 
@@ -308,10 +267,7 @@ fn killed(link: LinkKind) {
             }
             deaf.is_empty() && unheard.is_empty()
         });
-        println!(
-            "  {own:?} hears and is heard again {:?} after its restart",
-            restarted.elapsed()
-        );
+        println!("  {own:?} hears and is heard again {:?} after its restart", restarted.elapsed());
     }
 }
 
@@ -320,15 +276,8 @@ fn alone(ends_with_input: bool) -> (Process, Receiver<Reports>, UdpSocket) {
     let (sender, reports) = channel();
     let peers = peers(&[remote_io(0), station(0)]);
     let peer = UdpSocket::bind(peers[1].address).expect("found free");
-    peer.set_read_timeout(Some(DEADLINE))
-        .expect("a time that is not zero");
-    let part = Part {
-        own: remote_io(0),
-        life: 1,
-        link: LinkKind::Udp,
-        peers,
-        ends_with_input,
-    };
+    peer.set_read_timeout(Some(DEADLINE)).expect("a time that is not zero");
+    let part = Part { own: remote_io(0), life: 1, link: LinkKind::Udp, peers, ends_with_input };
     (Process::start(&part, &sender), reports, peer)
 }
 
@@ -336,19 +285,11 @@ fn ready_and_stopped() {
     for signal in [Signal::SIGTERM, Signal::SIGINT] {
         let (mut process, reports, peer) = alone(true);
         let (_, first) = reports.recv_timeout(DEADLINE).expect("a first record");
-        let Noted::Host(HostEvent::Ready {
-            process: id,
-            rights,
-            ..
-        }) = first
-        else {
+        let Noted::Host(HostEvent::Ready { process: id, rights, .. }) = first else {
             panic!("{first:?} is the first record");
         };
         assert_eq!(id, process.child.id());
-        assert_eq!(
-            rights.lacking.is_empty(),
-            rights.real_time && rights.locked_memory
-        );
+        assert_eq!(rights.lacking.is_empty(), rights.real_time && rights.locked_memory);
         // How many it says before the signal is the scheduler's business; one, and it has something to count.
         peer.recv(&mut [0; 2048]).expect("its first frame");
         process.signal(signal);
@@ -385,14 +326,9 @@ fn ends_with_input() {
     process.input = None;
     // It goes on: what is no frame still reaches it.
     let stranger = UdpSocket::bind(("127.0.0.1", 0)).expect("a free port");
-    stranger
-        .send_to(b"nonsense", address)
-        .expect("it is loopback");
+    stranger.send_to(b"nonsense", address).expect("it is loopback");
     wait_until(&reports, "the datagram", |(_, event)| {
-        matches!(
-            event,
-            Noted::Host(HostEvent::RefusedBytes { datagrams: 1, .. })
-        )
+        matches!(event, Noted::Host(HostEvent::RefusedBytes { datagrams: 1, .. }))
     });
     process.signal(Signal::SIGTERM);
     wait_until(&reports, "its last word", |(_, event)| {
@@ -404,9 +340,7 @@ fn ends_with_input() {
 fn commands_are_obeyed() {
     let (mut process, reports, _peer) = alone(true);
     process.command("release");
-    wait_until(&reports, "the release", |(_, event)| {
-        *event == Noted::Member(Chat::Released)
-    });
+    wait_until(&reports, "the release", |(_, event)| *event == Noted::Member(Chat::Released));
     process.command("stop");
     assert!(process.ended());
 }
@@ -416,13 +350,8 @@ fn port_in_use() {
     let frames = LinkKind::Zenoh.frames_address(peers[0].address);
     let address = frames.expect("a port");
     let _taken = TcpListener::bind(address).expect("a free port");
-    let part = Part {
-        own: station(0),
-        life: 1,
-        link: LinkKind::Zenoh,
-        peers,
-        ends_with_input: true,
-    };
+    let part =
+        Part { own: station(0), life: 1, link: LinkKind::Zenoh, peers, ends_with_input: true };
     let output = Command::new(std::env::current_exe().expect("this program"))
         .args([PART, &serde_json::to_string(&part).expect("plain data")])
         .stdin(Stdio::piped())

@@ -74,10 +74,7 @@ fn sync(sender: Member) -> (Frame, Vec<u8>) {
         header: Header {
             cluster: agreement().cluster,
             configuration: agreement().configuration,
-            moment: Moment {
-                epoch: Epoch(STRANGE_LIFE),
-                cycle: Cycle(1),
-            },
+            moment: Moment { epoch: Epoch(STRANGE_LIFE), cycle: Cycle(1) },
             sender,
             alone: false,
         },
@@ -102,17 +99,13 @@ fn sealed(sender: Member, key: FrameKey) -> Vec<u8> {
 fn a_stranger_is_named_and_not_believed() {
     let (sender, reports) = channel();
     let all = peers(&[station(0), station(1), remote_io(0), plant(0)]);
-    let running: Vec<_> = [station(0), remote_io(0)]
-        .map(|own| start(own, &all, &sender))
-        .into();
+    let running: Vec<_> = [station(0), remote_io(0)].map(|own| start(own, &all, &sender)).into();
     let at = |member| {
         let peer = all.iter().find(|peer| peer.member == member);
         peer.expect("it is among them").address
     };
     let stranger = UdpSocket::bind(at(station(1))).expect("nobody else has it");
-    stranger
-        .set_read_timeout(Some(Duration::from_millis(100)))
-        .expect("a time that is not zero");
+    stranger.set_read_timeout(Some(Duration::from_millis(100))).expect("a time that is not zero");
     let done = Arc::new(AtomicBool::new(false));
     let stop = Arc::clone(&done);
     let (from_station, from_remote_io) = (at(station(0)), at(remote_io(0)));
@@ -122,11 +115,7 @@ fn a_stranger_is_named_and_not_believed() {
             let Ok((length, from)) = stranger.recv_from(&mut received) else {
                 continue;
             };
-            let to = if from == from_station {
-                from_remote_io
-            } else {
-                from_station
-            };
+            let to = if from == from_station { from_remote_io } else { from_station };
             let mine = FrameKey::new([66; 32]);
             let said = [
                 // What it was told, to the other one, for whom it was meant too and who has it by now or will have it.
@@ -164,15 +153,12 @@ fn a_stranger_is_named_and_not_believed() {
         };
         match event {
             Noted::Member(Chat::Heard { life, speaker }) => {
-                assert_ne!(
-                    life, STRANGE_LIFE,
-                    "{listener:?} believes it of {speaker:?}"
-                );
+                assert_ne!(life, STRANGE_LIFE, "{listener:?} believes it of {speaker:?}");
                 heard |= (listener, speaker) == (remote_io(0), station(0));
             }
-            Noted::Host(HostEvent::RefusedFrames {
-                refused_as, sender, ..
-            }) if listener == remote_io(0) => {
+            Noted::Host(HostEvent::RefusedFrames { refused_as, sender, .. })
+                if listener == remote_io(0) =>
+            {
                 missing.remove(&(refused_as, sender));
             }
             Noted::Host(HostEvent::RefusedBytes { .. }) if listener == remote_io(0) => {

@@ -40,13 +40,7 @@ mod tests {
         let found: String = readings
             .chars()
             .map(|reading| if reading == '=' { &written } else { &other })
-            .map(|read| {
-                if contest.compare(&written, read) {
-                    '!'
-                } else {
-                    '.'
-                }
-            })
+            .map(|read| if contest.compare(&written, read) { '!' } else { '.' })
             .collect();
         assert_eq!(found, expected, "{readings}");
     }

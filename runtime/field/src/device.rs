@@ -105,28 +105,24 @@ impl Device {
             }),
             changed: Notify::new(),
         });
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build()?;
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
         let stale_after = settings.stale_after;
         let worker = Arc::clone(&shared);
-        let thread = std::thread::Builder::new()
-            .name("field".into())
-            .spawn(move || {
-                prepare(real_time);
-                runtime.block_on(
-                    Worker {
-                        inputs: Plan::new(&settings.inputs),
-                        outputs: Plan::new(&settings.outputs),
-                        settings,
-                        fail_safe,
-                        period,
-                        unread: Cell::new(0),
-                        shared: worker,
-                    }
-                    .run(),
-                );
-            })?;
+        let thread = std::thread::Builder::new().name("field".into()).spawn(move || {
+            prepare(real_time);
+            runtime.block_on(
+                Worker {
+                    inputs: Plan::new(&settings.inputs),
+                    outputs: Plan::new(&settings.outputs),
+                    settings,
+                    fail_safe,
+                    period,
+                    unread: Cell::new(0),
+                    shared: worker,
+                }
+                .run(),
+            );
+        })?;
         Ok(Self {
             shared,
             stale_after,

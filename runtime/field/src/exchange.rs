@@ -50,10 +50,7 @@ pub(crate) async fn connect(connection: &Connection, unit: u8) -> io::Result<Lin
             let stream = TcpStream::connect(address).await?;
             // An exchange is many small requests, each of which is waited for.
             stream.set_nodelay(true)?;
-            Ok(Link {
-                device: tcp::attach_slave(stream, Slave(unit)),
-                silence: None,
-            })
+            Ok(Link { device: tcp::attach_slave(stream, Slave(unit)), silence: None })
         }
         Connection::Rtu(line) => Ok(Link {
             device: rtu::attach_slave(serial::open(line)?, Slave(unit)),
@@ -107,11 +104,7 @@ pub(crate) async fn read_back(
 }
 
 async fn read(device: &mut Link, run: Run) -> Result<Vec<u16>, Trouble> {
-    let Run {
-        table,
-        start,
-        count,
-    } = run;
+    let Run { table, start, count } = run;
     let device = device.ready().await;
     let bits = |bits: Vec<bool>| bits.into_iter().map(u16::from).collect();
     let answer: Result<Vec<u16>, ExceptionCode> = match table {
@@ -140,10 +133,7 @@ async fn write(device: &mut Link, run: Run, words: &[u16]) -> Result<(), Trouble
             device.write_multiple_coils(start, &coils).await?
         }
     };
-    answer.map_err(|code| Trouble::Exception {
-        what: format!("to write {run}"),
-        code,
-    })
+    answer.map_err(|code| Trouble::Exception { what: format!("to write {run}"), code })
 }
 
 impl std::fmt::Display for Run {

@@ -4,10 +4,7 @@
 //! answer, which the cycle looks at ([`Device::look`]). Invariant: an answer that is looked at as good is whole, no older than
 //! configured, and nothing has gone wrong with the device since.
 
-#![allow(
-    clippy::disallowed_methods,
-    reason = "the age of an answer is counted on the real clock"
-)]
+#![allow(clippy::disallowed_methods, reason = "the age of an answer is counted on the real clock")]
 
 mod contest;
 mod device;

@@ -19,10 +19,7 @@ pub(crate) fn value(
 ) -> Result<u64, NotFinite> {
     let raw = joined(registers, words);
     let stored = if registers.is_scaled() {
-        store(
-            of,
-            number(registers.of, raw) * registers.scale + registers.offset,
-        )
+        store(of, number(registers.of, raw) * registers.scale + registers.offset)
     } else {
         convert(registers.of, of, raw)
     };
@@ -37,10 +34,7 @@ pub(crate) fn words(
     stored: u64,
 ) -> impl Iterator<Item = u16> {
     let raw = if registers.is_scaled() {
-        store(
-            registers.of,
-            (number(of, stored) - registers.offset) / registers.scale,
-        )
+        store(registers.of, (number(of, stored) - registers.offset) / registers.scale)
     } else {
         convert(of, registers.of, stored)
     };
@@ -75,11 +69,7 @@ fn split(registers: &Registers, raw: u64) -> impl Iterator<Item = u16> {
 }
 
 fn in_order(order: ByteOrder, word: u16) -> u16 {
-    if order.swaps_bytes() {
-        word.swap_bytes()
-    } else {
-        word
-    }
+    if order.swaps_bytes() { word.swap_bytes() } else { word }
 }
 
 fn convert(from: Elementary, to: Elementary, stored: u64) -> u64 {
@@ -130,11 +120,7 @@ mod tests {
 
     fn registers(text: &str, scale: f64, offset: f64) -> Registers {
         match text.parse() {
-            Ok(Place::Number(registers)) => Registers {
-                scale,
-                offset,
-                ..registers
-            },
+            Ok(Place::Number(registers)) => Registers { scale, offset, ..registers },
             other => panic!("{text}: {other:?}"),
         }
     }
@@ -174,15 +160,7 @@ mod tests {
         let (int, uint) = ("holding:0 int", "holding:0 uint");
         // 4 to 20 mA in 1/100 mA above -20 °C.
         check(int, 0.01, -20.0, Elementary::Real, 2000, real(0.0), 2000);
-        check(
-            int,
-            0.01,
-            -20.0,
-            Elementary::Real,
-            0xFFFF,
-            real(-20.01),
-            0xFFFF,
-        );
+        check(int, 0.01, -20.0, Elementary::Real, 0xFFFF, real(-20.01), 0xFFFF);
         check(int, 1.0, 0.0, Elementary::Lreal, 7, 7.0_f64.to_bits(), 7);
         check(int, 1.0, 0.0, Elementary::Int, 0xFFFE, 0xFFFE, 0xFFFE);
         check(int, 1.0, 0.0, Elementary::Sint, 300, 127, 127);
@@ -210,15 +188,11 @@ mod tests {
             assert_eq!(value(&registers, Elementary::Real, &words), Err(NotFinite));
             assert_eq!(value(&registers, Elementary::Lreal, &words), Err(NotFinite));
         }
-        let words: Vec<u16> = (0..4)
-            .map(|at| (1e300_f64.to_bits() >> (48 - 16 * at)) as u16)
-            .collect();
+        let words: Vec<u16> =
+            (0..4).map(|at| (1e300_f64.to_bits() >> (48 - 16 * at)) as u16).collect();
         let registers = registers("input:0 lreal", 1.0, 0.0);
         assert_eq!(value(&registers, Elementary::Real, &words), Err(NotFinite));
-        assert_eq!(
-            value(&registers, Elementary::Lreal, &words),
-            Ok(1e300_f64.to_bits())
-        );
+        assert_eq!(value(&registers, Elementary::Lreal, &words), Ok(1e300_f64.to_bits()));
     }
 
     proptest! {

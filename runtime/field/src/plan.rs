@@ -99,11 +99,7 @@ impl Plan {
                 at: usize::from(span.start - runs[run].start),
             })
         };
-        Self {
-            width: side.width,
-            signals: side.bindings.iter().filter_map(signal).collect(),
-            runs,
-        }
+        Self { width: side.width, signals: side.bindings.iter().filter_map(signal).collect(), runs }
     }
 
     /// The image of the signals, from a word for each address of each run.
@@ -200,11 +196,7 @@ fn span(place: &Place) -> Run {
             (table, registers.address, registers.count())
         }
     };
-    Run {
-        table,
-        start,
-        count,
-    }
+    Run { table, start, count }
 }
 
 /// The bit in the word of its address; a bit table has one bit at each address.
@@ -231,12 +223,7 @@ mod tests {
         let binding = |(point, (_, place)): (&understudy_typed::Point, &(Elementary, String))| {
             // A program may have signals without a place.
             let place = place.parse().ok()?;
-            Some(Binding {
-                name: point.name.clone(),
-                of: point.of,
-                bit: point.bit as usize,
-                place,
-            })
+            Some(Binding { name: point.name.clone(), of: point.of, bit: point.bit as usize, place })
         };
         Side {
             width: points.width(),
@@ -265,45 +252,22 @@ mod tests {
     fn neighbours_share_a_request_and_gaps_do_not() {
         assert_eq!(
             runs(&["coil:3", "coil:1", "coil:2", "coil:5", "discrete:4"]),
-            [
-                (Table::Discrete, 4, 1),
-                (Table::Coil, 1, 3),
-                (Table::Coil, 5, 1)
-            ]
+            [(Table::Discrete, 4, 1), (Table::Coil, 1, 3), (Table::Coil, 5, 1)]
         );
+        assert_eq!(runs(&["holding:7.3", "holding:7.0", "holding:8.15"]), [(Table::Holding, 7, 2)]);
+        assert_eq!(runs(&["coil:65535", "coil:65534"]), [(Table::Coil, 65534, 2)]);
         assert_eq!(
-            runs(&["holding:7.3", "holding:7.0", "holding:8.15"]),
-            [(Table::Holding, 7, 2)]
-        );
-        assert_eq!(
-            runs(&["coil:65535", "coil:65534"]),
-            [(Table::Coil, 65534, 2)]
-        );
-        assert_eq!(
-            runs(&[
-                "input:8 real",
-                "input:4 lreal",
-                "input:10.3",
-                "input:12 int",
-                "input:9 int"
-            ]),
+            runs(&["input:8 real", "input:4 lreal", "input:10.3", "input:12 int", "input:9 int"]),
             [(Table::Input, 4, 7), (Table::Input, 12, 1)]
         );
         let many: Vec<String> = (0..200).map(|number| format!("input:{number}.0")).collect();
         let many: Vec<&str> = many.iter().map(String::as_str).collect();
-        assert_eq!(
-            runs(&many),
-            [(Table::Input, 0, 123), (Table::Input, 123, 77)]
-        );
+        assert_eq!(runs(&many), [(Table::Input, 0, 123), (Table::Input, 123, 77)]);
         // 123 registers would end in the middle of a REAL.
-        let many: Vec<String> = (0..80)
-            .map(|number| format!("input:{} real", 2 * number))
-            .collect();
+        let many: Vec<String> =
+            (0..80).map(|number| format!("input:{} real", 2 * number)).collect();
         let many: Vec<&str> = many.iter().map(String::as_str).collect();
-        assert_eq!(
-            runs(&many),
-            [(Table::Input, 0, 122), (Table::Input, 122, 38)]
-        );
+        assert_eq!(runs(&many), [(Table::Input, 0, 122), (Table::Input, 122, 38)]);
     }
 
     #[test]
@@ -314,22 +278,13 @@ mod tests {
         let plan = super::tests::plan(&["input:0 real"]);
         assert_eq!(plan.image(&[vec![1]]), Err(Unread::Short));
         let infinite = plan.image(&[vec![0x7F80, 0]]).expect_err("infinity");
-        assert_eq!(
-            infinite.to_string(),
-            "`s0` at input:0 real is infinite or not a number"
-        );
+        assert_eq!(infinite.to_string(), "`s0` at input:0 real is infinite or not a number");
     }
 
     /// A signal of each width, with gaps in the image between them.
     #[test]
     fn numbers_have_their_bits_of_the_image() {
-        let plan = plan(&[
-            "coil:0",
-            "holding:0 int",
-            "coil:1",
-            "holding:1 real",
-            "holding:3 lint",
-        ]);
+        let plan = plan(&["coil:0", "holding:0 int", "coil:1", "holding:1 real", "holding:3 lint"]);
         let answers = [vec![1, 1], vec![0xFFFE, 0x4148, 0, 0, 0, 0, 7]];
         let image = plan.image(&answers).expect("whole");
         assert_eq!(image.words(), [0x0000_0001_FFFE_0001, 0x4148_0000, 7]);

@@ -25,11 +25,7 @@ pub(crate) fn read_keys(
 ) -> Result<Held, MemberError> {
     let folder = match (&options.keys, cluster.security()) {
         (_, Security::Off) => {
-            return Ok(Held {
-                guard: Guard::Off,
-                channel: None,
-                _watch: None,
-            });
+            return Ok(Held { guard: Guard::Off, channel: None, _watch: None });
         }
         (None, Security::Keys) => {
             return Err(MemberError::NoKeys);

@@ -15,13 +15,8 @@ use crate::error::MemberError;
 /// [`MemberError::NoName`].
 pub fn find_member(cluster: &Cluster, name: &str) -> Result<Member, MemberError> {
     cluster.member(name).ok_or_else(|| {
-        let known = cluster
-            .members()
-            .filter_map(|member| cluster.member_name(member));
-        MemberError::NoName {
-            name: name.to_owned(),
-            known: known.map(str::to_owned).collect(),
-        }
+        let known = cluster.members().filter_map(|member| cluster.member_name(member));
+        MemberError::NoName { name: name.to_owned(), known: known.map(str::to_owned).collect() }
     })
 }
 
@@ -30,10 +25,7 @@ pub fn find_member(cluster: &Cluster, name: &str) -> Result<Member, MemberError>
 /// # Errors
 /// [`MemberError::List`].
 pub fn listed_peers(path: &Path, text: &str) -> Result<Vec<Peer>, MemberError> {
-    let refused = |reason: String| MemberError::List {
-        path: path.to_owned(),
-        reason,
-    };
+    let refused = |reason: String| MemberError::List { path: path.to_owned(), reason };
     let peers: Vec<Peer> =
         serde_json::from_str(text).map_err(|error| refused(error.to_string()))?;
     for Peer { name, address, .. } in &peers {
@@ -50,21 +42,15 @@ pub fn listed_peers(path: &Path, text: &str) -> Result<Vec<Peer>, MemberError> {
 /// [`MemberError::NoAddress`].
 pub fn addressed_peers(cluster: &Cluster) -> Result<Vec<Peer>, MemberError> {
     let name = |member| cluster.member_name(member).unwrap_or_default().to_owned();
-    let known: Vec<(Member, Option<SocketAddr>)> = cluster
-        .members()
-        .map(|member| (member, cluster.address(member)))
-        .collect();
+    let known: Vec<(Member, Option<SocketAddr>)> =
+        cluster.members().map(|member| (member, cluster.address(member))).collect();
     let lacking = known.iter().filter(|(_, address)| address.is_none());
     let names: Vec<String> = lacking.map(|(member, _)| name(*member)).collect();
     if !names.is_empty() {
         return Err(MemberError::NoAddress { names });
     }
     let peers = known.into_iter().filter_map(|(member, address)| {
-        Some(Peer {
-            member,
-            name: name(member),
-            address: address?,
-        })
+        Some(Peer { member, name: name(member), address: address? })
     });
     Ok(peers.collect())
 }

@@ -93,11 +93,7 @@ pub fn run_plant(cluster: &Cluster, options: &MemberOptions) -> Result<(), Membe
 }
 
 fn wrong_kind(options: &MemberOptions, wanted: &'static str, command: &'static str) -> MemberError {
-    MemberError::WrongKind {
-        name: options.name.clone(),
-        wanted,
-        command,
-    }
+    MemberError::WrongKind { name: options.name.clone(), wanted, command }
 }
 
 /// The device of a remote I/O where it has one, and its simulated plant otherwise.
@@ -151,10 +147,9 @@ where
         None => Box::new(io::stdout()),
         Some(path) => {
             let segments = Segments::create(path, options.journal_limit);
-            Box::new(segments.map_err(|source| MemberError::Journal {
-                path: path.clone(),
-                source,
-            })?)
+            Box::new(
+                segments.map_err(|source| MemberError::Journal { path: path.clone(), source })?,
+            )
         }
     };
     // Its last record has said the summary already.
@@ -179,17 +174,12 @@ pub fn restart_for_zenoh(link: LinkKind) {
     }
     if let Ok(program) = std::env::current_exe() {
         // It only comes back where it fails; then Zenoh has more threads than it needs, and works.
-        let _ = Command::new(program)
-            .args(std::env::args_os().skip(1))
-            .env(variable, value)
-            .exec();
+        let _ = Command::new(program).args(std::env::args_os().skip(1)).env(variable, value).exec();
     }
 }
 
 /// Later than any epoch that the cluster has had.
 fn epoch_of_the_clock() -> Epoch {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    Epoch(since.map_or(1, |since| {
-        u64::try_from(since.as_micros()).unwrap_or(u64::MAX)
-    }))
+    Epoch(since.map_or(1, |since| u64::try_from(since.as_micros()).unwrap_or(u64::MAX)))
 }

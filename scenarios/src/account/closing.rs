@@ -27,10 +27,7 @@ impl Account {
             if !(during.from..during.to).contains(&at) {
                 continue;
             }
-            let source = cycle
-                .outcomes
-                .get(&during.remote_io)
-                .map(|outcome| outcome.source);
+            let source = cycle.outcomes.get(&during.remote_io).map(|outcome| outcome.source);
             if source.is_some_and(|source| during.sources.contains(&source)) {
                 continue;
             }
@@ -50,9 +47,10 @@ impl Account {
         while !self.open.is_empty() {
             self.close_oldest();
         }
-        let cycles_run = self.services.first().map_or(0, |service| {
-            service.intervals.last().map_or(0, |last| last.to)
-        });
+        let cycles_run = self
+            .services
+            .first()
+            .map_or(0, |service| service.intervals.last().map_or(0, |last| last.to));
         let stations = self.terms.agreement.schedule.stations();
         let presences = std::mem::replace(&mut self.presences, Presences::new(stations, 1));
         let stalls = std::mem::take(&mut self.stalls);
@@ -64,11 +62,7 @@ impl Account {
             })
         });
         let listed: Vec<Stall> = listed.filter(|stall| stall.cycle < self.cycles).collect();
-        Finished {
-            cycles_run,
-            presences: presences.finish(cycles_run),
-            stalls: listed,
-        }
+        Finished { cycles_run, presences: presences.finish(cycles_run), stalls: listed }
     }
 }
 

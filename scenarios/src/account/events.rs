@@ -27,31 +27,21 @@ impl Account {
                     cycle.covering.insert(station);
                     self.look_for_origin(number, *moment);
                 }
-                if let (Some(at), Some(trace)) = (
-                    self.since_origin(number),
-                    self.traces.stations.get_mut(station.index()),
-                ) {
+                if let (Some(at), Some(trace)) =
+                    (self.since_origin(number), self.traces.stations.get_mut(station.index()))
+                {
                     let mut sum = word.sum.clone();
                     let others = words.iter().filter(|other| other.mask != word.mask);
                     others.for_each(|other| sum.add(&other.sum));
                     trace.push(at, &sum);
                 }
             }
-            StationEvent::Holds {
-                moment,
-                program,
-                lineage,
-                state,
-            } => {
+            StationEvent::Holds { moment, program, lineage, state } => {
                 if let Some(referee) = self.terms.referees.get_mut(program.index()) {
                     referee.holds(*moment, *lineage, state);
                 }
             }
-            StationEvent::Refused {
-                member,
-                theirs,
-                ours,
-            } => {
+            StationEvent::Refused { member, theirs, ours } => {
                 self.refuse(*member, theirs.to_string(), ours.to_string());
             }
             _ => {}
@@ -67,22 +57,10 @@ impl Account {
         if let RemoteIoEvent::Sampled { moment, inputs, .. } = event {
             self.sampled(program, *moment, inputs);
         }
-        let RemoteIoEvent::Applied {
-            moment,
-            source,
-            missing,
-            heard,
-            ..
-        } = event
-        else {
+        let RemoteIoEvent::Applied { moment, source, missing, heard, .. } = event else {
             let changes = self.alarms.fold.remote_io(program, 0, event);
             self.alarms_changed(&changes, None);
-            if let RemoteIoEvent::Refused {
-                member,
-                theirs,
-                ours,
-            } = event
-            {
+            if let RemoteIoEvent::Refused { member, theirs, ours } = event {
                 self.refuse(*member, theirs.to_string(), ours.to_string());
             }
             if let Some(violation) = violation {
@@ -94,10 +72,7 @@ impl Account {
         let number = self.numbering.deadline(program, *moment, idle);
         let changes = self.alarms.fold.remote_io(program, number, event);
         self.alarms_changed(&changes, Some(number));
-        let outcome = Outcome {
-            source: *source,
-            wrong: violation.is_some(),
-        };
+        let outcome = Outcome { source: *source, wrong: violation.is_some() };
         if let Some(violation) = violation {
             self.violate(program, Some(number), violation);
         }
@@ -120,10 +95,7 @@ impl Account {
 
     /// u(i) of a program with inputs that do not come from the field.
     fn sampled(&mut self, program: ProgramId, moment: Moment, inputs: &Image) {
-        let at = self
-            .numbering
-            .of(moment)
-            .and_then(|number| self.since_origin(number));
+        let at = self.numbering.of(moment).and_then(|number| self.since_origin(number));
         let signals = self.terms.signals.get(program.index());
         if let Some(at) = at.filter(|at| *at < self.cycles)
             && signals.is_some_and(|signals| signals.sourced)
@@ -141,10 +113,7 @@ impl Account {
         if let Some(referee) = self.terms.referees.get_mut(program.index()) {
             referee.saw(&field.sensors);
         }
-        let at = self
-            .numbering
-            .of(*moment)
-            .and_then(|number| self.since_origin(number));
+        let at = self.numbering.of(*moment).and_then(|number| self.since_origin(number));
         let within = at.is_some_and(|at| at < self.cycles);
         if let Some(service) = self.services.get_mut(program.index())
             && (at.is_none() || within)
@@ -163,11 +132,7 @@ impl Account {
 
     pub(super) fn run(&mut self, event: &RunEvent) {
         match event {
-            RunEvent::Fault {
-                action,
-                member,
-                asked,
-            } => {
+            RunEvent::Fault { action, member, asked } => {
                 if let (Member::RemoteIo(program), Action::Release | Action::Choose { .. }) =
                     (*member, *action)
                     && let Some(referee) = self.terms.referees.get_mut(program.index())

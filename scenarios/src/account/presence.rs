@@ -49,11 +49,7 @@ pub(crate) fn extend<T: PartialEq>(intervals: &mut Vec<Interval<T>>, at: u64, st
     if intervals.len() == MAXIMUM_INTERVALS {
         return false;
     }
-    intervals.push(Interval {
-        from: at,
-        to: at + 1,
-        state,
-    });
+    intervals.push(Interval { from: at, to: at + 1, state });
     true
 }
 
@@ -77,12 +73,8 @@ pub(crate) struct Presences {
 
 impl Presences {
     pub(crate) fn new(stations: usize, flag_after: u32) -> Self {
-        let track = Track {
-            down: false,
-            silent_since: None,
-            silent_cycles: 0,
-            intervals: Vec::new(),
-        };
+        let track =
+            Track { down: false, silent_since: None, silent_cycles: 0, intervals: Vec::new() };
         Self {
             flag_after: u64::from(flag_after),
             tracks: vec![track; stations],
@@ -120,18 +112,11 @@ impl Presences {
         for track in &mut self.tracks {
             if let Some(since) = track.silent_since {
                 // Too short for a flag up to the end of the run.
-                let state = if track.down {
-                    Presence::Off
-                } else {
-                    Presence::On
-                };
+                let state = if track.down { Presence::Off } else { Presence::On };
                 track.fill(since, end, state);
             }
         }
-        self.tracks
-            .into_iter()
-            .map(|track| (track.intervals, track.silent_cycles))
-            .collect()
+        self.tracks.into_iter().map(|track| (track.intervals, track.silent_cycles)).collect()
     }
 }
 
@@ -146,11 +131,7 @@ impl Track {
     }
 
     fn silence(&self) -> Presence {
-        if self.down {
-            Presence::Off
-        } else {
-            Presence::Joining
-        }
+        if self.down { Presence::Off } else { Presence::Joining }
     }
 
     fn fill(&mut self, from: u64, to: u64, state: Presence) {
@@ -190,11 +171,7 @@ mod tests {
             presences.step(at, Member::Station(STATION), action);
         }
         for (at, turn) in turns.chars().enumerate() {
-            let heard = if turn == '1' {
-                StationSet::only(STATION)
-            } else {
-                StationSet::EMPTY
-            };
+            let heard = if turn == '1' { StationSet::only(STATION) } else { StationSet::EMPTY };
             presences.close_cycle(at as u64, heard);
         }
         let found = presences.finish(turns.len() as u64);

@@ -15,10 +15,7 @@ pub(crate) struct Trace<T> {
 
 impl<T> Default for Trace<T> {
     fn default() -> Self {
-        Self {
-            changes: Vec::new(),
-            end: 0,
-        }
+        Self { changes: Vec::new(), end: 0 }
     }
 }
 
@@ -31,11 +28,7 @@ impl<T: Clone + PartialEq> Trace<T> {
         if at > self.end {
             self.change(self.end, None);
         }
-        if self
-            .changes
-            .last()
-            .is_none_or(|(_, last)| last.as_ref() != Some(value))
-        {
+        if self.changes.last().is_none_or(|(_, last)| last.as_ref() != Some(value)) {
             self.change(at, Some(value.clone()));
         }
         self.end = at + 1;
@@ -47,12 +40,7 @@ impl<T: Clone + PartialEq> Trace<T> {
 
     /// Ranges of cycles with their values; gaps are left out.
     pub(crate) fn spans(&self) -> impl Iterator<Item = (u64, u64, &T)> {
-        let ends = self
-            .changes
-            .iter()
-            .skip(1)
-            .map(|(at, _)| *at)
-            .chain([self.end]);
+        let ends = self.changes.iter().skip(1).map(|(at, _)| *at).chain([self.end]);
         self.changes
             .iter()
             .zip(ends)
@@ -87,10 +75,7 @@ mod tests {
         for (at, value) in [(1, 'a'), (2, 'a'), (3, 'b'), (2, 'x'), (6, 'b'), (7, 'c')] {
             trace.push(at, &value);
         }
-        let spans: Vec<_> = trace
-            .spans()
-            .map(|(from, to, value)| (from, to, *value))
-            .collect();
+        let spans: Vec<_> = trace.spans().map(|(from, to, value)| (from, to, *value)).collect();
         assert_eq!(spans, [(1, 3, 'a'), (3, 4, 'b'), (6, 7, 'b'), (7, 8, 'c')]);
     }
 }

@@ -25,8 +25,7 @@ impl Reader<'_> {
         if let Some(first_too_many) = tables.get(MAXIMUM_STEPS) {
             let message = format!("{} steps: {MAXIMUM_STEPS} at most", tables.len());
             let place = first_too_many.span();
-            self.diagnostics
-                .push(Diagnostic::error("U0305", message, place));
+            self.diagnostics.push(Diagnostic::error("U0305", message, place));
         }
         let mut placed: Vec<Step> = tables
             .into_iter()
@@ -143,16 +142,12 @@ impl Reader<'_> {
             }
             "stop" => one(Action::Stop),
             "continue" => one(Action::Continue),
-            "release" if fields.has("input") => one(Action::Unset {
-                input: self.input(fields, member)?.place.first_bit(),
-            }),
+            "release" if fields.has("input") => {
+                one(Action::Unset { input: self.input(fields, member)?.place.first_bit() })
+            }
             "release" => one(Action::Release),
-            "cold-start" => one(Action::Choose {
-                choice: StateChoice::Cold,
-            }),
-            "accept-state" => one(Action::Choose {
-                choice: StateChoice::Newest { cycle: None },
-            }),
+            "cold-start" => one(Action::Choose { choice: StateChoice::Cold }),
+            "accept-state" => one(Action::Choose { choice: StateChoice::Newest { cycle: None } }),
             "write" => one(self.written(fields, member)?),
             "set" => {
                 fields.require(&["value"], &mut self.diagnostics);
@@ -173,33 +168,22 @@ impl Reader<'_> {
                     }
                 }
             }
-            "slow" => one(Action::Slow {
-                by: self.slowness(fields)?,
-            }),
+            "slow" => one(Action::Slow { by: self.slowness(fields)? }),
             "cut" => self.cut(fields, member, |to| Action::Cut { to }),
             "heal" => self.cut(fields, member, |to| Action::Heal { to }),
             "delay" => {
                 let by = self.slowness(fields);
-                let links = self.cut(fields, member, |to| Action::Delay {
-                    to,
-                    by: by.unwrap_or_default(),
-                });
+                let links =
+                    self.cut(fields, member, |to| Action::Delay { to, by: by.unwrap_or_default() });
                 by.and(links)
             }
             "forge" => one(Action::Forge),
-            "corrupt" => one(Action::Corrupt {
-                frames: self.number(fields, "frames")?,
-            }),
-            "replay" => one(Action::Replay {
-                age: self.number(fields, "age")?,
-            }),
+            "corrupt" => one(Action::Corrupt { frames: self.number(fields, "frames")? }),
+            "replay" => one(Action::Replay { age: self.number(fields, "age")? }),
             "flip-state" => {
                 let program = self.program(fields, member);
                 let bit = self.number(fields, "bit")?;
-                one(Action::FlipState {
-                    program: program?,
-                    bit,
-                })
+                one(Action::FlipState { program: program?, bit })
             }
             _ => {
                 let bit = self.number(fields, "bit");
@@ -250,8 +234,7 @@ impl Reader<'_> {
             let known = self.members?.operator_inputs(program);
             let help = suggestion(name.value, known.map(|input| input.name.as_str()));
             let message = format!("operators write no input `{}` there", name.value);
-            self.diagnostics
-                .push(Diagnostic::error("U0309", message, name.span).with_help(help));
+            self.diagnostics.push(Diagnostic::error("U0309", message, name.span).with_help(help));
             return None;
         };
         let place = named.input.place;
@@ -270,8 +253,7 @@ impl Reader<'_> {
             Err(expected) => expected,
         };
         let message = format!("`{}` is {}: {problem}", named.name, place.of);
-        self.diagnostics
-            .push(Diagnostic::error("U0304", message, value.span));
+        self.diagnostics.push(Diagnostic::error("U0304", message, value.span));
         None
     }
 
@@ -325,9 +307,7 @@ impl Reader<'_> {
         }
         let there = peers.iter().map(|&peer| (None, action(peer)));
         let back = peers.iter().map(|&peer| (Some(peer), action(member)));
-        let both = there
-            .clone()
-            .chain(back.take(if both_ways { peers.len() } else { 0 }));
+        let both = there.clone().chain(back.take(if both_ways { peers.len() } else { 0 }));
         Some(both.collect())
     }
 
@@ -354,8 +334,7 @@ impl Reader<'_> {
             let message = "whose state is it? `program` names a controller".to_owned();
             let names = self.members?.stations().take(programs);
             let help = suggestion("", names.map(|(_, name)| name));
-            self.diagnostics
-                .push(Diagnostic::error("U0309", message, place).with_help(help));
+            self.diagnostics.push(Diagnostic::error("U0309", message, place).with_help(help));
         }
         program
     }
@@ -377,10 +356,8 @@ impl Reader<'_> {
             let before = last.get(name.as_str());
             let possible = matches!(
                 (before.map(|(action, _)| *action), action),
-                (
-                    None | Some(Action::Restart | Action::Continue),
-                    Action::Crash | Action::Stop
-                ) | (Some(Action::Stop), Action::Continue | Action::Crash)
+                (None | Some(Action::Restart | Action::Continue), Action::Crash | Action::Stop)
+                    | (Some(Action::Stop), Action::Continue | Action::Crash)
                     | (Some(Action::Crash), Action::Restart)
             );
             if !possible {

@@ -16,10 +16,7 @@ pub(super) fn expectations(
     let total = summary.total();
     let plant_faults = summary.plants.iter().map(|plant| plant.plant_faults).sum();
     let wrong = at_most("wrong outputs", expect.wrong, summary.violation_count, 0);
-    let mut list = vec![ExpectationSummary {
-        needs_time: false,
-        ..wrong
-    }];
+    let mut list = vec![ExpectationSummary { needs_time: false, ..wrong }];
     for (member, records) in &account.unwritten {
         if matches!(member, Member::RemoteIo(_)) {
             list.push(ExpectationSummary {
@@ -53,21 +50,11 @@ pub(super) fn expectations(
         });
     }
     if let Some(held) = expect.held {
-        list.push(at_most(
-            "cycles held",
-            held,
-            total.held,
-            total.held_by_stall,
-        ));
+        list.push(at_most("cycles held", held, total.held, total.held_by_stall));
     }
     if let Some(fail_safe) = expect.fail_safe {
         let by_stall = total.fail_safe_by_stall;
-        list.push(at_most(
-            "cycles fail-safe",
-            fail_safe,
-            total.fail_safe,
-            by_stall,
-        ));
+        list.push(at_most("cycles fail-safe", fail_safe, total.fail_safe, by_stall));
     }
     if let Some(allowed) = expect.plant_faults {
         list.push(at_most("plant_faults", allowed, plant_faults, 0));
@@ -76,12 +63,7 @@ pub(super) fn expectations(
         let found = account.protected;
         list.push(ExpectationSummary {
             expected: "everybody synchronised at the end".to_owned(),
-            found: if found {
-                "synchronised"
-            } else {
-                "not synchronised"
-            }
-            .to_owned(),
+            found: if found { "synchronised" } else { "not synchronised" }.to_owned(),
             met: found,
             needs_time: true,
         });
@@ -111,10 +93,7 @@ pub(super) fn expectations(
     }
     let ranges = account.during.iter();
     list.extend(ranges.map(|(during, finding)| {
-        let remote_io = account
-            .terms
-            .members
-            .name(Member::RemoteIo(during.remote_io));
+        let remote_io = account.terms.members.name(Member::RemoteIo(during.remote_io));
         range(remote_io, during, *finding)
     }));
     list

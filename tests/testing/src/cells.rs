@@ -43,12 +43,7 @@ pub fn line(controllers: usize, understudies: usize, mode: Mode) -> Cluster {
 /// # Panics
 /// If the text has errors.
 pub fn cluster(text: &str, mode: Mode) -> Cluster {
-    let overrides = Overrides {
-        mode: Some(mode),
-        ..Overrides::default()
-    };
+    let overrides = Overrides { mode: Some(mode), ..Overrides::default() };
     let loaded = read_with_files(text, files(), overrides);
-    loaded
-        .cluster
-        .unwrap_or_else(|| panic!("{:?}", loaded.reports))
+    loaded.cluster.unwrap_or_else(|| panic!("{:?}", loaded.reports))
 }

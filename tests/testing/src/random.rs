@@ -62,10 +62,7 @@ pub fn random_program(seed: u64, rungs: usize) -> Program {
     let mut blocks = 0;
     for _ in 0..=dice.below(rungs) {
         let network = skeleton(&mut dice, &mut blocks, 3);
-        let targets: Vec<_> = program
-            .writable()
-            .map(|signal| signal.name.clone())
-            .collect();
+        let targets: Vec<_> = program.writable().map(|signal| signal.name.clone()).collect();
         let coils = (0..1 + dice.below(2)).map(|_| Coil {
             kind: CoilKind::ALL[dice.below(6)],
             target: targets[dice.below(targets.len())].clone(),
@@ -101,10 +98,7 @@ pub fn random_program(seed: u64, rungs: usize) -> Program {
 fn signals(dice: &mut Dice, name: &str, area: Area, most: usize) -> Vec<Signal> {
     (0..=dice.below(most))
         .map(|index| Signal {
-            address: dice.rarely(2).then(|| Address {
-                area,
-                path: vec![0, index as u32],
-            }),
+            address: dice.rarely(2).then(|| Address { area, path: vec![0, index as u32] }),
             initial: (area != Area::Input && dice.rarely(2)).then(|| dice.rarely(2)),
             description: dice.rarely(3).then(|| "what it is".to_owned()),
             comments: vec!["above".to_owned(); dice.below(2)],
@@ -124,9 +118,7 @@ fn skeleton(dice: &mut Dice, blocks: &mut usize, depth: usize) -> Series {
     (0..least + dice.below(3))
         .map(|_| match dice.below(8) {
             0 | 1 if depth > 0 => Element::Branches(
-                (0..2 + dice.below(2))
-                    .map(|_| skeleton(dice, blocks, depth - 1))
-                    .collect(),
+                (0..2 + dice.below(2)).map(|_| skeleton(dice, blocks, depth - 1)).collect(),
             ),
             2 if depth > 0 => Element::Block(block(dice, blocks, depth)),
             3 => Element::Comparison(Comparison {
@@ -162,17 +154,10 @@ fn block(dice: &mut Dice, blocks: &mut usize, depth: usize) -> Block {
     let mut pins = Vec::new();
     for (pin, required) in kind.side_inputs() {
         if *required || dice.rarely(2) {
-            pins.push(Feed {
-                pin: (*pin).into(),
-                network: skeleton(dice, blocks, depth - 1),
-            });
+            pins.push(Feed { pin: (*pin).into(), network: skeleton(dice, blocks, depth - 1) });
         }
     }
-    Block {
-        name: name.into(),
-        kind,
-        pins,
-    }
+    Block { name: name.into(), kind, pins }
 }
 
 /// Gives every contact and comparison something to read; a comparison without a counter becomes a contact.

@@ -35,10 +35,7 @@ impl Table {
             let next = inputs.iter().map(follows).collect();
             rows.push((name(&machine), next));
         }
-        Self {
-            inputs: inputs.iter().map(|&(_, input)| input).collect(),
-            rows,
-        }
+        Self { inputs: inputs.iter().map(|&(_, input)| input).collect(), rows }
     }
 
     /// The table as text: a dot where the state stays.

@@ -41,10 +41,8 @@ pub(super) fn order(
     preference: Preference,
     remarks: &mut Vec<String>,
 ) -> Result<Order, AllocationError> {
-    let prices: Vec<Option<u64>> = types
-        .iter()
-        .map(|(controller, _)| controller.number(Quantity::Price))
-        .collect();
+    let prices: Vec<Option<u64>> =
+        types.iter().map(|(controller, _)| controller.number(Quantity::Price)).collect();
     let known = prices.iter().flatten().count();
     let priced = preference == Preference::Cost && known > 0;
     if priced {
@@ -90,11 +88,7 @@ pub(super) fn order(
     for (rank, &place) in order.iter().enumerate() {
         places[place] = (rank, prices[place]);
     }
-    Ok(Order {
-        preference,
-        priced,
-        places,
-    })
+    Ok(Order { preference, priced, places })
 }
 
 impl Order {
@@ -112,9 +106,7 @@ impl Order {
         }
         if self.preference == Preference::Reserve {
             let margins = fits.filter(|fit| fit.verdict == Verdict::Fits);
-            let smallest = margins
-                .filter_map(Fit::smallest_margin)
-                .fold(1.0_f64, f64::min);
+            let smallest = margins.filter_map(Fit::smallest_margin).fold(1.0_f64, f64::min);
             return BOX + 100.0 * (1.0 - smallest) + rank as f64 / 1000.0;
         }
         BOX + rank as f64
@@ -138,9 +130,7 @@ impl Order {
             } else {
                 Ordering::Equal
             };
-            verdicts
-                .then(preferred)
-                .then(self.places[left].0.cmp(&self.places[right].0))
+            verdicts.then(preferred).then(self.places[left].0.cmp(&self.places[right].0))
         });
         let candidate = |place: usize| Candidate {
             vendor: types[place].0.vendor.clone(),

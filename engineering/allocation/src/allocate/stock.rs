@@ -25,10 +25,8 @@ pub(super) fn types<'a>(
     let mut errors = Vec::new();
     for Stock { name, count } in stock {
         match catalogue.named(name).as_slice() {
-            [] => errors.push(AllocationError::NoModel {
-                name: name.clone(),
-                like: catalogue.like(name),
-            }),
+            [] => errors
+                .push(AllocationError::NoModel { name: name.clone(), like: catalogue.like(name) }),
             [controller] => match types.iter_mut().find(|(known, _)| known == controller) {
                 Some((_, known)) => *known = known.map(|known| known.saturating_add(*count)),
                 None => types.push((controller, Some(*count))),
@@ -39,9 +37,5 @@ pub(super) fn types<'a>(
             }),
         }
     }
-    if errors.is_empty() {
-        Ok(types)
-    } else {
-        Err(errors)
-    }
+    if errors.is_empty() { Ok(types) } else { Err(errors) }
 }

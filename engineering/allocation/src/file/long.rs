@@ -10,13 +10,11 @@ use super::{Row, line, number, price_has_currency};
 use crate::controller::{Catalogue, Family};
 use crate::figures::{FamilyQuantity, Figure, Quantity, Statement};
 
-pub(super) const HEADER: [&str; 8] = [
-    "vendor", "model", "family", "kind", "figure", "value", "source", "notes",
-];
+pub(super) const HEADER: [&str; 8] =
+    ["vendor", "model", "family", "kind", "figure", "value", "source", "notes"];
 
-pub(super) const REQUIRED: [&str; 7] = [
-    "vendor", "model", "family", "kind", "figure", "value", "source",
-];
+pub(super) const REQUIRED: [&str; 7] =
+    ["vendor", "model", "family", "kind", "figure", "value", "source"];
 
 pub(super) fn catalogue(rows: &[Row<'_>], wrong: &mut Vec<Diagnostic>) -> Catalogue {
     let mut catalogue = Catalogue::default();
@@ -85,10 +83,7 @@ fn family(row: &Row<'_>, catalogue: &mut Catalogue, wrong: &mut Vec<Diagnostic>)
         return;
     };
     let Some(name) = name else { return };
-    let mut family = Family {
-        notes: row.text("notes").to_owned(),
-        ..Family::default()
-    };
+    let mut family = Family { notes: row.text("notes").to_owned(), ..Family::default() };
     let source = row.text("source").to_owned();
     family.numbers.insert(quantity, Figure { value, source });
     catalogue.put_family(&name, family);
@@ -99,10 +94,9 @@ fn model(row: &Row<'_>, catalogue: &mut Catalogue, wrong: &mut Vec<Diagnostic>) 
         return;
     };
     if let Some(known) = catalogue.get(&controller.vendor, &controller.model) {
-        for (column, agree) in [
-            ("family", known.family == controller.family),
-            ("kind", known.kind == controller.kind),
-        ] {
+        for (column, agree) in
+            [("family", known.family == controller.family), ("kind", known.kind == controller.kind)]
+        {
             if !agree {
                 let message = format!("another line says another {column} of {known}");
                 wrong.push(Diagnostic::error("U1112", message, row.span(column)));
@@ -113,9 +107,7 @@ fn model(row: &Row<'_>, catalogue: &mut Catalogue, wrong: &mut Vec<Diagnostic>) 
     let source = row.text("source").to_owned();
     if let Some(quantity) = Quantity::of(figure) {
         if let Some(value) = number(quantity, value, row.span("value"), wrong) {
-            controller
-                .numbers
-                .insert(quantity, Figure { value, source });
+            controller.numbers.insert(quantity, Figure { value, source });
         }
     } else if let Some(statement) = Statement::of(figure) {
         if value.is_empty() {
@@ -162,11 +154,7 @@ pub(super) fn write(catalogue: &Catalogue) -> String {
         let figures: Vec<_> = numbers.chain(texts).collect();
         let nothing = String::new();
         let none = [("", String::new(), &nothing)];
-        let lines = if figures.is_empty() {
-            &none[..]
-        } else {
-            &figures
-        };
+        let lines = if figures.is_empty() { &none[..] } else { &figures };
         for (name, value, source) in lines {
             let fields = [
                 &controller.vendor,

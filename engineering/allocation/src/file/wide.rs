@@ -78,8 +78,5 @@ pub(super) fn catalogue(rows: &[Row<'_>], wrong: &mut Vec<Diagnostic>) -> Catalo
 }
 
 fn figure<T>(value: T, source: &str) -> Figure<T> {
-    Figure {
-        value,
-        source: source.to_owned(),
-    }
+    Figure { value, source: source.to_owned() }
 }

@@ -11,29 +11,17 @@ pub(super) fn judge(judge: &mut Judge<'_>, requirement: &Requirement, need: &Nee
     let criterion = format!("required: {}", requirement.text);
     let instruction_time = judge.instruction_time();
     let mut is = |holds: bool, message: String, sources: Vec<String>| {
-        let verdict = if holds {
-            Verdict::Fits
-        } else {
-            Verdict::DoesNotFit
-        };
+        let verdict = if holds { Verdict::Fits } else { Verdict::DoesNotFit };
         judge.said(&criterion, verdict, message, sources);
     };
     match &requirement.asked {
         Asked::Vendor(vendor) => {
             let holds = controller.vendor.eq_ignore_ascii_case(vendor);
-            is(
-                holds,
-                format!("is made by {}", controller.vendor),
-                Vec::new(),
-            );
+            is(holds, format!("is made by {}", controller.vendor), Vec::new());
         }
         Asked::Family(family) => {
             let holds = controller.family.eq_ignore_ascii_case(family);
-            is(
-                holds,
-                format!("is of the family {}", controller.family),
-                Vec::new(),
-            );
+            is(holds, format!("is of the family {}", controller.family), Vec::new());
         }
         Asked::Model(model) => {
             let holds = controller.model.eq_ignore_ascii_case(model);
@@ -58,11 +46,7 @@ pub(super) fn judge(judge: &mut Judge<'_>, requirement: &Requirement, need: &Nee
                     Bound::Exactly => figure.value == *value,
                 };
                 let has = quantity.text(figure.value);
-                is(
-                    holds,
-                    format!("{quantity}: {has}"),
-                    vec![figure.source.clone()],
-                );
+                is(holds, format!("{quantity}: {has}"), vec![figure.source.clone()]);
             }
             None => judge.unknown(&criterion, format!("its {quantity} is unknown")),
         },

@@ -25,22 +25,14 @@ impl<'a> Judge<'a> {
         family: Option<&'a Family>,
         terms: &'a Terms,
     ) -> Self {
-        Self {
-            controller,
-            family,
-            terms,
-            findings: Vec::new(),
-            loads: BTreeMap::new(),
-        }
+        Self { controller, family, terms, findings: Vec::new(), loads: BTreeMap::new() }
     }
 
     /// The time of an instruction on bits: the model's own, its family's, or what is assumed.
     pub(super) fn instruction_time(&self) -> Option<Figure<u64>> {
         let own = self.controller.numbers.get(&Quantity::BoolInstructionNs);
-        own.cloned().or_else(|| {
-            self.terms
-                .of_family(self.family, FamilyQuantity::BoolInstructionNs)
-        })
+        own.cloned()
+            .or_else(|| self.terms.of_family(self.family, FamilyQuantity::BoolInstructionNs))
     }
 
     /// A finding without numbers.
@@ -91,10 +83,7 @@ impl<'a> Judge<'a> {
 
     fn source(&self, quantity: Quantity) -> Vec<String> {
         let figure = self.controller.numbers.get(&quantity);
-        figure
-            .map(|figure| figure.source.clone())
-            .into_iter()
-            .collect()
+        figure.map(|figure| figure.source.clone()).into_iter().collect()
     }
 
     /// Terminals on board, or with expansion modules where these count.
@@ -109,10 +98,7 @@ impl<'a> Judge<'a> {
             (Some(has), expansion) if need <= self.terms.usable(has) || expansion.is_none() => {
                 self.compare(name, "", need, has, self.source(quantity));
                 let usable = self.terms.usable(has);
-                let load = Load {
-                    takes: need,
-                    usable,
-                };
+                let load = Load { takes: need, usable };
                 self.loads.insert(dimension, load);
             }
             (has, Some(expansion)) if self.terms.expansion => {
@@ -122,12 +108,7 @@ impl<'a> Judge<'a> {
                 );
                 let figure = self.controller.texts.get(&Statement::MaxExpansionIo);
                 let source = figure.map(|figure| figure.source.clone());
-                self.said(
-                    name,
-                    Verdict::Unknown,
-                    message,
-                    source.into_iter().collect(),
-                );
+                self.said(name, Verdict::Unknown, message, source.into_iter().collect());
             }
             (Some(has), expansion) => {
                 self.compare(name, "", need, has, self.source(quantity));
@@ -165,10 +146,7 @@ impl<'a> Judge<'a> {
         };
         self.compare(name, "", need, has, self.source(quantity));
         let usable = self.terms.usable(has);
-        let load = Load {
-            takes: need,
-            usable,
-        };
+        let load = Load { takes: need, usable };
         self.loads.insert(dimension, load);
     }
 
@@ -186,17 +164,10 @@ impl<'a> Judge<'a> {
             let message = format!("needs {bytes} bytes; its capacity is unknown");
             return self.unknown(name, message);
         };
-        let all: Vec<String> = sources
-            .iter()
-            .cloned()
-            .chain(self.source(quantity))
-            .collect();
+        let all: Vec<String> = sources.iter().cloned().chain(self.source(quantity)).collect();
         self.compare(name, " bytes", bytes, has, all);
         let usable = self.terms.usable(has).saturating_sub(fixed);
-        let load = Load {
-            takes: bytes - fixed,
-            usable,
-        };
+        let load = Load { takes: bytes - fixed, usable };
         self.loads.insert(dimension, load);
     }
 
@@ -242,10 +213,7 @@ impl<'a> Judge<'a> {
             let share = u128::from(part) * u128::from(WHOLE) / u128::from(within_ns);
             u64::try_from(share).unwrap_or(u64::MAX)
         };
-        let load = Load {
-            takes: share(need).max(1),
-            usable: self.terms.usable(WHOLE),
-        };
+        let load = Load { takes: share(need).max(1), usable: self.terms.usable(WHOLE) };
         self.loads.insert(Dimension::ScanTime, load);
     }
 }

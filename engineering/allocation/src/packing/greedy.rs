@@ -31,10 +31,7 @@ pub(super) fn pack(
                 && types[one].stock.is_none_or(|stock| taken(one) < stock)
         });
         if let Some(box_type) = free {
-            boxes.push(PackedBox {
-                box_type,
-                items: vec![item],
-            });
+            boxes.push(PackedBox { box_type, items: vec![item] });
         }
     }
     boxes
@@ -51,6 +48,5 @@ fn is_held(box_type: &BoxType, items: &mut dyn Iterator<Item = usize>) -> bool {
             sums.entry(dimension).or_insert((0, usable)).0 += u128::from(takes);
         }
     }
-    sums.values()
-        .all(|(sum, usable)| *sum <= u128::from(*usable))
+    sums.values().all(|(sum, usable)| *sum <= u128::from(*usable))
 }

@@ -149,9 +149,7 @@ fn values(copies: &[Copy], left_over: &[Variable], boxes: &[PackedBox]) -> Vec<(
     let mut values = Vec::new();
     let mut placed = BTreeSet::new();
     for copy in copies {
-        let found = waiting
-            .iter()
-            .position(|packed| packed.box_type == copy.box_type);
+        let found = waiting.iter().position(|packed| packed.box_type == copy.box_type);
         let items = found.map(|found| waiting.remove(found).items.clone());
         values.push((copy.taken, if items.is_some() { 1.0 } else { 0.0 }));
         let items = items.unwrap_or_default();

@@ -12,12 +12,8 @@ fn figure<T>(value: T) -> Figure<T> {
 
 fn one(model: &str, inputs: u64) -> Catalogue {
     let mut controller = Controller::new("Works", model, "W", Kind::Plc);
-    controller
-        .numbers
-        .insert(Quantity::DigitalInputs, figure(inputs));
-    controller
-        .texts
-        .insert(Statement::CommPorts, figure("1x Ethernet".to_owned()));
+    controller.numbers.insert(Quantity::DigitalInputs, figure(inputs));
+    controller.texts.insert(Statement::CommPorts, figure("1x Ethernet".to_owned()));
     let mut catalogue = Catalogue::default();
     catalogue.put(controller);
     catalogue
@@ -34,10 +30,7 @@ fn what_comes_with_the_program_is_whole_and_every_figure_has_a_source() {
     for controller in known.controllers() {
         let numbers = controller.numbers.values().map(|figure| &figure.source);
         let texts = controller.texts.values().map(|figure| &figure.source);
-        assert!(
-            numbers.chain(texts).all(|source| !source.is_empty()),
-            "{controller}"
-        );
+        assert!(numbers.chain(texts).all(|source| !source.is_empty()), "{controller}");
     }
     for family in known.families.keys() {
         let used = known.controllers().any(|known| known.family == *family);
@@ -45,11 +38,7 @@ fn what_comes_with_the_program_is_whole_and_every_figure_has_a_source() {
     }
     let siemens = known.get("Siemens", "CPU 1214C").expect("it is there");
     assert_eq!(siemens.number(Quantity::BoolInstructionNs), Some(85));
-    assert_eq!(
-        siemens.number(Quantity::DataMemoryBytes),
-        None,
-        "blank is unknown"
-    );
+    assert_eq!(siemens.number(Quantity::DataMemoryBytes), None, "blank is unknown");
     let read = file::read("c.csv", &file::write(&known)).catalogue;
     assert_eq!(read, Some(known));
 }
@@ -78,9 +67,7 @@ fn a_model_that_is_there_is_updated_only_when_asked() {
 fn figures_of_families_are_new_or_updated_too() {
     let part = |value| {
         let mut family = Family::default();
-        family
-            .numbers
-            .insert(FamilyQuantity::DataBytesPerBit, figure(value));
+        family.numbers.insert(FamilyQuantity::DataBytesPerBit, figure(value));
         let mut part = Catalogue::default();
         part.put_family("W", family);
         part

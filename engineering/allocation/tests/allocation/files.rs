@@ -73,16 +73,8 @@ fn figure<T>(value: T, source: String) -> Figure<T> {
 }
 
 fn catalogues() -> impl Strategy<Value = Catalogue> {
-    let number = (
-        prop::sample::select(Quantity::ALL.to_vec()),
-        0_u64..100_000,
-        word(),
-    );
-    let text = (
-        prop::sample::select(Statement::ALL.to_vec()),
-        word(),
-        word(),
-    );
+    let number = (prop::sample::select(Quantity::ALL.to_vec()), 0_u64..100_000, word());
+    let text = (prop::sample::select(Statement::ALL.to_vec()), word(), word());
     let kind = prop::sample::select(Kind::ALL.to_vec());
     let controller = (
         (word(), word(), word(), kind),
@@ -106,30 +98,19 @@ fn catalogues() -> impl Strategy<Value = Catalogue> {
             controller.notes = notes;
             controller
         });
-    let family = (
-        word(),
-        prop::sample::select(FamilyQuantity::ALL.to_vec()),
-        0_u64..1000,
-        word(),
-        word(),
-    );
+    let family =
+        (word(), prop::sample::select(FamilyQuantity::ALL.to_vec()), 0_u64..1000, word(), word());
     let controllers = prop::collection::vec(controller, 0..6);
     (controllers, prop::collection::vec(family, 0..4)).prop_map(|(controllers, families)| {
         let mut catalogue = Catalogue::default();
         for controller in controllers {
             // A model stands once; a second of the same name would be an update.
-            if catalogue
-                .get(&controller.vendor, &controller.model)
-                .is_none()
-            {
+            if catalogue.get(&controller.vendor, &controller.model).is_none() {
                 catalogue.put(controller);
             }
         }
         for (name, quantity, value, source, notes) in families {
-            let mut family = Family {
-                notes,
-                ..Family::default()
-            };
+            let mut family = Family { notes, ..Family::default() };
             family.numbers.insert(quantity, figure(value, source));
             catalogue.put_family(&name, family);
         }

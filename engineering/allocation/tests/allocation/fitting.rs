@@ -54,25 +54,13 @@ fn known_family() -> Family {
 }
 
 fn compared(numbers: &[(Quantity, u64)], family: Option<&Family>) -> Fit {
-    fit(
-        &controller("A", numbers),
-        family,
-        &need(),
-        &Terms::default(),
-    )
+    fit(&controller("A", numbers), family, &need(), &Terms::default())
 }
 
 fn messages(fit: &Fit) -> Vec<String> {
     let findings = fit.findings.iter();
     findings
-        .map(|found| {
-            format!(
-                "{}, {}: {}",
-                found.verdict.words(),
-                found.criterion,
-                found.message
-            )
-        })
+        .map(|found| format!("{}, {}: {}", found.verdict.words(), found.criterion, found.message))
         .collect()
 }
 
@@ -84,10 +72,7 @@ fn with_every_figure_it_fits_and_says_how_much_is_left() {
     // 8 instructions of 500 ns.
     assert_eq!(found.scan_ns, Some(sample().instructions * 500));
     let smallest = found.smallest_margin().expect("margins");
-    assert!(
-        (smallest - 0.75).abs() < 1e-12,
-        "1 of 4 outputs and 2 of 8 inputs, not {smallest}"
-    );
+    assert!((smallest - 0.75).abs() < 1e-12, "1 of 4 outputs and 2 of 8 inputs, not {smallest}");
 }
 
 /// Leaving out any figure makes it unknown; making any too small makes it fail; both together fail.
@@ -99,19 +84,11 @@ fn one_missing_figure_is_unknown_and_one_that_is_too_small_fails() {
         let found = compared(&without, Some(&known_family()));
         assert_eq!(found.verdict, Verdict::Unknown, "{quantity}");
         assert_eq!(found.with(Verdict::Unknown).count(), 1, "{quantity}");
-        let small = if quantity == Quantity::BoolInstructionNs {
-            1_000_000
-        } else {
-            0
-        };
+        let small = if quantity == Quantity::BoolInstructionNs { 1_000_000 } else { 0 };
         without.push((quantity, small));
         let found = compared(&without, Some(&known_family()));
         assert_eq!(found.verdict, Verdict::DoesNotFit, "{quantity}");
-        assert_eq!(
-            compared(&without, None).verdict,
-            Verdict::DoesNotFit,
-            "{quantity}"
-        );
+        assert_eq!(compared(&without, None).verdict, Verdict::DoesNotFit, "{quantity}");
     }
 }
 
@@ -130,15 +107,9 @@ fn a_family_of_which_nothing_is_known_says_what_would_be_enough() {
     };
     let found = fit(&controller("A", &ALL), None, &need(), &terms);
     assert_eq!(found.verdict, Verdict::Fits);
-    let memory = found
-        .findings
-        .iter()
-        .find(|it| it.criterion == "program_memory_bytes");
+    let memory = found.findings.iter().find(|it| it.criterion == "program_memory_bytes");
     let sources = &memory.expect("a finding").sources;
-    assert!(
-        sources.iter().any(|source| source.starts_with("assumed: ")),
-        "{sources:?}"
-    );
+    assert!(sources.iter().any(|source| source.starts_with("assumed: ")), "{sources:?}");
 }
 
 #[test]
@@ -158,21 +129,10 @@ fn a_rule_for_program_and_data_together_needs_no_data_memory() {
 
 #[test]
 fn a_reserve_is_kept_of_every_capacity() {
-    for (percent, expected) in [
-        (0, Verdict::Fits),
-        (75, Verdict::Fits),
-        (76, Verdict::DoesNotFit),
-    ] {
-        let terms = Terms {
-            reserve_percent: percent,
-            ..Terms::default()
-        };
-        let found = fit(
-            &controller("A", &ALL),
-            Some(&known_family()),
-            &need(),
-            &terms,
-        );
+    for (percent, expected) in [(0, Verdict::Fits), (75, Verdict::Fits), (76, Verdict::DoesNotFit)]
+    {
+        let terms = Terms { reserve_percent: percent, ..Terms::default() };
+        let found = fit(&controller("A", &ALL), Some(&known_family()), &need(), &terms);
         assert_eq!(found.verdict, expected, "{percent}: {:?}", messages(&found));
     }
 }
@@ -193,11 +153,7 @@ fn modules_do_not_count_unless_asked_and_then_leave_it_open() {
     let mut terms = Terms::default();
     let found = fit(&controller, Some(&known_family()), &need, &terms);
     assert_eq!(found.verdict, Verdict::DoesNotFit);
-    assert!(
-        messages(&found)[0].contains("7 modules"),
-        "{:?}",
-        messages(&found)
-    );
+    assert!(messages(&found)[0].contains("7 modules"), "{:?}", messages(&found));
     terms.expansion = true;
     let found = fit(&controller, Some(&known_family()), &need, &terms);
     assert_eq!(found.verdict, Verdict::Unknown);
@@ -218,30 +174,17 @@ fn an_ethernet_port_is_needed_to_speak_with_a_remote_io() {
         assert_eq!(messages(&once), messages(&found));
     };
     check(&controller("A", &ALL), Verdict::Unknown);
-    check(
-        &with_text(Statement::CommPorts, "2x Ethernet"),
-        Verdict::Fits,
-    );
-    check(
-        &with_text(Statement::CommPorts, "RS-485"),
-        Verdict::DoesNotFit,
-    );
+    check(&with_text(Statement::CommPorts, "2x Ethernet"), Verdict::Fits);
+    check(&with_text(Statement::CommPorts, "RS-485"), Verdict::DoesNotFit);
     check(&with_text(Statement::CommPorts, "some"), Verdict::Unknown);
 }
 
 #[test]
 fn requirements_of_a_person_are_three_valued_too() {
     let check = |text: &str, expected| {
-        let terms = Terms {
-            requirements: vec![Requirement::parse(text).expect(text)],
-            ..Terms::default()
-        };
-        let found = fit(
-            &controller("A", &ALL),
-            Some(&known_family()),
-            &need(),
-            &terms,
-        );
+        let terms =
+            Terms { requirements: vec![Requirement::parse(text).expect(text)], ..Terms::default() };
+        let found = fit(&controller("A", &ALL), Some(&known_family()), &need(), &terms);
         assert_eq!(found.verdict, expected, "{text}: {:?}", messages(&found));
     };
     check("inputs>=8", Verdict::Fits);
@@ -283,15 +226,10 @@ fn what_is_not_needed_need_not_be_known() {
 
 #[test]
 fn an_assumed_time_of_an_instruction_decides_and_is_named() {
-    let numbers: Vec<_> = ALL
-        .into_iter()
-        .filter(|(quantity, _)| *quantity != Quantity::BoolInstructionNs)
-        .collect();
+    let numbers: Vec<_> =
+        ALL.into_iter().filter(|(quantity, _)| *quantity != Quantity::BoolInstructionNs).collect();
     let assumptions = [(FamilyQuantity::BoolInstructionNs, 1000)].into();
-    let assumed = Terms {
-        assumptions,
-        ..Terms::default()
-    };
+    let assumed = Terms { assumptions, ..Terms::default() };
     let scan = |family: &Family, terms: &Terms| {
         let found = fit(&controller("A", &numbers), Some(family), &need(), terms);
         let mut findings = found.findings.into_iter();

@@ -59,11 +59,7 @@ impl Machine {
                 Operator::OrOpen => opened.push((false, result)),
                 Operator::Close => {
                     let (is_and, before) = opened.pop().expect("an opened bracket");
-                    result = if is_and {
-                        before && result
-                    } else {
-                        before || result
-                    };
+                    result = if is_and { before && result } else { before || result };
                 }
                 Operator::Store => {
                     self.bits.insert(operand.clone(), result);
@@ -118,22 +114,15 @@ impl Machine {
         let clock = self.read(&pin("CLK"));
         // As matiec's: R_TRIG pulses in its first scan if its input is 1, F_TRIG if it is 0.
         let last = self.edges.insert(name.to_owned(), clock).unwrap_or(!rising);
-        let pulse = if rising {
-            clock && !last
-        } else {
-            !clock && last
-        };
+        let pulse = if rising { clock && !last } else { !clock && last };
         self.bits.insert(pin("Q"), pulse);
     }
 }
 
 fn check(program: &Program, inputs: &[Vec<bool>]) -> Result<(), TestCaseError> {
     let list = instructions(program);
-    let blocks: BTreeMap<String, BlockKind> = program
-        .blocks()
-        .into_iter()
-        .map(|block| (block.name.to_string(), block.kind))
-        .collect();
+    let blocks: BTreeMap<String, BlockKind> =
+        program.blocks().into_iter().map(|block| (block.name.to_string(), block.kind)).collect();
     let mut machine = Machine::default();
     let mut reference =
         Interpreter::new(program, Duration::from_millis(10)).expect("a sound program");
@@ -143,10 +132,7 @@ fn check(program: &Program, inputs: &[Vec<bool>]) -> Result<(), TestCaseError> {
         }
         machine.scan(&list, &blocks);
         let expected = reference.scan(scan);
-        let outputs = program
-            .outputs
-            .iter()
-            .map(|output| machine.read(&output.name));
+        let outputs = program.outputs.iter().map(|output| machine.read(&output.name));
         let found: Vec<bool> = outputs.collect();
         prop_assert_eq!(found, expected, "{:?}", list);
     }
@@ -170,9 +156,7 @@ fn series(depth: u32) -> BoxedStrategy<String> {
     let branches = prop::collection::vec(series(depth - 1), 2..4);
     let branches = branches.prop_map(|branches| format!("[ {} ]", branches.join(" | ")));
     let element = prop_oneof![4 => contact, 1 => block, 2 => branches];
-    prop::collection::vec(element, 1..4)
-        .prop_map(|elements| elements.join(" "))
-        .boxed()
+    prop::collection::vec(element, 1..4).prop_map(|elements| elements.join(" ")).boxed()
 }
 
 fn programs() -> impl Strategy<Value = String> {

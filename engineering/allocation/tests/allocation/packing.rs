@@ -20,33 +20,27 @@ struct Case {
 impl Case {
     fn box_types(&self) -> Vec<BoxType> {
         let dimensions = [Dimension::ProgramMemory, Dimension::Timers];
-        let of_type = self
-            .types
-            .iter()
-            .map(|(capacity, cost, stock, barred)| BoxType {
-                cost: *cost as f64,
-                stock: *stock,
-                loads: self
-                    .takes
-                    .iter()
-                    .zip(barred)
-                    .map(|(takes, barred)| {
-                        let fits = takes
-                            .iter()
-                            .zip(capacity)
-                            .all(|(takes, usable)| takes <= usable);
-                        (fits && !barred).then(|| {
-                            let parts = takes.iter().zip(capacity).zip(dimensions);
-                            parts
-                                .filter(|((takes, _), _)| **takes > 0)
-                                .map(|((&takes, &usable), dimension)| {
-                                    (dimension, Load { takes, usable })
-                                })
-                                .collect::<BTreeMap<_, _>>()
-                        })
+        let of_type = self.types.iter().map(|(capacity, cost, stock, barred)| BoxType {
+            cost: *cost as f64,
+            stock: *stock,
+            loads: self
+                .takes
+                .iter()
+                .zip(barred)
+                .map(|(takes, barred)| {
+                    let fits = takes.iter().zip(capacity).all(|(takes, usable)| takes <= usable);
+                    (fits && !barred).then(|| {
+                        let parts = takes.iter().zip(capacity).zip(dimensions);
+                        parts
+                            .filter(|((takes, _), _)| **takes > 0)
+                            .map(|((&takes, &usable), dimension)| {
+                                (dimension, Load { takes, usable })
+                            })
+                            .collect::<BTreeMap<_, _>>()
                     })
-                    .collect(),
-            });
+                })
+                .collect(),
+        });
         of_type.collect()
     }
 
@@ -69,10 +63,7 @@ impl Case {
         best: &mut (usize, u64),
     ) {
         if item == self.takes.len() {
-            let cost = boxes
-                .iter()
-                .map(|(box_type, _)| self.types[*box_type].1)
-                .sum();
+            let cost = boxes.iter().map(|(box_type, _)| self.types[*box_type].1).sum();
             *best = (*best).min((left, cost));
             return;
         }
@@ -113,18 +104,11 @@ impl Case {
 
     fn packed(&self) -> Packing {
         let types = self.box_types();
-        pack(self.takes.len(), &types, &|left, right| {
-            self.apart(left, right)
-        })
-        .expect("a packing")
+        pack(self.takes.len(), &types, &|left, right| self.apart(left, right)).expect("a packing")
     }
 
     fn cost(&self, packing: &Packing) -> (usize, u64) {
-        let cost = packing
-            .boxes
-            .iter()
-            .map(|packed| self.types[packed.box_type].1)
-            .sum();
+        let cost = packing.boxes.iter().map(|packed| self.types[packed.box_type].1).sum();
         (packing.left_over.len(), cost)
     }
 }
@@ -135,18 +119,12 @@ fn cases() -> impl Strategy<Value = Case> {
         let barred = prop::collection::vec(prop::bool::weighted(0.15), items);
         let stock = prop_oneof![3 => Just(None), 1 => (0_usize..3).prop_map(Some)];
         let box_type = ([1_u64..12, 0_u64..6], 1_u64..30, stock, barred);
-        let pairs: Vec<(usize, usize)> = (0..items)
-            .flat_map(|left| (left + 1..items).map(move |right| (left, right)))
-            .collect();
+        let pairs: Vec<(usize, usize)> =
+            (0..items).flat_map(|left| (left + 1..items).map(move |right| (left, right))).collect();
         let some = pairs.len();
         let apart = prop::sample::subsequence(pairs, 0..=some);
-        (takes, prop::collection::vec(box_type, types), apart).prop_map(|(takes, types, apart)| {
-            Case {
-                takes,
-                types,
-                apart,
-            }
-        })
+        (takes, prop::collection::vec(box_type, types), apart)
+            .prop_map(|(takes, types, apart)| Case { takes, types, apart })
     })
 }
 
@@ -166,10 +144,7 @@ proptest! {
 
 #[test]
 fn nothing_to_place_and_nothing_to_place_it_on() {
-    assert_eq!(
-        pack(0, &[], &|_, _| false).map(|found| found.boxes.len()),
-        Ok(0)
-    );
+    assert_eq!(pack(0, &[], &|_, _| false).map(|found| found.boxes.len()), Ok(0));
     let alone = pack(2, &[], &|_, _| false).expect("nothing is placed");
     assert_eq!(alone.left_over, [0, 1]);
 }
@@ -179,12 +154,8 @@ fn nothing_to_place_and_nothing_to_place_it_on() {
 fn items_that_share_with_nobody_take_what_is_cheapest_for_each() {
     let case = Case {
         takes: (0..60).map(|item| [1 + item % 5, 0]).collect(),
-        types: (2..6)
-            .map(|size| ([size, 0], 10 * size, None, vec![false; 60]))
-            .collect(),
-        apart: (0..60)
-            .flat_map(|left| (left + 1..60).map(move |right| (left, right)))
-            .collect(),
+        types: (2..6).map(|size| ([size, 0], 10 * size, None, vec![false; 60])).collect(),
+        apart: (0..60).flat_map(|left| (left + 1..60).map(move |right| (left, right))).collect(),
     };
     let packing = case.packed();
     assert!(packing.best);
@@ -214,14 +185,7 @@ fn what_is_too_large_is_packed_and_said_to_be_perhaps_not_the_best() {
     let case = Case {
         takes: (0..12).map(|item| [1 + item % 3, 1]).collect(),
         types: (0..40)
-            .map(|number| {
-                (
-                    [4 + number % 5, 2 + number / 8],
-                    10 + number,
-                    Some(3),
-                    vec![false; 12],
-                )
-            })
+            .map(|number| ([4 + number % 5, 2 + number / 8], 10 + number, Some(3), vec![false; 12]))
             .collect(),
         apart: vec![(0, 1), (2, 3)],
     };

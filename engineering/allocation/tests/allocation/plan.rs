@@ -73,62 +73,33 @@ fn boxes(plan: &Allocation) -> Vec<String> {
 }
 
 fn share() -> Options {
-    Options {
-        share_members: true,
-        ..Options::default()
-    }
+    Options { share_members: true, ..Options::default() }
 }
 
 #[test]
 fn one_failure_must_not_take_two() {
     let plan = planned(&cell(), &Options::default());
-    assert_eq!(
-        boxes(&plan),
-        ["S: press", "S: robot", "S: robot-io", "S: understudy"]
-    );
+    assert_eq!(boxes(&plan), ["S: press", "S: robot", "S: robot-io", "S: understudy"]);
     // Members may share where the user says so; the understudy and the remote I/O never do.
     let plan = planned(&cell(), &share());
-    assert_eq!(
-        boxes(&plan),
-        ["S: robot press", "S: robot-io", "S: understudy"]
-    );
+    assert_eq!(boxes(&plan), ["S: robot press", "S: robot-io", "S: understudy"]);
     assert!(plan.is_complete() && plan.best);
 }
 
 #[test]
 fn programs_without_an_understudy_share_what_holds_them() {
-    let items: Vec<Item> = (0..5)
-        .map(|number| program(&format!("p{number}"), None, Role::Controller))
-        .collect();
+    let items: Vec<Item> =
+        (0..5).map(|number| program(&format!("p{number}"), None, Role::Controller)).collect();
     // 80 bytes: one M of 200, for it is one box; S holds three.
-    assert_eq!(
-        boxes(&planned(&items, &Options::default())),
-        ["M: p0 p1 p2 p3 p4"]
-    );
-    let stock = |name: &str, count| Stock {
-        name: name.to_owned(),
-        count,
-    };
-    let few = Options {
-        stock: vec![stock("S", 1), stock("Works S", 1)],
-        ..Options::default()
-    };
+    assert_eq!(boxes(&planned(&items, &Options::default())), ["M: p0 p1 p2 p3 p4"]);
+    let stock = |name: &str, count| Stock { name: name.to_owned(), count };
+    let few = Options { stock: vec![stock("S", 1), stock("Works S", 1)], ..Options::default() };
     assert_eq!(planned(&items, &few).boxes.len(), 2);
-    let one = Options {
-        stock: vec![stock("S", 1)],
-        ..Options::default()
-    };
+    let one = Options { stock: vec![stock("S", 1)], ..Options::default() };
     let plan = planned(&items, &one);
     assert_eq!(plan.boxes[0].items.len(), 3);
-    let why: Vec<_> = plan
-        .items
-        .iter()
-        .filter_map(|item| item.left_over.clone())
-        .collect();
-    assert_eq!(
-        why,
-        vec!["insufficient stock: of 1 suitable controllers, all are in use"; 2]
-    );
+    let why: Vec<_> = plan.items.iter().filter_map(|item| item.left_over.clone()).collect();
+    assert_eq!(why, vec!["insufficient stock: of 1 suitable controllers, all are in use"; 2]);
 }
 
 #[test]
@@ -165,16 +136,10 @@ fn three_groups_share_as_few_boxes_as_the_largest_of_them_wants() {
 #[test]
 fn what_is_preferred_comes_first() {
     let first = |preference| {
-        let options = Options {
-            preference,
-            ..Options::default()
-        };
+        let options = Options { preference, ..Options::default() };
         let plan = planned(&cell()[..1], &options);
-        let ranked: Vec<String> = plan.items[0]
-            .candidates
-            .iter()
-            .map(|it| it.model.clone())
-            .collect();
+        let ranked: Vec<String> =
+            plan.items[0].candidates.iter().map(|it| it.model.clone()).collect();
         assert_eq!(ranked[3], "X", "what is not known is last");
         assert_eq!(plan.boxes[0].controller.model, ranked[0]);
         ranked[..3].concat()
@@ -196,9 +161,7 @@ fn priced(prices: [(&str, u64, &str); 2]) -> Catalogue {
         let mut update = controller(model, &[(Quantity::Price, price)]);
         let source = "a quotation".to_owned();
         let value = currency.to_owned();
-        update
-            .texts
-            .insert(Statement::Currency, Figure { value, source });
+        update.texts.insert(Statement::Currency, Figure { value, source });
         catalogue.put(update);
     }
     catalogue
@@ -209,20 +172,10 @@ fn prices_decide_where_they_are_known() {
     let catalogue = priced([("M", 9000, "EUR"), ("L", 5000, "EUR")]);
     let plan = allocate(&catalogue, &cell()[..2], &Options::default()).expect("a plan");
     assert_eq!(boxes(&plan), ["L: press", "L: robot"]);
-    assert!(
-        plan.remarks[0].starts_with("2 of 4 prices are unknown"),
-        "{:?}",
-        plan.remarks
-    );
+    assert!(plan.remarks[0].starts_with("2 of 4 prices are unknown"), "{:?}", plan.remarks);
     let catalogue = priced([("M", 9000, "EUR"), ("L", 5000, "USD")]);
     let errors = allocate(&catalogue, &cell(), &Options::default()).expect_err("two currencies");
-    assert_eq!(
-        errors,
-        [AllocationError::Currencies(vec![
-            "EUR".into(),
-            "USD".into()
-        ])]
-    );
+    assert_eq!(errors, [AllocationError::Currencies(vec!["EUR".into(), "USD".into()])]);
 }
 
 #[test]
@@ -231,14 +184,9 @@ fn a_stock_of_unknown_models_is_refused_whole() {
     let mut twin = controller("S", &[]);
     twin.vendor = "Others".to_owned();
     catalogue.put(twin);
-    let stock = |name: &str| Stock {
-        name: name.to_owned(),
-        count: 1,
-    };
-    let options = Options {
-        stock: vec![stock("S"), stock("T"), stock("Works L")],
-        ..Options::default()
-    };
+    let stock = |name: &str| Stock { name: name.to_owned(), count: 1 };
+    let options =
+        Options { stock: vec![stock("S"), stock("T"), stock("Works L")], ..Options::default() };
     let errors = allocate(&catalogue, &cell(), &options).expect_err("a wrong stock");
     let codes: Vec<&str> = errors.iter().map(AllocationError::code).collect();
     assert_eq!(codes, ["U1132", "U1131"]);
@@ -254,10 +202,7 @@ fn what_is_not_verified_is_not_recommended_unless_the_user_insists() {
     assert!(plan.items[0].candidates.is_empty());
     let why = plan.items[0].left_over.as_deref();
     assert_eq!(why, Some("not recommended: y can never be on"));
-    let insisted = Options {
-        unverified: true,
-        ..Options::default()
-    };
+    let insisted = Options { unverified: true, ..Options::default() };
     assert!(planned(&items, &insisted).is_complete());
 }
 
@@ -279,10 +224,7 @@ fn the_plan_as_lines_as_a_table_and_as_a_page() {
     let plan = planned(&cell(), &share());
     insta::assert_snapshot!("text", text(&plan, false));
     let table = csv(&plan);
-    assert_eq!(
-        table.lines().next().map(|line| line.split(',').count()),
-        Some(14)
-    );
+    assert_eq!(table.lines().next().map(|line| line.split(',').count()), Some(14));
     assert!(
         table.contains(
             "robot,controller,1,Works,S,yes,fits,program_memory_bytes,fits,16,60,0.7333,"
@@ -299,9 +241,6 @@ fn the_plan_as_lines_as_a_table_and_as_a_page() {
     let page = html(&plan, &Terms::default(), &about).expect("a page");
     assert!(page.contains("Controllers for a &lt;cell&gt;"));
     assert!(page.contains("<strong>3 boxes</strong> for 4 places"));
-    assert!(
-        !page.contains("vendor=A&B"),
-        "what comes from outside is escaped"
-    );
+    assert!(!page.contains("vendor=A&B"), "what comes from outside is escaped");
     assert!(!page.contains("<script"), "a page without code");
 }

@@ -92,13 +92,10 @@ fn the_vents_beside_the_paper() {
     let found = Resources::of(&program);
     assert_eq!((found.rungs, found.inputs, found.outputs), (3, 3, 3));
     assert_eq!((found.contacts, found.coils, found.branches), (18, 3, 4));
-    let third = program.rungs[2]
-        .network
-        .iter()
-        .map(|element| match element {
-            Element::Contact(contact) => format!("{}{}", contact.kind.sign(), contact.operand),
-            other => panic!("{other:?} is no contact"),
-        });
+    let third = program.rungs[2].network.iter().map(|element| match element {
+        Element::Contact(contact) => format!("{}{}", contact.kind.sign(), contact.operand),
+        other => panic!("{other:?} is no contact"),
+    });
     assert_eq!(third.collect::<Vec<_>>(), ["/v1", "/v2", "/v3"]);
     assert_eq!(program.rungs[2].coils[0].target, "no_vent".into());
 }

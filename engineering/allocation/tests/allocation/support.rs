@@ -26,9 +26,7 @@ pub(crate) fn controller(model: &str, numbers: &[(Quantity, u64)]) -> Controller
     let mut controller = Controller::new("Works", model, "W", Kind::Plc);
     for &(quantity, value) in numbers {
         let source = format!("sheet of {model}");
-        controller
-            .numbers
-            .insert(quantity, Figure { value, source });
+        controller.numbers.insert(quantity, Figure { value, source });
     }
     controller
 }
@@ -48,10 +46,8 @@ pub(crate) fn catalogue(controllers: Vec<Controller>) -> Catalogue {
     for controller in controllers {
         catalogue.put(controller);
     }
-    let figures = [
-        (FamilyQuantity::ProgramBytesPerInstruction, 4),
-        (FamilyQuantity::DataBytesPerBit, 1),
-    ];
+    let figures =
+        [(FamilyQuantity::ProgramBytesPerInstruction, 4), (FamilyQuantity::DataBytesPerBit, 1)];
     catalogue.put_family("W", family(&figures));
     catalogue
 }

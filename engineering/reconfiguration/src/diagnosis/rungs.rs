@@ -20,12 +20,9 @@ impl Writer<'_> {
             let differs = vec![vec![on(&raw), off(&last)], vec![off(&raw), on(&last)]];
             let mut network = vec![on(&started)];
             network.extend(any(differs));
-            self.program
-                .push_titled(&title, network, vec![coil(Plain, &moves)]);
-            self.program
-                .push_rung(vec![on(&raw)], vec![coil(Plain, &last)]);
-            self.program
-                .push_rung(vec![on(&moves), on(&diagnosed)], vec![coil(Set, &moved)]);
+            self.program.push_titled(&title, network, vec![coil(Plain, &moves)]);
+            self.program.push_rung(vec![on(&raw)], vec![coil(Plain, &last)]);
+            self.program.push_rung(vec![on(&moves), on(&diagnosed)], vec![coil(Set, &moved)]);
             let title =
                 format!("{channel}: repaired when its value is stable and possible in the model");
             let quiet = BlockKind::Ton(self.ground.patience.quiet);
@@ -39,21 +36,15 @@ impl Writer<'_> {
                 block(of(&channel, "quiet"), quiet),
             ];
             let mended = of(&channel, "mended");
-            self.program
-                .push_titled(&title, network, vec![coil(Plain, &mended)]);
+            self.program.push_titled(&title, network, vec![coil(Plain, &mended)]);
             let network = any(vec![vec![on(&mended)], vec![on(&release)]]);
-            self.program
-                .push_rung(network, vec![coil(Reset, &diagnosed)]);
+            self.program.push_rung(network, vec![coil(Reset, &diagnosed)]);
             let network = vec![off(&started), on(&recalled)];
             self.program.push_rung(network, vec![coil(Set, &diagnosed)]);
         }
         let anywhere = Name::from("diagnosis.anywhere");
         let lost = Name::from("diagnosis.lost");
-        let network = any(vec![
-            vec![off(&started)],
-            vec![on(&release)],
-            vec![on(&lost)],
-        ]);
+        let network = any(vec![vec![off(&started)], vec![on(&release)], vec![on(&lost)]]);
         self.program.push_titled(
             "state of the plant unknown",
             network,
@@ -67,15 +58,13 @@ impl Writer<'_> {
                 .collect();
             let name = Name::from(format!("lets.{}", number + 1));
             network.push(block(name, BlockKind::Tof(self.ground.patience.grace)));
-            self.program
-                .push_rung(network, vec![coil(Plain, &self.row(number))]);
+            self.program.push_rung(network, vec![coil(Plain, &self.row(number))]);
         }
         for state in self.states() {
             let own = &self.ground.controller.states()[state].outputs.0;
             let network = outputs.iter().zip(own);
             let network = network.map(|(name, &value)| contact(&Name::from(name.clone()), value));
-            self.program
-                .push_rung(network.collect(), vec![coil(Plain, &self.bit("at", state))]);
+            self.program.push_rung(network.collect(), vec![coil(Plain, &self.bit("at", state))]);
         }
     }
 
@@ -91,38 +80,31 @@ impl Writer<'_> {
                     .map(|what| of(&channel, what));
             let failed = ["failed", "diagnosed"].map(|what| vec![on(&of(&channel, what))]);
             let title = format!("{channel}: accepted value");
-            self.program
-                .push_titled(&title, any(failed.into()), vec![coil(Plain, &out)]);
+            self.program.push_titled(&title, any(failed.into()), vec![coil(Plain, &out)]);
             // A failed channel, and a channel in its first scan, is accepted as it is.
             let as_it_is = any(vec![vec![off(&started)], vec![on(&out)]]);
             for value in [true, false] {
                 let mut network = as_it_is.clone();
                 network.push(contact(&raw, value));
-                self.program
-                    .push_rung(network, vec![coil(if value { Set } else { Reset }, &seen)]);
+                self.program.push_rung(network, vec![coil(if value { Set } else { Reset }, &seen)]);
             }
             let other = vec![vec![on(&raw), off(&seen)], vec![off(&raw), on(&seen)]];
-            self.program
-                .push_rung(any(other), vec![coil(Plain, &differs)]);
+            self.program.push_rung(any(other), vec![coil(Plain, &differs)]);
             let mut network = vec![on(&differs)];
             if self.is_filtered(&channel) {
                 let steady = BlockKind::Ton(self.ground.patience.steady);
                 network.push(block(of(&channel, "lasts"), steady));
             }
+            self.program.push_rung(network, vec![coil(Plain, &accepted)]);
             self.program
-                .push_rung(network, vec![coil(Plain, &accepted)]);
-            self.program.push_rung(
-                vec![on(&waits), off(&differs), off(&out)],
-                vec![coil(Plain, &gone)],
-            );
+                .push_rung(vec![on(&waits), off(&differs), off(&out)], vec![coil(Plain, &gone)]);
             self.program.push_rung(
                 vec![on(&differs), off(&accepted)],
                 vec![coil(Plain, &waits), coil(Plain, &of(&channel, "unsteady"))],
             );
             for value in [true, false] {
                 let network = vec![on(&accepted), contact(&raw, value)];
-                self.program
-                    .push_rung(network, vec![coil(if value { Set } else { Reset }, &seen)]);
+                self.program.push_rung(network, vec![coil(if value { Set } else { Reset }, &seen)]);
             }
             outs.push(vec![on(&out)]);
             changes.push(vec![on(&accepted)]);
@@ -133,18 +115,12 @@ impl Writer<'_> {
             changes.extend(other);
         }
         let out = Name::from("diagnosis.out");
-        self.program.push_titled(
-            "at least one channel failed",
-            any(outs),
-            vec![coil(Plain, &out)],
-        );
+        self.program.push_titled("at least one channel failed", any(outs), vec![coil(Plain, &out)]);
         let change = Name::from("diagnosis.change");
-        self.program
-            .push_titled("input change", any(changes), vec![coil(Plain, &change)]);
+        self.program.push_titled("input change", any(changes), vec![coil(Plain, &change)]);
         for name in self.unwatched() {
             let network = vec![on(&Name::from(name.clone()))];
-            self.program
-                .push_rung(network, vec![coil(Plain, &of(&name, "last"))]);
+            self.program.push_rung(network, vec![coil(Plain, &of(&name, "last"))]);
         }
     }
 
@@ -164,11 +140,8 @@ impl Writer<'_> {
         let anywhere = Name::from("diagnosis.anywhere");
         for state in self.states() {
             let stays = on(&self.bit("m", state));
-            let (at, old, left) = (
-                self.bit("at", state),
-                self.bit("old", state),
-                self.bit("left", state),
-            );
+            let (at, old, left) =
+                (self.bit("at", state), self.bit("old", state), self.bit("left", state));
             if let Some(scans) = self.ground.timing.longest_stay[state] {
                 let time = self.ground.period * scans + self.ground.patience.late;
                 let timer = block(self.bit("stay", state), BlockKind::Ton(time));
@@ -236,10 +209,7 @@ impl Writer<'_> {
     fn shows(&self, state: usize, but: Option<usize>, accused: bool) -> Vec<Element> {
         let signals = &self.ground.controller.signals;
         let own = &self.ground.controller.states()[state].inputs.0;
-        let places = own
-            .iter()
-            .enumerate()
-            .filter(|(place, _)| but != Some(*place));
+        let places = own.iter().enumerate().filter(|(place, _)| but != Some(*place));
         let shown = places.map(|(place, &value)| {
             let name = &signals.inputs[place];
             if self.ground.channels.contains(&place) {
@@ -285,8 +255,7 @@ impl Writer<'_> {
             network.extend(any(vec![vec![on(&own)], vec![off(&change), on(&followed)]]));
             network.extend(any(branches.collect()));
             let title = format!("{channel}: its failure would explain the inputs");
-            self.program
-                .push_titled(&title, network, vec![coil(Plain, &explains)]);
+            self.program.push_titled(&title, network, vec![coil(Plain, &explains)]);
         }
         for channel in self.channels() {
             let [explains, gone, accused, diagnosed, moved] =
@@ -294,27 +263,19 @@ impl Writer<'_> {
                     .map(|what| of(&channel, what));
             let network = any(vec![vec![on(&explains)], vec![on(&gone)]]);
             let title = format!("{channel}: fault detected");
-            self.program
-                .push_titled(&title, network, vec![coil(Plain, &accused)]);
-            self.program
-                .push_rung(vec![on(&accused)], vec![coil(Set, &diagnosed)]);
+            self.program.push_titled(&title, network, vec![coil(Plain, &accused)]);
+            self.program.push_rung(vec![on(&accused)], vec![coil(Set, &diagnosed)]);
             let release = vec![on(&Name::from("diagnosis.release"))];
             let counter = Element::Block(understudy_ladder::Block {
                 name: of(&channel, "count"),
                 kind: BlockKind::Ctu(self.ground.patience.repairs),
-                pins: vec![understudy_ladder::Feed {
-                    pin: Name::from("R"),
-                    network: release,
-                }],
+                pins: vec![understudy_ladder::Feed { pin: Name::from("R"), network: release }],
             });
             let spent = coil(Plain, &of(&channel, "spent"));
-            self.program
-                .push_rung(vec![on(&accused), counter], vec![spent]);
+            self.program.push_rung(vec![on(&accused), counter], vec![spent]);
             // A channel that recovered by itself has changed; a value that caused the diagnosis must change once more.
-            self.program
-                .push_rung(vec![on(&accused), off(&gone)], vec![coil(Reset, &moved)]);
-            self.program
-                .push_rung(vec![on(&accused), on(&gone)], vec![coil(Set, &moved)]);
+            self.program.push_rung(vec![on(&accused), off(&gone)], vec![coil(Reset, &moved)]);
+            self.program.push_rung(vec![on(&accused), on(&gone)], vec![coil(Set, &moved)]);
         }
     }
 
@@ -325,31 +286,23 @@ impl Writer<'_> {
         let driven = Name::from("diagnosis.driven");
         for state in self.states() {
             let [may, next, left] = ["m", "n", "left"].map(|what| self.bit(what, state));
-            let mut network = any(vec![
-                vec![on(&next), off(&left)],
-                vec![on(&may), off(&possible)],
-            ]);
+            let mut network =
+                any(vec![vec![on(&next), off(&left)], vec![on(&may), off(&possible)]]);
             network.extend(self.shows(state, None, true));
             self.program.push_rung(network, vec![coil(Plain, &may)]);
         }
         self.count(&one, &two);
         let tracked = Name::from("diagnosis.tracked");
-        self.program
-            .push_rung(vec![on(&one)], vec![coil(Plain, &tracked)]);
+        self.program.push_rung(vec![on(&one)], vec![coil(Plain, &tracked)]);
         let lost = Name::from("diagnosis.lost");
         self.program.push_titled(
             "no state of the model explains the inputs: state of the plant unknown",
             vec![off(&one)],
             vec![coil(Plain, &lost)],
         );
-        let network = any(vec![
-            vec![off(&one)],
-            vec![on(&two)],
-            vec![off(&driven)],
-            vec![on(&out)],
-        ]);
-        self.program
-            .push_rung(network, vec![coil(Reset, &followed)]);
+        let network =
+            any(vec![vec![off(&one)], vec![on(&two)], vec![off(&driven)], vec![on(&out)]]);
+        self.program.push_rung(network, vec![coil(Reset, &followed)]);
         let own = self.states().map(|state| {
             let [may, at] = ["m", "at"].map(|what| self.bit(what, state));
             vec![on(&may), on(&at)]
@@ -364,21 +317,16 @@ impl Writer<'_> {
         for channel in self.channels() {
             let raw = Name::from(channel.clone());
             let place = self.ground.controller.signals.inputs.iter();
-            let place = place
-                .clone()
-                .position(|input| *input == channel)
-                .unwrap_or_default();
+            let place = place.clone().position(|input| *input == channel).unwrap_or_default();
             let branches = self.states().map(|state| {
                 let value = self.ground.controller.states()[state].inputs.0[place];
                 vec![on(&self.bit("m", state)), contact(&raw, value)]
             });
             let network = any(branches.collect());
-            self.program
-                .push_rung(network, vec![coil(Plain, &of(&channel, "fits"))]);
+            self.program.push_rung(network, vec![coil(Plain, &of(&channel, "fits"))]);
         }
         let started = Name::from("diagnosis.started");
-        self.program
-            .push_rung(Vec::new(), vec![coil(Set, &started)]);
+        self.program.push_rung(Vec::new(), vec![coil(Set, &started)]);
     }
 
     /// Whether the plant may be in one state, and in two.
@@ -390,8 +338,7 @@ impl Writer<'_> {
         );
         for state in self.states() {
             let may = self.bit("m", state);
-            self.program
-                .push_rung(vec![on(&may), on(one)], vec![coil(Set, two)]);
+            self.program.push_rung(vec![on(&may), on(one)], vec![coil(Set, two)]);
             self.program.push_rung(vec![on(&may)], vec![coil(Set, one)]);
         }
     }

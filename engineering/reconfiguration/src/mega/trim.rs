@@ -42,14 +42,9 @@ impl MegaController {
         place: usize,
         events: &[Event],
     ) -> bool {
-        let members = self.states[place]
-            .members
-            .iter()
-            .map(|&member| member as usize);
+        let members = self.states[place].members.iter().map(|&member| member as usize);
         let mut happening = members.flat_map(|member| {
-            let defined = events
-                .iter()
-                .filter(move |&&event| controller.is_defined(member, event));
+            let defined = events.iter().filter(move |&&event| controller.is_defined(member, event));
             defined.map(move |&event| (member, event))
         });
         !events.is_empty()

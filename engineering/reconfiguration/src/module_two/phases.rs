@@ -60,9 +60,8 @@ impl Writer<'_> {
             let shown = &self.controller.states()[state.members[0] as usize].inputs.0;
             let failed: BTreeSet<usize> =
                 failed_channels(&self.question.channels, state.failed).collect();
-            let working: Vec<usize> = (0..shown.len())
-                .filter(|input| !failed.contains(input))
-                .collect();
+            let working: Vec<usize> =
+                (0..shown.len()).filter(|input| !failed.contains(input)).collect();
             let inputs = &self.controller.signals.inputs;
             let mut found = Vec::new();
             for (label, target) in &mega.edges[place] {
@@ -79,14 +78,10 @@ impl Writer<'_> {
                 let value = |input: usize| {
                     shown[input] ^ events.iter().any(|event| event.channel() == Some(input))
                 };
-                let when = working
-                    .iter()
-                    .map(|&input| contact(&inputs[input], value(input)));
+                let when = working.iter().map(|&input| contact(&inputs[input], value(input)));
                 found.push((Some(*target), when.collect()));
             }
-            let differs = working
-                .iter()
-                .map(|&input| vec![contact(&inputs[input], !shown[input])]);
+            let differs = working.iter().map(|&input| vec![contact(&inputs[input], !shown[input])]);
             if let Some(when) = any(differs.collect()) {
                 found.push((None, when));
             }
@@ -108,31 +103,23 @@ impl Writer<'_> {
             };
             let latch = self.latched[&place].clone();
             let network = vec![on(&latch), on(at)];
-            self.program
-                .push_rung(network, vec![coil(CoilKind::Reset, &latch), held.clone()]);
+            self.program.push_rung(network, vec![coil(CoilKind::Reset, &latch), held.clone()]);
         }
         let mut network = vec![on(&self.names.release)];
         network.extend(self.names.failed.iter().map(off));
-        let mut coils: Vec<Coil> = self
-            .latched
-            .values()
-            .map(|latch| coil(CoilKind::Reset, latch))
-            .collect();
+        let mut coils: Vec<Coil> =
+            self.latched.values().map(|latch| coil(CoilKind::Reset, latch)).collect();
         coils.push(coil(CoilKind::Reset, &self.names.lost));
         coils.push(held);
-        self.program
-            .push_titled("module 2: release by the operator", network, coils);
+        self.program.push_titled("module 2: release by the operator", network, coils);
     }
 
     /// From transparent into Θ.
     pub(super) fn enter(&mut self) {
         let mega = self.mega;
         let channels = self.question.channels.len();
-        let states: Vec<(usize, Name)> = self
-            .at
-            .iter()
-            .map(|(&state, name)| (state, name.clone()))
-            .collect();
+        let states: Vec<(usize, Name)> =
+            self.at.iter().map(|(&state, name)| (state, name.clone())).collect();
         for failed in patterns(channels, self.question.simultaneous) {
             for (state, at) in &states {
                 let seed = [*state as u32];
@@ -157,12 +144,8 @@ impl Writer<'_> {
             }
         }
         // More channels than were asked about, or a ladder outside of the model.
-        let failed: Vec<Vec<Element>> = self
-            .names
-            .failed
-            .iter()
-            .map(|name| vec![on(name)])
-            .collect();
+        let failed: Vec<Vec<Element>> =
+            self.names.failed.iter().map(|name| vec![on(name)]).collect();
         let mut outside = Vec::new();
         for pattern in exactly(channels, self.question.simultaneous + 1) {
             let bits = (0..channels).filter(|bit| pattern >> bit & 1 == 1);
@@ -174,16 +157,12 @@ impl Writer<'_> {
         }
         if let Some(mut network) = any(outside) {
             network.insert(0, off(&self.names.held));
-            let coils = vec![
-                coil(CoilKind::Set, &self.names.lost),
-                coil(CoilKind::Set, &self.names.held),
-            ];
-            self.program
-                .push_titled("module 2: outside of the model", network, coils);
+            let coils =
+                vec![coil(CoilKind::Set, &self.names.lost), coil(CoilKind::Set, &self.names.held)];
+            self.program.push_titled("module 2: outside of the model", network, coils);
         }
         for (was, failed) in self.names.was.clone().iter().zip(self.names.failed.clone()) {
-            self.program
-                .push_rung(vec![on(&failed)], vec![coil(CoilKind::Plain, was)]);
+            self.program.push_rung(vec![on(&failed)], vec![coil(CoilKind::Plain, was)]);
         }
     }
 
@@ -194,8 +173,7 @@ impl Writer<'_> {
         }
         let latch = self.latched[&target].clone();
         let held = coil(CoilKind::Set, &self.names.held);
-        self.program
-            .push_rung(network, vec![coil(CoilKind::Set, &latch), held]);
+        self.program.push_rung(network, vec![coil(CoilKind::Set, &latch), held]);
     }
 
     /// Writes the commands over the outputs, and where Θ is down to one state, that state's memory into the ladder's.
@@ -205,31 +183,20 @@ impl Writer<'_> {
         for (&place, latch) in &self.latched {
             let state = &self.mega.states[place];
             let single = &self.controller.states()[state.members[0] as usize];
-            let outputs = state
-                .command
-                .as_ref()
-                .map_or(&single.outputs, |command| &command.outputs);
+            let outputs =
+                state.command.as_ref().map_or(&single.outputs, |command| &command.outputs);
             for (output, &value) in outputs.0.iter().enumerate() {
-                writes
-                    .entry((output, value))
-                    .or_default()
-                    .push(vec![on(latch)]);
+                writes.entry((output, value)).or_default().push(vec![on(latch)]);
             }
             if let ([memory], [_], None) = (&single.memory[..], &state.members[..], &state.command)
             {
                 for (bit, &value) in memory.0.iter().enumerate() {
-                    restores
-                        .entry((bit, value))
-                        .or_default()
-                        .push(vec![on(latch)]);
+                    restores.entry((bit, value)).or_default().push(vec![on(latch)]);
                 }
             }
         }
         for (output, &value) in lost_outputs.0.iter().enumerate() {
-            writes
-                .entry((output, value))
-                .or_default()
-                .push(vec![on(&self.names.lost)]);
+            writes.entry((output, value)).or_default().push(vec![on(&self.names.lost)]);
         }
         let outputs = &self.controller.signals.outputs;
         let memory = &self.controller.memory;
@@ -239,19 +206,12 @@ impl Writer<'_> {
             });
             named.collect::<Vec<_>>()
         };
-        let all = named(writes, outputs)
-            .into_iter()
-            .chain(named(restores, memory));
+        let all = named(writes, outputs).into_iter().chain(named(restores, memory));
         for (target, value, latches) in all.collect::<Vec<_>>() {
-            let kind = if value {
-                CoilKind::Set
-            } else {
-                CoilKind::Reset
-            };
+            let kind = if value { CoilKind::Set } else { CoilKind::Reset };
             let title = format!("module 2: {target} {}", if value { "on" } else { "off" });
             if let Some(network) = any(latches) {
-                self.program
-                    .push_titled(&title, network, vec![coil(kind, &target)]);
+                self.program.push_titled(&title, network, vec![coil(kind, &target)]);
             }
         }
     }

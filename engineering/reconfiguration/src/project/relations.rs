@@ -29,21 +29,14 @@ impl Pattern {
             '-' => Some(None),
             _ => None,
         };
-        let bits = left
-            .chars()
-            .chain(right.chars())
-            .map(bit)
-            .collect::<Option<_>>()?;
+        let bits = left.chars().chain(right.chars()).map(bit).collect::<Option<_>>()?;
         Some(Self { bits })
     }
 
     /// Whether it fits.
     pub fn fits(&self, inputs: &Bits, outputs: &Bits) -> bool {
         let vector = inputs.0.iter().chain(&outputs.0);
-        self.bits
-            .iter()
-            .zip(vector)
-            .all(|(wanted, is)| wanted.is_none_or(|wanted| wanted == *is))
+        self.bits.iter().zip(vector).all(|(wanted, is)| wanted.is_none_or(|wanted| wanted == *is))
     }
 }
 
@@ -100,10 +93,7 @@ pub(super) fn read(
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Vec<RelationEntry> {
     let names = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
-    let signals = Signals {
-        inputs: names(inputs),
-        outputs: names(outputs),
-    };
+    let signals = Signals { inputs: names(inputs), outputs: names(outputs) };
     let mut entries = Vec::new();
     for mut fields in tables {
         fields.require(&["events", "rows"], diagnostics);
@@ -112,10 +102,8 @@ pub(super) fn read(
             match signals.event(name.value) {
                 Some(event) => events.push(event),
                 None => {
-                    let known: Vec<String> = signals
-                        .events()
-                        .map(|event| signals.event_name(event))
-                        .collect();
+                    let known: Vec<String> =
+                        signals.events().map(|event| signals.event_name(event)).collect();
                     let known: Vec<&str> = known.iter().map(String::as_str).collect();
                     diagnostics.push(unknown("event", name.value, name.span, &known));
                 }
@@ -166,13 +154,7 @@ pub(super) fn read(
         let except = patterns("except");
         let span = fields.span();
         fields.finish(diagnostics);
-        entries.push(RelationEntry {
-            events,
-            rows: rows.into(),
-            states,
-            except,
-            span,
-        });
+        entries.push(RelationEntry { events, rows: rows.into(), states, except, span });
     }
     entries
 }

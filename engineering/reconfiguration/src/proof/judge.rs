@@ -19,9 +19,7 @@ impl Prover<'_> {
             return Err("two states of the mega-controller are latched at once".into());
         }
         if lost {
-            return self
-                .keeps_back(&[world.state], 0, &world.outputs)
-                .map(|()| false);
+            return self.keeps_back(&[world.state], 0, &world.outputs).map(|()| false);
         }
         let (members, failed) = match latched {
             [] if at.is_empty() && world.failed == 0 => return Ok(false),
@@ -40,10 +38,8 @@ impl Prover<'_> {
                 Some(&state) if world.is_single || members.len() == 1 => world.state = state,
                 _ if world.alone.is_some() => return Ok(false),
                 _ => {
-                    let sets: Vec<String> = members
-                        .iter()
-                        .map(|&state| number(state).to_string())
-                        .collect();
+                    let sets: Vec<String> =
+                        members.iter().map(|&state| number(state).to_string()).collect();
                     return Err(format!(
                         "the plant is in state {}, and the mega-controller thinks of {}",
                         number(world.state),
@@ -88,8 +84,7 @@ impl Prover<'_> {
     /// Whether an unseen move leaves `members`.
     fn must_prevent(&self, members: &[u32], failed: u64) -> bool {
         members.iter().any(|&state| {
-            self.unseen(state, failed)
-                .any(|step| !members.contains(&(step.target as u32)))
+            self.unseen(state, failed).any(|step| !members.contains(&(step.target as u32)))
         })
     }
 
@@ -110,10 +105,7 @@ impl Prover<'_> {
         let claim = self.claim;
         let (controller, relation) = (claim.controller, claim.relation);
         let is_possible = |state: u32, event: Event| {
-            controller
-                .moves(state as usize)
-                .iter()
-                .any(|step| step.events.contains(&event))
+            controller.moves(state as usize).iter().any(|step| step.events.contains(&event))
         };
         let own = |state: u32| &controller.states()[state as usize].outputs;
         let forbids = |state: u32, event: Event| {

@@ -138,8 +138,7 @@ impl Bench {
     /// What must not happen to a box.
     fn watch(&mut self) {
         if self.plant.get("plant_fault") {
-            self.plant_faults
-                .push(format!("scan {}: filled beside the box", self.scans));
+            self.plant_faults.push(format!("scan {}: filled beside the box", self.scans));
         }
         self.finished += u32::from(self.plant.get("finished"));
     }

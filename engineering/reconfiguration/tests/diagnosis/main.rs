@@ -9,20 +9,15 @@ const BOX_SCANS: usize = 130;
 
 #[test]
 fn nobody_is_accused_while_all_is_well() {
-    for channels in [
-        &["ps1"][..],
-        &["ps1", "Filling_done"],
-        &["ps1", "ps2", "Filling_done", "Weight_recd"],
-    ] {
+    for channels in
+        [&["ps1"][..], &["ps1", "Filling_done"], &["ps1", "ps2", "Filling_done", "Weight_recd"]]
+    {
         let (project, outcome) = analysed(channels);
         let mut bench = Bench::new(&project, &outcome);
         for scan in 0..3000 {
             bench.cycle(&|_, shown| shown, false);
             for channel in channels {
-                assert!(
-                    !bench.diagnosed(channel),
-                    "{channel} in scan {scan} of {channels:?}"
-                );
+                assert!(!bench.diagnosed(channel), "{channel} in scan {scan} of {channels:?}");
             }
         }
         assert_eq!(bench.plant_faults, Vec::<String>::new());
@@ -117,33 +112,15 @@ fn a_stuck_channel_is_found_before_anything_goes_wrong() {
                 if is_plausible(box_expected || fill_expected) || bench.unsteady(channel) {
                     continue;
                 }
-                let came = suffer(
-                    &bench,
-                    &channels,
-                    &Fault {
-                        channel,
-                        shows: &|_, _| value,
-                        lasts: 300,
-                    },
-                );
+                let came =
+                    suffer(&bench, &channels, &Fault { channel, shows: &|_, _| value, lasts: 300 });
                 let what = format!("{channel} stuck at {value} in scan {}", bench.scans);
-                assert!(
-                    came.found.is_some_and(|scan| scan < 120),
-                    "{what}: {:?}",
-                    came.found
-                );
+                assert!(came.found.is_some_and(|scan| scan < 120), "{what}: {:?}", came.found);
                 assert!(!came.others_accused, "{what}");
                 let again = came.believed_again;
-                assert!(
-                    again.is_some_and(|scan| scan >= 300),
-                    "{what}: believed in {again:?}"
-                );
+                assert!(again.is_some_and(|scan| scan >= 300), "{what}: believed in {again:?}");
                 assert_eq!(came.plant_faults, Vec::<String>::new(), "{what}");
-                assert!(
-                    came.finished >= 2,
-                    "{what}: {} boxes after it",
-                    came.finished
-                );
+                assert!(came.finished >= 2, "{what}: {} boxes after it", came.finished);
             }
         }
     }
@@ -158,26 +135,14 @@ fn a_channel_that_flickers_is_found_and_believed_again() {
             let came = suffer(
                 &bench,
                 &channels,
-                &Fault {
-                    channel,
-                    shows: &|scan, shown| shown ^ (scan % 2 == 0),
-                    lasts: 30,
-                },
+                &Fault { channel, shows: &|scan, shown| shown ^ (scan % 2 == 0), lasts: 30 },
             );
             let what = format!("{channel} flickers in scan {}", bench.scans);
-            assert!(
-                came.found.is_some_and(|scan| scan < 6),
-                "{what}: {:?}",
-                came.found
-            );
+            assert!(came.found.is_some_and(|scan| scan < 6), "{what}: {:?}", came.found);
             assert!(!came.others_accused, "{what}");
             assert!(came.believed_again.is_some_and(|scan| scan > 30), "{what}");
             assert_eq!(came.plant_faults, Vec::<String>::new(), "{what}");
-            assert!(
-                came.finished >= 2,
-                "{what}: {} boxes after it",
-                came.finished
-            );
+            assert!(came.finished >= 2, "{what}: {} boxes after it", came.finished);
         }
     }
 }
@@ -190,11 +155,7 @@ fn what_fails_too_often_waits_for_the_operator() {
     let came = suffer(
         &benches[0],
         &channels,
-        &Fault {
-            channel: "ps1",
-            shows: &|scan, shown| shown ^ (scan % 40 == 0),
-            lasts: 300,
-        },
+        &Fault { channel: "ps1", shows: &|scan, shown| shown ^ (scan % 40 == 0), lasts: 300 },
     );
     assert_eq!(came.believed_again, Some(LOOKS));
     assert_eq!(came.plant_faults, Vec::<String>::new());

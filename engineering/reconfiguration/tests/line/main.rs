@@ -68,9 +68,8 @@ fn exploration_finds_the_twelve_states_of_table_4_at_any_period() {
     for period in [500, 100, 20] {
         let found = explored(Duration::from_millis(period));
         let controller = &found.controller;
-        let mut names: Vec<String> = (0..controller.states().len())
-            .map(|state| controller.state_name(state))
-            .collect();
+        let mut names: Vec<String> =
+            (0..controller.states().len()).map(|state| controller.state_name(state)).collect();
         names.sort();
         let mut table = [
             "00000_0000",
@@ -172,10 +171,7 @@ fn what_is_not_written_over_the_outputs_is_refuted() {
                 place <= first || !is_off
             });
         });
-        assert!(
-            matches!(refuted, Err(NotProved::Refuted { .. })),
-            "{output}: {refuted:?}"
-        );
+        assert!(matches!(refuted, Err(NotProved::Refuted { .. })), "{output}: {refuted:?}");
     }
 }
 
@@ -196,12 +192,7 @@ fn a_detection_that_is_late_refutes_a_ladder_for_a_prompt_one() {
         let mega = MegaController::build(controller, &relation, &question).expect("commands");
         let lost = Bits(vec![false; 4]);
         let combined = combine(&ladder, controller, &mega, &question, &lost).expect("small");
-        let sets = |place: usize| {
-            (
-                mega.states[place].members.clone(),
-                mega.states[place].failed,
-            )
-        };
+        let sets = |place: usize| (mega.states[place].members.clone(), mega.states[place].failed);
         prove(&Claim {
             controller,
             relation: &relation,
@@ -216,10 +207,7 @@ fn a_detection_that_is_late_refutes_a_ladder_for_a_prompt_one() {
             maximum_states: 100_000,
         })
     };
-    assert!(
-        matches!(refuted, Err(NotProved::Refuted { .. })),
-        "{refuted:?}"
-    );
+    assert!(matches!(refuted, Err(NotProved::Refuted { .. })), "{refuted:?}");
 }
 
 /// No scan runs through two transitions: every rung that latches a state resets the one that it comes from and closes its phase.
@@ -243,9 +231,7 @@ fn each_phase_makes_one_transition() {
 fn any_relation() -> impl Strategy<Value = Vec<Vec<Vec<Option<bool>>>>> {
     let entry = prop_oneof![3 => Just(None), 2 => Just(Some(true)), 1 => Just(Some(false))];
     let row = prop::collection::vec(entry, 4);
-    let row = row.prop_filter("it would always hold", |row| {
-        row.iter().any(Option::is_some)
-    });
+    let row = row.prop_filter("it would always hold", |row| row.iter().any(Option::is_some));
     // For each of the ten events, up to two rows; none makes it uncontrollable.
     prop::collection::vec(prop::collection::vec(row, 0..=2), 10)
 }

@@ -20,10 +20,7 @@ fn rows(text: &str) -> Arc<[Row]> {
 }
 
 fn demand(text: &str, enable: bool) -> Demand {
-    Demand {
-        rows: rows(text),
-        enable,
-    }
+    Demand { rows: rows(text), enable }
 }
 
 #[test]
@@ -42,10 +39,8 @@ fn example_2_activates_outputs_1_and_3() {
 
 #[test]
 fn example_1_cannot_be_combined_on_outputs() {
-    let signals = Signals {
-        inputs: vec!["i1".into(), "i2".into()],
-        outputs: vec!["o1".into(), "o2".into()],
-    };
+    let signals =
+        Signals { inputs: vec!["i1".into(), "i2".into()], outputs: vec!["o1".into(), "o2".into()] };
     // e1 is i1+, e2 is i2+.
     let (e1, e2) = (Event::Rises(0), Event::Rises(1));
     let state = |inputs, outputs| State {
@@ -65,24 +60,11 @@ fn example_1_cannot_be_combined_on_outputs() {
         .map(|(state, event)| feedback(&controller, &relation, state, event).text())
         .to_vec();
     assert_eq!(table, ["0", "1", "0", "dc"], "Table 2");
-    assert_eq!(
-        feedback(&controller, &relation, 0, Event::Falls(0)),
-        Feedback::DontCare
-    );
+    assert_eq!(feedback(&controller, &relation, 0, Event::Falls(0)), Feedback::DontCare);
     // Free of conflicts on events; on outputs o1 differs, and there is still a command for both.
-    assert_ne!(
-        controller.states()[0].outputs,
-        controller.states()[1].outputs
-    );
-    let demands = [
-        demand("dc 1", false),
-        demand("dc 0", true),
-        demand("1 1", false),
-    ];
-    assert_eq!(
-        solve(&demands, &[1.0; 2]).expect("feasible").to_string(),
-        "00"
-    );
+    assert_ne!(controller.states()[0].outputs, controller.states()[1].outputs);
+    let demands = [demand("dc 1", false), demand("dc 0", true), demand("1 1", false)];
+    assert_eq!(solve(&demands, &[1.0; 2]).expect("feasible").to_string(), "00");
 }
 
 #[test]
@@ -93,28 +75,16 @@ fn a_conflict_is_shown_by_its_rows() {
         demand("dc 0", true),
         demand("0 dc; dc dc", true),
     ];
-    assert_eq!(
-        solve(&demands, &[1.0; 2]),
-        Err(Unsolved::Conflict(vec![1, 2]))
-    );
+    assert_eq!(solve(&demands, &[1.0; 2]), Err(Unsolved::Conflict(vec![1, 2])));
 }
 
 #[test]
 fn weights_choose_among_what_is_safe() {
     let either = [demand("1 dc; dc 1", true)];
-    assert_eq!(
-        solve(&either, &[2.0, 1.0]).expect("feasible").to_string(),
-        "01"
-    );
-    assert_eq!(
-        solve(&either, &[1.0, 2.0]).expect("feasible").to_string(),
-        "10"
-    );
+    assert_eq!(solve(&either, &[2.0, 1.0]).expect("feasible").to_string(), "01");
+    assert_eq!(solve(&either, &[1.0, 2.0]).expect("feasible").to_string(), "10");
     // Nearest to outputs that are on is a negative weight.
-    assert_eq!(
-        solve(&either, &[-1.0, -1.0]).expect("feasible").to_string(),
-        "11"
-    );
+    assert_eq!(solve(&either, &[-1.0, -1.0]).expect("feasible").to_string(), "11");
 }
 
 fn any_demands() -> impl Strategy<Value = (usize, Vec<Demand>)> {

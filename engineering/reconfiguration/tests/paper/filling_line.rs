@@ -58,12 +58,7 @@ pub(crate) fn controller() -> Controller {
         }
     };
     let moves = MOVES.iter().map(|(from, to)| (from - 1, to - 1));
-    Controller::new(
-        signals(),
-        Vec::new(),
-        STATES.iter().map(state).collect(),
-        moves,
-    )
+    Controller::new(signals(), Vec::new(), STATES.iter().map(state).collect(), moves)
 }
 
 /// Table 5.

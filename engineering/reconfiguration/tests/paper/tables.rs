@@ -42,9 +42,8 @@ fn table_6_follows_from_tables_4_and_5() {
 fn ps2_is_uncontrollable_in_four_states_only() {
     let relation = relation();
     let ps2 = signals().event("ps2+").expect("an event");
-    let without: Vec<usize> = (1..=12)
-        .filter(|state| relation.rows(state - 1, ps2).is_empty())
-        .collect();
+    let without: Vec<usize> =
+        (1..=12).filter(|state| relation.rows(state - 1, ps2).is_empty()).collect();
     assert_eq!(without, [4, 10, 11, 12]);
 }
 
@@ -70,22 +69,10 @@ fn after_break(
     channel: usize,
 ) -> (Vec<usize>, Option<String>) {
     let home = mega.find(&[state as u32 - 1], 0).expect("reached");
-    let place = mega
-        .follow(home, &Label::Break(channel))
-        .expect("it may fail");
+    let place = mega.follow(home, &Label::Break(channel)).expect("it may fail");
     let found = &mega.states[place];
-    let members = found
-        .members
-        .iter()
-        .map(|&member| member as usize + 1)
-        .collect();
-    (
-        members,
-        found
-            .command
-            .as_ref()
-            .map(|command| command.outputs.to_string()),
-    )
+    let members = found.members.iter().map(|&member| member as usize + 1).collect();
+    (members, found.command.as_ref().map(|command| command.outputs.to_string()))
 }
 
 #[test]
@@ -118,15 +105,9 @@ fn ps1_failed_in_state_3_disables_ps1() {
 #[test]
 fn filling_done_failed_in_state_5_stops_the_filling() {
     let prompt = build(Analysis::Prompt, &[3]);
-    assert_eq!(
-        after_break(&prompt, 5, 0),
-        (vec![5], Some("0000".to_owned()))
-    );
+    assert_eq!(after_break(&prompt, 5, 0), (vec![5], Some("0000".to_owned())));
     let late = build(Analysis::Late, &[3]);
-    assert_eq!(
-        after_break(&late, 5, 0),
-        (vec![5, 6, 7], Some("0000".to_owned()))
-    );
+    assert_eq!(after_break(&late, 5, 0), (vec![5, 6, 7], Some("0000".to_owned())));
 }
 
 #[test]
@@ -156,9 +137,8 @@ fn trimming_disables_what_leads_to_where_nothing_leads_back() {
         assert_eq!(told, crossing.count(), "{analysis:?}");
         for (state, events) in &trimming.disabled {
             for &member in &mega.states[*state].members {
-                let defined = events
-                    .iter()
-                    .filter(|&&event| controller.is_defined(member as usize, event));
+                let defined =
+                    events.iter().filter(|&&event| controller.is_defined(member as usize, event));
                 assert!(
                     defined
                         .into_iter()

@@ -79,11 +79,7 @@ impl Section {
 
 /// Places of what is left of each line when comment and white space are off it; nothing of a line where nothing is left.
 fn lines(text: &str) -> impl Iterator<Item = Range<usize>> + '_ {
-    let mut start = if text.starts_with('\u{feff}') {
-        '\u{feff}'.len_utf8()
-    } else {
-        0
-    };
+    let mut start = if text.starts_with('\u{feff}') { '\u{feff}'.len_utf8() } else { 0 };
     let body = &text[start..];
     body.split_inclusive(['\n', '\r']).filter_map(move |line| {
         let at = start;
@@ -254,8 +250,7 @@ impl Reader {
             if size > MAXIMUM_STATES as u64 {
                 let message =
                     format!("{size} states: the format has room for {MAXIMUM_STATES} states");
-                self.diagnostics
-                    .push(Diagnostic::error("U0817", message, place));
+                self.diagnostics.push(Diagnostic::error("U0817", message, place));
             } else {
                 self.size = Some((size, place));
             }
@@ -263,19 +258,14 @@ impl Reader {
         let marked = self.take_marked();
         let vocal = self.take_vocal();
         let transitions = self.take_transitions(text);
-        self.diagnostics
-            .sort_by_key(|diagnostic| diagnostic.span.start);
+        self.diagnostics.sort_by_key(|diagnostic| diagnostic.span.start);
         let automaton = if understudy_text::has_errors(&self.diagnostics) {
             None
         } else {
             let name = self.name.take().unwrap_or_default();
             self.build(name, marked, transitions)
         };
-        Read {
-            automaton,
-            vocal,
-            diagnostics: self.diagnostics,
-        }
+        Read { automaton, vocal, diagnostics: self.diagnostics }
     }
 
     fn check_headings(&mut self, text: &str) {
@@ -283,14 +273,10 @@ impl Reader {
         for section in [Section::Size, Section::Marker, Section::Transitions] {
             if !self.headings.iter().any(|(known, _)| *known == section) {
                 let message = format!("the heading \"{}\" is missing", section.heading());
-                self.diagnostics
-                    .push(Diagnostic::error("U0810", message, end..end));
+                self.diagnostics.push(Diagnostic::error("U0810", message, end..end));
             }
         }
-        let size_heading = self
-            .headings
-            .iter()
-            .find(|(section, _)| *section == Section::Size);
+        let size_heading = self.headings.iter().find(|(section, _)| *section == Section::Size);
         if let (Some((_, place)), None) = (size_heading, &self.size) {
             let message = "the number of states is missing";
             self.diagnostics.push(
@@ -317,13 +303,9 @@ impl Reader {
             let state = self.state(state, &place);
             if !(10..=99).contains(&output) {
                 let message = format!("vocal output {output}: outputs are 10 to 99");
-                self.diagnostics
-                    .push(Diagnostic::error("U0816", message, place));
+                self.diagnostics.push(Diagnostic::error("U0816", message, place));
             } else if let Some(state) = state {
-                vocal.push(Vocal {
-                    state,
-                    output: output as u8,
-                });
+                vocal.push(Vocal { state, output: output as u8 });
             }
         }
         vocal
@@ -343,11 +325,7 @@ impl Reader {
             match known.get(&(source, label)) {
                 None => {
                     known.insert((source, label), (target, line));
-                    transitions.push(Transition {
-                        source,
-                        label,
-                        target,
-                    });
+                    transitions.push(Transition { source, label, target });
                 }
                 Some((first, before)) if *first == target => {
                     let message = format!("the transition {source} {label} {target} stands twice");
@@ -381,8 +359,7 @@ impl Reader {
         let built = Automaton::new(name, [], marked, transitions);
         built
             .map_err(|error: AutomatonError| {
-                self.diagnostics
-                    .push(Diagnostic::error(error.code(), error.to_string(), 0..0));
+                self.diagnostics.push(Diagnostic::error(error.code(), error.to_string(), 0..0));
             })
             .ok()
     }

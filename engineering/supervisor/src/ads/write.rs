@@ -46,10 +46,7 @@ pub fn write_ads(automaton: &Automaton, vocal: &[Vocal]) -> Result<String, AdsEr
         return Err(AdsError::TooManyStates { states });
     }
     let events = automaton.alphabet().events();
-    if let Some(event) = events
-        .iter()
-        .find(|event| event.label.number() > MAXIMUM_LABEL)
-    {
+    if let Some(event) = events.iter().find(|event| event.label.number() > MAXIMUM_LABEL) {
         return Err(AdsError::LabelTooHigh {
             label: event.label.number(),
             name: event.name.clone(),
@@ -77,11 +74,7 @@ pub fn write_ads(automaton: &Automaton, vocal: &[Vocal]) -> Result<String, AdsEr
     text.push_str("# Transition_Label in range 0 to 999.\n");
     text.push_str("# Example: 2 0 1 (for transition labeled 0 from state 2 to state 1).\n\n");
     for transition in automaton.transitions() {
-        let _ = writeln!(
-            text,
-            "{} {} {}",
-            transition.source, transition.label, transition.target
-        );
+        let _ = writeln!(text, "{} {} {}", transition.source, transition.label, transition.target);
     }
     Ok(text)
 }

@@ -32,10 +32,7 @@ const SHARES: [f64; 9] = [0.5, 0.42, 0.58, 0.34, 0.66, 0.26, 0.74, 0.18, 0.82];
 
 impl Label {
     pub(crate) fn at(place: Point, lines: &[String]) -> Self {
-        Self {
-            places: vec![place],
-            lines: lines.to_vec(),
-        }
+        Self { places: vec![place], lines: lines.to_vec() }
     }
 
     /// Along quadratic curves, each by its start, its control point and its end.
@@ -46,15 +43,9 @@ impl Label {
             let (start, control, end) = pieces[number];
             let t = way - number as f64;
             let (a, b, c) = ((1.0 - t) * (1.0 - t), 2.0 * t * (1.0 - t), t * t);
-            (
-                a * start.0 + b * control.0 + c * end.0,
-                a * start.1 + b * control.1 + c * end.1,
-            )
+            (a * start.0 + b * control.0 + c * end.0, a * start.1 + b * control.1 + c * end.1)
         };
-        Self {
-            places: SHARES.into_iter().map(place).collect(),
-            lines: lines.to_vec(),
-        }
+        Self { places: SHARES.into_iter().map(place).collect(), lines: lines.to_vec() }
     }
 }
 
@@ -84,10 +75,7 @@ mod tests {
         let label = Label::along(&line, &["go".to_owned()]);
         let half = (7.0, 7.0);
         assert_eq!(free_place(&label.places, half, &[]), (50.0, 0.0));
-        let other = Area {
-            centre: (50.0, 0.0),
-            half,
-        };
+        let other = Area { centre: (50.0, 0.0), half };
         let place = free_place(&label.places, half, &[other]);
         assert!((place.0 - 50.0).abs() >= 14.0, "{place:?}");
         assert_eq!(free_place(&[(50.0, 0.0)], half, &[other]), (50.0, 0.0));

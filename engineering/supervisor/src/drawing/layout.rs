@@ -50,19 +50,12 @@ pub(crate) fn lay_out(graph: &Graph) -> Layout {
     let mut items: Vec<Item> = Vec::new();
     for (&half, &column) in graph.nodes.iter().zip(&column_of) {
         columns[column].push(items.len());
-        items.push(Item {
-            half,
-            neighbours: Vec::new(),
-            y: 0.0,
-        });
+        items.push(Item { half, neighbours: Vec::new(), y: 0.0 });
     }
     let mut passing: Vec<Vec<usize>> = Vec::new();
     let mut label_width = vec![0.0_f64; count];
     for &(from, to, label) in &graph.arrows {
-        let (low, high) = (
-            column_of[from].min(column_of[to]),
-            column_of[from].max(column_of[to]),
-        );
+        let (low, high) = (column_of[from].min(column_of[to]), column_of[from].max(column_of[to]));
         if high == low + 1 {
             label_width[low] = label_width[low].max(label.0);
         }
@@ -100,10 +93,7 @@ pub(crate) fn lay_out(graph: &Graph) -> Layout {
     }
     Layout {
         nodes: places[..graph.nodes.len()].to_vec(),
-        bends: passing
-            .iter()
-            .map(|path| path.iter().map(|&item| places[item]).collect())
-            .collect(),
+        bends: passing.iter().map(|path| path.iter().map(|&item| places[item]).collect()).collect(),
     }
 }
 
@@ -136,10 +126,7 @@ fn columns_of(graph: &Graph) -> Vec<usize> {
     for node in 0..graph.nodes.len() {
         begin(&[node]);
     }
-    columns
-        .into_iter()
-        .map(|column| column.unwrap_or(0))
-        .collect()
+    columns.into_iter().map(|column| column.unwrap_or(0)).collect()
 }
 
 /// Orders each column by its neighbours, and gives heights.
@@ -150,18 +137,12 @@ fn order(columns: &mut [Vec<usize>], items: &mut [Item]) {
     for sweep in 0..SWEEPS {
         let count = columns.len();
         for step in 0..count {
-            let column = if sweep % 2 == 0 {
-                step
-            } else {
-                count - 1 - step
-            };
+            let column = if sweep % 2 == 0 { step } else { count - 1 - step };
             let column = &mut columns[column];
             // In the last sweeps only the heights change.
             if sweep < SWEEPS * 2 / 3 {
-                let keys: BTreeMap<usize, f64> = column
-                    .iter()
-                    .map(|&item| (item, barycentre(items, item)))
-                    .collect();
+                let keys: BTreeMap<usize, f64> =
+                    column.iter().map(|&item| (item, barycentre(items, item))).collect();
                 column.sort_by(|left, right| keys[left].total_cmp(&keys[right]));
             }
             let wanted: Vec<f64> = column.iter().map(|&item| barycentre(items, item)).collect();
@@ -202,9 +183,8 @@ fn stack(column: &[usize], items: &mut [Item], wanted: &[f64]) {
             blocks.push((low + high, few + many));
         }
     }
-    let heights = blocks
-        .iter()
-        .flat_map(|&(sum, count)| std::iter::repeat_n(sum / count as f64, count));
+    let heights =
+        blocks.iter().flat_map(|&(sum, count)| std::iter::repeat_n(sum / count as f64, count));
     for ((&item, height), offset) in column.iter().zip(heights).zip(offsets) {
         items[item].y = height + offset;
     }

@@ -172,11 +172,7 @@ impl Picture {
     }
 
     fn line(&mut self, path: &str, style: Style) {
-        let dash = if style.dashed {
-            " stroke-dasharray=\"5 3\""
-        } else {
-            ""
-        };
+        let dash = if style.dashed { " stroke-dasharray=\"5 3\"" } else { "" };
         let head = if style.round { "circle" } else { "arrow" };
         let _ = writeln!(
             self.shapes,

@@ -29,28 +29,18 @@ impl Predecessors {
         let mut next = ends.clone();
         for source in 0..states {
             for edge in &edges[first[source] as usize..first[source + 1] as usize] {
-                let flag = if is_controllable[edge.event as usize] {
-                    0
-                } else {
-                    UNCONTROLLABLE
-                };
+                let flag = if is_controllable[edge.event as usize] { 0 } else { UNCONTROLLABLE };
                 let place = &mut next[edge.target.index()];
                 sources[*place as usize] = source as u32 | flag;
                 *place += 1;
             }
         }
-        Self {
-            first: ends,
-            sources,
-        }
+        Self { first: ends, sources }
     }
 
     pub(crate) fn of(automaton: &Automaton) -> Self {
-        let controllable: Vec<bool> = automaton
-            .alphabet()
-            .labels()
-            .map(Label::is_controllable)
-            .collect();
+        let controllable: Vec<bool> =
+            automaton.alphabet().labels().map(Label::is_controllable).collect();
         let (first, edges) = automaton.arrays();
         Self::new(first, edges, &controllable)
     }
@@ -58,12 +48,9 @@ impl Predecessors {
     /// The sources of what leads to `state`, and whether uncontrollably.
     pub(crate) fn of_state(&self, state: usize) -> impl Iterator<Item = (usize, bool)> + '_ {
         let range = self.first[state] as usize..self.first[state + 1] as usize;
-        self.sources[range].iter().map(|&source| {
-            (
-                (source & !UNCONTROLLABLE) as usize,
-                source & UNCONTROLLABLE != 0,
-            )
-        })
+        self.sources[range]
+            .iter()
+            .map(|&source| ((source & !UNCONTROLLABLE) as usize, source & UNCONTROLLABLE != 0))
     }
 }
 
@@ -74,9 +61,8 @@ pub(crate) fn coreachable(
     within: &[bool],
 ) -> Vec<bool> {
     let mut reached = vec![false; marked.len()];
-    let mut pending: Vec<usize> = (0..marked.len())
-        .filter(|&state| marked[state] && within[state])
-        .collect();
+    let mut pending: Vec<usize> =
+        (0..marked.len()).filter(|&state| marked[state] && within[state]).collect();
     for &state in &pending {
         reached[state] = true;
     }
@@ -120,25 +106,16 @@ pub(crate) fn restrict(
                 numbers[target] = order.len() as u32;
                 order.push(edge.target);
             }
-            edges.push(Edge {
-                event: edge.event,
-                target: State::new(numbers[target]),
-            });
+            edges.push(Edge { event: edge.event, target: State::new(numbers[target]) });
         }
         first.push(edges.len() as u32);
         next += 1;
     }
-    let marked = order
-        .iter()
-        .map(|&state| automaton.is_marked(state))
-        .collect();
+    let marked = order.iter().map(|&state| automaton.is_marked(state)).collect();
     let kept = Automaton::from_parts(name, automaton.alphabet().clone(), marked, first, edges);
     let kept = match automaton.state_names() {
         Some(names) => {
-            let names = order
-                .iter()
-                .map(|state| names[state.index()].clone())
-                .collect();
+            let names = order.iter().map(|state| names[state.index()].clone()).collect();
             kept.named_states(names)
         }
         None => kept,

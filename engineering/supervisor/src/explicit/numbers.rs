@@ -28,11 +28,7 @@ const WIDEST_TABLE: usize = 30;
 impl<const WORDS: usize> Numbers<WORDS> {
     /// `bits` of a tuple are in use, the lowest ones.
     pub(super) fn new(bits: usize) -> Self {
-        let dense_from = if bits <= WIDEST_TABLE {
-            (1 << bits) / 4
-        } else {
-            usize::MAX
-        };
+        let dense_from = if bits <= WIDEST_TABLE { (1 << bits) / 4 } else { usize::MAX };
         Self {
             tuples: Vec::new(),
             places: Places::Hashed(HashTable::new()),

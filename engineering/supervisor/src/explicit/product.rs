@@ -40,10 +40,7 @@ impl Product {
         let alphabet = Alphabet::new([]).union(parts.iter().map(|part| part.alphabet()));
         let (fields, bits) = fields(&parts);
         let search = Search {
-            components: parts
-                .iter()
-                .map(|part| Component::new(part, &alphabet, joint))
-                .collect(),
+            components: parts.iter().map(|part| Component::new(part, &alphabet, joint)).collect(),
             plants: plants.len(),
             participants: participants(&parts, &alphabet),
             uncontrollable: uncontrollable(&alphabet),
@@ -58,10 +55,7 @@ impl Product {
             129..=256 => search.run::<4>(),
             257..=512 => search.run::<8>(),
             513..=WIDEST => search.run::<16>(),
-            _ => Err(TooLarge::Tuple {
-                bits,
-                limit: WIDEST,
-            }),
+            _ => Err(TooLarge::Tuple { bits, limit: WIDEST }),
         }
     }
 
@@ -178,11 +172,7 @@ impl<'a> Component<'a> {
                 allowed[start + place / 64] |= 1 << (place % 64);
             }
         }
-        Self {
-            automaton,
-            own,
-            allowed,
-        }
+        Self { automaton, own, allowed }
     }
 
     /// Where `event`, which is enabled and its own, leads: its edges are in the order of the product's alphabet, so the place among
@@ -194,9 +184,7 @@ impl<'a> Component<'a> {
         let before = (0..word).map(|word| (allowed[word] & self.own[word]).count_ones());
         let rank = before.sum::<u32>()
             + (allowed[word] & self.own[word] & ((1 << (event % 64)) - 1)).count_ones();
-        self.automaton.edges(State::new(state))[rank as usize]
-            .target
-            .number()
+        self.automaton.edges(State::new(state))[rank as usize].target.number()
     }
 }
 
@@ -220,11 +208,7 @@ impl Search<'_> {
         let mut violated = Vec::new();
         let mut local = vec![0; self.components.len()];
         let mut enabled = vec![0; self.uncontrollable.len()];
-        if self
-            .components
-            .iter()
-            .all(|component| !component.automaton.is_empty())
-        {
+        if self.components.iter().all(|component| !component.automaton.is_empty()) {
             numbers.number([0; WORDS]);
         }
         let mut state = 0;
@@ -242,10 +226,7 @@ impl Search<'_> {
                         set &= set - 1;
                         let next = self.next(tuple, &local, event);
                         let number = numbers.number(next);
-                        edges.push(Edge {
-                            event: event as u32,
-                            target: State::new(number),
-                        });
+                        edges.push(Edge { event: event as u32, target: State::new(number) });
                     }
                 }
             } else {
@@ -290,9 +271,7 @@ impl Search<'_> {
                 self.components[component].allowed[local[component] as usize * words + word]
             };
             let plant = (0..self.plants).map(allowed).fold(!0, |all, set| all & set);
-            let all = (self.plants..local.len())
-                .map(allowed)
-                .fold(plant, |all, set| all & set);
+            let all = (self.plants..local.len()).map(allowed).fold(plant, |all, set| all & set);
             violated |= plant & !all & self.uncontrollable[word];
             *enabled = all;
         }

@@ -22,28 +22,21 @@ impl Located {
     /// The same, not read from a text.
     #[must_use]
     pub fn without_place(self) -> Self {
-        Self {
-            signal: Name::from(self.signal.as_str()),
-            ..self
-        }
+        Self { signal: Name::from(self.signal.as_str()), ..self }
     }
 }
 
 /// Addresses under the key `addresses`; U0867 for an invalid one.
 pub(crate) fn read_addresses(form: &mut Form<'_>, table: &DeTable) -> Vec<Located> {
-    let entries = table
-        .get("addresses")
-        .and_then(|value| form.table("addresses", value));
+    let entries = table.get("addresses").and_then(|value| form.table("addresses", value));
     let mut located = Vec::new();
     for (name, value) in entries.into_iter().flatten() {
         let Some(text) = form.string(name.get_ref(), value) else {
             continue;
         };
         match text.strip_prefix('%').and_then(parse_address) {
-            Some(address) => located.push(Located {
-                signal: Name::at(name.get_ref().as_ref(), name.span()),
-                address,
-            }),
+            Some(address) => located
+                .push(Located { signal: Name::at(name.get_ref().as_ref(), name.span()), address }),
             None => form.diagnostics.push(
                 Diagnostic::error(
                     "U0867",
@@ -66,14 +59,9 @@ pub fn locate(program: &mut Program, addresses: &[Located]) -> Result<(), Vec<Di
     let mut diagnostics = Vec::new();
     for (number, located) in addresses.iter().enumerate() {
         let Located { signal, address } = located;
-        if let Some(first) = addresses[..number]
-            .iter()
-            .find(|first| first.address == *address)
-        {
-            let message = format!(
-                "{address} is the address of `{signal}` and of `{}`",
-                first.signal
-            );
+        if let Some(first) = addresses[..number].iter().find(|first| first.address == *address) {
+            let message =
+                format!("{address} is the address of `{signal}` and of `{}`", first.signal);
             diagnostics.push(
                 Diagnostic::error("U0867", message, signal.span())
                     .with_related(first.signal.span(), "the first is here"),
@@ -100,11 +88,7 @@ pub fn locate(program: &mut Program, addresses: &[Located]) -> Result<(), Vec<Di
             Some((_, declared)) => declared.address = Some(address.clone()),
         }
     }
-    if diagnostics.is_empty() {
-        Ok(())
-    } else {
-        Err(diagnostics)
-    }
+    if diagnostics.is_empty() { Ok(()) } else { Err(diagnostics) }
 }
 
 fn unknown(program: &Program, signal: &Name) -> Diagnostic {

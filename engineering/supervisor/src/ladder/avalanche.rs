@@ -26,14 +26,12 @@ pub fn repetitions(automaton: &Automaton) -> Vec<Repetition> {
                 continue;
             }
             let second = automaton.successor(edge.target, edge.event);
-            *place = second
-                .filter(|&target| target != edge.target)
-                .map(|target| Repetition {
-                    label: automaton.label(*edge),
-                    source,
-                    middle: edge.target,
-                    target,
-                });
+            *place = second.filter(|&target| target != edge.target).map(|target| Repetition {
+                label: automaton.label(*edge),
+                source,
+                middle: edge.target,
+                target,
+            });
         }
     }
     found.into_iter().flatten().collect()
@@ -44,8 +42,5 @@ pub fn repetitions(automaton: &Automaton) -> Vec<Repetition> {
 /// This is all that can happen while rungs are grouped by event, as [`convert`](super::convert) groups them. Where they stand
 /// by state, an event can also come back to a rung by way of other events and commands of the same scan.
 pub fn avalanche_events(automaton: &Automaton) -> Vec<Label> {
-    repetitions(automaton)
-        .into_iter()
-        .map(|repetition| repetition.label)
-        .collect()
+    repetitions(automaton).into_iter().map(|repetition| repetition.label).collect()
 }

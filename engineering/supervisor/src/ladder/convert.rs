@@ -53,10 +53,7 @@ pub fn convert(
     mode: Mode,
 ) -> Result<Conversion, Vec<Diagnostic>> {
     let partition = Partition::new(map, modules)?;
-    let rows = modules
-        .all()
-        .map(|automaton| omega(automaton, map, &partition, mode))
-        .collect();
+    let rows = modules.all().map(|automaton| omega(automaton, map, &partition, mode)).collect();
     let converter = Converter::new(modules, map, &partition, mode);
     let mut conversion = converter.finish(rows);
     locate(&mut conversion.program, &map.addresses)?;
@@ -102,10 +99,7 @@ impl<'a> Converter<'a> {
             modules: *modules,
             groups: groups(modules),
             names: Names::default(),
-            program: Program {
-                name: map.program.clone(),
-                ..Program::default()
-            },
+            program: Program { name: map.program.clone(), ..Program::default() },
             states: Vec::new(),
             requests: BTreeMap::new(),
             bits: BTreeMap::new(),
@@ -137,10 +131,7 @@ impl<'a> Converter<'a> {
             program: self.program,
             rows,
             consumed: self.consumed.into_iter().collect(),
-            correspondence: Correspondence {
-                states: self.states,
-                requests: self.requests,
-            },
+            correspondence: Correspondence { states: self.states, requests: self.requests },
         }
     }
 
@@ -150,10 +141,7 @@ impl<'a> Converter<'a> {
             .iter()
             .map(|automaton| {
                 let (states, transitions) = (automaton.state_count(), automaton.transition_count());
-                format!(
-                    "{} ({states} states, {transitions} transitions)",
-                    automaton.name()
-                )
+                format!("{} ({states} states, {transitions} transitions)", automaton.name())
             })
             .collect();
         self.program.comments = vec![
@@ -189,10 +177,7 @@ impl<'a> Converter<'a> {
                 When::Low => "is 0",
             };
             let text = format!("{by}: {} when it {when}", input.event);
-            match inputs
-                .iter_mut()
-                .find(|known: &&mut Signal| known.name == input.signal)
-            {
+            match inputs.iter_mut().find(|known: &&mut Signal| known.name == input.signal) {
                 Some(known) => {
                     let description = known.description.get_or_insert_default();
                     description.push_str(&format!("; {} when it {when}", input.event));
@@ -223,10 +208,7 @@ impl<'a> Converter<'a> {
         }
         let signals = self.program.inputs.iter().chain(self.program.writable());
         let signals: Vec<Name> = signals.map(|signal| signal.name.clone()).collect();
-        for signal in signals
-            .iter()
-            .chain(map.timers.iter().map(|timer| &timer.name))
-        {
+        for signal in signals.iter().chain(map.timers.iter().map(|timer| &timer.name)) {
             self.names.take(signal);
         }
     }
@@ -301,10 +283,7 @@ impl<'a> Converter<'a> {
     /// Needed where a command brings an automaton to a state with another command, so that the plant sees one at a time.
     fn begin_scan(&mut self) {
         let controllable = |automaton: &Automaton, state| {
-            let mut labels = automaton
-                .edges(state)
-                .iter()
-                .map(|edge| automaton.label(*edge));
+            let mut labels = automaton.edges(state).iter().map(|edge| automaton.label(*edge));
             labels.any(Label::is_controllable)
         };
         let chains = self.automata.len() > 1
@@ -330,11 +309,7 @@ impl<'a> Converter<'a> {
         if let (Some(start), Some(started)) = (&self.map.start, self.started.clone()) {
             let mut coils: Vec<_> = self.states.iter().map(|bits| set(&bits[0])).collect();
             coils.push(set(&started));
-            let title = if self.automata.len() == 1 {
-                "1: start"
-            } else {
-                "start"
-            };
+            let title = if self.automata.len() == 1 { "1: start" } else { "start" };
             self.push(title, vec![open(start), closed(&started)], coils);
         }
     }
@@ -436,13 +411,9 @@ fn repeats(automaton: &Automaton, label: Label) -> bool {
         return false;
     };
     automaton.states().any(|source| {
-        let middle = automaton
-            .successor(source, event)
-            .filter(|&target| target != source);
+        let middle = automaton.successor(source, event).filter(|&target| target != source);
         middle.is_some_and(|middle| {
-            automaton
-                .successor(middle, event)
-                .is_some_and(|target| target != middle)
+            automaton.successor(middle, event).is_some_and(|target| target != middle)
         })
     })
 }

@@ -74,10 +74,7 @@ impl InputOutputMap {
             })
         });
         let own: Vec<Signal> = own.collect();
-        let map = Self {
-            program,
-            ..Self::default()
-        };
+        let map = Self { program, ..Self::default() };
         map.with_signals(&own, alphabet)
     }
 
@@ -85,10 +82,8 @@ impl InputOutputMap {
     /// event, an output that is 1 for one scan for a controllable one.
     #[must_use]
     pub fn with_signals(mut self, signals: &[Signal], alphabet: &Alphabet) -> Self {
-        let named: BTreeSet<Label> = self
-            .event_names()
-            .filter_map(|name| find_event(alphabet, name))
-            .collect();
+        let named: BTreeSet<Label> =
+            self.event_names().filter_map(|name| find_event(alphabet, name)).collect();
         for event in alphabet.events() {
             let signal = signals.iter().find(|signal| signal.label == event.label);
             let Some(signal) = signal.filter(|_| !named.contains(&event.label)) else {
@@ -147,10 +142,10 @@ impl InputOutputMap {
     /// `automaton` with the names that the map gives to its events.
     #[must_use]
     pub fn name_events(&self, automaton: Automaton) -> Automaton {
-        let named = self.events.iter().map(|event| Event {
-            label: event.label,
-            name: event.name.to_string(),
-        });
+        let named = self
+            .events
+            .iter()
+            .map(|event| Event { label: event.label, name: event.name.to_string() });
         automaton.with_event_names(&Alphabet::new(named))
     }
 }
@@ -290,11 +285,8 @@ pub enum Mode {
 
 impl Mode {
     /// All, with their words on the command line.
-    pub const WORDS: [(&'static str, Self); 3] = [
-        ("automatic", Self::Automatic),
-        ("manual", Self::Manual),
-        ("requested", Self::Requested),
-    ];
+    pub const WORDS: [(&'static str, Self); 3] =
+        [("automatic", Self::Automatic), ("manual", Self::Manual), ("requested", Self::Requested)];
 }
 
 impl fmt::Display for Mode {

@@ -19,11 +19,8 @@ impl Names {
     /// The name that is nearest to `parts` with dots between them: what a name cannot have becomes `_`, and a number is put
     /// behind one that is taken.
     pub(crate) fn fresh(&mut self, parts: &[&str]) -> Name {
-        let parts: Vec<String> = parts
-            .iter()
-            .filter(|part| !part.is_empty())
-            .map(|part| legal(part))
-            .collect();
+        let parts: Vec<String> =
+            parts.iter().filter(|part| !part.is_empty()).map(|part| legal(part)).collect();
         let mut wanted = parts.join(".");
         if !wanted.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_') {
             wanted.insert(0, '_');
@@ -50,9 +47,7 @@ pub(crate) const ILLEGAL_NAME: &str = "letters, digits and `_`, single dots betw
 pub(crate) fn is_legal(name: &str) -> bool {
     let part = |part: &str| {
         !part.is_empty()
-            && part
-                .chars()
-                .all(|character| character.is_ascii_alphanumeric() || character == '_')
+            && part.chars().all(|character| character.is_ascii_alphanumeric() || character == '_')
     };
     name.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_')
         && name.split('.').all(part)
@@ -62,11 +57,7 @@ pub(crate) fn is_legal(name: &str) -> bool {
 
 fn legal(part: &str) -> String {
     let character = |character: char| {
-        if character.is_ascii_alphanumeric() {
-            character
-        } else {
-            '_'
-        }
+        if character.is_ascii_alphanumeric() { character } else { '_' }
     };
     part.chars().map(character).collect()
 }

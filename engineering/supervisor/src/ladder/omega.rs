@@ -72,9 +72,8 @@ pub fn omega(
     }
     for source in automaton.states() {
         let edges = automaton.edges(source);
-        let (commands, events): (Vec<&Edge>, Vec<&Edge>) = edges
-            .iter()
-            .partition(|edge| automaton.label(**edge).is_controllable());
+        let (commands, events): (Vec<&Edge>, Vec<&Edge>) =
+            edges.iter().partition(|edge| automaton.label(**edge).is_controllable());
         let has_choice = commands.len() > 1;
         for edge in events.into_iter().filter(|edge| edge.target != source) {
             rows.push(Row {
@@ -155,16 +154,9 @@ pub(crate) fn action(
 /// The rows as the thesis prints them: number, current state, event, next state, latch, unlatch. A request bears the mark '.
 pub fn table(automaton: &Automaton, rows: &[Row]) -> String {
     let mut cells = vec![
-        [
-            "Rung",
-            "Current state",
-            "Event",
-            "Next state",
-            "Latch",
-            "Unlatch",
-        ]
-        .map(str::to_owned)
-        .to_vec(),
+        ["Rung", "Current state", "Event", "Next state", "Latch", "Unlatch"]
+            .map(str::to_owned)
+            .to_vec(),
     ];
     for row in rows {
         let (mark, event) = match &row.trigger {
@@ -177,16 +169,11 @@ pub fn table(automaton: &Automaton, rows: &[Row]) -> String {
         let empty = || "∅".to_owned();
         cells.push(vec![
             format!("{}{mark}", row.number),
-            row.source
-                .map_or_else(empty, |state| automaton.state_name(state).into_owned()),
+            row.source.map_or_else(empty, |state| automaton.state_name(state).into_owned()),
             event,
             automaton.state_name(row.target).into_owned(),
             row.latch.as_ref().map_or_else(empty, Name::to_string),
-            if unlatch.is_empty() {
-                empty()
-            } else {
-                format!("{{{}}}", unlatch.join(", "))
-            },
+            if unlatch.is_empty() { empty() } else { format!("{{{}}}", unlatch.join(", ")) },
         ]);
     }
     let width = |column: usize| {

@@ -29,10 +29,8 @@ pub(crate) fn groups(modules: &Modules) -> Vec<Group> {
         }
     }
     let (enables, saves) = before(modules, &moving);
-    let mut waiting: BTreeMap<Label, BTreeSet<Label>> = moving
-        .iter()
-        .map(|&label| (label, BTreeSet::new()))
-        .collect();
+    let mut waiting: BTreeMap<Label, BTreeSet<Label>> =
+        moving.iter().map(|&label| (label, BTreeSet::new())).collect();
     for (first, second) in enables.union(&saves) {
         if let Some(waits) = waiting.get_mut(second) {
             waits.insert(*first);
@@ -45,9 +43,7 @@ pub(crate) fn groups(modules: &Modules) -> Vec<Group> {
         let next = waiting
             .iter()
             .min_by_key(|(label, waits)| {
-                let saving = waits
-                    .iter()
-                    .filter(|&&first| saves.contains(&(first, **label)));
+                let saving = waits.iter().filter(|&&first| saves.contains(&(first, **label)));
                 (saving.count(), waits.len(), **label)
             })
             .map(|(label, _)| *label);
@@ -71,10 +67,7 @@ pub(crate) fn groups(modules: &Modules) -> Vec<Group> {
     }
     let mut groups = Vec::new();
     for (index, label) in order.into_iter().enumerate() {
-        groups.push(Group {
-            label,
-            again: false,
-        });
+        groups.push(Group { label, again: false });
         let later = again.remove(&index).into_iter().flatten();
         groups.extend(later.map(|label| Group { label, again: true }));
     }
@@ -91,11 +84,8 @@ fn before(modules: &Modules, moving: &BTreeSet<Label>) -> (Pairs, Pairs) {
     let mut saves = Pairs::new();
     for (index, automaton) in automata.iter().enumerate() {
         let is_witness = |label: Label| modules.witnesses(label).contains(&index);
-        let witnessed: BTreeSet<Label> = moving
-            .iter()
-            .copied()
-            .filter(|&label| is_witness(label))
-            .collect();
+        let witnessed: BTreeSet<Label> =
+            moving.iter().copied().filter(|&label| is_witness(label)).collect();
         let uncontrollable = |state: State| {
             automaton
                 .edges(state)

@@ -26,10 +26,7 @@ pub struct Modules<'a> {
 impl<'a> Modules<'a> {
     /// One supervisor alone.
     pub fn supervisor(supervisor: &'a Automaton) -> Self {
-        Self {
-            supervisors: std::slice::from_ref(supervisor),
-            plants: &[],
-        }
+        Self { supervisors: std::slice::from_ref(supervisor), plants: &[] }
     }
 
     /// All automata, supervisors first.
@@ -54,16 +51,10 @@ impl<'a> Modules<'a> {
         let first_plant = self.supervisors.len();
         if self.plants.iter().any(knows) {
             let plants = (first_plant..).zip(self.plants);
-            plants
-                .filter(|(_, plant)| knows(plant))
-                .map(|(place, _)| place)
-                .collect()
+            plants.filter(|(_, plant)| knows(plant)).map(|(place, _)| place).collect()
         } else {
             let supervisors = (0..).zip(self.supervisors);
-            supervisors
-                .filter(|(_, automaton)| knows(automaton))
-                .map(|(place, _)| place)
-                .collect()
+            supervisors.filter(|(_, automaton)| knows(automaton)).map(|(place, _)| place).collect()
         }
     }
 
@@ -107,10 +98,10 @@ impl Partition {
     /// on a signal that no switch has, U0858 an automaton without states, U0859 too many positions, or none.
     pub fn new(map: &InputOutputMap, modules: &Modules) -> Result<Self, Vec<Diagnostic>> {
         let alphabet = modules.alphabet();
-        let given = map.events.iter().map(|event| Event {
-            label: event.label,
-            name: event.name.to_string(),
-        });
+        let given = map
+            .events
+            .iter()
+            .map(|event| Event { label: event.label, name: event.name.to_string() });
         let known = alphabet.labels().collect::<Vec<_>>();
         let given = given.filter(|event| known.contains(&event.label));
         let alphabet = Alphabet::new(given).union([&alphabet]);
@@ -125,9 +116,7 @@ impl Partition {
                 "the automaton `{}` has no state: there is no supervisor that keeps the specification",
                 automaton.name()
             );
-            resolver
-                .diagnostics
-                .push(Diagnostic::error("U0858", message, 0..0));
+            resolver.diagnostics.push(Diagnostic::error("U0858", message, 0..0));
         }
         resolver.name(&map.program);
         if let Some(start) = &map.start {
@@ -182,9 +171,7 @@ impl Resolver<'_> {
         for (place, input) in map.inputs.iter().enumerate() {
             self.give(&input.event, Meaning::Input(place), false);
             let others = seen.entry(&input.signal).or_default();
-            let clash = others
-                .iter()
-                .find(|&&other| map.inputs[other].when == input.when);
+            let clash = others.iter().find(|&&other| map.inputs[other].when == input.when);
             if let Some(&other) = clash {
                 let message = format!("`{}` brings two events in the same way", input.signal);
                 let first = &map.inputs[other].signal;
@@ -204,10 +191,7 @@ impl Resolver<'_> {
             self.signal(&timer.name, "a timer");
             let positions = map.switches.iter().flat_map(|switch| &switch.positions);
             let signals = positions.map(|position| position.signal.as_str());
-            if !signals
-                .clone()
-                .any(|signal| signal == timer.runs_while.as_str())
-            {
+            if !signals.clone().any(|signal| signal == timer.runs_while.as_str()) {
                 let message = format!("no switch has the signal `{}`", timer.runs_while);
                 let help = spelling::question(&timer.runs_while, signals).unwrap_or_else(|| {
                     "a timer runs while the signal of a switch's position is on".into()
@@ -226,10 +210,7 @@ impl Resolver<'_> {
                 self.give(off, Meaning::Switch { switch, position }, true);
             }
             for (place, position) in content.positions.iter().enumerate() {
-                let meaning = Meaning::Switch {
-                    switch,
-                    position: place + 1,
-                };
+                let meaning = Meaning::Switch { switch, position: place + 1 };
                 self.give(&position.event, meaning, true);
                 self.signal(&position.signal, "a position of a switch");
             }
@@ -247,8 +228,7 @@ impl Resolver<'_> {
                     content.positions.len()
                 );
                 let span = content.positions[MAXIMUM_POSITIONS].event.span();
-                self.diagnostics
-                    .push(Diagnostic::error("U0859", message, span));
+                self.diagnostics.push(Diagnostic::error("U0859", message, span));
             }
         }
         for (place, pulse) in map.pulses.iter().enumerate() {
@@ -267,8 +247,7 @@ impl Resolver<'_> {
             self.signal(&request.signal, "a request");
             if requests.insert(label, request.signal.clone()).is_some() {
                 let message = format!("`{}` has two requests", request.event);
-                self.diagnostics
-                    .push(Diagnostic::error("U0852", message, request.event.span()));
+                self.diagnostics.push(Diagnostic::error("U0852", message, request.event.span()));
             }
         }
         requests
@@ -285,8 +264,7 @@ impl Resolver<'_> {
                 ("uncontrollable", "give it an [[input]] or a [[timer]]")
             };
             let message = format!("the {kind} event `{}` has no signal", event.name);
-            self.diagnostics
-                .push(Diagnostic::error("U0853", message, 0..0).with_help(help));
+            self.diagnostics.push(Diagnostic::error("U0853", message, 0..0).with_help(help));
         }
     }
 
@@ -315,8 +293,7 @@ impl Resolver<'_> {
         } else {
             format!("`{event}` is controllable ({label}, an odd label): the PLC generates it")
         };
-        self.diagnostics
-            .push(Diagnostic::error("U0854", message, event.span()));
+        self.diagnostics.push(Diagnostic::error("U0854", message, event.span()));
     }
 
     fn label(&mut self, event: &Name) -> Option<Label> {
@@ -349,8 +326,7 @@ impl Resolver<'_> {
                     .with_related(first.span(), "the first is here"),
             );
         } else {
-            self.signals
-                .insert(signal.to_string(), (what.to_owned(), signal.clone()));
+            self.signals.insert(signal.to_string(), (what.to_owned(), signal.clone()));
         }
     }
 }

@@ -58,10 +58,7 @@ pub struct ReadMap {
 /// the names mean something is the business of [`Partition::new`](super::Partition::new).
 pub fn read_map(text: &str) -> ReadMap {
     let (map, diagnostics) = form::read(text, &CODES, map);
-    ReadMap {
-        map: map.filter(|_| !has_errors(&diagnostics)),
-        diagnostics,
-    }
+    ReadMap { map: map.filter(|_| !has_errors(&diagnostics)), diagnostics }
 }
 
 fn map(form: &mut Form<'_>, table: &DeTable) -> InputOutputMap {
@@ -129,9 +126,7 @@ fn map(form: &mut Form<'_>, table: &DeTable) -> InputOutputMap {
 }
 
 fn event_names(form: &mut Form<'_>, table: &DeTable) -> Vec<EventName> {
-    let entries = table
-        .get("events")
-        .and_then(|value| form.table("events", value));
+    let entries = table.get("events").and_then(|value| form.table("events", value));
     let mut events = Vec::new();
     for (name, value) in entries.into_iter().flatten() {
         let number = value.get_ref().as_integer();

@@ -3,10 +3,7 @@
 use understudy_ladder::{Coil, CoilKind, Contact, ContactKind, Element, Name, Rung};
 
 fn contact(kind: ContactKind, operand: &Name) -> Element {
-    Element::Contact(Contact {
-        kind,
-        operand: operand.clone(),
-    })
+    Element::Contact(Contact { kind, operand: operand.clone() })
 }
 
 /// `a`
@@ -30,17 +27,12 @@ pub(crate) fn any<'n>(operands: impl IntoIterator<Item = &'n Name>) -> Option<El
     match contacts.len() {
         0 => None,
         1 => contacts.pop(),
-        _ => Some(Element::Branches(
-            contacts.into_iter().map(|contact| vec![contact]).collect(),
-        )),
+        _ => Some(Element::Branches(contacts.into_iter().map(|contact| vec![contact]).collect())),
     }
 }
 
 fn coil(kind: CoilKind, target: &Name) -> Coil {
-    Coil {
-        kind,
-        target: target.clone(),
-    }
+    Coil { kind, target: target.clone() }
 }
 
 /// `( y )`
@@ -60,10 +52,5 @@ pub(crate) fn reset(target: &Name) -> Coil {
 
 /// A rung with a title.
 pub(crate) fn rung(title: impl Into<String>, network: Vec<Element>, coils: Vec<Coil>) -> Rung {
-    Rung {
-        title: Some(title.into()),
-        network,
-        coils,
-        ..Rung::default()
-    }
+    Rung { title: Some(title.into()), network, coils, ..Rung::default() }
 }

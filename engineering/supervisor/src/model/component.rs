@@ -67,12 +67,8 @@ pub(super) fn read_component(
         None => Vec::new(),
     };
     let own = own.iter().filter_map(|word| events.find(form, word));
-    let own: Vec<Event> = own
-        .map(|label| Event {
-            label,
-            name: events.alphabet.name(label),
-        })
-        .collect();
+    let own: Vec<Event> =
+        own.map(|label| Event { label, name: events.alphabet.name(label) }).collect();
     if states.names.is_empty() {
         // `states = []` says that there is none: EMPTY.
         if table.contains_key("states") {
@@ -80,9 +76,7 @@ pub(super) fn read_component(
         }
         states.names.push(("0", place.clone()));
     }
-    let initial = initial
-        .and_then(|(word, _)| states.numbers.get(word).copied())
-        .unwrap_or(0);
+    let initial = initial.and_then(|(word, _)| states.numbers.get(word).copied()).unwrap_or(0);
     build(form, name, own, states, marked, transitions, initial)
 }
 
@@ -113,14 +107,8 @@ fn build(
         Ok(automaton) => {
             warn_of_unreached(form, &automaton, &names);
             // Numbers are the names of states that have none.
-            let has_names = (0_u32..)
-                .zip(&texts)
-                .any(|(number, text)| *text != number.to_string());
-            Some(if has_names {
-                automaton.named_states(texts)
-            } else {
-                automaton
-            })
+            let has_names = (0_u32..).zip(&texts).any(|(number, text)| *text != number.to_string());
+            Some(if has_names { automaton.named_states(texts) } else { automaton })
         }
         Err(error) => {
             let place = names[0].1.clone();
@@ -178,8 +166,7 @@ fn transitions<'t>(
                     event.0
                 );
                 let diagnostic = Diagnostic::error("U0826", message, place);
-                form.diagnostics
-                    .push(diagnostic.with_related(other.clone(), "the other one"));
+                form.diagnostics.push(diagnostic.with_related(other.clone(), "the other one"));
             }
             _ => {
                 known.insert((source, label), (target, place));

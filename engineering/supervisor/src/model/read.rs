@@ -46,18 +46,11 @@ const ROLES: [&str; 3] = ["plant", "specification", "supervisor"];
 pub fn read_model(text: &str, mut load: impl FnMut(&str) -> Result<String, String>) -> ReadModel {
     let mut files = Vec::new();
     let (model, diagnostics) = form::read(text, &CODES, |form, table| {
-        let mut loader = Loader {
-            load: &mut load,
-            files: &mut files,
-        };
+        let mut loader = Loader { load: &mut load, files: &mut files };
         model(form, table, &mut loader)
     });
     let right = !has_errors(&diagnostics) && !files.iter().any(Report::has_errors);
-    ReadModel {
-        model: model.filter(|_| right),
-        diagnostics,
-        files,
-    }
+    ReadModel { model: model.filter(|_| right), diagnostics, files }
 }
 
 /// Files named by a model.
@@ -89,11 +82,7 @@ impl Loader<'_> {
     fn net(&mut self, form: &mut Form<'_>, value: &Spanned<DeValue>) -> Option<NetFile> {
         let (path, text) = self.text(form, "net", value)?;
         let read = read_net(&text);
-        self.files.push(Report {
-            name: path,
-            text,
-            diagnostics: read.diagnostics,
-        });
+        self.files.push(Report { name: path, text, diagnostics: read.diagnostics });
         read.file
     }
 
@@ -106,11 +95,7 @@ impl Loader<'_> {
     ) -> Option<Automaton> {
         let (path, text) = self.text(form, "file", value)?;
         let read = read_ads(&text);
-        self.files.push(Report {
-            name: path,
-            text,
-            diagnostics: read.diagnostics,
-        });
+        self.files.push(Report { name: path, text, diagnostics: read.diagnostics });
         let automaton = read.automaton?;
         Some(match name {
             Some(name) => automaton.with_name(name),
@@ -167,15 +152,10 @@ fn model(form: &mut Form<'_>, table: &DeTable, loader: &mut Loader<'_>) -> Model
 
 /// The nets that are plants, by the place of their key.
 fn nets(form: &mut Form<'_>, table: &DeTable, loader: &mut Loader<'_>) -> HashMap<usize, NetFile> {
-    let plants = table
-        .get("plant")
-        .and_then(|plants| plants.get_ref().as_array());
+    let plants = table.get("plant").and_then(|plants| plants.get_ref().as_array());
     let mut nets = HashMap::new();
     for plant in plants.into_iter().flatten() {
-        let value = plant
-            .get_ref()
-            .as_table()
-            .and_then(|plant| plant.get("net"));
+        let value = plant.get_ref().as_table().and_then(|plant| plant.get("net"));
         if let Some(value) = value
             && let Some(net) = loader.net(form, value)
         {

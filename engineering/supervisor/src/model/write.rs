@@ -16,11 +16,7 @@ pub fn write_model(model: &Model) -> String {
             key(&event.name),
             event.label
         );
-        if let Some(signal) = model
-            .signals
-            .iter()
-            .find(|signal| signal.label == event.label)
-        {
+        if let Some(signal) = model.signals.iter().find(|signal| signal.label == event.label) {
             let _ = write!(text, ", signal = {}", quoted(&signal.signal));
             if let Some(when) = signal.when {
                 let _ = write!(text, ", when = {}", quoted(when.word()));
@@ -50,41 +46,21 @@ pub fn write_model(model: &Model) -> String {
 }
 
 fn write_automaton(text: &mut String, automaton: &Automaton, event_name: &dyn Fn(Label) -> String) {
-    let list = |words: Vec<String>| {
-        words
-            .iter()
-            .map(|word| quoted(word))
-            .collect::<Vec<_>>()
-            .join(", ")
-    };
+    let list =
+        |words: Vec<String>| words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(", ");
     let state = |state| automaton.state_name(state).into_owned();
     let _ = writeln!(text, "name = {}", quoted(automaton.name()));
-    let blocked = automaton
-        .blocked_events()
-        .into_iter()
-        .map(event_name)
-        .collect::<Vec<_>>();
+    let blocked = automaton.blocked_events().into_iter().map(event_name).collect::<Vec<_>>();
     if !blocked.is_empty() {
         let _ = writeln!(text, "# never possible\nevents = [{}]", list(blocked));
     }
     // States are numbered in the order in which a reader meets them; this keeps the numbers.
-    let _ = writeln!(
-        text,
-        "states = [{}]",
-        list(automaton.states().map(state).collect())
-    );
-    let _ = writeln!(
-        text,
-        "marked = [{}]",
-        list(automaton.marked().map(state).collect())
-    );
+    let _ = writeln!(text, "states = [{}]", list(automaton.states().map(state).collect()));
+    let _ = writeln!(text, "marked = [{}]", list(automaton.marked().map(state).collect()));
     text.push_str("transitions = [\n");
     for transition in automaton.transitions() {
-        let line = [
-            state(transition.source),
-            event_name(transition.label),
-            state(transition.target),
-        ];
+        let line =
+            [state(transition.source), event_name(transition.label), state(transition.target)];
         let _ = writeln!(text, "    {},", quoted(&line.join(" ")));
     }
     text.push_str("]\n");

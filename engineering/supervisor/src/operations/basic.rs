@@ -26,9 +26,7 @@ impl AlreadyKnown {
 /// # Errors
 /// It knows one of the events already.
 pub fn selfloop(automaton: &Automaton, events: &[Event]) -> Result<Automaton, AlreadyKnown> {
-    let known = events
-        .iter()
-        .find(|event| automaton.alphabet().contains(event.label));
+    let known = events.iter().find(|event| automaton.alphabet().contains(event.label));
     if let Some(event) = known {
         return Err(AlreadyKnown {
             automaton: automaton.name().to_owned(),
@@ -46,28 +44,19 @@ pub fn selfloop(automaton: &Automaton, events: &[Event]) -> Result<Automaton, Al
         Vec::with_capacity(automaton.transition_count() + automaton.state_count() * loops.len());
     for state in automaton.states() {
         let start = edges.len();
-        edges.extend(automaton.edges(state).iter().map(|edge| Edge {
-            event: places[edge.event as usize],
-            target: edge.target,
-        }));
-        edges.extend(loops.iter().map(|&event| Edge {
-            event,
-            target: state,
-        }));
+        edges.extend(
+            automaton
+                .edges(state)
+                .iter()
+                .map(|edge| Edge { event: places[edge.event as usize], target: edge.target }),
+        );
+        edges.extend(loops.iter().map(|&event| Edge { event, target: state }));
         edges[start..].sort_unstable_by_key(|edge: &Edge| edge.event);
         first.push(edges.len() as u32);
     }
-    let marked = automaton
-        .states()
-        .map(|state| automaton.is_marked(state))
-        .collect();
-    let looped = Automaton::from_parts(
-        automaton.name().to_owned(),
-        alphabet.clone(),
-        marked,
-        first,
-        edges,
-    );
+    let marked = automaton.states().map(|state| automaton.is_marked(state)).collect();
+    let looped =
+        Automaton::from_parts(automaton.name().to_owned(), alphabet.clone(), marked, first, edges);
     Ok(match automaton.state_names() {
         Some(names) => looped.named_states(names.to_vec()),
         None => looped,
@@ -76,19 +65,10 @@ pub fn selfloop(automaton: &Automaton, events: &[Event]) -> Result<Automaton, Al
 
 /// `allevents`: one marked state that allows every event of `alphabet`.
 pub fn allevents(alphabet: &Alphabet) -> Automaton {
-    let edges = (0..alphabet.len() as u32).map(|event| Edge {
-        event,
-        target: State::INITIAL,
-    });
+    let edges = (0..alphabet.len() as u32).map(|event| Edge { event, target: State::INITIAL });
     let edges: Vec<Edge> = edges.collect();
     let first = vec![0, edges.len() as u32];
-    Automaton::from_parts(
-        "ALLEVENTS".to_owned(),
-        alphabet.clone(),
-        vec![true],
-        first,
-        edges,
-    )
+    Automaton::from_parts("ALLEVENTS".to_owned(), alphabet.clone(), vec![true], first, edges)
 }
 
 /// What can be reached from the initial state.
@@ -99,10 +79,7 @@ pub fn reachable(automaton: &Automaton) -> Automaton {
 
 /// `trim`: what can be reached and from where a marked state can be reached; EMPTY where that leaves no initial state.
 pub fn trim(automaton: &Automaton) -> Automaton {
-    let marked: Vec<bool> = automaton
-        .states()
-        .map(|state| automaton.is_marked(state))
-        .collect();
+    let marked: Vec<bool> = automaton.states().map(|state| automaton.is_marked(state)).collect();
     let all = vec![true; marked.len()];
     let keep = coreachable(&Predecessors::of(automaton), &marked, &all);
     restrict(automaton, automaton.name().to_owned(), &keep).0

@@ -63,9 +63,7 @@ pub fn condat(
     }
     let rows = disabled.into_iter();
     Ok(ControlData {
-        table: rows
-            .map(|(state, events)| (state, events.into_iter().collect()))
-            .collect(),
+        table: rows.map(|(state, events)| (state, events.into_iter().collect())).collect(),
         uncontrollable: uncontrollable.into_iter().collect(),
     })
 }

@@ -79,11 +79,7 @@ struct Walk {
 
 impl Walk {
     fn new(first: Place) -> Self {
-        Self {
-            known: FxHashSet::from_iter([first]),
-            places: vec![first],
-            reached: Vec::new(),
-        }
+        Self { known: FxHashSet::from_iter([first]), places: vec![first], reached: Vec::new() }
     }
 
     fn reach(&mut self, place: Place, from: usize, label: Label) {

@@ -41,10 +41,7 @@ pub enum Difference {
 /// A first difference.
 pub fn isomorph(left: &Automaton, right: &Automaton) -> Result<Vec<State>, Difference> {
     if left.state_count() != right.state_count() {
-        return Err(Difference::StateCounts(
-            left.state_count(),
-            right.state_count(),
-        ));
+        return Err(Difference::StateCounts(left.state_count(), right.state_count()));
     }
     let Some(initial) = left.initial() else {
         return Ok(Vec::new());
@@ -64,15 +61,10 @@ pub fn isomorph(left: &Automaton, right: &Automaton) -> Result<Vec<State>, Diffe
             continue;
         };
         if left.is_marked(state) != right.is_marked(image) {
-            return Err(Difference::Marked {
-                word: word(&arrived, state),
-            });
+            return Err(Difference::Marked { word: word(&arrived, state) });
         }
         if let Some(event) = enabled_difference(left, state, right, image) {
-            return Err(Difference::Enabled {
-                word: word(&arrived, state),
-                event,
-            });
+            return Err(Difference::Enabled { word: word(&arrived, state), event });
         }
         for (edge, other) in left.edges(state).iter().zip(right.edges(image)) {
             let (target, image) = (edge.target, other.target);
@@ -89,20 +81,14 @@ pub fn isomorph(left: &Automaton, right: &Automaton) -> Result<Vec<State>, Diffe
                     let mut other = word(&arrived, state);
                     other.push(label);
                     let first = known.map_or(back, |_| Some(target)).unwrap_or(target);
-                    return Err(Difference::Merged {
-                        word: word(&arrived, first),
-                        other,
-                    });
+                    return Err(Difference::Merged { word: word(&arrived, first), other });
                 }
             }
         }
     }
     if order.len() < states {
         let name = left.name().to_owned();
-        return Err(Difference::Unreachable {
-            name,
-            reached: order.len(),
-        });
+        return Err(Difference::Unreachable { name, reached: order.len() });
     }
     Ok(forward.into_iter().flatten().collect())
 }

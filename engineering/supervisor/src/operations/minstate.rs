@@ -40,20 +40,13 @@ pub fn minstate(automaton: &Automaton) -> Automaton {
         }));
         first.push(merged.len() as u32);
     }
-    let marked = leaders
-        .iter()
-        .map(|&leader| automaton.is_marked(leader))
-        .collect();
+    let marked = leaders.iter().map(|&leader| automaton.is_marked(leader)).collect();
     let name = automaton.name().to_owned();
     let minimal = Automaton::from_parts(name, automaton.alphabet().clone(), marked, first, merged);
     match automaton.state_names() {
         // A merged state has the name of its first state.
-        Some(names) => minimal.named_states(
-            leaders
-                .iter()
-                .map(|leader| names[leader.index()].clone())
-                .collect(),
-        ),
+        Some(names) => minimal
+            .named_states(leaders.iter().map(|leader| names[leader.index()].clone()).collect()),
         None => minimal,
     }
 }

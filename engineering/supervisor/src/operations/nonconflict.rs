@@ -20,11 +20,7 @@ pub struct Conflict {
 /// The product passes the bounds.
 pub fn nonconflict(automata: &[&Automaton], bounds: Bounds) -> Result<Option<Conflict>, TooLarge> {
     let product = Product::explore(automata, &[], Joint::Synchronous, bounds)?;
-    let controllable: Vec<bool> = product
-        .alphabet
-        .labels()
-        .map(Label::is_controllable)
-        .collect();
+    let controllable: Vec<bool> = product.alphabet.labels().map(Label::is_controllable).collect();
     let predecessors = Predecessors::new(&product.first, &product.edges, &controllable);
     let all = vec![true; product.state_count()];
     let live = coreachable(&predecessors, &product.marked, &all);

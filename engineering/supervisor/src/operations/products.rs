@@ -44,10 +44,7 @@ pub fn mutex(
     let product = Product::explore(&both, &[], Joint::Synchronous, bounds)?;
     let keep: Vec<bool> = (0..product.state_count())
         .map(|state| {
-            let pair = (
-                product.component_state(state, 0),
-                product.component_state(state, 1),
-            );
+            let pair = (product.component_state(state, 0), product.component_state(state, 1));
             !excluded.contains(&pair)
         })
         .collect();

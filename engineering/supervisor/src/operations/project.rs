@@ -16,17 +16,10 @@ pub fn project(
     bounds: crate::explicit::Bounds,
 ) -> Result<Automaton, TooLarge> {
     let visible = automaton.alphabet().events().iter();
-    let alphabet = Alphabet::new(
-        visible
-            .filter(|event| !hidden.contains(&event.label))
-            .cloned(),
-    );
+    let alphabet = Alphabet::new(visible.filter(|event| !hidden.contains(&event.label)).cloned());
     // The place in the projected alphabet of each event, where it is seen.
-    let places: Vec<Option<u32>> = automaton
-        .alphabet()
-        .labels()
-        .map(|label| alphabet.place(label))
-        .collect();
+    let places: Vec<Option<u32>> =
+        automaton.alphabet().labels().map(|label| alphabet.place(label)).collect();
     let Some(initial) = automaton.initial() else {
         return Ok(Automaton::empty(automaton.name(), alphabet));
     };
@@ -58,10 +51,7 @@ pub fn project(
                 sets.push(set);
                 sets.len() as u32 - 1
             });
-            edges.push(Edge {
-                event: event as u32,
-                target: State::new(number),
-            });
+            edges.push(Edge { event: event as u32, target: State::new(number) });
         }
         first.push(edges.len() as u32);
         next += 1;

@@ -72,19 +72,15 @@ pub fn supcon(
 ) -> Result<Supcon, TooLarge> {
     let mut result = explicit_supcon(&[plant], &[specification], Joint::Meet, bounds)?;
     let labels = plant.alphabet().labels();
-    result.not_lifted = labels
-        .filter(|&label| !specification.alphabet().contains(label))
-        .collect();
+    result.not_lifted = labels.filter(|&label| !specification.alphabet().contains(label)).collect();
     Ok(result)
 }
 
 /// `specification` with a self-loop of every event of `alphabet` that it does not know, as sync with ALLEVENTS makes it.
 pub fn lift(specification: &Automaton, alphabet: &Alphabet) -> Automaton {
     let unknown = alphabet.events().iter();
-    let unknown: Vec<Event> = unknown
-        .filter(|event| !specification.alphabet().contains(event.label))
-        .cloned()
-        .collect();
+    let unknown: Vec<Event> =
+        unknown.filter(|event| !specification.alphabet().contains(event.label)).cloned().collect();
     // Only events that it does not know are added.
     selfloop(specification, &unknown).unwrap_or_else(|_| allevents(alphabet))
 }
@@ -111,11 +107,7 @@ pub(crate) fn explicit_supcon(
 ) -> Result<Supcon, TooLarge> {
     let parts: Vec<&Automaton> = plants.iter().chain(specifications).copied().collect();
     let product = Product::explore(plants, specifications, joint, bounds)?;
-    let controllable: Vec<bool> = product
-        .alphabet
-        .labels()
-        .map(Label::is_controllable)
-        .collect();
+    let controllable: Vec<bool> = product.alphabet.labels().map(Label::is_controllable).collect();
     let predecessors = Predecessors::new(&product.first, &product.edges, &controllable);
     let fates = fates(&product, &predecessors);
     drop(predecessors);
@@ -124,9 +116,7 @@ pub(crate) fn explicit_supcon(
         None => parts
             .iter()
             .find(|part| part.is_empty())
-            .map(|part| Explanation::EmptyPart {
-                name: part.name().to_owned(),
-            }),
+            .map(|part| Explanation::EmptyPart { name: part.name().to_owned() }),
         Some(Fate::Good) => None,
         Some(_) => explain(&product, &fates, plants, specifications, joint),
     };
@@ -203,29 +193,18 @@ fn violation_at(
 ) -> Option<Violation> {
     let allows = |component: usize, part: &Automaton, label: Label| {
         let passes = joint == Joint::Synchronous && !part.alphabet().contains(label);
-        passes
-            || part
-                .step(product.component_state(state, component), label)
-                .is_some()
+        passes || part.step(product.component_state(state, component), label).is_some()
     };
-    product
-        .alphabet
-        .labels()
-        .filter(|label| !label.is_controllable())
-        .find_map(|event| {
-            let mut numbered = plants.iter().enumerate();
-            if !numbered.all(|(component, part)| allows(component, part, event)) {
-                return None;
-            }
-            let mut numbered = specifications.iter().enumerate();
-            let specification =
-                numbered.position(|(number, part)| !allows(plants.len() + number, part, event))?;
-            Some(Violation {
-                word: word.clone(),
-                event,
-                specification,
-            })
-        })
+    product.alphabet.labels().filter(|label| !label.is_controllable()).find_map(|event| {
+        let mut numbered = plants.iter().enumerate();
+        if !numbered.all(|(component, part)| allows(component, part, event)) {
+            return None;
+        }
+        let mut numbered = specifications.iter().enumerate();
+        let specification =
+            numbered.position(|(number, part)| !allows(plants.len() + number, part, event))?;
+        Some(Violation { word: word.clone(), event, specification })
+    })
 }
 
 fn explain(
@@ -243,8 +222,6 @@ fn explain(
             .map(Explanation::Violated);
     }
     let components = 0..plants.len() + specifications.len();
-    let states = components
-        .map(|component| product.component_state(state, component))
-        .collect();
+    let states = components.map(|component| product.component_state(state, component)).collect();
     Some(Explanation::Blocked { word, states })
 }

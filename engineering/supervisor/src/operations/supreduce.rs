@@ -65,20 +65,14 @@ pub fn supreduce_while(
     bounds: Bounds,
     go_on: &mut dyn FnMut(Reducing) -> bool,
 ) -> Result<Reduction, TooLarge> {
-    let mut best = Reduction {
-        supervisor: supervisor.clone(),
-        is_complete: true,
-    };
+    let mut best = Reduction { supervisor: supervisor.clone(), is_complete: true };
     if supervisor.is_empty() {
         return Ok(best);
     }
     let demands = Demands::new(plant, supervisor, bounds)?;
     Cells::check_fits(supervisor, bounds)?;
     let orders = [ascending(supervisor), depth_first(supervisor)];
-    let mut limits = Limits {
-        cells: supervisor.state_count(),
-        steps: u64::MAX,
-    };
+    let mut limits = Limits { cells: supervisor.state_count(), steps: u64::MAX };
     for (number, order) in orders.iter().enumerate() {
         let mut cells = Cells::new(supervisor, &demands);
         let mut go_on = |tried, left| {

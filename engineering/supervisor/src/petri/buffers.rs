@@ -23,9 +23,7 @@ pub fn buffers(net: &Net, bounds: &[u32]) -> Result<Vec<Automaton>, AutomatonErr
         let mut known = Vec::new();
         for (transition, event) in net.transitions().iter().zip(&events) {
             let arcs = transition.takes.iter().chain(&transition.gives);
-            let mut arcs = arcs
-                .chain(&transition.inhibitors)
-                .chain(&transition.enablers);
+            let mut arcs = arcs.chain(&transition.inhibitors).chain(&transition.enablers);
             if !arcs.any(|arc| arc.place == index) {
                 continue;
             }

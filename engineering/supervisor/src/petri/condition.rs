@@ -23,13 +23,7 @@ const SIGNS: [(char, When); 3] = [('/', When::Low), ('+', When::Rising), ('-', W
 
 /// Reads a condition; `place` is that of its first letter. U0888 for an invalid condition, U0855 for an invalid name.
 pub(super) fn parse_condition(form: &mut Form<'_>, (text, place): Word<'_>) -> Condition {
-    let mut parser = Parser {
-        form,
-        text,
-        start: place.start,
-        at: 0,
-        depth: 0,
-    };
+    let mut parser = Parser { form, text, start: place.start, at: 0, depth: 0 };
     let condition = parser.series();
     if parser.at < text.len() {
         parser.wrong("a `]` or `|` without its `[`", 1);

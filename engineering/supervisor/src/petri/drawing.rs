@@ -31,11 +31,7 @@ pub fn draw_net_dot(net: &Net) -> String {
     }
     for (number, transition) in net.transitions().iter().enumerate() {
         let label = quoted(&describe_transition(transition).join("\n"));
-        let fill = if is_controllable(transition) {
-            ", style=filled, fillcolor=black"
-        } else {
-            ""
-        };
+        let fill = if is_controllable(transition) { ", style=filled, fillcolor=black" } else { "" };
         let _ = writeln!(
             text,
             "    t{number} [shape=box, width=0.1, height=0.5, label=\"\", xlabel={label}{fill}];"
@@ -69,10 +65,7 @@ pub fn draw_net_svg(net: &Net) -> Result<String, TooLargeToDraw> {
     let (places, transitions) = (net.places(), net.transitions());
     let arcs = transitions.iter().flat_map(all_arcs).count();
     if places.len() + transitions.len() > MAXIMUM_DRAWN || arcs > 2 * MAXIMUM_DRAWN {
-        return Err(TooLargeToDraw {
-            states: places.len() + transitions.len(),
-            arrows: arcs,
-        });
+        return Err(TooLargeToDraw { states: places.len() + transitions.len(), arrows: arcs });
     }
     let texts: Vec<Vec<String>> = places
         .iter()
@@ -86,9 +79,7 @@ pub fn draw_net_svg(net: &Net) -> Result<String, TooLargeToDraw> {
     });
     let mut graph = Graph {
         nodes: halves.collect(),
-        first: (0..places.len())
-            .filter(|&place| places[place].initial > 0)
-            .collect(),
+        first: (0..places.len()).filter(|&place| places[place].initial > 0).collect(),
         ..Graph::default()
     };
     let mut drawn = Vec::new();
@@ -114,11 +105,7 @@ pub fn draw_net_svg(net: &Net) -> Result<String, TooLargeToDraw> {
     for (place, half) in layout.nodes.iter().zip(&graph.nodes) {
         picture.keep_free(*place, *half);
     }
-    let pairs: Vec<(usize, usize)> = graph
-        .arrows
-        .iter()
-        .map(|&(from, to, _)| (from, to))
-        .collect();
+    let pairs: Vec<(usize, usize)> = graph.arrows.iter().map(|&(from, to, _)| (from, to)).collect();
     for (number, (style, label)) in drawn.iter().enumerate() {
         let (from, to) = pairs[number];
         let (place, goal) = (layout.nodes[from], layout.nodes[to]);
@@ -128,13 +115,7 @@ pub fn draw_net_svg(net: &Net) -> Result<String, TooLargeToDraw> {
         if bends.is_empty() && is_pair {
             bends.push(aside(place, goal, 30.0));
         }
-        picture.arrow(
-            (place, shape(from)),
-            &bends,
-            (goal, shape(to)),
-            *style,
-            label,
-        );
+        picture.arrow((place, shape(from)), &bends, (goal, shape(to)), *style, label);
     }
     for (node, text) in texts.iter().enumerate() {
         let place = layout.nodes[node];
@@ -157,25 +138,17 @@ pub fn draw_net_svg(net: &Net) -> Result<String, TooLargeToDraw> {
 fn all_arcs(transition: &NetTransition) -> impl Iterator<Item = (Arc, bool, Style)> + use<> {
     let kind = |arcs: &[Arc], gives: bool, dashed: bool, round: bool| {
         let style = Style { dashed, round };
-        arcs.iter()
-            .map(|arc| (*arc, gives, style))
-            .collect::<Vec<_>>()
+        arcs.iter().map(|arc| (*arc, gives, style)).collect::<Vec<_>>()
     };
     let takes = kind(&transition.takes, false, false, false);
     let gives = kind(&transition.gives, true, false, false);
     let inhibitors = kind(&transition.inhibitors, false, false, true);
     let enablers = kind(&transition.enablers, false, true, false);
-    takes
-        .into_iter()
-        .chain(gives)
-        .chain(inhibitors)
-        .chain(enablers)
+    takes.into_iter().chain(gives).chain(inhibitors).chain(enablers)
 }
 
 fn is_controllable(transition: &NetTransition) -> bool {
-    transition
-        .label
-        .is_some_and(|label| label.is_controllable())
+    transition.label.is_some_and(|label| label.is_controllable())
 }
 
 /// Tokens as dots, and from four on as a number.

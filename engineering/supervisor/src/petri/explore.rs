@@ -54,9 +54,7 @@ impl Net {
     /// capacities proves that the net is not bounded (Karp and Miller).
     pub fn explore(&self, limit: usize) -> Result<Exploration<'_>, ExplorationError> {
         let transitions = self.transitions();
-        let is_monotone = transitions
-            .iter()
-            .all(|transition| transition.inhibitors.is_empty())
+        let is_monotone = transitions.iter().all(|transition| transition.inhibitors.is_empty())
             && self.places().iter().all(|place| place.capacity.is_none());
         let mut markings = vec![self.initial()];
         let mut parents: Vec<Option<(usize, usize)>> = vec![None];
@@ -88,11 +86,7 @@ impl Net {
             }
             source += 1;
         }
-        Ok(Exploration {
-            net: self,
-            markings,
-            firings,
-        })
+        Ok(Exploration { net: self, markings, firings })
     }
 
     /// Looks for a marking on the way to `next` that it covers strictly.
@@ -111,20 +105,16 @@ impl Net {
             let before = &markings[marking];
             if grows.is_none() && before.iter().zip(next).all(|(before, next)| before <= next) {
                 // It is another marking, so one of its places has more.
-                grows = before
-                    .iter()
-                    .zip(next)
-                    .position(|(before, next)| before < next);
+                grows = before.iter().zip(next).position(|(before, next)| before < next);
             }
             at = parents[marking];
         }
         run.reverse();
         match grows {
             None => Ok(()),
-            Some(place) => Err(ExplorationError::Unbounded {
-                place: self.places()[place].name.clone(),
-                run,
-            }),
+            Some(place) => {
+                Err(ExplorationError::Unbounded { place: self.places()[place].name.clone(), run })
+            }
         }
     }
 }
@@ -150,8 +140,7 @@ impl Exploration<'_> {
         }
         let transitions = self.net.transitions().iter().zip(fires);
         let dead = transitions.filter(|(_, fires)| !fires);
-        dead.map(|(transition, _)| transition.name.as_str())
-            .collect()
+        dead.map(|(transition, _)| transition.name.as_str()).collect()
     }
 
     /// Markings that enable nothing, whatever the conditions are.
@@ -172,26 +161,16 @@ impl Exploration<'_> {
     /// its own: an even number above all others.
     pub fn automaton(&self) -> Result<Automaton, AutomatonError> {
         let events = self.net.events();
-        let transitions = self
-            .firings
-            .iter()
-            .map(|&(source, transition, target)| Transition {
-                source: State::new(source as u32),
-                label: events[transition].label,
-                target: State::new(target as u32),
-            });
+        let transitions = self.firings.iter().map(|&(source, transition, target)| Transition {
+            source: State::new(source as u32),
+            label: events[transition].label,
+            target: State::new(target as u32),
+        });
         let mut marked = vec![false; self.markings.len()];
         marked[0] = true;
-        let names = self
-            .markings
-            .iter()
-            .map(|marking| self.net.name_of(marking));
-        let automaton = Automaton::new(
-            self.net.name(),
-            events.iter().cloned(),
-            marked,
-            transitions.collect(),
-        )?;
+        let names = self.markings.iter().map(|marking| self.net.name_of(marking));
+        let automaton =
+            Automaton::new(self.net.name(), events.iter().cloned(), marked, transitions.collect())?;
         automaton.with_state_names(names.collect())
     }
 }
@@ -210,24 +189,15 @@ impl Net {
 
     /// The event of each transition.
     pub(crate) fn events(&self) -> Vec<Event> {
-        let labels = self
-            .transitions()
-            .iter()
-            .filter_map(|transition| transition.label);
-        let mut free = labels
-            .map(Label::number)
-            .max()
-            .map_or(0, |most| most / 2 * 2 + 2);
+        let labels = self.transitions().iter().filter_map(|transition| transition.label);
+        let mut free = labels.map(Label::number).max().map_or(0, |most| most / 2 * 2 + 2);
         let events = self.transitions().iter().map(|transition| {
             let label = transition.label.unwrap_or_else(|| {
                 let label = Label::new(free);
                 free += 2;
                 label
             });
-            Event {
-                label,
-                name: transition.name.clone(),
-            }
+            Event { label, name: transition.name.clone() }
         });
         events.collect()
     }

@@ -197,18 +197,10 @@ impl Net {
             }
         };
         unique(places.iter().map(|place| &place.name).collect());
-        unique(
-            transitions
-                .iter()
-                .map(|transition| &transition.name)
-                .collect(),
-        );
+        unique(transitions.iter().map(|transition| &transition.name).collect());
         for transition in &transitions {
             let arcs = transition.takes.iter().chain(&transition.gives);
-            for arc in arcs
-                .chain(&transition.inhibitors)
-                .chain(&transition.enablers)
-            {
+            for arc in arcs.chain(&transition.inhibitors).chain(&transition.enablers) {
                 match places.get(arc.place) {
                     None => errors.push(NetError::NoSuchPlace {
                         transition: transition.name.clone(),
@@ -223,18 +215,11 @@ impl Net {
                 }
             }
         }
-        for transition in transitions
-            .iter()
-            .filter(|transition| transition.delay.is_some())
-        {
+        for transition in transitions.iter().filter(|transition| transition.delay.is_some()) {
             let mut has_edge = false;
-            transition
-                .condition
-                .visit(&mut |_, when| has_edge |= when.is_edge());
+            transition.condition.visit(&mut |_, when| has_edge |= when.is_edge());
             if has_edge {
-                errors.push(NetError::EdgeWithDelay {
-                    transition: transition.name.clone(),
-                });
+                errors.push(NetError::EdgeWithDelay { transition: transition.name.clone() });
             }
         }
         for place in &places {
@@ -247,11 +232,7 @@ impl Net {
             }
         }
         if errors.is_empty() {
-            Ok(Self {
-                name: name.into(),
-                places,
-                transitions,
-            })
+            Ok(Self { name: name.into(), places, transitions })
         } else {
             Err(errors)
         }

@@ -72,10 +72,7 @@ pub struct ReadNet {
 pub fn read_net(text: &str) -> ReadNet {
     let (file, mut diagnostics) = form::read(text, &CODES, read_file);
     diagnostics.sort_by_key(|diagnostic| diagnostic.span.start);
-    ReadNet {
-        file: file.flatten().filter(|_| !has_errors(&diagnostics)),
-        diagnostics,
-    }
+    ReadNet { file: file.flatten().filter(|_| !has_errors(&diagnostics)), diagnostics }
 }
 
 fn read_file(form: &mut Form<'_>, table: &DeTable) -> Option<NetFile> {
@@ -101,11 +98,7 @@ fn read_file(form: &mut Form<'_>, table: &DeTable) -> Option<NetFile> {
     });
     check_directions(form, &places, &transitions);
     match Net::new(name.as_str(), places, transitions) {
-        Ok(net) => Some(NetFile {
-            net,
-            events: events.alphabet,
-            addresses,
-        }),
+        Ok(net) => Some(NetFile { net, events: events.alphabet, addresses }),
         Err(errors) => {
             for error in errors {
                 report(form, &error, &names);
@@ -230,9 +223,7 @@ fn report(form: &mut Form<'_>, error: &NetError, names: &[Name]) {
     };
     let span = place.map_or(0..0, Name::span);
     let text = error.to_string();
-    let message = text
-        .split_once(": ")
-        .map_or(text.as_str(), |(_, rest)| rest);
+    let message = text.split_once(": ").map_or(text.as_str(), |(_, rest)| rest);
     form.error(error.code(), message, span);
 }
 
@@ -246,9 +237,7 @@ fn place(form: &mut Form<'_>, entry: &DeTable, span: &form::Place) -> Place {
     }
     Place {
         name: name.to_string(),
-        initial: form
-            .number(entry, "tokens", 0..=MAXIMUM_TOKENS)
-            .unwrap_or(0),
+        initial: form.number(entry, "tokens", 0..=MAXIMUM_TOKENS).unwrap_or(0),
         capacity: form.number(entry, "capacity", 1..=MAXIMUM_TOKENS),
         actions,
     }

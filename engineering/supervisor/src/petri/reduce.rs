@@ -36,10 +36,7 @@ impl fmt::Display for Reduction {
                 "transition {transition} only hands on what comes to place {place}"
             ),
             Self::ParallelTransition(transition) => {
-                write!(
-                    formatter,
-                    "transition {transition} does what another one does"
-                )
+                write!(formatter, "transition {transition} does what another one does")
             }
         }
     }
@@ -65,11 +62,7 @@ fn step(places: &mut Vec<Place>, transitions: &mut Vec<NetTransition>) -> Option
             continue;
         }
         if is_implied(&places[place], transitions, place) {
-            return Some(Reduction::ImpliedPlace(remove_place(
-                places,
-                transitions,
-                place,
-            )));
+            return Some(Reduction::ImpliedPlace(remove_place(places, transitions, place)));
         }
         let twin = (0..places.len()).find(|&other| {
             other != place
@@ -81,11 +74,7 @@ fn step(places: &mut Vec<Place>, transitions: &mut Vec<NetTransition>) -> Option
                 })
         });
         if twin.is_some() {
-            return Some(Reduction::ParallelPlace(remove_place(
-                places,
-                transitions,
-                place,
-            )));
+            return Some(Reduction::ParallelPlace(remove_place(places, transitions, place)));
         }
         if let Some((transition, target)) = series(places, transitions, place) {
             let name = transitions.remove(transition).name;
@@ -96,10 +85,7 @@ fn step(places: &mut Vec<Place>, transitions: &mut Vec<NetTransition>) -> Option
             }
             places[target].initial += places[place].initial;
             let place = remove_place(places, transitions, place);
-            return Some(Reduction::Series {
-                transition: name,
-                place,
-            });
+            return Some(Reduction::Series { transition: name, place });
         }
     }
     let twin = (0..transitions.len()).find(|&number| {
@@ -136,9 +122,7 @@ fn is_implied(place: &Place, transitions: &[NetTransition], index: usize) -> boo
     let mut touching = transitions
         .iter()
         .filter(|transition| transition.taken(index) + transition.given(index) > 0);
-    place
-        .capacity
-        .is_none_or(|capacity| capacity >= place.initial)
+    place.capacity.is_none_or(|capacity| capacity >= place.initial)
         && touching.all(|transition| {
             let taken = transition.taken(index);
             taken == transition.given(index) && taken <= place.initial

@@ -94,11 +94,7 @@ pub fn to_ladder(
             return Err(HybridError::EmptySupervisor { name });
         }
         let known: BTreeSet<_> = net.transitions().iter().filter_map(|t| t.label).collect();
-        if let Some(label) = supervisor
-            .alphabet()
-            .labels()
-            .find(|label| !known.contains(label))
-        {
+        if let Some(label) = supervisor.alphabet().labels().find(|label| !known.contains(label)) {
             return Err(HybridError::UnknownEvent {
                 supervisor: name,
                 event: supervisor.alphabet().name(label),

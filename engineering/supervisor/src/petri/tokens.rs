@@ -89,17 +89,9 @@ impl Tokens {
     pub(super) fn ready(&self) -> Vec<Element> {
         match self {
             Self::Flags(_) => Vec::new(),
-            Self::Counter {
-                comes,
-                goes,
-                busy,
-                first,
-                ..
-            } => [comes, goes, busy]
-                .into_iter()
-                .chain(first)
-                .map(closed)
-                .collect(),
+            Self::Counter { comes, goes, busy, first, .. } => {
+                [comes, goes, busy].into_iter().chain(first).map(closed).collect()
+            }
         }
     }
 
@@ -108,11 +100,7 @@ impl Tokens {
         match self {
             _ if change == 0 => Vec::new(),
             Self::Flags(flags) if flags.len() == 1 => {
-                vec![if change > 0 {
-                    set(&flags[0])
-                } else {
-                    reset(&flags[0])
-                }]
+                vec![if change > 0 { set(&flags[0]) } else { reset(&flags[0]) }]
             }
             Self::Flags(_) => Vec::new(),
             Self::Counter { comes, goes, .. } => vec![set(if change > 0 { comes } else { goes })],
@@ -137,18 +125,10 @@ impl Tokens {
             let mut network = vec![open(fires)];
             if change > 0 {
                 network.extend(self.at_least(count.saturating_sub(width) as u32));
-                rung(
-                    format!("{name}: add {width}, {count} or more"),
-                    network,
-                    vec![set(flag)],
-                )
+                rung(format!("{name}: add {width}, {count} or more"), network, vec![set(flag)])
             } else {
                 network.extend(self.fewer((count + width) as u32));
-                rung(
-                    format!("{name}: remove {width}, below {count}"),
-                    network,
-                    vec![reset(flag)],
-                )
+                rung(format!("{name}: remove {width}, below {count}"), network, vec![reset(flag)])
             }
         });
         rungs.collect()
@@ -156,32 +136,15 @@ impl Tokens {
 
     /// The counter itself, at the end of the scan.
     pub(super) fn count(&self, name: &str) -> Option<Rung> {
-        let Self::Counter {
-            counter,
-            bound,
-            comes,
-            goes,
-            first,
-            ..
-        } = self
-        else {
+        let Self::Counter { counter, bound, comes, goes, first, .. } = self else {
             return None;
         };
-        let feed = |pin: &str, signal: &Name| Feed {
-            pin: Name::from(pin),
-            network: vec![open(signal)],
-        };
+        let feed =
+            |pin: &str, signal: &Name| Feed { pin: Name::from(pin), network: vec![open(signal)] };
         let mut pins = vec![feed("CD", goes)];
         pins.extend(first.iter().map(|first| feed("LD", first)));
-        let block = Element::Block(Block {
-            name: counter.clone(),
-            kind: BlockKind::Ctud(*bound),
-            pins,
-        });
-        Some(rung(
-            format!("tokens of {name}"),
-            vec![open(comes), block],
-            Vec::new(),
-        ))
+        let block =
+            Element::Block(Block { name: counter.clone(), kind: BlockKind::Ctud(*bound), pins });
+        Some(rung(format!("tokens of {name}"), vec![open(comes), block], Vec::new()))
     }
 }

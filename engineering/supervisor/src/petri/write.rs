@@ -16,10 +16,7 @@ pub fn write_net(file: &NetFile) -> String {
     for event in file.events.events() {
         let (name, controllable) = (key(&event.name), event.label.is_controllable());
         let label = event.label;
-        let _ = writeln!(
-            text,
-            "{name} = {{ controllable = {controllable}, label = {label} }}"
-        );
+        let _ = writeln!(text, "{name} = {{ controllable = {controllable}, label = {label} }}");
     }
     for place in net.places() {
         let _ = write!(text, "\n[[place]]\nname = {}\n", quoted(&place.name));
@@ -51,11 +48,7 @@ pub fn write_net(file: &NetFile) -> String {
 }
 
 fn write_transition(text: &mut String, file: &NetFile, net: &Net, transition: &NetTransition) {
-    let _ = write!(
-        text,
-        "\n[[transition]]\nname = {}\n",
-        quoted(&transition.name)
-    );
+    let _ = write!(text, "\n[[transition]]\nname = {}\n", quoted(&transition.name));
     if let Some(label) = transition.label {
         let event = file.events.name(label);
         if event != transition.name {

@@ -70,9 +70,7 @@ impl Environment {
         Self {
             kinds,
             start: map.start.as_ref().and_then(|start| at(start)),
-            requests: requests
-                .filter_map(|(&label, name)| Some((label, at(name)?)))
-                .collect(),
+            requests: requests.filter_map(|(&label, name)| Some((label, at(name)?))).collect(),
             events,
             simultaneous,
         }
@@ -121,12 +119,8 @@ impl Environment {
             When::Rising => now[place] && !last[place],
             When::Falling => !now[place] && last[place],
         };
-        let mut events: Vec<Label> = self
-            .events
-            .iter()
-            .filter(occurs)
-            .map(|(label, _, _)| *label)
-            .collect();
+        let mut events: Vec<Label> =
+            self.events.iter().filter(occurs).map(|(label, _, _)| *label).collect();
         events.sort_unstable();
         Happening {
             start: self.start.is_some_and(|place| now[place]),
@@ -143,9 +137,7 @@ impl Environment {
     /// Part of an image kept for the next scan: momentary inputs return to 0.
     pub(super) fn kept(&self, image: &[bool]) -> Vec<bool> {
         let kinds = self.kinds.iter().zip(image);
-        kinds
-            .map(|(kind, &value)| value && !matches!(kind, Kind::Momentary))
-            .collect()
+        kinds.map(|(kind, &value)| value && !matches!(kind, Kind::Momentary)).collect()
     }
 }
 

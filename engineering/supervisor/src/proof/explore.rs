@@ -33,11 +33,7 @@ pub struct ProofSettings {
 
 impl Default for ProofSettings {
     fn default() -> Self {
-        Self {
-            mode: Mode::Automatic,
-            simultaneous: 2,
-            maximum_states: 2_000_000,
-        }
+        Self { mode: Mode::Automatic, simultaneous: 2, maximum_states: 2_000_000 }
     }
 }
 
@@ -141,15 +137,10 @@ struct Exploration<'a> {
 
 impl Exploration<'_> {
     fn run(&mut self, report: &mut dyn FnMut(Proving)) -> Result<Verdict, ProofError> {
-        let on: Box<[u32]> = ones_in(self.sparse.scan().initial())
-            .map(|place| place as u32)
-            .collect();
+        let on: Box<[u32]> =
+            ones_in(self.sparse.scan().initial()).map(|place| place as u32).collect();
         let seen = self.see(&on, &[]);
-        let state = seen
-            .states
-            .iter()
-            .map(|states| states.first().copied())
-            .collect();
+        let state = seen.states.iter().map(|states| states.first().copied()).collect();
         self.keep(Node {
             on,
             kept: vec![false; self.circuit.inputs().len()].into(),
@@ -171,17 +162,12 @@ impl Exploration<'_> {
                     return Ok(Verdict::Refuted(Box::new(counterexample)));
                 }
             }
-            report(Proving {
-                reached: self.nodes.len(),
-                scanned: next,
-            });
+            report(Proving { reached: self.nodes.len(), scanned: next });
             for node in &self.nodes[first..next] {
                 self.joint.extend(node.state.clone());
             }
             if self.nodes.len() > self.settings.maximum_states {
-                return Err(ProofError::TooLarge {
-                    limit: self.settings.maximum_states,
-                });
+                return Err(ProofError::TooLarge { limit: self.settings.maximum_states });
             }
         }
         let mut events: Vec<Label> = self.used.iter().copied().collect();
@@ -229,8 +215,7 @@ impl Exploration<'_> {
         let same = |&known: &usize| nodes[known].on == node.on && nodes[known].kept == node.kept;
         let code = hash(&node);
         if self.known.find(code, same).is_none() {
-            self.known
-                .insert_unique(code, nodes.len(), |&known| hash(&nodes[known]));
+            self.known.insert_unique(code, nodes.len(), |&known| hash(&nodes[known]));
             self.nodes.push(node);
         }
     }
@@ -263,15 +248,11 @@ impl Exploration<'_> {
             if self.cache.len() >= REMEMBERED {
                 self.cache.clear();
             }
-            let allowed = self
-                .reference
-                .scan(&node.state, &node.positions, &happening);
+            let allowed = self.reference.scan(&node.state, &node.positions, &happening);
             self.cache.insert(question.clone(), allowed);
         }
         let seen = self.see(&run.on, &run.signals);
-        let found = self.cache[&question]
-            .iter()
-            .find(|allowed| seen.is(allowed));
+        let found = self.cache[&question].iter().find(|allowed| seen.is(allowed));
         let Some(found) = found else {
             let deviation = self.deviation(&seen, &question);
             let allowed = self.cache[&question].clone();
@@ -297,9 +278,7 @@ impl Exploration<'_> {
         for &(automaton, state) in &self.view.constant {
             seen.states[automaton].push(state);
         }
-        let registers = registers
-            .iter()
-            .map(|&place| self.view.registers[place as usize]);
+        let registers = registers.iter().map(|&place| self.view.registers[place as usize]);
         let outputs = ones_in(outputs).map(|place| self.view.outputs[place]);
         for bit in registers.chain(outputs) {
             match bit {
@@ -317,23 +296,17 @@ impl Exploration<'_> {
         let is_started = question.0.is_some() || question.4;
         let name = |index: usize| automata[index].name().to_owned();
         if let Some(index) = seen.states.iter().position(|states| states.len() > 1) {
-            return Deviation::StateDoubled {
-                automaton: name(index),
-            };
+            return Deviation::StateDoubled { automaton: name(index) };
         }
         if let Some(index) = seen.states.iter().position(Vec::is_empty)
             && is_started
         {
-            return Deviation::StateLost {
-                automaton: name(index),
-            };
+            return Deviation::StateLost { automaton: name(index) };
         }
         if let Some(switch) = seen.positions.iter().position(|on| on.len() > 1) {
             let signals = seen.positions[switch].iter();
             return Deviation::SwitchDoubled {
-                signals: signals
-                    .filter_map(|&position| self.signal(switch, position))
-                    .collect(),
+                signals: signals.filter_map(|&position| self.signal(switch, position)).collect(),
             };
         }
         Deviation::NotAllowed
@@ -365,11 +338,7 @@ impl Exploration<'_> {
                     Some(states) => states.iter().map(|&state| vec![state]).collect(),
                     None => Vec::new(),
                 },
-                positions: node
-                    .positions
-                    .iter()
-                    .map(|&position| vec![position])
-                    .collect(),
+                positions: node.positions.iter().map(|&position| vec![position]).collect(),
                 pulses: Vec::new(),
             };
             scans.push(self.record(&self.nodes[*parent].kept, image, &seen));
@@ -387,22 +356,13 @@ impl Exploration<'_> {
             deviation,
             allowed: allowed
                 .iter()
-                .map(|end| {
-                    (
-                        end.word.iter().map(|&label| self.name(label)).collect(),
-                        states(end),
-                    )
-                })
+                .map(|end| (end.word.iter().map(|&label| self.name(label)).collect(), states(end)))
                 .collect(),
         }
     }
 
     fn name(&self, label: Label) -> String {
-        let mut alphabets = self
-            .reference
-            .automata()
-            .iter()
-            .map(|automaton| automaton.alphabet());
+        let mut alphabets = self.reference.automata().iter().map(|automaton| automaton.alphabet());
         let known = alphabets.find(|alphabet| alphabet.contains(label));
         known.map_or_else(|| label.to_string(), |alphabet| alphabet.name(label))
     }
@@ -424,11 +384,7 @@ impl Exploration<'_> {
         let inputs = self.circuit.inputs().iter().zip(image);
         let mut outputs: Vec<String> = Vec::new();
         for (switch, positions) in seen.positions.iter().enumerate() {
-            outputs.extend(
-                positions
-                    .iter()
-                    .filter_map(|&position| self.signal(switch, position)),
-            );
+            outputs.extend(positions.iter().filter_map(|&position| self.signal(switch, position)));
         }
         for &pulse in &seen.pulses {
             let is = |bit: &Bit| matches!(bit, Bit::Pulse(number) if *number == pulse);
@@ -436,10 +392,7 @@ impl Exploration<'_> {
             outputs.extend(place.map(|place| self.circuit.outputs()[place].name.clone()));
         }
         ScanRecord {
-            inputs: inputs
-                .filter(|(_, value)| **value)
-                .map(|(name, _)| name.clone())
-                .collect(),
+            inputs: inputs.filter(|(_, value)| **value).map(|(name, _)| name.clone()).collect(),
             events: events.into_iter().map(|label| self.name(label)).collect(),
             outputs,
             states: self.state_names(seen.states.iter().map(Vec::as_slice)),

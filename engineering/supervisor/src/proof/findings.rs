@@ -131,10 +131,7 @@ pub fn hybrid_findings(
     }
     let bounds = net.explore(limit)?.bounds();
     let plants = buffers(net, &bounds)?;
-    let modules = Modules {
-        supervisors,
-        plants: &plants,
-    };
+    let modules = Modules { supervisors, plants: &plants };
     Ok(findings(&modules)?)
 }
 

@@ -79,10 +79,7 @@ fn freed(ladder: &HybridLadder) -> Program {
         program.rungs[place].network.pop();
         program.rungs[place].coils.push(write(&power));
         let ended = vec![open(&power), open(&over)];
-        program.rungs.insert(
-            place + 1,
-            rung("the delay is over", ended, vec![write(&output)]),
-        );
+        program.rungs.insert(place + 1, rung("the delay is over", ended, vec![write(&output)]));
         program.outputs.extend([power, output].map(Signal::new));
         program.inputs.push(Signal::new(over));
     }
@@ -111,9 +108,7 @@ impl Bits {
         let registers: HashMap<&str, usize> = registers.zip(0..).collect();
         let output = |name: &Name| -> Result<usize, ProofError> {
             let place = outputs.get(name.as_str()).copied();
-            place.ok_or_else(|| ProofError::NoBit {
-                name: name.to_string(),
-            })
+            place.ok_or_else(|| ProofError::NoBit { name: name.to_string() })
         };
         let all = |names: &Vec<Name>| names.iter().map(output).collect::<Result<Vec<_>, _>>();
         let counters = ladder.counters.iter().map(|counter| {
@@ -124,9 +119,7 @@ impl Bits {
             bits.collect()
         });
         let powers = ladder.timers.iter().map(|timer| {
-            let power = timer
-                .as_ref()
-                .map(|timer| Name::from(format!("{timer}.IN")));
+            let power = timer.as_ref().map(|timer| Name::from(format!("{timer}.IN")));
             power.map(|power| output(&power)).transpose()
         });
         let actions = reference::actions(net);
@@ -161,11 +154,7 @@ impl Bits {
             fires: all(&self.fires),
             tokens: tokens.collect(),
             states: self.states.iter().map(all).collect(),
-            powers: self
-                .powers
-                .iter()
-                .map(|power| power.as_ref().map(on))
-                .collect(),
+            powers: self.powers.iter().map(|power| power.as_ref().map(on)).collect(),
             actions: all(&self.actions),
         }
     }
@@ -202,9 +191,7 @@ impl Exploration<'_> {
                 return Ok(HybridVerdict::Refuted(Box::new(counterexample)));
             }
             if self.nodes.len() > self.settings.maximum_states {
-                return Err(ProofError::TooLarge {
-                    limit: self.settings.maximum_states,
-                });
+                return Err(ProofError::TooLarge { limit: self.settings.maximum_states });
             }
             next += 1;
         }
@@ -228,12 +215,7 @@ impl Exploration<'_> {
         let key = (registers, kept, joint);
         if self.known.insert(key.clone()) {
             let (registers, kept, joint) = key;
-            self.nodes.push(Node {
-                registers,
-                kept,
-                joint,
-                parent,
-            });
+            self.nodes.push(Node { registers, kept, joint, parent });
         }
     }
 
@@ -285,10 +267,7 @@ impl Exploration<'_> {
         let inputs = self.circuit.inputs().iter().zip(image);
         let actions = self.bits.actions.iter().zip(&seen.actions);
         ScanRecord {
-            inputs: inputs
-                .filter(|(_, value)| **value)
-                .map(|(name, _)| name.clone())
-                .collect(),
+            inputs: inputs.filter(|(_, value)| **value).map(|(name, _)| name.clone()).collect(),
             events: self.reference.names(seen.fires.iter().copied()),
             outputs: actions
                 .filter(|(_, on)| **on)

@@ -64,14 +64,7 @@ impl<'a> Reference<'a> {
                 knowing.entry(label).or_default().push((index, place));
             }
         }
-        Self {
-            supervisors: modules.supervisors.len(),
-            automata,
-            map,
-            partition,
-            mode,
-            knowing,
-        }
+        Self { supervisors: modules.supervisors.len(), automata, map, partition, mode, knowing }
     }
 
     pub(super) fn automata(&self) -> &[&'a Automaton] {
@@ -98,13 +91,10 @@ impl<'a> Reference<'a> {
         if label.is_controllable() || self.supervisors == self.automata.len() {
             return None;
         }
-        let (supervisors, plants): (Vec<_>, Vec<_>) = knowing
-            .iter()
-            .partition(|(index, _)| *index < self.supervisors);
+        let (supervisors, plants): (Vec<_>, Vec<_>) =
+            knowing.iter().partition(|(index, _)| *index < self.supervisors);
         let can = |&&(index, place): &&(usize, u32)| {
-            self.automata[index]
-                .successor(state[index], place)
-                .is_some()
+            self.automata[index].successor(state[index], place).is_some()
         };
         if plants.is_empty() || !plants.iter().all(&can) {
             return None;
@@ -176,9 +166,8 @@ impl<'a> Reference<'a> {
         word: &[Label],
     ) -> Vec<Allowed> {
         let controllable = self.knowing.keys().filter(|label| label.is_controllable());
-        let enabled: Vec<(Label, Box<[State]>)> = controllable
-            .filter_map(|&label| Some((label, self.step(state, label)?)))
-            .collect();
+        let enabled: Vec<(Label, Box<[State]>)> =
+            controllable.filter_map(|&label| Some((label, self.step(state, label)?))).collect();
         let asks = match self.mode {
             Mode::Automatic => false,
             Mode::Manual => self.automata.len() > 1 || enabled.len() > 1,
@@ -213,12 +202,7 @@ impl<'a> Reference<'a> {
     }
 
     fn quiet(&self, state: Joint, positions: &[u8], word: Vec<Label>) -> Allowed {
-        Allowed {
-            state,
-            positions: positions.into(),
-            pulse: None,
-            word,
-        }
+        Allowed { state, positions: positions.into(), pulse: None, word }
     }
 
     /// How many switches the map has.

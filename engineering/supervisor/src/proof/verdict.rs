@@ -99,18 +99,11 @@ impl fmt::Display for Counterexample {
             }
             Deviation::NotAllowed => writeln!(formatter, "the automata do not allow that")?,
             Deviation::Uncontrollable { automaton, event } => {
-                writeln!(
-                    formatter,
-                    "{automaton} would have to forbid {event}, and cannot"
-                )?;
+                writeln!(formatter, "{automaton} would have to forbid {event}, and cannot")?;
             }
         }
         for (word, states) in &self.allowed {
-            let word = if word.is_empty() {
-                "nothing".into()
-            } else {
-                word.join(" then ")
-            };
+            let word = if word.is_empty() { "nothing".into() } else { word.join(" then ") };
             writeln!(formatter, "allowed: {word}, in {}", states.join(" "))?;
         }
         Ok(())
@@ -123,11 +116,7 @@ pub(super) fn write_scans<'s>(
     scans: impl IntoIterator<Item = &'s ScanRecord>,
 ) -> fmt::Result {
     let or_none = |names: &[String]| {
-        if names.is_empty() {
-            "-".to_owned()
-        } else {
-            names.join(" ")
-        }
+        if names.is_empty() { "-".to_owned() } else { names.join(" ") }
     };
     for (number, record) in (1..).zip(scans) {
         writeln!(

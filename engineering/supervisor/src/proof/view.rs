@@ -35,19 +35,15 @@ impl View {
         map: &InputOutputMap,
         correspondence: &Correspondence,
     ) -> Result<Self, ProofError> {
-        let registers = circuit
-            .registers()
-            .iter()
-            .map(|register| register.name.clone());
+        let registers = circuit.registers().iter().map(|register| register.name.clone());
         let register_of: HashMap<String, usize> = registers.zip(0..).collect();
         let outputs = circuit.outputs().iter().map(|output| output.name.as_str());
         let output_of: HashMap<&str, usize> = outputs.zip(0..).collect();
         let coils = program.rungs.iter().flat_map(|rung| &rung.coils);
         let written: HashSet<&str> = coils.map(|coil| coil.target.as_str()).collect();
         let memory = program.memory.iter();
-        let memory: HashMap<&str, &Signal> = memory
-            .map(|signal| (signal.name.as_str(), signal))
-            .collect();
+        let memory: HashMap<&str, &Signal> =
+            memory.map(|signal| (signal.name.as_str(), signal)).collect();
         let mut view = Self {
             registers: vec![Bit::Other; circuit.registers().len()],
             outputs: vec![Bit::Other; circuit.outputs().len()],
@@ -102,9 +98,7 @@ impl View {
 }
 
 fn no_bit(name: &Name) -> ProofError {
-    ProofError::NoBit {
-        name: name.to_string(),
-    }
+    ProofError::NoBit { name: name.to_string() }
 }
 
 /// What is to be seen after a scan.

@@ -36,16 +36,12 @@ impl SymbolicSupervisor<'_> {
             let is_violated = |&event: &Label| {
                 Some((event, self.violated_specification(&states, event, plants)?))
             };
-            let mut uncontrollable = self
-                .alphabet
-                .labels()
-                .filter(|label| !label.is_controllable());
+            let mut uncontrollable =
+                self.alphabet.labels().filter(|label| !label.is_controllable());
             match uncontrollable.find_map(|event| is_violated(&event)) {
-                Some((event, specification)) => Explanation::Violated(Violation {
-                    word,
-                    event,
-                    specification,
-                }),
+                Some((event, specification)) => {
+                    Explanation::Violated(Violation { word, event, specification })
+                }
                 None => Explanation::Blocked { word, states },
             }
         }))
@@ -80,9 +76,7 @@ impl SymbolicSupervisor<'_> {
         let mut word = Vec::new();
         for layer in layers.iter().rev() {
             let step = self.alphabet.labels().find_map(|label| {
-                let next = self
-                    .next(&states, label)
-                    .filter(|next| self.holds(layer, next));
+                let next = self.next(&states, label).filter(|next| self.holds(layer, next));
                 Some((label, next.filter(|_| !label.is_controllable())?))
             });
             let Some((label, next)) = step else {
@@ -95,8 +89,7 @@ impl SymbolicSupervisor<'_> {
     }
 
     fn holds(&self, set: &Diagram, states: &[State]) -> bool {
-        self.space
-            .contains(set, |level| states[self.order[level]].number())
+        self.space.contains(set, |level| states[self.order[level]].number())
     }
 
     /// The specification that forbids `event` where all plants can do it.

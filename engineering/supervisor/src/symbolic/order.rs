@@ -6,16 +6,11 @@ use crate::automaton::Automaton;
 /// An order of the components in which those that share events stand near each other: F. Aloul, I. Markov, K. Sakallah, *FORCE*
 /// (2003). Each event pulls its components to their centre of gravity; the order with the smallest sum of spans is kept.
 pub(super) fn force(parts: &[&Automaton]) -> Vec<usize> {
-    let mut labels: Vec<Label> = parts
-        .iter()
-        .flat_map(|part| part.alphabet().labels())
-        .collect();
+    let mut labels: Vec<Label> = parts.iter().flat_map(|part| part.alphabet().labels()).collect();
     labels.sort_unstable();
     labels.dedup();
     let knowing = |label: &Label| -> Vec<usize> {
-        (0..parts.len())
-            .filter(|&part| parts[part].alphabet().contains(*label))
-            .collect()
+        (0..parts.len()).filter(|&part| parts[part].alphabet().contains(*label)).collect()
     };
     let events: Vec<Vec<usize>> = labels.iter().map(knowing).collect();
     let mut order: Vec<usize> = (0..parts.len()).collect();

@@ -19,9 +19,7 @@ impl Moves {
             let pairs = pairs.iter().map(|&(from, to)| (to, from));
             (*level, pairs.collect())
         });
-        Self {
-            levels: turned.collect(),
-        }
+        Self { levels: turned.collect() }
     }
 }
 
@@ -45,13 +43,7 @@ impl<'a> Saturation<'a> {
                 topmost[*level].push(number);
             }
         }
-        Self {
-            space,
-            events,
-            topmost,
-            saturated: HashMap::new(),
-            fired: HashMap::new(),
-        }
+        Self { space, events, topmost, saturated: HashMap::new(), fired: HashMap::new() }
     }
 
     /// What is reached from `start` by the events without leaving `within`, which holds `start`.

@@ -26,11 +26,7 @@ impl Space {
         let mut bits = 0;
         let blocks = sizes.iter().map(|&states| {
             let width = (usize::BITS - (states - 1).leading_zeros()) as usize;
-            let block = Block {
-                first: bits,
-                bits: width,
-                states,
-            };
+            let block = Block { first: bits, bits: width, states };
             bits += width;
             block
         });
@@ -38,11 +34,7 @@ impl Space {
         let diagrams = Diagrams::new((0..bits as u32).map(Variable::Register), nodes);
         let variables = (0..bits as u32).map(|bit| diagrams.variable(Variable::Register(bit)));
         let variables = variables.collect::<Result<_, _>>()?;
-        Ok(Self {
-            diagrams,
-            blocks,
-            variables,
-        })
+        Ok(Self { diagrams, blocks, variables })
     }
 
     pub(super) fn levels(&self) -> usize {
@@ -99,8 +91,7 @@ impl Space {
                 if pair[0] == pair[1] {
                     Ok(pair[0].clone())
                 } else {
-                    self.diagrams
-                        .choose(&self.variables[bit], &pair[1], &pair[0])
+                    self.diagrams.choose(&self.variables[bit], &pair[1], &pair[0])
                 }
             });
             parts = halves.collect::<Result<_, _>>()?;
@@ -117,11 +108,7 @@ impl Space {
         let (all, nothing) = (self.everything(), self.nothing());
         let states = 0..self.blocks[level].states as u32;
         let pick = |state| {
-            if contains(state) {
-                all.clone()
-            } else {
-                nothing.clone()
-            }
+            if contains(state) { all.clone() } else { nothing.clone() }
         };
         self.join(states.map(pick).collect(), level)
     }
@@ -155,9 +142,7 @@ impl Space {
             return count;
         }
         let parts = self.split(set, level);
-        let mut counts = parts
-            .iter()
-            .map(|part| self.count_below(level + 1, part, known));
+        let mut counts = parts.iter().map(|part| self.count_below(level + 1, part, known));
         let count = counts.try_fold(0_u128, |sum, count| sum.checked_add(count?));
         known.insert(key, count);
         count

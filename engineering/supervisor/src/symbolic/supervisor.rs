@@ -93,26 +93,12 @@ impl<'a> SymbolicSupervisor<'a> {
         let alphabet = Alphabet::new([]).union(parts.iter().map(|part| part.alphabet()));
         let order = force(&parts);
         // A level has at least one state; the set of states of an empty component is empty below.
-        let sizes: Vec<usize> = order
-            .iter()
-            .map(|&part| parts[part].state_count().max(1))
-            .collect();
+        let sizes: Vec<usize> =
+            order.iter().map(|&part| parts[part].state_count().max(1)).collect();
         let space = Space::new(&sizes, bounds.nodes)?;
-        let events = alphabet
-            .labels()
-            .map(|label| moves(&parts, &order, label))
-            .collect();
+        let events = alphabet.labels().map(|label| moves(&parts, &order, label)).collect();
         let (states, causes) = (space.nothing(), space.nothing());
-        Ok(Self {
-            parts,
-            alphabet,
-            space,
-            order,
-            events,
-            states,
-            causes,
-            bounds,
-        })
+        Ok(Self { parts, alphabet, space, order, events, states, causes, bounds })
     }
 
     /// What is reached from the initial tuple within `within`.
@@ -136,9 +122,7 @@ impl<'a> SymbolicSupervisor<'a> {
         let violated = self.violated(plants)?;
         let violated = space.and(&violated, &tuples)?;
         let mut causes = violated.clone();
-        let mut bad = self
-            .uncontrollably_backwards()
-            .closure(&violated, &tuples)?;
+        let mut bad = self.uncontrollably_backwards().closure(&violated, &tuples)?;
         loop {
             let good = space.without(&tuples, &bad)?;
             let reached = self.reached_within(&good)?;
@@ -157,13 +141,11 @@ impl<'a> SymbolicSupervisor<'a> {
     /// The tuples that are on every level as `holds` asks.
     fn each_level(&self, holds: impl Fn(&Automaton, u32) -> bool) -> Result<Diagram, BddError> {
         let levels = 0..self.space.levels();
-        levels
-            .rev()
-            .try_fold(self.space.everything(), |all, level| {
-                let part = self.parts[self.order[level]];
-                let local = self.space.where_local(level, |state| holds(part, state))?;
-                self.space.and(&local, &all)
-            })
+        levels.rev().try_fold(self.space.everything(), |all, level| {
+            let part = self.parts[self.order[level]];
+            let local = self.space.where_local(level, |state| holds(part, state))?;
+            self.space.and(&local, &all)
+        })
     }
 
     /// Where the plants enable an uncontrollable event that a specification forbids.
@@ -221,9 +203,7 @@ impl<'a> SymbolicSupervisor<'a> {
                 .and_then(|sources| self.space.and(&sources, &self.states))
                 .map_err(|error| TooComplex::of(&error, self.bounds))?;
             let count = self.space.count(&sources);
-            sum = sum
-                .zip(count)
-                .and_then(|(sum, count)| sum.checked_add(count));
+            sum = sum.zip(count).and_then(|(sum, count)| sum.checked_add(count));
         }
         Ok(sum)
     }
@@ -245,18 +225,13 @@ impl<'a> SymbolicSupervisor<'a> {
 
     /// Whether a tuple is one of its states.
     pub fn contains(&self, states: &[State]) -> bool {
-        self.space
-            .contains(&self.states, |level| states[self.order[level]].number())
+        self.space.contains(&self.states, |level| states[self.order[level]].number())
     }
 
     /// Where `event` leads from the tuple `states`, if all components allow it.
     pub fn next(&self, states: &[State], event: Label) -> Option<Vec<State>> {
         let moved = self.parts.iter().zip(states).map(|(part, &state)| {
-            if part.alphabet().contains(event) {
-                part.step(state, event)
-            } else {
-                Some(state)
-            }
+            if part.alphabet().contains(event) { part.step(state, event) } else { Some(state) }
         });
         self.alphabet.contains(event).then(|| moved.collect())?
     }
@@ -287,18 +262,13 @@ impl<'a> SymbolicSupervisor<'a> {
         let mut at = 0;
         while at < tuples.len() {
             for (event, label) in self.alphabet.labels().enumerate() {
-                let next = self
-                    .next(&tuples[at], label)
-                    .filter(|next| self.contains(next));
+                let next = self.next(&tuples[at], label).filter(|next| self.contains(next));
                 let Some(next) = next else { continue };
                 let number = *numbers.entry(next).or_insert_with_key(|next| {
                     tuples.push(next.clone());
                     tuples.len() as u32 - 1
                 });
-                edges.push(Edge {
-                    event: event as u32,
-                    target: State::new(number),
-                });
+                edges.push(Edge { event: event as u32, target: State::new(number) });
             }
             first.push(edges.len() as u32);
             at += 1;
@@ -312,20 +282,11 @@ impl<'a> SymbolicSupervisor<'a> {
             }
         }
         let all_marked = |tuple: &Vec<State>| {
-            self.parts
-                .iter()
-                .zip(tuple)
-                .all(|(part, &state)| part.is_marked(state))
+            self.parts.iter().zip(tuple).all(|(part, &state)| part.is_marked(state))
         };
         let marked = tuples.iter().map(all_marked).collect();
         let alphabet = self.alphabet.clone();
-        Ok(Automaton::from_parts(
-            "SUPER".to_owned(),
-            alphabet,
-            marked,
-            first,
-            edges,
-        ))
+        Ok(Automaton::from_parts("SUPER".to_owned(), alphabet, marked, first, edges))
     }
 }
 
@@ -340,7 +301,5 @@ fn moves(parts: &[&Automaton], order: &[usize], label: Label) -> Moves {
         });
         Some((level, pairs.collect()))
     });
-    Moves {
-        levels: knowing.collect(),
-    }
+    Moves { levels: knowing.collect() }
 }

@@ -36,14 +36,8 @@ fn a_picture_has_all_states_and_events_and_a_bound() {
     let reduced = model.file("_SIMSUP");
     let picture = draw_automaton_svg(&reduced).expect("it fits");
     let marked = reduced.marked().count();
-    assert_eq!(
-        picture.matches("<ellipse").count(),
-        reduced.state_count() + marked
-    );
-    assert!(
-        picture.contains(">1, 3<") && picture.contains("stroke-dasharray"),
-        "{picture}"
-    );
+    assert_eq!(picture.matches("<ellipse").count(), reduced.state_count() + marked);
+    assert!(picture.contains(">1, 3<") && picture.contains("stroke-dasharray"), "{picture}");
     draw_automaton_svg(&Automaton::empty("E", Alphabet::new([]))).expect("nothing to draw");
     let (plants, buffers) = line(5, 2);
     let parts: Vec<&Automaton> = plants.iter().chain(&buffers).collect();

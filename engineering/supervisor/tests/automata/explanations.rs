@@ -29,19 +29,15 @@ name = "wanted"
 "#
     );
     let read = read_model(&text, |_| Err("nothing to load".to_owned()));
-    read.model
-        .unwrap_or_else(|| panic!("{:?}", read.diagnostics))
+    read.model.unwrap_or_else(|| panic!("{:?}", read.diagnostics))
 }
 
 fn said(model: &Model) -> String {
     let result =
         synthesise(&model.plants(), &model.specifications(), Bounds::default()).expect("it fits");
-    let findings = model_findings(model)
-        .into_iter()
-        .chain(synthesis_findings(model, &result));
-    let lines: Vec<String> = findings
-        .map(|finding| format!("{} {}", finding.code, finding.message))
-        .collect();
+    let findings = model_findings(model).into_iter().chain(synthesis_findings(model, &result));
+    let lines: Vec<String> =
+        findings.map(|finding| format!("{} {}", finding.code, finding.message)).collect();
     lines.join("\n")
 }
 
@@ -105,9 +101,7 @@ name = "no_burst"
 marked = "all"
 events = ["burst"]
 "#;
-    let model = read_model(text, |_| Err(String::new()))
-        .model
-        .expect("right");
+    let model = read_model(text, |_| Err(String::new())).model.expect("right");
     assert_snapshot!(said(&model), @r#"
 U0841 there is no supervisor: by uncontrollable events alone, after "alarm" the plant may do burst, which is uncontrollable, and specification no_burst forbids it
 "#);
@@ -119,16 +113,10 @@ fn a_specification_that_is_not_lifted_is_named() {
         r#"marked = ["a"]
 transitions = ["a start b", "b finish a"]"#,
     );
-    let result = supcon(
-        &model.plants[0],
-        &model.specifications[0],
-        Bounds::default(),
-    )
-    .expect("it fits");
-    let said: Vec<String> = synthesis_findings(&model, &result)
-        .into_iter()
-        .map(|finding| finding.message)
-        .collect();
+    let result =
+        supcon(&model.plants[0], &model.specifications[0], Bounds::default()).expect("it fits");
+    let said: Vec<String> =
+        synthesis_findings(&model, &result).into_iter().map(|finding| finding.message).collect();
     assert_snapshot!(said.join("\n"), @r#"
 the specification does not know fail repair, so the meet forbids it for ever; lift the specification (sync with ALLEVENTS) if that is not meant
 after "start" the plant may do fail, which is uncontrollable, and specification wanted forbids it; the supervisor keeps away from there
@@ -158,15 +146,11 @@ name = "b_first"
 marked = ["done"]
 transitions = ["none b one", "one a done"]
 "#;
-    let model = read_model(text, |_| Err(String::new()))
-        .model
-        .expect("right");
+    let model = read_model(text, |_| Err(String::new())).model.expect("right");
     let result = synthesise_modularly(&model.plants(), &model.specifications(), Bounds::default())
         .expect("it fits");
-    let said: Vec<String> = modular_findings(&model, &result)
-        .into_iter()
-        .map(|finding| finding.message)
-        .collect();
+    let said: Vec<String> =
+        modular_findings(&model, &result).into_iter().map(|finding| finding.message).collect();
     assert_snapshot!(said.join("\n"), @r#"
 the local supervisors conflict: from the beginning they cannot all come to marked states any more
 "#);
@@ -177,14 +161,8 @@ fn past_its_bound_the_explicit_engine_stops_and_names_the_other_one() {
     let (plants, buffers) = line(6, 4);
     let plants: Vec<_> = plants.iter().collect();
     let buffers: Vec<_> = buffers.iter().collect();
-    let error = synthesise(
-        &plants,
-        &buffers,
-        Bounds {
-            memory_bytes: 1_000_000,
-        },
-    )
-    .expect_err("it does not fit");
+    let error = synthesise(&plants, &buffers, Bounds { memory_bytes: 1_000_000 })
+        .expect_err("it does not fit");
     assert!(matches!(error, TooLarge::Memory { states, .. } if states < 40_000));
     assert_eq!(error.code(), "U0830");
     assert!(error.to_string().contains("--engine symbolic"), "{error}");

@@ -8,13 +8,11 @@ fn automaton(
     marked: u32,
     transitions: &[(u32, u32, u32)],
 ) -> Automaton {
-    let transitions = transitions
-        .iter()
-        .map(|&(source, label, target)| Transition {
-            source: State::new(source),
-            label: Label::new(label),
-            target: State::new(target),
-        });
+    let transitions = transitions.iter().map(|&(source, label, target)| Transition {
+        source: State::new(source),
+        label: Label::new(label),
+        target: State::new(target),
+    });
     let marked = (0..states as u32).map(|state| state == marked).collect();
     Automaton::new(name, [], marked, transitions.collect()).expect("deterministic")
 }
@@ -29,17 +27,9 @@ pub(crate) fn line(machines: u32, capacity: u32) -> (Vec<Automaton>, Vec<Automat
         let (fill, empty) = (2 * number, 2 * number + 3);
         let steps =
             (0..capacity).flat_map(|parts| [(parts, fill, parts + 1), (parts + 1, empty, parts)]);
-        automaton(
-            format!("B{number}"),
-            capacity as usize + 1,
-            0,
-            &steps.collect::<Vec<_>>(),
-        )
+        automaton(format!("B{number}"), capacity as usize + 1, 0, &steps.collect::<Vec<_>>())
     };
-    (
-        (1..=machines).map(machine).collect(),
-        (1..machines).map(buffer).collect(),
-    )
+    ((1..=machines).map(machine).collect(), (1..machines).map(buffer).collect())
 }
 
 /// Philosophers who take their forks one by one, left or right first, and put both back at once; and the forks.
@@ -96,12 +86,7 @@ pub(crate) fn workshop(
         let (fill, empty) = (finish(number, kind), start(number + 1, kind));
         let steps =
             (0..capacity).flat_map(|parts| [(parts, fill, parts + 1), (parts + 1, empty, parts)]);
-        automaton(
-            format!("B{number}_{kind}"),
-            capacity as usize + 1,
-            0,
-            &steps.collect::<Vec<_>>(),
-        )
+        automaton(format!("B{number}_{kind}"), capacity as usize + 1, 0, &steps.collect::<Vec<_>>())
     };
     let tool = |tool: u32| {
         let users = (0..machines).flat_map(|machine| (0..kinds).map(move |kind| (machine, kind)));
@@ -119,8 +104,5 @@ pub(crate) fn workshop(
     let pairs = (0..machines - 1).flat_map(|number| (0..kinds).map(move |kind| (number, kind)));
     let buffers = pairs.map(|(number, kind)| buffer(number, kind));
     let tools = (0..(machines + kinds) / 2).map(tool);
-    (
-        (0..machines).map(machine).collect(),
-        buffers.chain(tools).collect(),
-    )
+    ((0..machines).map(machine).collect(), buffers.chain(tools).collect())
 }

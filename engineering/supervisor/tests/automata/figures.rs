@@ -34,11 +34,7 @@ fn make(model: &Model) -> Made {
     let result = supcon(&plant, &specification, bounds).expect("it fits");
     assert_eq!(result.not_lifted, []);
     assert_eq!(result.explanation, None);
-    Made {
-        plant,
-        specification,
-        supervisor: result.supervisor,
-    }
+    Made { plant, specification, supervisor: result.supervisor }
 }
 
 fn check(name: &str) {
@@ -46,9 +42,7 @@ fn check(name: &str) {
     let model = Model::read(name);
     let made = make(&model);
     let expect = |key: &str, automaton: &Automaton| {
-        let expected = model
-            .counts(key)
-            .unwrap_or_else(|| panic!("{name} has no {key}"));
+        let expected = model.counts(key).unwrap_or_else(|| panic!("{name} has no {key}"));
         assert_eq!(counts(automaton), expected, "{name}: {key}");
     };
     expect("plant", &made.plant);
@@ -59,30 +53,14 @@ fn check(name: &str) {
     expect("minstate_of_super", &minstate(&made.supervisor));
 
     let of_tct = model.file("_SUPER");
-    assert_eq!(
-        isomorph(&made.supervisor, &of_tct).err(),
-        None,
-        "{name}: TCT's supervisor"
-    );
+    assert_eq!(isomorph(&made.supervisor, &of_tct).err(), None, "{name}: TCT's supervisor");
     let at_once = synthesise(&model.plants(), &model.specifications(), bounds).expect("it fits");
-    assert_eq!(
-        isomorph(&at_once.supervisor, &of_tct).err(),
-        None,
-        "{name}: at once"
-    );
-    assert_eq!(
-        nonconflict(&[&made.plant, &made.supervisor], bounds),
-        Ok(None),
-        "{name}"
-    );
+    assert_eq!(isomorph(&at_once.supervisor, &of_tct).err(), None, "{name}: at once");
+    assert_eq!(nonconflict(&[&made.plant, &made.supervisor], bounds), Ok(None), "{name}");
 
     let data = condat(&made.plant, &of_tct, bounds).expect("it fits");
     let expected = &model.expected["condat"];
-    assert_eq!(
-        expected["states_with_disablement"],
-        data.states_with_disablement(),
-        "{name}"
-    );
+    assert_eq!(expected["states_with_disablement"], data.states_with_disablement(), "{name}");
     assert_eq!(expected["pairs"], data.pairs(), "{name}");
     assert_eq!(data.uncontrollable, []);
     if let Some(table) = model.expected["condat_table"].as_object() {
@@ -90,21 +68,13 @@ fn check(name: &str) {
             let events: Vec<u32> = events.iter().map(|event| event.number()).collect();
             (state.to_string(), events.into())
         });
-        assert_eq!(
-            &rows.collect::<serde_json::Map<_, _>>(),
-            table,
-            "{name}: condat"
-        );
+        assert_eq!(&rows.collect::<serde_json::Map<_, _>>(), table, "{name}: condat");
     }
 
     let of_tct = model.file("_SIMSUP");
     for supervisor in [&made.supervisor, &model.file("_SUPER")] {
         let reduced = supreduce(&made.plant, supervisor, bounds).expect("it fits");
-        assert!(
-            reduced.state_count() <= of_tct.state_count(),
-            "{name}: {:?}",
-            counts(&reduced)
-        );
+        assert!(reduced.state_count() <= of_tct.state_count(), "{name}: {:?}", counts(&reduced));
         assert_same_effect(&made.plant, &reduced, supervisor);
         assert_same_effect(&made.plant, &reduced, &of_tct);
     }

@@ -16,11 +16,8 @@ fn local_supervisors_are_the_monolithic_one_together() {
         let model = Model::read(name);
         let modular = synthesise_modularly(&model.plants(), &model.specifications(), bounds)
             .expect("it fits");
-        let local: Vec<&Automaton> = modular
-            .local
-            .iter()
-            .map(|one| &one.result.supervisor)
-            .collect();
+        let local: Vec<&Automaton> =
+            modular.local.iter().map(|one| &one.result.supervisor).collect();
         let symbolic = nonconflicting_symbolically(&local, SymbolicBounds::default());
         let nonconflicting = modular.together == Together::Nonconflicting;
         assert_eq!(symbolic, Ok(nonconflicting), "{name}");

@@ -36,9 +36,7 @@ pub(crate) fn sized(labels: Vec<u32>, states: Range<u32>) -> impl Strategy<Value
                     target: State::new((*target)?),
                 })
             });
-            let events = labels
-                .iter()
-                .map(|&label| Event::unnamed(Label::new(label)));
+            let events = labels.iter().map(|&label| Event::unnamed(Label::new(label)));
             Automaton::new("A", events, marked, transitions.collect()).expect("deterministic")
         })
     })
@@ -61,27 +59,17 @@ struct Naive<'a>(&'a [&'a Automaton]);
 impl Naive<'_> {
     fn next(&self, tuple: &Tuple, label: Label) -> Option<Tuple> {
         let moved = self.0.iter().zip(tuple).map(|(part, &state)| {
-            if part.alphabet().contains(label) {
-                part.step(state, label)
-            } else {
-                Some(state)
-            }
+            if part.alphabet().contains(label) { part.step(state, label) } else { Some(state) }
         });
         moved.collect()
     }
 
     fn labels(&self) -> BTreeSet<Label> {
-        self.0
-            .iter()
-            .flat_map(|part| part.alphabet().labels())
-            .collect()
+        self.0.iter().flat_map(|part| part.alphabet().labels()).collect()
     }
 
     fn marked(&self, tuple: &Tuple) -> bool {
-        self.0
-            .iter()
-            .zip(tuple)
-            .all(|(part, &state)| part.is_marked(state))
+        self.0.iter().zip(tuple).all(|(part, &state)| part.is_marked(state))
     }
 
     fn reached(&self, good: impl Fn(&Tuple) -> bool) -> BTreeSet<Tuple> {
@@ -90,30 +78,23 @@ impl Naive<'_> {
         let mut pending = vec![initial];
         while let Some(tuple) = pending.pop() {
             if good(&tuple) && reached.insert(tuple.clone()) {
-                pending.extend(
-                    self.labels()
-                        .into_iter()
-                        .filter_map(|label| self.next(&tuple, label)),
-                );
+                pending
+                    .extend(self.labels().into_iter().filter_map(|label| self.next(&tuple, label)));
             }
         }
         reached
     }
 
     fn live(&self, within: &BTreeSet<Tuple>) -> BTreeSet<Tuple> {
-        let mut live: BTreeSet<Tuple> = within
-            .iter()
-            .filter(|tuple| self.marked(tuple))
-            .cloned()
-            .collect();
+        let mut live: BTreeSet<Tuple> =
+            within.iter().filter(|tuple| self.marked(tuple)).cloned().collect();
         loop {
             let more: Vec<Tuple> = within
                 .iter()
                 .filter(|tuple| !live.contains(*tuple))
                 .filter(|tuple| {
                     self.labels().iter().any(|&label| {
-                        self.next(tuple, label)
-                            .is_some_and(|next| live.contains(&next))
+                        self.next(tuple, label).is_some_and(|next| live.contains(&next))
                     })
                 })
                 .cloned()
@@ -137,14 +118,10 @@ impl Naive<'_> {
                     let escapes = |label: Label| {
                         let possible = plant.next(&tuple[..plants].to_vec(), label).is_some();
                         possible
-                            && !self
-                                .next(tuple, label)
-                                .is_some_and(|next| good.contains(&next))
+                            && !self.next(tuple, label).is_some_and(|next| good.contains(&next))
                     };
-                    let mut uncontrollable = self
-                        .labels()
-                        .into_iter()
-                        .filter(|label| !label.is_controllable());
+                    let mut uncontrollable =
+                        self.labels().into_iter().filter(|label| !label.is_controllable());
                     !live.contains(*tuple) || uncontrollable.any(escapes)
                 })
                 .cloned()
@@ -184,11 +161,7 @@ impl Naive<'_> {
 
 /// Whether two automata have the same closed and marked languages, by words up to a length that tells them apart.
 pub(crate) fn same_languages(left: &Automaton, right: &Automaton) -> bool {
-    let labels: Vec<Label> = left
-        .alphabet()
-        .labels()
-        .chain(right.alphabet().labels())
-        .collect();
+    let labels: Vec<Label> = left.alphabet().labels().chain(right.alphabet().labels()).collect();
     let mut pairs = BTreeSet::new();
     let mut pending = vec![(left.initial(), right.initial())];
     while let Some(pair) = pending.pop() {
@@ -197,9 +170,7 @@ pub(crate) fn same_languages(left: &Automaton, right: &Automaton) -> bool {
             (Some(one), Some(two)) if left.is_marked(one) == right.is_marked(two) => {
                 if pairs.insert((one, two)) {
                     pending.extend(
-                        labels
-                            .iter()
-                            .map(|&label| (left.step(one, label), right.step(two, label))),
+                        labels.iter().map(|&label| (left.step(one, label), right.step(two, label))),
                     );
                 }
             }

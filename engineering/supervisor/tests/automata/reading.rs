@@ -10,18 +10,10 @@ use understudy_text::{Diagnostic, Report};
 use crate::models::{MODELS, Model as Reference};
 
 fn places(text: &str, diagnostics: &[Diagnostic]) -> String {
-    let report = Report {
-        name: String::new(),
-        text: text.to_owned(),
-        diagnostics: Vec::new(),
-    };
+    let report = Report { name: String::new(), text: text.to_owned(), diagnostics: Vec::new() };
     let line = |diagnostic: &Diagnostic| {
         let place = report.line_and_column(diagnostic.span.start);
-        let help = diagnostic
-            .help
-            .as_ref()
-            .map(|help| format!(" [{help}]"))
-            .unwrap_or_default();
+        let help = diagnostic.help.as_ref().map(|help| format!(" [{help}]")).unwrap_or_default();
         format!("{place} {} {}{help}", diagnostic.code, diagnostic.message)
     };
     diagnostics.iter().map(line).collect::<Vec<_>>().join("\n")
@@ -29,8 +21,7 @@ fn places(text: &str, diagnostics: &[Diagnostic]) -> String {
 
 fn accepted(text: &str) -> Automaton {
     let read = read_ads(text);
-    read.automaton
-        .unwrap_or_else(|| panic!("{}", places(text, &read.diagnostics)))
+    read.automaton.unwrap_or_else(|| panic!("{}", places(text, &read.diagnostics)))
 }
 
 #[test]
@@ -55,10 +46,7 @@ fn empty_and_vocal_are_read_and_written() {
     let empty = accepted("EMPTY\nState size:\n0\nMarker states:\n\nTransitions:\n");
     assert!(empty.is_empty() && empty.initial().is_none());
     assert_eq!(accepted(&write_ads(&empty, &[]).expect("it fits")), empty);
-    let event = Event {
-        label: Label::new(3),
-        name: "start".to_owned(),
-    };
+    let event = Event { label: Label::new(3), name: "start".to_owned() };
     let nothing = Model {
         alphabet: Alphabet::new([event.clone()]),
         supervisors: vec![Automaton::empty("EMPTY", Alphabet::new([event]))],
@@ -68,10 +56,7 @@ fn empty_and_vocal_are_read_and_written() {
     assert_eq!(again.model.expect("right").supervisors, nothing.supervisors);
     let text = "V\nState size:\n2\nMarker states:\nVocal states:\n1 10\nTransitions:\n0 0 1\n";
     let read = read_ads(text);
-    let vocal = [Vocal {
-        state: State::new(1),
-        output: 10,
-    }];
+    let vocal = [Vocal { state: State::new(1), output: 10 }];
     assert_eq!(read.vocal, vocal);
     let again =
         read_ads(&write_ads(&read.automaton.expect("right"), &read.vocal).expect("it fits"));
@@ -119,10 +104,7 @@ fn reference_models_survive_writing_in_both_formats() {
     for name in MODELS {
         let model = Reference::read(name);
         for automaton in model.plants.iter().chain(&model.specifications) {
-            assert_eq!(
-                &accepted(&write_ads(automaton, &[]).expect("it fits")),
-                automaton
-            );
+            assert_eq!(&accepted(&write_ads(automaton, &[]).expect("it fits")), automaton);
         }
         let alphabets = model.plants.iter().map(Automaton::alphabet);
         let whole = Model {
@@ -134,23 +116,15 @@ fn reference_models_survive_writing_in_both_formats() {
         };
         let text = write_model(&whole);
         let read = read_model(&text, |_| Err("nothing to load".to_owned()));
-        let read = read
-            .model
-            .unwrap_or_else(|| panic!("{}", places(&text, &read.diagnostics)));
+        let read = read.model.unwrap_or_else(|| panic!("{}", places(&text, &read.diagnostics)));
         for (one, other) in read.plants.iter().zip(&whole.plants) {
-            assert!(
-                one.transitions().eq(other.transitions()),
-                "{name}: {}",
-                other.name()
-            );
+            assert!(one.transitions().eq(other.transitions()), "{name}: {}", other.name());
             assert!(one.marked().eq(other.marked()), "{name}: {}", other.name());
         }
         assert_eq!(
             write_model(&read),
             write_model(
-                &read_model(&write_model(&read), |_| Err(String::new()))
-                    .model
-                    .expect("right")
+                &read_model(&write_model(&read), |_| Err(String::new())).model.expect("right")
             )
         );
     }
@@ -186,27 +160,17 @@ fn a_model_has_named_events_states_signals_and_files() {
     });
     assert_eq!(read.diagnostics, []);
     let model = read.model.expect("right");
-    let event = |number: u32, name: &str| Event {
-        label: Label::new(number),
-        name: name.to_owned(),
-    };
-    assert_eq!(
-        model.alphabet.events(),
-        [event(0, "finish"), event(1, "reset"), event(3, "start")]
-    );
+    let event =
+        |number: u32, name: &str| Event { label: Label::new(number), name: name.to_owned() };
+    assert_eq!(model.alphabet.events(), [event(0, "finish"), event(1, "reset"), event(3, "start")]);
     assert_eq!(model.signals.len(), 1);
     let machine = &model.plants[0];
     assert_eq!(machine.state_name(State::INITIAL), "idle");
     assert_eq!(
-        machine
-            .run(&[Label::new(3)])
-            .map(|state| machine.state_name(state).into_owned()),
+        machine.run(&[Label::new(3)]).map(|state| machine.state_name(state).into_owned()),
         Some("working".to_owned())
     );
-    assert_eq!(
-        model.specifications[0].alphabet().name(Label::new(3)),
-        "start"
-    );
+    assert_eq!(model.specifications[0].alphabet().name(Label::new(3)), "start");
 }
 
 #[test]

@@ -47,11 +47,7 @@ impl<'a> Naive<'a> {
                 }
             }
             if plant.is_marked(at) {
-                let asked = if supervisor.is_marked(state) {
-                    &mut enables
-                } else {
-                    &mut disables
-                };
+                let asked = if supervisor.is_marked(state) { &mut enables } else { &mut disables };
                 asked.insert((state.index(), None::<Label>));
             }
         }
@@ -59,10 +55,7 @@ impl<'a> Naive<'a> {
             let against = disables.iter().filter(move |(_, other)| other == what);
             against.map(move |(other, _)| (*one.min(other), *one.max(other)))
         });
-        Self {
-            supervisor,
-            clashes: pairs.collect(),
-        }
+        Self { supervisor, clashes: pairs.collect() }
     }
 
     /// The finest coarser partition in which `left` and `right` are together and events are deterministic; nothing where states clash.
@@ -70,10 +63,8 @@ impl<'a> Naive<'a> {
         let mut partition = partition.clone();
         let mut join = Some((left, right));
         while let Some((left, right)) = join {
-            let (kept, gone) = (
-                partition[left].min(partition[right]),
-                partition[left].max(partition[right]),
-            );
+            let (kept, gone) =
+                (partition[left].min(partition[right]), partition[left].max(partition[right]));
             for cell in &mut partition {
                 if *cell == gone {
                     *cell = kept;
@@ -90,10 +81,7 @@ impl<'a> Naive<'a> {
                 });
             join = split.map(|(one, other)| (one.target.index(), other.target.index()));
         }
-        let clash = self
-            .clashes
-            .iter()
-            .any(|&(one, other)| partition[one] == partition[other]);
+        let clash = self.clashes.iter().any(|&(one, other)| partition[one] == partition[other]);
         (!clash).then_some(partition)
     }
 
@@ -114,11 +102,8 @@ impl<'a> Naive<'a> {
         let mut cells = partition.clone();
         cells.sort_unstable();
         cells.dedup();
-        let number = |state: State| {
-            cells
-                .binary_search(&partition[state.index()])
-                .expect("a cell") as u32
-        };
+        let number =
+            |state: State| cells.binary_search(&partition[state.index()]).expect("a cell") as u32;
         let transitions = self.supervisor.transitions().map(|transition| Transition {
             source: State::new(number(transition.source)),
             label: transition.label,
@@ -190,21 +175,14 @@ fn a_large_supervisor_is_reduced() {
     let (plants, specifications) = workshop(3, 4, 1);
     let plants: Vec<&Automaton> = plants.iter().collect();
     let specifications: Vec<&Automaton> = specifications.iter().collect();
-    let supervisor = synthesise(&plants, &specifications, bounds)
-        .expect("it fits")
-        .supervisor;
+    let supervisor = synthesise(&plants, &specifications, bounds).expect("it fits").supervisor;
     let plant = sync(&plants, bounds).expect("it fits");
     assert_eq!(size(&supervisor), (12_807, 55_825));
     let made = supreduce_while(&plant, &supervisor, bounds, &mut |_| true).expect("it fits");
     assert!(made.is_complete);
     assert_eq!(size(&made.supervisor), (1_300, 20_398));
-    assert_eq!(
-        compare_effects(&plant, &supervisor, &made.supervisor, bounds),
-        Ok(None)
-    );
-    let little = Bounds {
-        memory_bytes: 100_000,
-    };
+    assert_eq!(compare_effects(&plant, &supervisor, &made.supervisor, bounds), Ok(None));
+    let little = Bounds { memory_bytes: 100_000 };
     assert!(compare_effects(&plant, &supervisor, &made.supervisor, little).is_err());
     assert!(supreduce(&plant, &supervisor, little).is_err());
     let mut asked = 0;
@@ -214,8 +192,5 @@ fn a_large_supervisor_is_reduced() {
     });
     let stopped = stopped.expect("it fits");
     assert!(!stopped.is_complete && stopped.supervisor.state_count() < supervisor.state_count());
-    assert_eq!(
-        compare_effects(&plant, &supervisor, &stopped.supervisor, bounds),
-        Ok(None)
-    );
+    assert_eq!(compare_effects(&plant, &supervisor, &stopped.supervisor, bounds), Ok(None));
 }

@@ -14,17 +14,9 @@ fn check(name: &str, plants: &[&Automaton], specifications: &[&Automaton]) {
     let states = explicit.supervisor.state_count() as u128;
     assert_eq!(symbolic.state_count(), Some(states), "{name}: states");
     let transitions = explicit.supervisor.transition_count() as u128;
-    assert_eq!(
-        symbolic.transition_count(),
-        Ok(Some(transitions)),
-        "{name}: transitions"
-    );
+    assert_eq!(symbolic.transition_count(), Ok(Some(transitions)), "{name}: transitions");
     let listed = symbolic.to_automaton(Bounds::default()).expect("it fits");
-    assert_eq!(
-        isomorph(&listed, &explicit.supervisor).err(),
-        None,
-        "{name}"
-    );
+    assert_eq!(isomorph(&listed, &explicit.supervisor).err(), None, "{name}");
 }
 
 #[test]

@@ -9,14 +9,8 @@ use serde_json::Value;
 use understudy_supervisor::{Automaton, read_ads};
 
 /// The models that have plants and specifications, and a supervisor of TCT's.
-pub(crate) const MODELS: [&str; 6] = [
-    "small_factory",
-    "transfer_line",
-    "guideway",
-    "dining5",
-    "line4_3",
-    "agv",
-];
+pub(crate) const MODELS: [&str; 6] =
+    ["small_factory", "transfer_line", "guideway", "dining5", "line4_3", "agv"];
 
 /// Automata of papers, in `examples/avalanche`.
 pub(crate) const OF_PAPERS: [&str; 3] = ["TEST", "FIG4", "FIG6"];
@@ -80,8 +74,7 @@ pub(crate) fn counts(automaton: &Automaton) -> (usize, usize) {
 pub(crate) fn automaton(model: &str, name: &str) -> Automaton {
     let (path, text) = file(model, &format!("{name}.ADS"));
     let read = read_ads(&text);
-    read.automaton
-        .unwrap_or_else(|| panic!("{}: {:?}", path.display(), read.diagnostics))
+    read.automaton.unwrap_or_else(|| panic!("{}: {:?}", path.display(), read.diagnostics))
 }
 
 /// `model.json` or `expected.json` of a model.

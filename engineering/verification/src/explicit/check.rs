@@ -18,16 +18,8 @@ impl Explicit {
         signals.sort_unstable();
         signals.dedup();
         let values = self.values(&signals);
-        let model = Model {
-            listed: self,
-            ways_back: WaysBack::of(self),
-            signals,
-            values,
-        };
-        properties
-            .iter()
-            .map(|property| model.check(property))
-            .collect()
+        let model = Model { listed: self, ways_back: WaysBack::of(self), signals, values };
+        properties.iter().map(|property| model.check(property)).collect()
     }
 
     /// For each formula of one scan the shortest run to where it is broken, as far as states are listed.
@@ -156,10 +148,9 @@ impl Model<'_> {
 
     fn set(&self, formula: &Core) -> Set {
         match formula {
-            Core::Constant(value) => Set(vec![
-                u64::from(*value).wrapping_neg();
-                self.listed.states().div_ceil(64)
-            ]),
+            Core::Constant(value) => {
+                Set(vec![u64::from(*value).wrapping_neg(); self.listed.states().div_ceil(64)])
+            }
             Core::Signal(signal) => {
                 let place = self.signals.binary_search(signal);
                 self.values[place.expect("signals were collected")].clone()

@@ -50,13 +50,10 @@ impl Lanes {
         self.take_registers(listed, &states, words);
         let inputs = listed.scan.input_count();
         self.inputs.clear();
-        self.inputs
-            .extend((0..inputs).map(|input| lanes_of_input(input, states.start)));
+        self.inputs.extend((0..inputs).map(|input| lanes_of_input(input, states.start)));
         self.outputs.resize(listed.scan.output_count(), [0; WORDS]);
         let scratch = &mut self.scratch;
-        listed
-            .scan
-            .step_wide(scratch, &mut self.state, &self.inputs, &mut self.outputs);
+        listed.scan.step_wide(scratch, &mut self.state, &self.inputs, &mut self.outputs);
         self.next.resize(LANES * listed.width, 0);
         let mut square = [0; 64];
         for (chunk, registers) in self.state.chunks(64).enumerate() {
@@ -112,10 +109,7 @@ impl Lanes {
 
     /// For who looks at every scan.
     pub(super) fn seen(&self) -> Seen<'_> {
-        Seen {
-            states: self.states.clone(),
-            outputs: &self.outputs,
-        }
+        Seen { states: self.states.clone(), outputs: &self.outputs }
     }
 }
 

@@ -62,22 +62,10 @@ impl<'c> Unrolling<'c> {
             if !from_start {
                 return Lit::new(solver.new_var_default(), true);
             }
-            if circuit.registers()[register as usize].initial {
-                one
-            } else {
-                !one
-            }
+            if circuit.registers()[register as usize].initial { one } else { !one }
         });
         let before = vec![first.collect()];
-        Self {
-            circuit,
-            solver,
-            one,
-            registers,
-            before,
-            inputs: Vec::new(),
-            made: Vec::new(),
-        }
+        Self { circuit, solver, one, registers, before, inputs: Vec::new(), made: Vec::new() }
     }
 
     /// Adds a scan.
@@ -100,10 +88,8 @@ impl<'c> Unrolling<'c> {
         for earlier in 0..scan {
             let pairs = self.before[earlier].iter().zip(&self.before[scan]);
             let pairs: Vec<(Lit, Lit)> = pairs.map(|(left, right)| (*left, *right)).collect();
-            let mut some: Vec<Lit> = pairs
-                .into_iter()
-                .map(|(left, right)| self.sum(left, right))
-                .collect();
+            let mut some: Vec<Lit> =
+                pairs.into_iter().map(|(left, right)| self.sum(left, right)).collect();
             self.solver.add_clause_reuse(&mut some);
         }
     }
@@ -179,11 +165,7 @@ impl<'c> Unrolling<'c> {
             let operation = circuit.graph().operation(expression);
             let waiting = pending.len();
             let made = &self.made[scan];
-            pending.extend(
-                operation
-                    .operands()
-                    .filter(|operand| !made.contains_key(operand)),
-            );
+            pending.extend(operation.operands().filter(|operand| !made.contains_key(operand)));
             if pending.len() > waiting {
                 continue;
             }
@@ -225,12 +207,9 @@ impl<'c> Unrolling<'c> {
 
     fn sum(&mut self, left: Lit, right: Lit) -> Lit {
         let one = Lit::new(self.solver.new_var_default(), true);
-        for clause in [
-            [!one, left, right],
-            [!one, !left, !right],
-            [one, !left, right],
-            [one, left, !right],
-        ] {
+        for clause in
+            [[!one, left, right], [!one, !left, !right], [one, !left, right], [one, left, !right]]
+        {
             self.solver.add_clause_reuse(&mut clause.to_vec());
         }
         one

@@ -79,11 +79,7 @@ impl Abstraction {
                     line: 0,
                     what: error.to_string(),
                 })?;
-                return Ok(Self {
-                    circuit,
-                    meanings: pass.meanings,
-                    boundaries: found,
-                });
+                return Ok(Self { circuit, meanings: pass.meanings, boundaries: found });
             }
             boundaries = found;
         }
@@ -152,10 +148,7 @@ impl<'s> Pass<'s> {
         // Operands first, so that no long chain of terms is walked at once.
         let roots = self.system.observed.iter().map(|(_, term)| *term).collect();
         let cells = &self.system.cells;
-        let reached = self
-            .system
-            .terms
-            .reached(roots, |cell| cells[cell as usize].next);
+        let reached = self.system.terms.reached(roots, |cell| cells[cell as usize].next);
         for term in reached {
             if self.is_bits(term) {
                 self.bits(term);

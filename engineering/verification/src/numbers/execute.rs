@@ -99,11 +99,7 @@ struct Loop<'l> {
 enum Test<'l> {
     While(&'l Expression),
     Repeat(&'l Expression),
-    For {
-        counter: (u64, Elementary),
-        to: Term,
-        by: Term,
-    },
+    For { counter: (u64, Elementary), to: Term, by: Term },
 }
 
 type Result<T> = std::result::Result<T, Unsupported>;
@@ -169,10 +165,7 @@ impl<'a> Execution<'a> {
     /// # Errors
     /// What cannot be followed.
     pub(super) fn task(&mut self, routine: RoutineId, own: u32, runs: Term) -> Result<()> {
-        let context = Context {
-            routine,
-            own: u64::from(own),
-        };
+        let context = Context { routine, own: u64::from(own) };
         let changes = self.within(runs, |this| {
             this.clear_frame(routine);
             this.body(context)
@@ -292,11 +285,7 @@ impl<'a> Execution<'a> {
 
     fn staying(&mut self) -> Left {
         let none = self.terms.boolean(false);
-        Left {
-            exit: none,
-            next: none,
-            back: none,
-        }
+        Left { exit: none, next: none, back: none }
     }
 
     fn one_of(&mut self, condition: Term, left: Either<Left>) -> Left {
@@ -383,10 +372,7 @@ impl<'a> Execution<'a> {
                 for (condition, address) in self.places(context, place)? {
                     let (changes, ()) = self.within(condition, |this| {
                         this.clear_frame(*routine);
-                        this.body(Context {
-                            routine: *routine,
-                            own: address / 64,
-                        })
+                        this.body(Context { routine: *routine, own: address / 64 })
                     })?;
                     self.merge(condition, changes, HashMap::new());
                 }

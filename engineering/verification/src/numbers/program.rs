@@ -125,9 +125,7 @@ impl System {
             }
             Code::Circuit(circuit) => {
                 let outputs = circuit.outputs().iter();
-                outputs
-                    .map(|output| (output.name.clone(), Elementary::Bool))
-                    .collect()
+                outputs.map(|output| (output.name.clone(), Elementary::Bool)).collect()
             }
         };
         let outputs = points.into_iter().map(|(name, of)| {
@@ -136,10 +134,7 @@ impl System {
         });
         let outputs = outputs.collect();
         let name = format!("{} can be read", member.name);
-        Before {
-            outputs,
-            can_be_read: self.cell(name, Elementary::Bool, 0),
-        }
+        Before { outputs, can_be_read: self.cell(name, Elementary::Bool, 0) }
     }
 
     fn keep_outputs(&mut self, before: &Before, outputs: &Outputs, sampled: Term) {
@@ -163,23 +158,16 @@ impl System {
         let points: Vec<(String, Elementary, bool)> = match member.code {
             Code::Typed(program) => {
                 let points = program.inputs.iter();
-                points
-                    .map(|point| (point.name.clone(), point.of, point.slot == 0))
-                    .collect()
+                points.map(|point| (point.name.clone(), point.of, point.slot == 0)).collect()
             }
             Code::Circuit(circuit) => {
                 let inputs = circuit.inputs().iter();
-                inputs
-                    .map(|name| (name.clone(), Elementary::Bool, false))
-                    .collect()
+                inputs.map(|name| (name.clone(), Elementary::Bool, false)).collect()
             }
         };
         // A remote I/O that restarts has no value of a signal; it samples nothing meanwhile.
         let reads = member.sources.iter();
-        let reads = reads
-            .filter(|source| matches!(source, Source::Signal { .. }))
-            .count()
-            > 0;
+        let reads = reads.filter(|source| matches!(source, Source::Signal { .. })).count() > 0;
         let forgets = match reads {
             true => {
                 let restarts = self.input(format!("{prefix}restarted"), Elementary::Bool, None);
@@ -206,12 +194,7 @@ impl System {
                     late.push((terms.len(), other.clone()));
                     self.terms.boolean(false)
                 }
-                Some(Source::Signal {
-                    program,
-                    output,
-                    default,
-                    stale_after,
-                }) => {
+                Some(Source::Signal { program, output, default, stale_after }) => {
                     let source = &before[*program];
                     let is_read = match proved.get(program) {
                         Some(&known) => known,
@@ -247,8 +230,7 @@ impl System {
             }
         }
         for (name, is_valid) in valid {
-            self.observed
-                .push((format!("{prefix}{name}.valid"), is_valid));
+            self.observed.push((format!("{prefix}{name}.valid"), is_valid));
         }
         terms
     }
@@ -270,11 +252,8 @@ impl System {
         let limit = self.terms.constant(Elementary::Uint, u64::from(last) + 1);
         let one = self.terms.constant(Elementary::Uint, 1);
         let is_old = self.terms.compare(Comparison::GreaterOrEqual, old, limit);
-        let older = self.terms.apply(
-            Operation::Add(Elementary::Uint),
-            Elementary::Uint,
-            &[old, one],
-        );
+        let older =
+            self.terms.apply(Operation::Add(Elementary::Uint), Elementary::Uint, &[old, one]);
         let aged = self.terms.choose(is_old, limit, older);
         let zero = self.terms.constant(Elementary::Uint, 0);
         let now = self.terms.choose(is_read, zero, aged);
@@ -318,8 +297,7 @@ impl System {
                 Gate::Or(left, right) => self.terms.or(of(left), of(right)),
                 Gate::Xor(left, right) => {
                     let xor = Operation::Xor(Elementary::Bool);
-                    self.terms
-                        .apply(xor, Elementary::Bool, &[of(left), of(right)])
+                    self.terms.apply(xor, Elementary::Bool, &[of(left), of(right)])
                 }
             };
             terms.push(term);
@@ -339,10 +317,7 @@ impl System {
             self.observed.push((name, value));
             points.insert(output.name.clone(), value);
         }
-        Outputs {
-            points,
-            can_be_read: self.terms.boolean(true),
-        }
+        Outputs { points, can_be_read: self.terms.boolean(true) }
     }
 
     /// Adds a program with numbers; it makes a scan where `runs` holds.
@@ -357,29 +332,18 @@ impl System {
         let was_stopped = self.cells[stopped as usize].term;
         let scans = self.cell(format!("{prefix}scans"), Elementary::Ulint, 0);
         let was_scans = self.cells[scans as usize].term;
-        let first = Scan {
-            prefix,
-            program,
-            inputs,
-            scans: was_scans,
-            stopped: None,
-        };
+        let first = Scan { prefix, program, inputs, scans: was_scans, stopped: None };
         let mut numbers = HashMap::new();
         let mut scan = self.scan(&first, &mut numbers)?;
         let mut can_fault = scan.faulted;
         if !self.terms.is(can_fault, false) {
             // It can stop: a scan may begin with the initial values.
-            let again = Scan {
-                stopped: Some(was_stopped),
-                ..first
-            };
+            let again = Scan { stopped: Some(was_stopped), ..first };
             scan = self.scan(&again, &mut numbers)?;
             can_fault = scan.faulted;
         }
         let resets = program.inputs.iter().zip(inputs);
-        let mut reset = resets
-            .filter(|(point, _)| point.slot == 0)
-            .map(|(_, &term)| term);
+        let mut reset = resets.filter(|(point, _)| point.slot == 0).map(|(_, &term)| term);
         let reset = reset.next().unwrap_or_else(|| self.terms.boolean(false));
         let running = self.terms.not(was_stopped);
         let begins = self.terms.or(running, reset);
@@ -453,9 +417,6 @@ impl System {
                 }
             }
         }
-        Outputs {
-            points,
-            can_be_read: self.terms.not(faulted),
-        }
+        Outputs { points, can_be_read: self.terms.not(faulted) }
     }
 }

@@ -51,11 +51,7 @@ struct Scan {
 
 impl<'s> Replay<'s> {
     pub(super) fn new(system: &'s System, abstraction: &'s Abstraction, go_on: GoOn<'s>) -> Self {
-        Self {
-            system,
-            abstraction,
-            go_on,
-        }
+        Self { system, abstraction, go_on }
     }
 
     /// Repeats `trace`; it ends where one of `kept` is broken.
@@ -84,14 +80,8 @@ impl<'s> Replay<'s> {
                 break;
             }
         }
-        let run = self
-            .is_known(&trace.signals)
-            .then(|| self.run(trace, &scans, is_broken));
-        Followed {
-            run,
-            is_broken,
-            mismatch,
-        }
+        let run = self.is_known(&trace.signals).then(|| self.run(trace, &scans, is_broken));
+        Followed { run, is_broken, mismatch }
     }
 
     /// Searches a run that breaks an invariant, with inputs at and between the constants of the programs.
@@ -99,9 +89,8 @@ impl<'s> Replay<'s> {
         if !self.is_known(&trace.signals) {
             return None;
         }
-        let pools: Vec<Vec<u64>> = (0..self.system.inputs.len())
-            .map(|input| self.pool(input))
-            .collect();
+        let pools: Vec<Vec<u64>> =
+            (0..self.system.inputs.len()).map(|input| self.pool(input)).collect();
         let mut dice = Dice(1);
         let runs = EVALUATIONS / SCANS / self.system.terms.len().max(1);
         for _ in 0..runs.max(1) {
@@ -121,10 +110,7 @@ impl<'s> Replay<'s> {
                     }
                 }
                 let scan = self.scan(inputs, &cells);
-                let row = ScanRow {
-                    inputs: Vec::new(),
-                    outputs: Vec::new(),
-                };
+                let row = ScanRow { inputs: Vec::new(), outputs: Vec::new() };
                 let is_broken = !self.holds(kept, &scan, &row);
                 cells = self.after(&scan);
                 scans.push(scan);
@@ -190,9 +176,7 @@ impl<'s> Replay<'s> {
 
     fn after(&self, scan: &Scan) -> Vec<u64> {
         let cells = self.system.cells.iter();
-        cells
-            .map(|cell| scan.values[Terms::index(cell.next)])
-            .collect()
+        cells.map(|cell| scan.values[Terms::index(cell.next)]).collect()
     }
 
     fn holds(&self, kept: &Resolved, scan: &Scan, row: &ScanRow) -> bool {
@@ -220,9 +204,7 @@ impl<'s> Replay<'s> {
         let cells = &self.system.cells;
         let terms = &self.system.terms;
         let reached = terms.reached(roots.collect(), |cell| cells[cell as usize].next);
-        reached
-            .into_iter()
-            .all(|term| !matches!(terms.node(term), Node::Unknown(_)))
+        reached.into_iter().all(|term| !matches!(terms.node(term), Node::Unknown(_)))
     }
 
     /// The scan whose numbers agree with a row of the circuit, or the first one tried and a comparison that does not.
@@ -305,11 +287,8 @@ impl<'s> Replay<'s> {
                     let of = terms.of(term);
                     let at = position(of, scan.values[Terms::index(term)]);
                     let really = at.is_some_and(|at| at <= boundary);
-                    let text = format!(
-                        "{} {}",
-                        self.system.describe(term),
-                        boundary_text(of, boundary)
-                    );
+                    let text =
+                        format!("{} {}", self.system.describe(term), boundary_text(of, boundary));
                     (at.is_none() || really == is, text)
                 }
                 Meaning::Less(left, right) => {
@@ -319,11 +298,8 @@ impl<'s> Replay<'s> {
                         (Some(left), Some(right)) => left < right,
                         _ => is,
                     };
-                    let text = format!(
-                        "{} < {}",
-                        self.system.describe(left),
-                        self.system.describe(right)
-                    );
+                    let text =
+                        format!("{} < {}", self.system.describe(left), self.system.describe(right));
                     (really == is, text)
                 }
                 Meaning::NotANumber(term) => {
@@ -353,17 +329,12 @@ impl<'s> Replay<'s> {
         };
         let signals = trace.signals.iter().copied().filter(is_bool).collect();
         let rows = scans.iter().enumerate().map(|(place, scan)| {
-            let empty = ScanRow {
-                inputs: Vec::new(),
-                outputs: Vec::new(),
-            };
+            let empty = ScanRow { inputs: Vec::new(), outputs: Vec::new() };
             let row = trace.scans.get(place).unwrap_or(&empty);
             let inputs = 0..self.abstraction.meanings.len();
             let outputs = 0..self.system.observed.len();
             ScanRow {
-                inputs: inputs
-                    .map(|input| self.value(Signal::Input(input), scan, row))
-                    .collect(),
+                inputs: inputs.map(|input| self.value(Signal::Input(input), scan, row)).collect(),
                 outputs: outputs
                     .map(|output| self.value(Signal::Output(output), scan, row))
                     .collect(),
@@ -405,9 +376,7 @@ impl<'s> Replay<'s> {
             let values = scans.iter();
             Row {
                 name: name.clone(),
-                values: values
-                    .map(|scan| of.text(scan.values[Terms::index(term)]))
-                    .collect(),
+                values: values.map(|scan| of.text(scan.values[Terms::index(term)])).collect(),
             }
         })
         .collect()
@@ -422,9 +391,7 @@ fn some_value(of: Elementary, above: i128, at_most: i128, which: usize) -> u64 {
         _ => (above, at_most),
     };
     let value = between(of, Some(ends.0), Some(ends.1));
-    value
-        .or_else(|| between(of, Some(above), Some(at_most)))
-        .unwrap_or(0)
+    value.or_else(|| between(of, Some(above), Some(at_most))).unwrap_or(0)
 }
 
 /// Numbers that look drawn, the same in every run of the tool.

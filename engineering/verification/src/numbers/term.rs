@@ -275,11 +275,9 @@ impl Terms {
                     let operands: Vec<u64> = operands.iter().map(of_term).collect();
                     operation.apply(&operands).unwrap_or(0)
                 }
-                Node::Choose([condition, then, otherwise]) => of_term(if of_term(condition) != 0 {
-                    then
-                } else {
-                    otherwise
-                }),
+                Node::Choose([condition, then, otherwise]) => {
+                    of_term(if of_term(condition) != 0 { then } else { otherwise })
+                }
             };
             values.push(value);
         }

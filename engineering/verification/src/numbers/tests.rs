@@ -12,14 +12,9 @@ use crate::property::read_one;
 
 fn lowered(text: &str) -> Program {
     let (file, _) = understudy_structured_text::parser::parse(text);
-    let options = Options {
-        text,
-        ..Options::default()
-    };
+    let options = Options { text, ..Options::default() };
     let lowered = lower(&file, &options);
-    lowered
-        .program
-        .unwrap_or_else(|| panic!("{:?}", lowered.diagnostics))
+    lowered.program.unwrap_or_else(|| panic!("{:?}", lowered.diagnostics))
 }
 
 /// An input that is often at a bound or near a constant.
@@ -101,15 +96,11 @@ fn compare(program: &Program, seed: u64, scans: usize) -> bool {
                 Meaning::NotANumber(term) => position(system.terms.of(term), of(term)).is_none(),
                 Meaning::Less(left, right) => {
                     let place = |term| position(system.terms.of(term), of(term));
-                    place(left)
-                        .zip(place(right))
-                        .is_some_and(|(left, right)| left < right)
+                    place(left).zip(place(right)).is_some_and(|(left, right)| left < right)
                 }
                 Meaning::Equal(left, right) => {
                     let place = |term| position(system.terms.of(term), of(term));
-                    place(left)
-                        .zip(place(right))
-                        .is_some_and(|(left, right)| left == right)
+                    place(left).zip(place(right)).is_some_and(|(left, right)| left == right)
                 }
                 Meaning::Free(term, bit) => of(term) >> bit & 1 == 1,
             })
@@ -272,18 +263,12 @@ fn ask(model: &Model, property: &str) -> Answer {
 #[test]
 fn what_holds_for_all_numbers_is_proved() {
     let model = Model::of_program(&lowered(PROGRAMS[5])).expect("followed");
-    assert_eq!(
-        ask(&model, "never pump and program.fault"),
-        Answer::Holds(None)
-    );
+    assert_eq!(ask(&model, "never pump and program.fault"), Answer::Holds(None));
     assert!(matches!(ask(&model, "never done"), Answer::Fails(Some(_))));
     // Enumerations and step numbers are followed bit by bit, so that what can happen is known as well.
     assert!(matches!(ask(&model, "AG EF pump"), Answer::Holds(_)));
     let model = Model::of_program(&lowered(PROGRAMS[2])).expect("followed");
-    assert_eq!(
-        ask(&model, "AG (alarm -> AX (alarm | !alarm))"),
-        Answer::Holds(None)
-    );
+    assert_eq!(ask(&model, "AG (alarm -> AX (alarm | !alarm))"), Answer::Holds(None));
 }
 
 #[test]
@@ -299,19 +284,14 @@ fn the_order_of_comparisons_is_kept() {
          END_PROGRAM",
     );
     let model = Model::of_program(&program).expect("followed");
-    assert_eq!(
-        ask(&model, "never higher and not high"),
-        Answer::Holds(None)
-    );
+    assert_eq!(ask(&model, "never higher and not high"), Answer::Holds(None));
     let Answer::Fails(Some(run)) = ask(&model, "never high and not higher") else {
         panic!("it fails");
     };
     let last = run.trace.scans.len() - 1;
     let number = |name: &str| -> f64 {
         let row = run.numbers.iter().find(|row| row.name == name);
-        row.expect("the input is shown").values[last]
-            .parse()
-            .expect("a number")
+        row.expect("the input is shown").values[last].parse().expect("a number")
     };
     let product = number("a") * number("b");
     assert!(product > 80.0 && product <= 90.0, "{product}");
@@ -334,12 +314,7 @@ fn what_no_number_does_is_undecided_with_the_comparison() {
 }
 
 fn signal(program: usize, output: &str, default: u64) -> Source {
-    Source::Signal {
-        program,
-        output: output.to_owned(),
-        default,
-        stale_after: 0,
-    }
+    Source::Signal { program, output: output.to_owned(), default, stale_after: 0 }
 }
 
 #[test]
@@ -360,11 +335,7 @@ fn two_programs_keep_what_each_alone_does_not() {
             Member {
                 name: "left".to_owned(),
                 code: Code::Typed(&left),
-                sources: vec![
-                    Source::Any(None),
-                    signal(1, "wants_in", 0),
-                    signal(1, "inside", 1),
-                ],
+                sources: vec![Source::Any(None), signal(1, "wants_in", 0), signal(1, "inside", 1)],
             },
             Member {
                 name: "right".to_owned(),

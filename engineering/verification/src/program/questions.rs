@@ -67,9 +67,7 @@ impl Questions {
         let roots = circuit.roots();
         let copies = builder
             .graph()
-            .import(circuit.graph(), &roots, |graph, variable| {
-                graph.variable(variable)
-            });
+            .import(circuit.graph(), &roots, |graph, variable| graph.variable(variable));
         let (next, values) = copies.split_at(registers.len());
         for (register, &next) in registers.into_iter().zip(next) {
             builder.set_next(register, next);
@@ -119,10 +117,7 @@ impl Questions {
             }
         }
         Self {
-            circuit: asking
-                .builder
-                .finish()
-                .expect("names are those of a circuit, and numbers"),
+            circuit: asking.builder.finish().expect("names are those of a circuit, and numbers"),
             changes,
             targets,
         }
@@ -138,10 +133,7 @@ impl Asking {
         let mut sets = Vec::new();
         for moment in moments.iter().rev() {
             let undone = graph.and(falls_later, lost);
-            sets.push((
-                graph.and(moment.rises, undone),
-                graph.and(moment.rises, kept),
-            ));
+            sets.push((graph.and(moment.rises, undone), graph.and(moment.rises, kept)));
             falls_later = graph.or(moment.falls, falls_later);
         }
         sets.reverse();
@@ -164,9 +156,7 @@ impl Asking {
         let sets = sets.into_iter();
         Target {
             writes,
-            sets: sets
-                .map(|(undone, stays)| (self.ask(undone), self.ask(stays)))
-                .collect(),
+            sets: sets.map(|(undone, stays)| (self.ask(undone), self.ask(stays))).collect(),
             through: self.ask(through),
             race: self.ask(race),
         }

@@ -53,10 +53,7 @@ impl Subject {
         bounds: Bounds<'_>,
     ) -> Result<Remarks, LowerError> {
         let coils = program.rungs.iter().flat_map(|rung| &rung.coils);
-        if coils
-            .map(|coil| coil.target.span())
-            .all(|span| span.is_empty())
-        {
+        if coils.map(|coil| coil.target.span()).all(|span| span.is_empty()) {
             return Ok(Remarks::default());
         }
         let (circuit, writes) = program.lower_writes(period)?;
@@ -77,9 +74,7 @@ impl Subject {
             remarking.target(target);
         }
         let mut remarks = remarking.remarks;
-        remarks
-            .found
-            .sort_by_key(|remark| remark.diagnostic.span.start);
+        remarks.found.sort_by_key(|remark| remark.diagnostic.span.start);
         Ok(remarks)
     }
 }
@@ -114,10 +109,8 @@ impl Remarking<'_> {
         if self.search.is_seen(change) || !matches!(self.ask(change), Found::Never) {
             return;
         }
-        let message = format!(
-            "rung {} has no effect: none of its coils ever changes a value",
-            rung + 1
-        );
+        let message =
+            format!("rung {} has no effect: none of its coils ever changes a value", rung + 1);
         let place = self.program.rungs[rung].coils[0].target.span();
         let help = "remove the rung, or find the contact that never closes";
         self.remarks.found.push(Remark {
@@ -140,10 +133,8 @@ impl Remarking<'_> {
             if !matches!(self.ask(stays), Found::Never) {
                 continue;
             }
-            let (set, resets) = (
-                writes[place],
-                self.resets(&writes[place + 1..], &self.last(&inputs)),
-            );
+            let (set, resets) =
+                (writes[place], self.resets(&writes[place + 1..], &self.last(&inputs)));
             let message = format!(
                 "`{}` is set in rung {} and reset in rung {} of the same scan, always: it is never set at the end of a scan",
                 self.name(set),

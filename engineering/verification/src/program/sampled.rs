@@ -30,9 +30,8 @@ impl Sampled {
         let scan = Scan::new(circuit);
         let mut scratch = Scratch::default();
         let initial = circuit.registers().iter();
-        let mut state: Vec<[u64; 1]> = initial
-            .map(|register| [u64::from(register.initial).wrapping_neg()])
-            .collect();
+        let mut state: Vec<[u64; 1]> =
+            initial.map(|register| [u64::from(register.initial).wrapping_neg()]).collect();
         let mut outputs = vec![[0]; scan.output_count()];
         let mut inputs = vec![[0]; scan.input_count()];
         let mut seen = vec![None; questions.len()];
@@ -51,10 +50,8 @@ impl Sampled {
             for (question, seen) in questions.iter().zip(&mut seen) {
                 if seen.is_none() {
                     let [runs] = words(question, &outputs, &inputs);
-                    *seen = (runs != 0).then(|| Seen {
-                        scan: number,
-                        run: runs.trailing_zeros() as usize,
-                    });
+                    *seen = (runs != 0)
+                        .then(|| Seen { scan: number, run: runs.trailing_zeros() as usize });
                     open -= usize::from(seen.is_some());
                 }
             }

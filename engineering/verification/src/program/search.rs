@@ -93,11 +93,7 @@ impl<'a> Search<'a> {
                 return found;
             }
         }
-        if wanted {
-            self.by_clauses(question)
-        } else {
-            Found::Unknown
-        }
+        if wanted { self.by_clauses(question) } else { Found::Unknown }
     }
 
     fn in_list(&self, question: usize) -> Option<Found> {
@@ -136,11 +132,7 @@ impl<'a> Search<'a> {
             return Found::Unknown;
         }
         self.by_clauses += 1;
-        let depth = Depth {
-            scans: SCANS,
-            steps: STEPS,
-            go_on: self.bounds.go_on,
-        };
+        let depth = Depth { scans: SCANS, steps: STEPS, go_on: self.bounds.go_on };
         match prove_always(self.circuit, &asked(question).negated(), depth) {
             Some(Induction::Holds(_)) => Found::Never,
             Some(Induction::Fails(trace)) => {

@@ -48,10 +48,7 @@ impl fmt::Display for Undecided {
             None => {}
         }
         if let Some(states) = self.listed {
-            write!(
-                formatter,
-                "; none of the {states} states nearest to the start breaks it"
-            )?;
+            write!(formatter, "; none of the {states} states nearest to the start breaks it")?;
         }
         Ok(())
     }
@@ -78,9 +75,7 @@ impl<'s, 'b> Stages<'s, 'b> {
         answered: &'s mut dyn FnMut(usize, &Answer),
     ) -> Self {
         let nothing = Undecided {
-            why: Stopped::Diagrams(BddError::TooManyNodes {
-                limit: bounds.nodes,
-            }),
+            why: Stopped::Diagrams(BddError::TooManyNodes { limit: bounds.nodes }),
             unbroken: None,
             listed: None,
         };
@@ -159,11 +154,7 @@ impl<'s, 'b> Stages<'s, 'b> {
 
     /// Invariants. Induction knows no fairness: what it proves of all runs holds of the fair ones, and its counterexample may be unfair.
     fn induction(&mut self, scans: u32, steps: u64) {
-        let depth = Depth {
-            scans,
-            steps,
-            go_on: self.bounds.go_on,
-        };
+        let depth = Depth { scans, steps, go_on: self.bounds.go_on };
         for place in self.left() {
             let Some(kept) = invariant(&self.properties[place]) else {
                 continue;
@@ -207,19 +198,13 @@ impl<'s, 'b> Stages<'s, 'b> {
             let _ = self.subject.listed.set(listed);
         }
         let listed = self.subject.listed.get()?;
-        let asked: Vec<Resolved> = left
-            .iter()
-            .map(|&place| self.properties[place].clone())
-            .collect();
+        let asked: Vec<Resolved> =
+            left.iter().map(|&place| self.properties[place].clone()).collect();
         for ((place, property), (holds, run)) in
             left.into_iter().zip(&asked).zip(listed.check(&asked))
         {
             let trace = run.map(|run| rows(circuit, &Cone::of(circuit, [property]), run));
-            let answer = if holds {
-                Answer::Holds(trace)
-            } else {
-                Answer::Fails(trace)
-            };
+            let answer = if holds { Answer::Holds(trace) } else { Answer::Fails(trace) };
             self.answer(place, answer);
         }
         None

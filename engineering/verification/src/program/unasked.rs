@@ -31,10 +31,8 @@ impl Subject {
     /// Whether each output can always be switched on and off again.
     pub fn switches(&self, bounds: Bounds<'_>) -> Vec<(Signal, OutputFinding)> {
         let outputs: Vec<Signal> = self.outputs().collect();
-        let questions: Vec<Resolved> = outputs
-            .iter()
-            .flat_map(|&output| questions(output))
-            .collect();
+        let questions: Vec<Resolved> =
+            outputs.iter().flat_map(|&output| questions(output)).collect();
         let answers = self.check(&questions, Vec::new(), bounds, &mut |_, _| {});
         let found = answers.chunks(4).map(finding);
         outputs.into_iter().zip(found).collect()
@@ -44,12 +42,7 @@ impl Subject {
 fn questions(output: Signal) -> [Resolved; 4] {
     let on = Formula::Signal(output);
     let off = on.clone().negated();
-    [
-        off.clone().always(),
-        on.clone().always(),
-        on.reachable().always(),
-        off.reachable().always(),
-    ]
+    [off.clone().always(), on.clone().always(), on.reachable().always(), off.reachable().always()]
 }
 
 fn finding(answers: &[Answer]) -> OutputFinding {
@@ -72,9 +65,7 @@ fn finding(answers: &[Answer]) -> OutputFinding {
         return OutputFinding::Free;
     };
     // Never on was refuted, and never off.
-    let changes = answers[..2]
-        .iter()
-        .all(|answer| matches!(answer, Answer::Fails(_)));
+    let changes = answers[..2].iter().all(|answer| matches!(answer, Answer::Fails(_)));
     OutputFinding::Undecided(if changes {
         format!("it can be on and off; whether again and again is not decided: {why}")
     } else {

@@ -51,9 +51,7 @@ pub fn read(text: &str) -> Properties {
             found.fair.push(property);
         } else {
             let place = start + body.len() - body.trim_start().len();
-            found
-                .diagnostics
-                .push(not_of_one_scan(place..start + body.trim_end().len()));
+            found.diagnostics.push(not_of_one_scan(place..start + body.trim_end().len()));
         }
     }
     found
@@ -125,8 +123,7 @@ impl<'t> Parser<'_, 't> {
         if self.depth == MAXIMUM_NESTING {
             let message = format!("more than {MAXIMUM_NESTING} signs and brackets in each other");
             let span = self.span();
-            self.diagnostics
-                .push(Diagnostic::error("U0432", message, span));
+            self.diagnostics.push(Diagnostic::error("U0432", message, span));
             return None;
         }
         self.depth += 1;
@@ -174,10 +171,7 @@ impl<'t> Parser<'_, 't> {
         }
         if self.takes(Sign::Open) {
             let inner = self.formula()?;
-            return self
-                .takes(Sign::Close)
-                .then_some(inner)
-                .or_else(|| self.wrong("`)`"));
+            return self.takes(Sign::Close).then_some(inner).or_else(|| self.wrong("`)`"));
         }
         let word = self.peek().filter(|token| token.sign == Sign::Word);
         let Some(token) = word.cloned() else {
@@ -205,14 +199,9 @@ impl<'t> Parser<'_, 't> {
                 }
                 let right = Box::new(self.formula()?);
                 let until = Formula::Until(path, left, right);
-                self.takes(Sign::CloseSquare)
-                    .then_some(until)
-                    .or_else(|| self.wrong("`]`"))
+                self.takes(Sign::CloseSquare).then_some(until).or_else(|| self.wrong("`]`"))
             }
-            name => Some(Formula::Signal(Named {
-                name: name.to_owned(),
-                span: token.span,
-            })),
+            name => Some(Formula::Signal(Named { name: name.to_owned(), span: token.span })),
         }
     }
 
@@ -229,16 +218,11 @@ impl<'t> Parser<'_, 't> {
         let Some(token) = self.peek().filter(|token| token.sign == Sign::Number) else {
             return self.wrong("a number of scans");
         };
-        let number = token
-            .text
-            .parse()
-            .ok()
-            .filter(|&scans| scans <= MAXIMUM_SCANS);
+        let number = token.text.parse().ok().filter(|&scans| scans <= MAXIMUM_SCANS);
         if number.is_none() {
             let message = format!("{} scans are more than {MAXIMUM_SCANS}", token.text);
             let span = token.span.clone();
-            self.diagnostics
-                .push(Diagnostic::error("U0433", message, span));
+            self.diagnostics.push(Diagnostic::error("U0433", message, span));
         }
         self.at += 1;
         number
@@ -265,9 +249,7 @@ impl<'t> Parser<'_, 't> {
     }
 
     pub(super) fn takes_word(&mut self, word: &str) -> bool {
-        let taken = self
-            .peek()
-            .is_some_and(|token| token.sign == Sign::Word && token.text == word);
+        let taken = self.peek().is_some_and(|token| token.sign == Sign::Word && token.text == word);
         self.at += usize::from(taken);
         taken
     }
@@ -278,15 +260,12 @@ impl<'t> Parser<'_, 't> {
         let rest = &self.tokens[self.at..];
         rest.windows(words.len()).any(|window| {
             let pairs = window.iter().zip(&words);
-            pairs
-                .into_iter()
-                .all(|(token, word)| token.sign == Sign::Word && token.text == *word)
+            pairs.into_iter().all(|(token, word)| token.sign == Sign::Word && token.text == *word)
         })
     }
 
     fn span(&self) -> std::ops::Range<usize> {
-        self.peek()
-            .map_or(self.end..self.end, |token| token.span.clone())
+        self.peek().map_or(self.end..self.end, |token| token.span.clone())
     }
 
     /// Reports what was expected here.

@@ -32,10 +32,7 @@ impl Parser<'_, '_> {
             "can be reached",
             "can always be reached",
         ];
-        words
-            .iter()
-            .any(|words| self.has_words(words))
-            .then(|| self.relation())
+        words.iter().any(|words| self.has_words(words)).then(|| self.relation())
     }
 
     fn never(&mut self) -> Option<Read> {

@@ -167,9 +167,7 @@ fn write_main(program: &Program, modules: &[Module], text: &mut String) {
         namer.name(&format!("r{place}"));
     }
     let inputs = program.inputs.iter().map(|signal| signal.name.to_string());
-    let read = modules
-        .iter()
-        .flat_map(|module| module.reads.iter().cloned());
+    let read = modules.iter().flat_map(|module| module.reads.iter().cloned());
     for signal in inputs.chain(read) {
         if let Entry::Vacant(entry) = sources.entry(signal) {
             let name = namer.name(entry.key());
@@ -178,11 +176,7 @@ fn write_main(program: &Program, modules: &[Module], text: &mut String) {
         }
     }
     for (place, module) in modules.iter().enumerate() {
-        let actual: Vec<&str> = module
-            .reads
-            .iter()
-            .map(|read| sources[read].as_str())
-            .collect();
+        let actual: Vec<&str> = module.reads.iter().map(|read| sources[read].as_str()).collect();
         let actual = match actual.len() {
             0 => String::new(),
             _ => format!("({})", actual.join(",")),

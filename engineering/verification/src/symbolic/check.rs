@@ -28,12 +28,8 @@ pub(super) fn check(model: &Model<'_>, property: &Resolved) -> Result<Verdict, S
     let formula = Core::of(property);
     let holds = model.states(&formula)?;
     let fails = model.diagrams.not(&holds)?;
-    let initial: Vec<bool> = model
-        .circuit
-        .registers()
-        .iter()
-        .map(|register| register.initial)
-        .collect();
+    let initial: Vec<bool> =
+        model.circuit.registers().iter().map(|register| register.initial).collect();
     let failing = model.with_registers(&fails, &initial)?;
     let tracer = Tracer::new(model);
     if failing.is_constant(false) {
@@ -61,9 +57,7 @@ impl Model<'_> {
             Core::Always(inner) => self.always(&self.states(inner)?)?,
             Core::Reaches(scans, inner) => {
                 let end = self.fair_only(&self.states(inner)?)?;
-                self.within(*scans, &end)?
-                    .pop()
-                    .map_or(end, |ring| ring.states)
+                self.within(*scans, &end)?.pop().map_or(end, |ring| ring.states)
             }
             Core::Stays(scans, inner) => {
                 let inner = self.states(inner)?;
@@ -92,10 +86,7 @@ impl Model<'_> {
     pub(super) fn rings(&self, hold: &Diagram, end: &Diagram) -> Result<Vec<Ring>, Stopped> {
         let mut rings = vec![Ring::single(end.clone())];
         self.search(hold, end, &mut |scans, states| {
-            rings.push(Ring {
-                states: states.clone(),
-                scans,
-            });
+            rings.push(Ring { states: states.clone(), scans });
         })?;
         Ok(rings)
     }

@@ -158,9 +158,7 @@ impl<'c> Model<'c> {
     /// Makes the diagrams of the signals, and drops those of others.
     fn show_signals(&mut self) -> Result<(), Stopped> {
         self.signals.clear();
-        let mut builder = self
-            .diagrams
-            .builder(self.circuit.graph(), |variable| variable);
+        let mut builder = self.diagrams.builder(self.circuit.graph(), |variable| variable);
         for &signal in &self.cone.signals {
             let diagram = match signal {
                 Signal::Output(output) => builder.diagram(self.circuit.outputs()[output].value)?,
@@ -179,11 +177,7 @@ impl<'c> Model<'c> {
     /// Counts a step, and ends when the caller no longer waits.
     pub(super) fn goes_on(&self) -> Result<(), Stopped> {
         self.steps.set(self.steps.get() + 1);
-        if (self.wanted)(Work::Diagrams(self.steps.get())) {
-            Ok(())
-        } else {
-            Err(Stopped::Time)
-        }
+        if (self.wanted)(Work::Diagrams(self.steps.get())) { Ok(()) } else { Err(Stopped::Time) }
     }
 
     /// Made on first use.
@@ -214,11 +208,8 @@ impl<'c> Model<'c> {
                 continue;
             };
             let bit = self.diagrams.variable(variable)?;
-            let literal = if registers[register as usize] {
-                bit
-            } else {
-                self.diagrams.not(&bit)?
-            };
+            let literal =
+                if registers[register as usize] { bit } else { self.diagrams.not(&bit)? };
             states = self.diagrams.and(&states, &literal)?;
         }
         Ok(states)
@@ -231,9 +222,7 @@ fn order(circuit: &Circuit, cone: &Cone, registers: &[u32]) -> Vec<Variable> {
         Signal::Output(output) => Some(circuit.outputs()[*output].value),
         Signal::Input(_) => None,
     });
-    let next = registers
-        .iter()
-        .map(|&register| circuit.registers()[register as usize].next);
+    let next = registers.iter().map(|&register| circuit.registers()[register as usize].next);
     let roots: Vec<Expression> = outputs.chain(next).collect();
     let mut order = depth_first_order(circuit.graph(), &roots);
     let placed: BTreeSet<Variable> = order.iter().copied().collect();

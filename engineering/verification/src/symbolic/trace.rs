@@ -65,10 +65,7 @@ pub(super) struct Tracer<'m, 'c> {
 
 impl<'m, 'c> Tracer<'m, 'c> {
     pub(super) fn new(model: &'m Model<'c>) -> Self {
-        Self {
-            model,
-            running: Running::new(model.circuit),
-        }
+        Self { model, running: Running::new(model.circuit) }
     }
 
     /// A run from one of the states `first`, all of which start from `registers` and satisfy `formula`; nothing where `formula` speaks of
@@ -86,10 +83,7 @@ impl<'m, 'c> Tracer<'m, 'c> {
         let Some(state) = self.pick(registers.to_vec(), &nearest)? else {
             return Ok(None);
         };
-        let mut run = Run {
-            states: vec![state],
-            again_from: None,
-        };
+        let mut run = Run { states: vec![state], again_from: None };
         self.extend(&mut run, formula)?;
         Ok(Some(self.told(run)))
     }
@@ -194,9 +188,7 @@ impl<'m, 'c> Tracer<'m, 'c> {
             }
             let back = self.only(&run.states[start])?;
             let rings = model.rings(inside, &back)?;
-            let returns = rings
-                .iter()
-                .any(|ring| self.contains(&ring.states, run.last()));
+            let returns = rings.iter().any(|ring| self.contains(&ring.states, run.last()));
             if returns {
                 self.descend(run, &rings)?;
                 run.states.pop();
@@ -220,10 +212,7 @@ impl<'m, 'c> Tracer<'m, 'c> {
     /// One scan on, with unchanged inputs.
     fn wait(&self, run: &mut Run) {
         let last = run.last();
-        let next = State {
-            registers: self.next(last),
-            inputs: last.inputs.clone(),
-        };
+        let next = State { registers: self.next(last), inputs: last.inputs.clone() };
         run.states.push(next);
     }
 
@@ -243,12 +232,10 @@ impl<'m, 'c> Tracer<'m, 'c> {
     }
 
     fn contains(&self, states: &Diagram, state: &State) -> bool {
-        self.model
-            .diagrams
-            .value(states, |variable| match variable {
-                Variable::Input(input) => state.inputs[input as usize],
-                Variable::Register(register) => state.registers[register as usize],
-            })
+        self.model.diagrams.value(states, |variable| match variable {
+            Variable::Input(input) => state.inputs[input as usize],
+            Variable::Register(register) => state.registers[register as usize],
+        })
     }
 
     /// The set of one state, as far as the cone sees it.
@@ -258,11 +245,8 @@ impl<'m, 'c> Tracer<'m, 'c> {
         for &variable in &model.cone.variables {
             if let Variable::Input(input) = variable {
                 let bit = model.diagrams.variable(variable)?;
-                let literal = if state.inputs[input as usize] {
-                    bit
-                } else {
-                    model.diagrams.not(&bit)?
-                };
+                let literal =
+                    if state.inputs[input as usize] { bit } else { model.diagrams.not(&bit)? };
                 states = model.diagrams.and(&states, &literal)?;
             }
         }
@@ -289,15 +273,8 @@ impl<'m, 'c> Tracer<'m, 'c> {
 /// The run from the first scan on with these inputs, one list a scan.
 pub(crate) fn rows(circuit: &Circuit, cone: &Cone, inputs: Vec<Vec<bool>>) -> Trace {
     let mut running = Running::new(circuit);
-    let rows = inputs.into_iter().map(|inputs| ScanRow {
-        outputs: running.step(&inputs),
-        inputs,
-    });
-    Trace {
-        signals: cone.shown(),
-        scans: rows.collect(),
-        again_from: None,
-    }
+    let rows = inputs.into_iter().map(|inputs| ScanRow { outputs: running.step(&inputs), inputs });
+    Trace { signals: cone.shown(), scans: rows.collect(), again_from: None }
 }
 
 /// States one after the other.

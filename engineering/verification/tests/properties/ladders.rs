@@ -34,10 +34,7 @@ rung
 fn circuit() -> Circuit {
     let parsed = parse(SEAL_IN);
     assert_eq!(parsed.diagnostics, []);
-    parsed
-        .program
-        .lower_observed(Duration::from_millis(10))
-        .expect("a right program")
+    parsed.program.lower_observed(Duration::from_millis(10)).expect("a right program")
 }
 
 fn check(property: &str, fair: &[&str]) -> (bool, Option<Vec<String>>) {
@@ -55,13 +52,10 @@ fn check(property: &str, fair: &[&str]) -> (bool, Option<Vec<String>>) {
     let rows = trace.map(|trace| {
         assert!(replays(&circuit, &trace));
         let bits = |bits: &[bool]| -> String {
-            bits.iter()
-                .map(|&bit| if bit { '1' } else { '0' })
-                .collect()
+            bits.iter().map(|&bit| if bit { '1' } else { '0' }).collect()
         };
         let rows = trace.scans.iter();
-        rows.map(|row| format!("{} {}", bits(&row.inputs), bits(&row.outputs)))
-            .collect()
+        rows.map(|row| format!("{} {}", bits(&row.inputs), bits(&row.outputs))).collect()
     });
     (holds, rows)
 }
@@ -116,14 +110,7 @@ fn every_output_is_asked_whether_it_can_be_switched() {
     let stuck = |lamp| {
         let signals = Vec::new();
         let (scans, again_from) = (Vec::new(), None);
-        OutputFinding::Stuck(
-            lamp,
-            Trace {
-                signals,
-                scans,
-                again_from,
-            },
-        )
+        OutputFinding::Stuck(lamp, Trace { signals, scans, again_from })
     };
     check("a ( y )", OutputFinding::Free);
     check("a /a ( y )", OutputFinding::Never(Lamp::On));
@@ -175,9 +162,7 @@ fn listed_states_of_many_inputs_and_registers() {
     let waiting: Vec<String> = (1..70).map(|place| format!("/m{place}")).collect();
     let _ = writeln!(text, "rung\n    i0 i7 /m0 {} ( m0 )", waiting.join(" "));
     let (program, _) = parse(&text).into_result().expect("a right program");
-    let circuit = program
-        .lower_observed(Duration::from_millis(10))
-        .expect("a right program");
+    let circuit = program.lower_observed(Duration::from_millis(10)).expect("a right program");
     let listed = Explicit::new(&circuit, 100_000).expect("few states");
     assert_eq!(listed.count(), 71);
     let formulas = ["AG !y", "AG EF y", "never i0 and y", "EF (y & m3)"].map(|text| {
@@ -186,18 +171,9 @@ fn listed_states_of_many_inputs_and_registers() {
     });
     let found = listed.check(&formulas);
     let found = found.iter();
-    let found: Vec<(bool, Option<usize>)> = found
-        .map(|(holds, run)| (*holds, run.as_ref().map(Vec::len)))
-        .collect();
-    assert_eq!(
-        found,
-        [
-            (false, Some(71)),
-            (true, None),
-            (false, Some(71)),
-            (false, None)
-        ]
-    );
+    let found: Vec<(bool, Option<usize>)> =
+        found.map(|(holds, run)| (*holds, run.as_ref().map(Vec::len))).collect();
+    assert_eq!(found, [(false, Some(71)), (true, None), (false, Some(71)), (false, None)]);
     let bound = 70 * 256;
     let refused = Explicit::new(&circuit, bound).err();
     assert_eq!(refused, Some(ExplicitError::States { bound }));
@@ -217,19 +193,13 @@ fn an_order_that_is_bad_is_changed_by_need() {
     text += &format!("rung\n    {}( right )\n", all("b"));
     let twins: Vec<String> = (0..pairs).map(|k| format!("a{k} b{k}")).collect();
     text += &format!("rung\n    [ {} ] ( any )\n", twins.join(" | "));
-    let circuit = parse(&text)
-        .program
-        .lower_observed(Duration::from_millis(10))
-        .expect("a right program");
+    let circuit =
+        parse(&text).program.lower_observed(Duration::from_millis(10)).expect("a right program");
     let verdict = |property: &str, nodes: usize, fixed: bool| {
         let property = read_one(property).expect("right");
         let formula = resolve(&property.formula, &circuit).expect("known signals");
         let checker = Checker::new(&circuit, Vec::new(), nodes);
-        let mut checker = if fixed {
-            checker.in_fixed_order()
-        } else {
-            checker
-        };
+        let mut checker = if fixed { checker.in_fixed_order() } else { checker };
         checker.check(&formula).map(|verdict| match verdict {
             Verdict::Holds(_) => true,
             Verdict::Fails(trace) => {
@@ -258,10 +228,7 @@ fn a_large_supervisor_is_decided() {
     let program = parse(text).program;
     let period = Duration::from_secs(5);
     let subject = Subject::new(&program, period).expect("a right program");
-    let bounds = Bounds {
-        nodes: 1 << 14,
-        ..Bounds::default()
-    };
+    let bounds = Bounds { nodes: 1 << 14, ..Bounds::default() };
     for (signal, finding) in subject.switches(bounds) {
         let name = signal.name(subject.circuit());
         assert_eq!(finding, OutputFinding::Free, "{name}");
@@ -297,10 +264,7 @@ fn a_proof_ends_when_nobody_waits() {
         asked.set(asked.get() + 1);
         asked.get() < 40
     };
-    let bounds = Bounds {
-        go_on: &go_on,
-        ..Bounds::default()
-    };
+    let bounds = Bounds { go_on: &go_on, ..Bounds::default() };
     let property = read_one("AG EF gas_valve_high").expect("right");
     let formula = subject.resolve(&property).expect("known signals");
     let mut told = 0;

@@ -20,18 +20,9 @@ impl<'c> Naive<'c> {
     pub(crate) fn new(circuit: &'c Circuit, fair: &[Resolved]) -> Self {
         let registers = circuit.registers().len();
         let states = 1 << (registers + circuit.inputs().len());
-        let mut naive = Self {
-            circuit,
-            states,
-            registers,
-            next: Vec::new(),
-            fair: Vec::new(),
-        };
+        let mut naive = Self { circuit, states, registers, next: Vec::new(), fair: Vec::new() };
         naive.next = (0..states).map(|state| naive.scan(state)).collect();
-        naive.fair = fair
-            .iter()
-            .map(|condition| naive.satisfying(condition))
-            .collect();
+        naive.fair = fair.iter().map(|condition| naive.satisfying(condition)).collect();
         naive
     }
 
@@ -68,9 +59,8 @@ impl<'c> Naive<'c> {
         let mut set = end.to_vec();
         loop {
             let before = self.before(&set);
-            let next: Vec<bool> = (0..self.states)
-                .map(|state| end[state] || hold[state] && before[state])
-                .collect();
+            let next: Vec<bool> =
+                (0..self.states).map(|state| end[state] || hold[state] && before[state]).collect();
             if next == set {
                 return set;
             }
@@ -81,11 +71,7 @@ impl<'c> Naive<'c> {
     fn always(&self, hold: &[bool]) -> Vec<bool> {
         let mut set = hold.to_vec();
         let anywhere = vec![vec![true; self.states]];
-        let conditions = if self.fair.is_empty() {
-            &anywhere
-        } else {
-            &self.fair
-        };
+        let conditions = if self.fair.is_empty() { &anywhere } else { &self.fair };
         loop {
             let mut next = set.clone();
             for condition in conditions {
@@ -147,11 +133,8 @@ impl<'c> Naive<'c> {
             }
             Formula::Until(Path::All, left, right) => {
                 let (not_left, not_right) = (not(of(left)), not(of(right)));
-                let lost: Vec<bool> = not_left
-                    .iter()
-                    .zip(&not_right)
-                    .map(|(a, b)| *a && *b)
-                    .collect();
+                let lost: Vec<bool> =
+                    not_left.iter().zip(&not_right).map(|(a, b)| *a && *b).collect();
                 let lost = self.until(&not_right, &self.fairly(&lost));
                 let never = self.always(&not_right);
                 lost.iter().zip(never).map(|(a, b)| !a && !b).collect()
@@ -181,9 +164,8 @@ impl<'c> Naive<'c> {
     pub(crate) fn holds(&self, formula: &Resolved) -> bool {
         let set = self.satisfying(formula);
         let registers = self.circuit.registers().iter().enumerate();
-        let initial: usize = registers
-            .map(|(place, register)| usize::from(register.initial) << place)
-            .sum();
+        let initial: usize =
+            registers.map(|(place, register)| usize::from(register.initial) << place).sum();
         (0..1_usize << self.circuit.inputs().len())
             .all(|inputs| set[initial | inputs << self.registers])
     }

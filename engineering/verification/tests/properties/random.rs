@@ -28,9 +28,7 @@ fn of_sums(recipe: &[(u8, u8, u8)], initial: u8, inputs_each: usize) -> Circuit 
         let names = (0..inputs_each).map(|place| format!("u{}", input + place * INPUTS));
         let inputs: Vec<Expression> = names.map(|name| builder.input(name)).collect();
         let graph = builder.graph();
-        let sum = inputs
-            .into_iter()
-            .reduce(|sum, input| graph.xor(sum, input));
+        let sum = inputs.into_iter().reduce(|sum, input| graph.xor(sum, input));
         pool.push(sum.expect("at least one"));
     }
     let sums = pool.clone();

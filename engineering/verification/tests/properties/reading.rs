@@ -18,10 +18,7 @@ fn sentences_and_formulas_mean_the_same() {
     check("always a | b", "AG (a | b)");
     check("a only while b", "AG (a -> b)");
     check("a is followed by b", "AG (a -> (AF b))");
-    check(
-        "a is followed by b within 5 scans",
-        "AG (a -> (ABF 0..5 b))",
-    );
+    check("a is followed by b within 5 scans", "AG (a -> (ABF 0..5 b))");
     check("a can be reached", "EF a");
     check("a & b can always be reached", "AG (EF (a & b))");
     check("a stays until b", "AG (a -> !(E[!b U (!a & !b)]))");
@@ -67,11 +64,7 @@ right: AG a
 
 #[test]
 fn deep_nesting_is_an_error_and_no_crash() {
-    for text in [
-        "(".repeat(100_000),
-        "!".repeat(100_000),
-        "AG ".repeat(100_000),
-    ] {
+    for text in ["(".repeat(100_000), "!".repeat(100_000), "AG ".repeat(100_000)] {
         let wrong = read_one(&text).expect_err("too deep");
         assert_eq!(wrong[0].code, "U0432");
     }

@@ -15,9 +15,7 @@ const PERIOD: Duration = Duration::from_millis(100);
 
 fn remarks(program: &Program) -> (Subject, Remarks) {
     let subject = Subject::new(program, PERIOD).expect("a right program");
-    let remarks = subject
-        .remarks(program, PERIOD, Bounds::default())
-        .expect("a right program");
+    let remarks = subject.remarks(program, PERIOD, Bounds::default()).expect("a right program");
     (subject, remarks)
 }
 
@@ -42,18 +40,12 @@ fn check(rungs: &str, expected: &[(&str, usize)]) {
 
 #[test]
 fn nothing_is_said_of_a_sound_ladder() {
-    check(
-        "rung\n    [ a | y ] /b ( y )\nrung\n    y {TON t 300ms} ( z )\n",
-        &[],
-    );
+    check("rung\n    [ a | y ] /b ( y )\nrung\n    y {TON t 300ms} ( z )\n", &[]);
 }
 
 #[test]
 fn a_rung_without_effect() {
-    check(
-        "rung\n    a b ( y )\nrung\n    y /a ( z )\n",
-        &[("U0443", 0)],
-    );
+    check("rung\n    a b ( y )\nrung\n    y /a ( z )\n", &[("U0443", 0)]);
 }
 
 /// Rungs made from the statements of a text: their order is the order of the statements.
@@ -148,9 +140,8 @@ fn every_scan(circuit: &Circuit, writes: &[Write], see: &mut dyn FnMut(&[[bool; 
             scan.step(&mut scratch, &mut next, &[inputs], &mut outputs);
             let bit = |place: usize| bit(&outputs, place);
             let bits = writes.iter();
-            let bits: Vec<[bool; 3]> = bits
-                .map(|write| [bit(write.power), bit(write.before), bit(write.after)])
-                .collect();
+            let bits: Vec<[bool; 3]> =
+                bits.map(|write| [bit(write.power), bit(write.before), bit(write.after)]).collect();
             see(&bits);
             if known.insert(next.clone()) {
                 pending.push(next);
@@ -164,10 +155,8 @@ fn expected(program: &Program) -> BTreeSet<(&'static str, String)> {
     let (circuit, writes) = program.lower_writes(PERIOD).expect("a right program");
     let coil = |write: &Write| &program.rungs[write.rung].coils[write.coil];
     let mut changed = vec![false; program.rungs.len()];
-    let targets: BTreeSet<String> = writes
-        .iter()
-        .map(|write| coil(write).target.to_string())
-        .collect();
+    let targets: BTreeSet<String> =
+        writes.iter().map(|write| coil(write).target.to_string()).collect();
     let of_target = |target: &str| -> Vec<usize> {
         let all = writes.iter().enumerate();
         all.filter(|(_, write)| coil(write).target.as_str() == target)
@@ -190,9 +179,8 @@ fn expected(program: &Program) -> BTreeSet<(&'static str, String)> {
                 let [power, before, after] = bits[place];
                 let rises = !before && after;
                 risen |= rises;
-                let undone = places[order + 1..]
-                    .iter()
-                    .any(|&later| bits[later][1] && !bits[later][2]);
+                let undone =
+                    places[order + 1..].iter().any(|&later| bits[later][1] && !bits[later][2]);
                 if rises && undone && !end {
                     lost.insert(place);
                 }
@@ -225,20 +213,14 @@ fn expected(program: &Program) -> BTreeSet<(&'static str, String)> {
         let places = of_target(target);
         let reads = |place: &usize| {
             let mut reads = false;
-            visit(
-                &program.rungs[writes[*place].rung].network,
-                &mut |element| {
-                    if let Element::Contact(contact) = element {
-                        reads |= contact.operand.as_str() == target;
-                    }
-                },
-            );
+            visit(&program.rungs[writes[*place].rung].network, &mut |element| {
+                if let Element::Contact(contact) = element {
+                    reads |= contact.operand.as_str() == target;
+                }
+            });
             reads
         };
-        if places
-            .iter()
-            .any(|place| lost.contains(place) && !kept.contains(place))
-        {
+        if places.iter().any(|place| lost.contains(place) && !kept.contains(place)) {
             said.insert(("U0445", target.clone()));
         } else if through.contains(target) && places[1..].iter().all(reads) {
             said.insert(("U0446", target.clone()));

@@ -22,12 +22,7 @@ pub(crate) fn replays(circuit: &Circuit, trace: &Trace) -> bool {
         if !same {
             return false;
         }
-        state = registers
-            .iter()
-            .map(|register| graph.evaluate(register.next, value))
-            .collect();
+        state = registers.iter().map(|register| graph.evaluate(register.next, value)).collect();
     }
-    trace
-        .again_from
-        .is_none_or(|from| entered.get(from).is_some())
+    trace.again_from.is_none_or(|from| entered.get(from).is_some())
 }

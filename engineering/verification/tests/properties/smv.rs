@@ -107,11 +107,7 @@ struct Reading<'a> {
 
 impl Reading<'_> {
     fn of(tokens: &[String], module: &Module, values: &BTreeMap<String, bool>) -> bool {
-        let mut reading = Reading {
-            tokens: tokens.iter(),
-            module,
-            values,
-        };
+        let mut reading = Reading { tokens: tokens.iter(), module, values };
         let value = reading.value();
         assert_eq!(reading.tokens.as_slice(), &[] as &[String]);
         value
@@ -153,9 +149,7 @@ fn run_beside(circuit: &Circuit, module: &Module, mut seed: u64) {
     assert_eq!(values.len(), kept.len());
     for _ in 0..12 {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-        let inputs: Vec<bool> = (0..inputs)
-            .map(|place| seed >> (40 + place) & 1 == 1)
-            .collect();
+        let inputs: Vec<bool> = (0..inputs).map(|place| seed >> (40 + place) & 1 == 1).collect();
         values.extend(given.iter().cloned().zip(inputs.iter().copied()));
         let outputs = running.step(&inputs);
         for (output, expected) in circuit.outputs().iter().zip(outputs) {

@@ -12,12 +12,7 @@ fn cell() -> Cluster {
 
 #[test]
 fn the_cluster_loses_no_cycle_to_a_failure() {
-    let plan = ComparisonPlan {
-        failures: 6,
-        cycles: 300,
-        copies: 2,
-        seed: 1,
-    };
+    let plan = ComparisonPlan { failures: 6, cycles: 300, copies: 2, seed: 1 };
     let comparison = compare(&cell(), &plan).expect("it comes into step");
     assert_eq!(compare(&cell(), &plan), Ok(comparison.clone()));
     let ours = &comparison.contenders[0];
@@ -36,14 +31,6 @@ fn the_cluster_loses_no_cycle_to_a_failure() {
 
 #[test]
 fn copies_have_bounds() {
-    let plan = ComparisonPlan {
-        failures: 1,
-        cycles: 1,
-        copies: 9,
-        seed: 1,
-    };
-    assert!(matches!(
-        compare(&cell(), &plan),
-        Err(CompareError::Schedule(_))
-    ));
+    let plan = ComparisonPlan { failures: 1, cycles: 1, copies: 9, seed: 1 };
+    assert!(matches!(compare(&cell(), &plan), Err(CompareError::Schedule(_))));
 }

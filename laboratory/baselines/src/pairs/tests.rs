@@ -29,19 +29,11 @@ fn a_quiet_pair_serves_every_cycle() {
         pairs.run(1000.0);
         let account = pairs.take_account();
         assert_eq!(account.deadlines, 2000, "{redundancy:?}");
-        let bad = (
-            account.lost,
-            account.two_masters,
-            account.differing,
-            account.false_take_overs,
-        );
+        let bad = (account.lost, account.two_masters, account.differing, account.false_take_overs);
         assert_eq!(bad, (0, 0, 0, 0), "{redundancy:?}");
         // The plants work: the robot feeds the press.
         let fields = pairs.cells.iter().filter_map(|cell| cell.shown.as_ref());
-        assert!(
-            fields.map(|field| field.finished).sum::<u64>() > 0,
-            "{redundancy:?}"
-        );
+        assert!(fields.map(|field| field.finished).sum::<u64>() > 0, "{redundancy:?}");
     }
 }
 
@@ -62,18 +54,12 @@ fn a_crash_costs_what_the_standby_waits() {
                 Redundancy::HotStandby { misses } => u64::from(misses) - 1,
                 Redundancy::ActiveActive => 0,
             };
-            assert!(
-                account.lost <= most,
-                "{redundancy:?} at {phase}: {account:?}"
-            );
+            assert!(account.lost <= most, "{redundancy:?} at {phase}: {account:?}");
             assert_eq!((account.false_take_overs, account.two_masters), (0, 0));
             // The other box can fail now.
             let other = pairs.crash_a_driver(0);
             pairs.run(20.0);
-            assert_eq!(
-                redundancy == Redundancy::ActiveActive,
-                other == rank || other == 0
-            );
+            assert_eq!(redundancy == Redundancy::ActiveActive, other == rank || other == 0);
             assert!(pairs.take_account().lost <= most);
         }
     }
@@ -82,10 +68,7 @@ fn a_crash_costs_what_the_standby_waits() {
 /// An impatient standby takes lost frames for a dead partner.
 #[test]
 fn an_impatient_standby_takes_over_by_mistake() {
-    let lossy = Network {
-        loss: 0.3,
-        ..Network::default()
-    };
+    let lossy = Network { loss: 0.3, ..Network::default() };
     let mistakes = |misses| {
         let mut pairs = pairs(Redundancy::HotStandby { misses }, lossy);
         pairs.run(2000.0);

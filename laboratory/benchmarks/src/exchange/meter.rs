@@ -75,8 +75,7 @@ impl Meter {
             self.skip -= 1;
         } else if self.durations_ns.len() < self.wanted {
             let duration_ns = now.since(self.first).as_nanos();
-            self.durations_ns
-                .push(u64::try_from(duration_ns).unwrap_or(u64::MAX));
+            self.durations_ns.push(u64::try_from(duration_ns).unwrap_or(u64::MAX));
         }
     }
 
@@ -121,24 +120,14 @@ mod tests {
         let one = [(10, 1, None), (12, 1, Some(0)), (15, 1, Some(1))];
         check(0, &one, &[5], 0);
         // A copy after the end, a stale turn, and a cycle whose Sync was lost.
-        let more = [
-            (16, 1, Some(1)),
-            (20, 2, Some(0)),
-            (21, 1, Some(1)),
-            (29, 2, Some(1)),
-        ];
+        let more = [(16, 1, Some(1)), (20, 2, Some(0)), (21, 1, Some(1)), (29, 2, Some(1))];
         check(0, &[&one[..], &more].concat(), &[5, 9], 0);
     }
 
     #[test]
     fn a_cycle_with_a_turn_missing_is_incomplete() {
-        let missing = [
-            (10, 1, None),
-            (12, 1, Some(0)),
-            (20, 2, None),
-            (21, 2, Some(0)),
-            (24, 2, Some(1)),
-        ];
+        let missing =
+            [(10, 1, None), (12, 1, Some(0)), (20, 2, None), (21, 2, Some(0)), (24, 2, Some(1))];
         check(0, &missing, &[4], 1);
         check(1, &missing, &[], 0);
         check(0, &[], &[], 0);

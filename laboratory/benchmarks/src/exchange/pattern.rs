@@ -45,10 +45,7 @@ impl Pattern {
             period,
             due: Time::default(),
             // As long as a real epoch is on the wire.
-            moment: Moment {
-                epoch: Epoch(u64::MAX),
-                cycle: Cycle(0),
-            },
+            moment: Moment { epoch: Epoch(u64::MAX), cycle: Cycle(0) },
             sampled: ProgramSet::EMPTY,
             published: StationSet::EMPTY,
             outputs: VecDeque::new(),
@@ -141,11 +138,7 @@ impl Machine for Pattern {
     }
 
     fn wakeup(&self) -> Time {
-        if self.is_cycle_master() {
-            self.due
-        } else {
-            Time(u64::MAX)
-        }
+        if self.is_cycle_master() { self.due } else { Time(u64::MAX) }
     }
 }
 
@@ -204,12 +197,7 @@ fn turn(own: StationId) -> Body {
     Body::Turn(Turn {
         heard: StationSet::first(usize::from(own.0)),
         holdings: mask.iter().map(holding).collect(),
-        words: [Word {
-            mask,
-            sum: Image::zero(WIDTH),
-        }]
-        .into_iter()
-        .collect(),
+        words: [Word { mask, sum: Image::zero(WIDTH) }].into_iter().collect(),
         recalled: Vec::new(),
         lacks: ProgramSet::EMPTY,
         relayed: Vec::new(),
@@ -217,10 +205,7 @@ fn turn(own: StationId) -> Body {
 }
 
 fn moment() -> Moment {
-    Moment {
-        epoch: Epoch(u64::MAX),
-        cycle: Cycle(1_000_000),
-    }
+    Moment { epoch: Epoch(u64::MAX), cycle: Cycle(1_000_000) }
 }
 
 /// The frames of one cycle in the order in which they are sent, for the yardstick, which carries the same number of bytes.

@@ -80,12 +80,7 @@ pub(super) fn measure(carrier: Carrier, settings: Settings) -> Result<Exchange, 
     let mut running = Running(Vec::new());
     // The cycle master is the last to start.
     for own in members.iter().rev().map(|peer| peer.member) {
-        let part = Part {
-            own,
-            members: members.clone(),
-            carrier,
-            settings,
-        };
+        let part = Part { own, members: members.clone(), carrier, settings };
         let mut command = Command::new(&program);
         command.arg("member");
         command.arg(serde_json::to_string(&part).unwrap_or_default());
@@ -143,12 +138,7 @@ pub(crate) fn run_member(arguments: &MemberArguments) -> Answer {
 }
 
 fn play_part(part: Part) -> Result<(), BusError> {
-    let Part {
-        own,
-        members,
-        carrier,
-        settings,
-    } = part;
+    let Part { own, members, carrier, settings } = part;
     let roster = Roster::new(PROGRAMS.into(), STATIONS.into(), Vec::new());
     let endpoints = Endpoints::new(ClusterHash(u64::MAX), own, members, roster)?;
     let wanted = settings.cycles as usize;
@@ -176,17 +166,10 @@ fn play_part(part: Part) -> Result<(), BusError> {
 fn guard(endpoints: &Endpoints) -> Guard {
     let secret = ClusterSecret::new([0; KEY_BYTES]);
     let key = |peer: &Peer| {
-        secret.frame_key(Title {
-            cluster: "exchange",
-            member: &peer.name,
-            generation: 1,
-        })
+        secret.frame_key(Title { cluster: "exchange", member: &peer.name, generation: 1 })
     };
     let own = endpoints.own();
-    let senders = endpoints
-        .others()
-        .iter()
-        .map(|peer| (peer.member, key(peer)));
+    let senders = endpoints.others().iter().map(|peer| (peer.member, key(peer)));
     Guard::with_keys(
         Seal::new(own.member, key(own), 1, []),
         Opener::new(own.member, senders, [], Arc::default()),
@@ -217,11 +200,7 @@ fn members() -> io::Result<Vec<Peer>> {
     let remote_ios = (0..PROGRAMS).map(|program| Member::RemoteIo(ProgramId(program)));
     let members: Vec<Member> = stations.chain(remote_ios).collect();
     let addresses = free_addresses(members.len())?;
-    let peer = |(member, address)| Peer {
-        member,
-        name: format!("{member:?}"),
-        address,
-    };
+    let peer = |(member, address)| Peer { member, name: format!("{member:?}"), address };
     Ok(members.into_iter().zip(addresses).map(peer).collect())
 }
 

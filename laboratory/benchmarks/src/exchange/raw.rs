@@ -41,10 +41,7 @@ impl Script {
         });
         Self {
             datagrams: datagrams.collect(),
-            senders: frames
-                .iter()
-                .map(|frame| (frame.header.sender, turn_of(frame)))
-                .collect(),
+            senders: frames.iter().map(|frame| (frame.header.sender, turn_of(frame))).collect(),
             receivers: frames.iter().map(receivers).collect(),
         }
     }
@@ -75,9 +72,7 @@ pub(super) fn play(
     let mut script = Script::new(endpoints);
     let is_cycle_master = own == CYCLE_MASTER;
     // The cycle master's first datagram is the Sync, and its second the turn.
-    let mine = script
-        .place_of(own, usize::from(is_cycle_master))
-        .unwrap_or(usize::MAX);
+    let mine = script.place_of(own, usize::from(is_cycle_master)).unwrap_or(usize::MAX);
     let clock = Clock::start();
     let mut received = [0; 2048];
     let mut cycle = 0_u64;

@@ -68,12 +68,7 @@ pub fn hold_against_model(
     let bias = acceleration_bias(&planned.system, own, factor, planned.forced)?;
     let mut campaigned = planned.system.clone();
     campaigned.detection = Some(time(cycles * factor).map_err(one)?);
-    let assessment = assess(
-        &measured.campaign,
-        &campaigned,
-        CONFIDENCE,
-        planned.plan.seed,
-    )?;
+    let assessment = assess(&measured.campaign, &campaigned, CONFIDENCE, planned.plan.seed)?;
     let closed = planned.closed_form_hours;
     Ok(Found {
         cluster: cluster.name().to_owned(),
@@ -156,10 +151,7 @@ impl Found {
         let assessment = &self.assessment;
         let verdict = |inside| if inside { "inside" } else { "OUTSIDE" };
         let mut lines = vec![
-            (
-                "MTTF measured, 95 % interval",
-                said(&assessment.mttf_hours, " h"),
-            ),
+            ("MTTF measured, 95 % interval", said(&assessment.mttf_hours, " h")),
             (
                 "  calculated for this campaign",
                 format!(
@@ -190,29 +182,20 @@ impl Found {
         if let Some(coverage) = &assessment.coverage {
             let (masked, asked) = self.masked;
             let coverage = said(coverage, "");
-            lines.push((
-                "failures masked",
-                format!("{masked} of {asked}, coverage {coverage}"),
-            ));
+            lines.push(("failures masked", format!("{masked} of {asked}, coverage {coverage}")));
         }
         let cycles = |cycles: Option<f64>| {
             cycles.map_or("none".to_owned(), |cycles| format!("{cycles:.2} cycles"))
         };
         lines.push(("detected after", cycles(self.own.detection_cycles)));
-        lines.push((
-            "states taken over after a restart",
-            cycles(self.own.taking_over_cycles),
-        ));
+        lines.push(("states taken over after a restart", cycles(self.own.taking_over_cycles)));
         lines.push(("and proved in shadow after", cycles(self.own.shadow_cycles)));
         if let Some(repair) = &assessment.repair_hours {
             lines.push(("repaired after", said(repair, " h")));
         }
         if let Some(fit) = &assessment.fit {
             let p = fit.anderson_darling_p;
-            lines.push((
-                "fit to the law of the model",
-                format!("p = {p:.3} (Anderson-Darling)"),
-            ));
+            lines.push(("fit to the law of the model", format!("p = {p:.3} (Anderson-Darling)")));
         }
         if assessment.censored > 0 {
             lines.push((

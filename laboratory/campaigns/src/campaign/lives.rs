@@ -87,11 +87,7 @@ const STALL_CYCLES: u64 = 10;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Order {
     /// So many cycles from now on.
-    Do {
-        station: StationId,
-        action: Action,
-        after_cycles: f64,
-    },
+    Do { station: StationId, action: Action, after_cycles: f64 },
     /// What was ordered to this station and is not done yet is not to be done.
     Forget(StationId),
 }
@@ -163,11 +159,7 @@ impl<'a> Lives<'a> {
             _ => self.plan.mttr_cycles,
         };
         let drawn: f64 = Exp1.sample(&mut self.random);
-        self.orders.push(Order::Do {
-            station,
-            action,
-            after_cycles: mean * drawn,
-        });
+        self.orders.push(Order::Do { station, action, after_cycles: mean * drawn });
     }
 
     /// Whom the crews work on from now on, where there are fewer of them than boxes to repair: any of these is as likely as any other.
@@ -266,10 +258,7 @@ impl<'a> Lives<'a> {
         let before = self.down();
         let was_up = self.is_up(station);
         if let Life::Shadow { since, .. } = self.lives[station.index()] {
-            self.run
-                .shadow
-                .unfinished_ns
-                .push(now.0.saturating_sub(since.0));
+            self.run.shadow.unfinished_ns.push(now.0.saturating_sub(since.0));
         }
         self.lives[station.index()] = Life::Undetected { since: now };
         // A shadow does not speak yet, so it masks nothing yet.
@@ -278,11 +267,7 @@ impl<'a> Lives<'a> {
             .any(|rank| rank != station && matches!(self.lives[rank.index()], Life::Shadow { .. }));
         let counts_as_masked = was_up && speaking && !self.has_failed();
         self.run.asked += u64::from(counts_as_masked);
-        self.newest = Some(Newest {
-            station,
-            before,
-            counts_as_masked,
-        });
+        self.newest = Some(Newest { station, before, counts_as_masked });
         // One that has not published since its return still counts as failed; nobody flags it once more.
         if self.flagged.contains(station) {
             self.detected(now, station);
@@ -291,10 +276,7 @@ impl<'a> Lives<'a> {
 
     fn detected(&mut self, now: Time, station: StationId) {
         if let Life::Undetected { since } = self.lives[station.index()] {
-            self.run
-                .detection
-                .finished_ns
-                .push(now.0.saturating_sub(since.0));
+            self.run.detection.finished_ns.push(now.0.saturating_sub(since.0));
             self.lives[station.index()] = Life::Repaired { since: now };
             self.assign_crews(Some(station));
         }
@@ -304,14 +286,8 @@ impl<'a> Lives<'a> {
         let Life::Repaired { since } = self.lives[station.index()] else {
             return;
         };
-        self.run
-            .repair
-            .finished_ns
-            .push(now.0.saturating_sub(since.0));
-        self.lives[station.index()] = Life::TakingOver {
-            since: now,
-            lacks: self.duty(station),
-        };
+        self.run.repair.finished_ns.push(now.0.saturating_sub(since.0));
+        self.lives[station.index()] = Life::TakingOver { since: now, lacks: self.duty(station) };
         if self.plan.crews.is_some() {
             self.assign_crews(None);
         }
@@ -323,17 +299,11 @@ impl<'a> Lives<'a> {
         };
         let lacks = lacks.without(ProgramSet::only(program));
         self.lives[station.index()] = if lacks.is_empty() {
-            self.run
-                .taking_over
-                .finished_ns
-                .push(now.0.saturating_sub(since.0));
+            self.run.taking_over.finished_ns.push(now.0.saturating_sub(since.0));
             if self.mode() == Mode::Full {
                 self.order(station, Action::Crash);
             }
-            Life::Shadow {
-                since: now,
-                unproved: self.duty(station),
-            }
+            Life::Shadow { since: now, unproved: self.duty(station) }
         } else {
             Life::TakingOver { since, lacks }
         };
@@ -345,10 +315,7 @@ impl<'a> Lives<'a> {
         };
         let unproved = unproved.without(ProgramSet::only(program));
         self.lives[station.index()] = if unproved.is_empty() {
-            self.run
-                .shadow
-                .finished_ns
-                .push(now.0.saturating_sub(since.0));
+            self.run.shadow.finished_ns.push(now.0.saturating_sub(since.0));
             if self.mode() == Mode::Paper {
                 self.order(station, Action::Crash);
             }

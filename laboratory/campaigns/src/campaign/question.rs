@@ -109,10 +109,8 @@ pub fn plan_campaign(
     let mut options = options_of(cluster, question.mtbf, question.mttr);
     options.crews = question.crews;
     let system = options.system().map_err(all)?;
-    let closed_form_hours = system
-        .chain()
-        .and_then(|chain| chain.mttf().map_err(|error| vec![error]))
-        .map_err(all)?;
+    let closed_form_hours =
+        system.chain().and_then(|chain| chain.mttf().map_err(|error| vec![error])).map_err(all)?;
     let period_hours = cluster.agreement().schedule.period().as_secs_f64() / 3600.0;
     let by_cycles = |cycles: f64| question.mttr.get() / (cycles * period_hours);
     let factor = match question.speed {
@@ -133,14 +131,7 @@ pub fn plan_campaign(
         maximum_cycles: (PATIENCE * cycles(closed_form_hours)).max(PATIENCE) as u64,
         threads: std::thread::available_parallelism().map_or(1, usize::from),
     };
-    Ok(Planned {
-        plan,
-        options,
-        system,
-        closed_form_hours,
-        period_hours,
-        forced: question.forced,
-    })
+    Ok(Planned { plan, options, system, closed_form_hours, period_hours, forced: question.forced })
 }
 
 impl Planned {
@@ -169,10 +160,7 @@ pub fn set_unequal(
 ) -> Vec<ReliabilityError> {
     let mut errors = Vec::new();
     for mut boxes in boxes {
-        let wrong = |why: String| ReliabilityError::BoxText {
-            text: boxes.name.clone(),
-            why,
-        };
+        let wrong = |why: String| ReliabilityError::BoxText { text: boxes.name.clone(), why };
         if options.unequal.iter().any(|known| known.name == boxes.name) {
             errors.push(wrong("its times are given twice".to_owned()));
             continue;

@@ -79,14 +79,8 @@ pub fn run_real_campaign(
         };
         let settings = real.laboratory.clone();
         let scenario = endless(cluster);
-        let ran = run_conducted(
-            cluster,
-            &scenario,
-            settings,
-            &inside,
-            &mut fates,
-            &mut on_progress,
-        );
+        let ran =
+            run_conducted(cluster, &scenario, settings, &inside, &mut fates, &mut on_progress);
         let (interrupted, error) = match ran {
             Ok(run) => (run.account.interrupted, run.failure),
             Err(error) => (false, Some(error)),
@@ -95,15 +89,9 @@ pub fn run_real_campaign(
         let run = fates.end();
         failed += u64::from(run.as_ref().is_some_and(|run| run.cause.is_some()));
         runs.extend(run);
-        watch(Progress::Failure {
-            done: failed,
-            of: plan.failures,
-        });
+        watch(Progress::Failure { done: failed, of: plan.failures });
         if interrupted {
-            remarks.push(format!(
-                "interrupted after {failed} of {} failures",
-                plan.failures
-            ));
+            remarks.push(format!("interrupted after {failed} of {} failures", plan.failures));
             break;
         }
         if error.is_some() {
@@ -131,11 +119,7 @@ pub fn run_real_campaign(
         measured.remarks = remarks;
         measured
     });
-    Ok(RealCampaignRun {
-        measured,
-        directory: directory.path().to_owned(),
-        failure,
-    })
+    Ok(RealCampaignRun { measured, directory: directory.path().to_owned(), failure })
 }
 
 fn endless(cluster: &Cluster) -> Scenario {
@@ -211,21 +195,13 @@ impl<'a> Fates<'a> {
     fn carry_out_orders(&mut self, now: Instant) {
         for order in self.lives.take_orders() {
             match order {
-                Order::Do {
-                    station,
-                    action,
-                    after_cycles,
-                } => {
+                Order::Do { station, action, after_cycles } => {
                     // A wait that no clock can hold is longer than any limit.
                     let after =
                         Duration::try_from_secs_f64(self.period.as_secs_f64() * after_cycles);
                     let at = after.ok().and_then(|after| now.checked_add(after));
-                    let fault = Fault {
-                        at_cycle: 0,
-                        phase: 0.0,
-                        member: Member::Station(station),
-                        action,
-                    };
+                    let fault =
+                        Fault { at_cycle: 0, phase: 0.0, member: Member::Station(station), action };
                     self.due.extend(at.map(|at| (at, fault)));
                 }
                 Order::Forget(station) => {
@@ -271,10 +247,7 @@ impl Conductor for Fates<'_> {
     fn take_due(&mut self, now: Instant) -> Option<Fault> {
         let due = self.next_due()?;
         let asked = self.cycle + 1;
-        (due <= now).then(|| Fault {
-            at_cycle: asked,
-            ..self.due.remove(0).1
-        })
+        (due <= now).then(|| Fault { at_cycle: asked, ..self.due.remove(0).1 })
     }
 
     fn wait_for_time(&self) -> bool {

@@ -49,11 +49,7 @@ pub(super) fn simulated(
 fn carry_out(simulation: &mut Simulation, lives: &mut Lives<'_>) {
     for order in lives.take_orders() {
         match order {
-            Order::Do {
-                station,
-                action,
-                after_cycles,
-            } => {
+            Order::Do { station, action, after_cycles } => {
                 let at = simulation.cycle_time().unwrap_or(0.0) + after_cycles;
                 simulation.schedule(Fault {
                     at_cycle: at as u64,

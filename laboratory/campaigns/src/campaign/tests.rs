@@ -27,10 +27,7 @@ fn a_campaign_is_the_same_on_any_number_of_processors() {
     let one = run_campaign(&cell, &plan(6, 1), &mut |_| {});
     let three = run_campaign(&cell, &plan(6, 3), &mut |_| {});
     assert_eq!(one, three);
-    let other = CampaignPlan {
-        seed: 4,
-        ..plan(6, 1)
-    };
+    let other = CampaignPlan { seed: 4, ..plan(6, 1) };
     assert_ne!(one, run_campaign(&cell, &other, &mut |_| {}));
 }
 
@@ -53,11 +50,7 @@ fn every_failure_of_the_system_has_the_cause_that_its_definition_names() {
 
 #[test]
 fn a_replica_that_does_not_fail_is_censored() {
-    let lasting = CampaignPlan {
-        mtbf_cycles: 1e9,
-        maximum_cycles: 200,
-        ..plan(2, 1)
-    };
+    let lasting = CampaignPlan { mtbf_cycles: 1e9, maximum_cycles: 200, ..plan(2, 1) };
     let found = run_campaign(&press_cell(Mode::Full), &lasting, &mut |_| {}).expect("synchronised");
     assert_eq!(found.campaign.failures.len(), 0);
     assert_eq!(found.campaign.censored_hours.len(), 2);
@@ -71,11 +64,7 @@ fn hours(cycles: f64) -> Hours {
 /// With the protocol's own time, and with no more than that, the model is that of the campaign.
 #[test]
 fn the_model_with_the_protocols_own_time_lies_in_the_interval() {
-    for (mode, crews) in [
-        (Mode::Full, None),
-        (Mode::Paper, None),
-        (Mode::Full, Some(1)),
-    ] {
+    for (mode, crews) in [(Mode::Full, None), (Mode::Paper, None), (Mode::Full, Some(1))] {
         let cell = press_cell(mode);
         let question = Question {
             mtbf: hours(300.0),
@@ -108,9 +97,7 @@ fn orders(lives: &mut Lives<'_>) -> Vec<(StationId, Action)> {
     let orders = lives.take_orders().into_iter();
     orders
         .filter_map(|order| match order {
-            Order::Do {
-                station, action, ..
-            } => Some((station, action)),
+            Order::Do { station, action, .. } => Some((station, action)),
             Order::Forget(_) => None,
         })
         .collect()
@@ -155,19 +142,14 @@ fn a_station_is_down_until_it_holds_every_state() {
 #[test]
 fn one_crew_works_on_one_station_at_a_time() {
     let cell = press_cell(Mode::Full);
-    let plan = CampaignPlan {
-        crews: Some(1),
-        ..plan(1, 1)
-    };
+    let plan = CampaignPlan { crews: Some(1), ..plan(1, 1) };
     let mut lives = Lives::new(&cell, &plan, 0);
     for (time, station) in [(1, ROBOT), (2, PRESS)] {
         lives.see(Time(time), Seen::Crashed(station));
         lives.see(Time(time), Seen::Flagged(station));
     }
     let ordered = lives.take_orders();
-    let forgotten = ordered
-        .iter()
-        .filter(|order| matches!(order, Order::Forget(_)));
+    let forgotten = ordered.iter().filter(|order| matches!(order, Order::Forget(_)));
     assert_eq!(forgotten.count(), 2, "{ordered:?}");
     let Some(Order::Do { station, .. }) = ordered.last() else {
         panic!("{ordered:?}");
@@ -189,10 +171,7 @@ fn a_deadline_beside_a_stall_of_the_host_says_nothing_of_the_masking() {
             lives.see(Time(cycle * period), seen.clone());
         }
         let run = lives.end(Time(100 * period), 100, false);
-        assert_eq!(
-            (run.asked, run.unmasked, run.excused),
-            (asked, unmasked, excused)
-        );
+        assert_eq!((run.asked, run.unmasked, run.excused), (asked, unmasked, excused));
     };
     check(&[], 1, 0, 0);
     check(&[(1, Seen::Missed), (2, Seen::Missed)], 1, 1, 0);

@@ -61,9 +61,7 @@ impl Coverage {
     }
 
     fn row(&mut self, kind: Kind, role: Role) -> Option<&mut CoverageRow> {
-        self.0
-            .iter_mut()
-            .find(|row| row.kind == kind && row.role == role)
+        self.0.iter_mut().find(|row| row.kind == kind && row.role == role)
     }
 
     pub(super) fn add(&mut self, rows: &[CoverageRow]) {

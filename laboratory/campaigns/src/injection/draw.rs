@@ -41,18 +41,13 @@ impl<'a> Target<'a> {
             let inputs = remote_io.operator_inputs();
             inputs.map(move |declared| (program, declared.input))
         });
-        Self {
-            schedule: &cluster.agreement().schedule,
-            inputs: inputs.collect(),
-        }
+        Self { schedule: &cluster.agreement().schedule, inputs: inputs.collect() }
     }
 
     /// The kinds that can be drawn: a cluster without operator inputs has no writes.
     pub(super) fn kinds(&self, kinds: &[Kind]) -> Vec<Kind> {
         let kinds = kinds.iter().copied();
-        kinds
-            .filter(|kind| *kind != Kind::Write || !self.inputs.is_empty())
-            .collect()
+        kinds.filter(|kind| *kind != Kind::Write || !self.inputs.is_empty()).collect()
     }
 }
 
@@ -63,12 +58,8 @@ pub(super) fn draw(
     kinds: &[Kind],
     cycles: &Range<u64>,
 ) -> Faultload {
-    let mut drawn = Draw {
-        random,
-        schedule: target.schedule,
-        inputs: &target.inputs,
-        cycles: cycles.clone(),
-    };
+    let mut drawn =
+        Draw { random, schedule: target.schedule, inputs: &target.inputs, cycles: cycles.clone() };
     let mut faultload = Faultload::default();
     let (of_values, kinds): (Vec<Kind>, Vec<Kind>) =
         kinds.iter().partition(|kind| kind.is_value_fault());
@@ -78,9 +69,8 @@ pub(super) fn draw(
         faultload.injections.extend(drawn.injection(kind));
         return faultload;
     }
-    let (of_network, of_members): (Vec<Kind>, Vec<Kind>) = kinds
-        .iter()
-        .partition(|kind| kind.roles() == [Role::Network]);
+    let (of_network, of_members): (Vec<Kind>, Vec<Kind>) =
+        kinds.iter().partition(|kind| kind.roles() == [Role::Network]);
     if !of_network.is_empty() && (of_members.is_empty() || drawn.random.random_range(0..4) == 0) {
         faultload.network = Some(drawn.network(&of_network));
     }
@@ -90,10 +80,7 @@ pub(super) fn draw(
     for _ in 0..drawn.random.random_range(1..=MAXIMUM_INJECTIONS) {
         let kind = drawn.one_of(&of_members);
         if let Some(injection) = drawn.injection(kind)
-            && !faultload
-                .injections
-                .iter()
-                .any(|other| other.collides_with(&injection))
+            && !faultload.injections.iter().any(|other| other.collides_with(&injection))
         {
             faultload.injections.push(injection);
         }
@@ -132,12 +119,7 @@ impl Draw<'_> {
         }
         let member = self.one_of(&members);
         let (span, phase) = self.span();
-        let step = |at_cycle: u64, action: Action| Fault {
-            at_cycle,
-            phase,
-            member,
-            action,
-        };
+        let step = |at_cycle: u64, action: Action| Fault { at_cycle, phase, member, action };
         let (from, to) = (span.start, span.end);
         let lasting = |begins, ends| vec![step(from, begins), step(to, ends)];
         let steps = match kind {
@@ -265,22 +247,14 @@ impl Draw<'_> {
             (heals, member, Action::Heal { to }),
             (restarts, station, Action::Restart),
         ]
-        .map(|(at_cycle, member, action)| Fault {
-            at_cycle,
-            phase,
-            member,
-            action,
-        })
+        .map(|(at_cycle, member, action)| Fault { at_cycle, phase, member, action })
         .to_vec();
         steps.sort_by_key(|step| step.at_cycle);
         steps
     }
 
     fn flip(&mut self) -> (u16, u16) {
-        (
-            self.random.random_range(0..64),
-            self.random.random_range(1..=4),
-        )
+        (self.random.random_range(0..64), self.random.random_range(1..=4))
     }
 
     fn others(&self, member: Member) -> Vec<Member> {
@@ -319,10 +293,7 @@ impl Draw<'_> {
                 _ => {}
             }
         }
-        Disturbance {
-            network,
-            cycles: Some(span.start..span.end + 1),
-        }
+        Disturbance { network, cycles: Some(span.start..span.end + 1) }
     }
 }
 

@@ -31,13 +31,7 @@ impl Injection {
     pub(super) fn collides_with(&self, other: &Self) -> bool {
         let decides = |step: &&Fault| matches!(step.action, Action::Crash | Action::Stop);
         let mut decided = self.steps.iter().filter(decides);
-        let by_other = |member| {
-            other
-                .steps
-                .iter()
-                .filter(decides)
-                .any(|it| it.member == member)
-        };
+        let by_other = |member| other.steps.iter().filter(decides).any(|it| it.member == member);
         let (own, others) = (self.cycles(), other.cycles());
         let meet = own.start < others.end && others.start < own.end;
         meet && decided.any(|step| by_other(step.member))
@@ -56,10 +50,7 @@ pub(super) struct Faultload {
 impl Faultload {
     /// All steps in the order of their times.
     pub(super) fn steps(&self) -> Vec<Fault> {
-        let steps = self
-            .injections
-            .iter()
-            .flat_map(|injection| &injection.steps);
+        let steps = self.injections.iter().flat_map(|injection| &injection.steps);
         let mut steps: Vec<Fault> = steps.copied().collect();
         steps.sort_by(|left, right| {
             let (left, right) = ((left.at_cycle, left.phase), (right.at_cycle, right.phase));
@@ -94,11 +85,7 @@ impl Faultload {
     pub(super) fn size(&self) -> (usize, u64) {
         let faults = self.injections.len() + usize::from(self.network.is_some());
         let ranges = self.injections.iter().map(Injection::cycles);
-        let ranges = ranges.chain(
-            self.network
-                .iter()
-                .filter_map(|network| network.cycles.clone()),
-        );
+        let ranges = ranges.chain(self.network.iter().filter_map(|network| network.cycles.clone()));
         (faults, ranges.map(|range| range.end - range.start).sum())
     }
 }

@@ -108,15 +108,9 @@ impl Failure {
         small: &Violating,
     ) -> Self {
         let members = Members::of(cluster);
-        let title = format!(
-            "{} in run {run} of seed {}",
-            plan.property.word(),
-            plan.seed
-        );
+        let title = format!("{} in run {run} of seed {}", plan.property.word(), plan.seed);
         let expect = plan.property.expectation();
-        let scenario = small
-            .faultload
-            .scenario(title, small.cycles, small.seed, expect);
+        let scenario = small.faultload.scenario(title, small.cycles, small.seed, expect);
         let remarks = [
             format!("Cycle {}: {}", small.symptom.cycle, small.symptom.what),
             format!(
@@ -131,10 +125,7 @@ impl Failure {
             cycles: small.cycles,
             seed: small.seed,
             cycle: small.symptom.cycle,
-            member: small
-                .symptom
-                .member
-                .map(|member| members.name(member).to_owned()),
+            member: small.symptom.member.map(|member| members.name(member).to_owned()),
             what: small.symptom.what.clone(),
             scenario: write(&scenario, &members, &remarks),
         }
@@ -196,9 +187,7 @@ impl Findings {
         if findings.format == FORMAT {
             Ok(findings)
         } else {
-            Err(FindingsError::Format {
-                found: findings.format,
-            })
+            Err(FindingsError::Format { found: findings.format })
         }
     }
 
@@ -233,9 +222,7 @@ impl Findings {
 /// For people.
 impl fmt::Display for Findings {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            plan, deadlines, ..
-        } = self;
+        let Self { plan, deadlines, .. } = self;
         let shard = match plan.shard {
             super::Shard::WHOLE => String::new(),
             shard => format!(" of shard {shard}"),
@@ -256,11 +243,7 @@ impl fmt::Display for Findings {
             ("fail-safe", deadlines.fail_safe),
         ];
         for (word, count) in parts {
-            writeln!(
-                formatter,
-                "{word:15}{count:>14} deadlines, {:.3} %",
-                share(count)
-            )?;
+            writeln!(formatter, "{word:15}{count:>14} deadlines, {:.3} %", share(count))?;
         }
         writeln!(
             formatter,

@@ -127,17 +127,12 @@ impl Kind {
     /// The kinds of which nothing wrong may come in a cluster with so many understudies.
     pub fn masked_by(understudies: usize) -> Vec<Self> {
         let kinds = Self::ALL.into_iter();
-        kinds
-            .filter(|kind| understudies > 0 || !kind.is_value_fault())
-            .collect()
+        kinds.filter(|kind| understudies > 0 || !kind.is_value_fault()).collect()
     }
 
     /// Whether bits flip behind the back of every checksum, so that only words that differ can show it.
     pub fn is_value_fault(self) -> bool {
-        matches!(
-            self,
-            Self::FlippedState | Self::FlippedSample | Self::FlippedWord
-        )
+        matches!(self, Self::FlippedState | Self::FlippedSample | Self::FlippedWord)
     }
 }
 
@@ -163,12 +158,7 @@ pub enum Role {
 
 impl Role {
     /// In order.
-    pub const ALL: [Self; 4] = [
-        Self::Controller,
-        Self::Understudy,
-        Self::RemoteIo,
-        Self::Network,
-    ];
+    pub const ALL: [Self; 4] = [Self::Controller, Self::Understudy, Self::RemoteIo, Self::Network];
 
     /// As tables write it.
     pub fn word(self) -> &'static str {
@@ -223,13 +213,8 @@ pub enum Phase {
 
 impl Phase {
     /// In the order of the cycle.
-    pub const ALL: [Self; 5] = [
-        Self::Samples,
-        Self::Controllers,
-        Self::Understudies,
-        Self::Copies,
-        Self::Rest,
-    ];
+    pub const ALL: [Self; 5] =
+        [Self::Samples, Self::Controllers, Self::Understudies, Self::Copies, Self::Rest];
 
     /// As tables write it.
     pub fn word(self) -> &'static str {
@@ -271,29 +256,23 @@ mod tests {
         for understudies in 0..3 {
             let schedule = Schedule::new(Duration::from_millis(10), 2, understudies, 2)
                 .expect("within bounds");
-            let phases: Vec<Phase> = (0..1000)
-                .map(|part| Phase::at(f64::from(part) / 1000.0, &schedule))
-                .collect();
+            let phases: Vec<Phase> =
+                (0..1000).map(|part| Phase::at(f64::from(part) / 1000.0, &schedule)).collect();
             assert!(phases.is_sorted());
             for phase in Phase::ALL {
                 let met = phases.contains(&phase);
                 assert_eq!(met, phase != Phase::Understudies || understudies > 0);
             }
             let before = Phase::at(0.6499, &schedule);
-            assert_eq!(
-                (before, Phase::at(0.65, &schedule)),
-                (Phase::Copies, Phase::Rest)
-            );
+            assert_eq!((before, Phase::at(0.65, &schedule)), (Phase::Copies, Phase::Rest));
         }
     }
 
     #[test]
     fn every_member_has_one_role() {
         let schedule = Schedule::new(Duration::from_millis(10), 3, 2, 2).expect("within bounds");
-        let members: Vec<Member> = Role::ALL
-            .into_iter()
-            .flat_map(|role| role.members(&schedule))
-            .collect();
+        let members: Vec<Member> =
+            Role::ALL.into_iter().flat_map(|role| role.members(&schedule)).collect();
         assert_eq!(members.len(), 3 + 2 + 3);
         let distinct: std::collections::BTreeSet<_> = members.iter().collect();
         assert_eq!(distinct.len(), members.len());

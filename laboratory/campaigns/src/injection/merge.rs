@@ -46,11 +46,7 @@ pub enum MergeError {
 /// The first few of many.
 fn list(numbers: &[u64]) -> String {
     let shown: Vec<String> = numbers.iter().take(20).map(u64::to_string).collect();
-    let more = if numbers.len() > shown.len() {
-        ", ..."
-    } else {
-        ""
-    };
+    let more = if numbers.len() > shown.len() { ", ..." } else { "" };
     shown.join(", ") + more
 }
 
@@ -67,25 +63,15 @@ pub fn merge(shards: Vec<(String, Findings)>) -> Result<Findings, Vec<MergeError
     let mut by_number: BTreeMap<u64, &str> = BTreeMap::new();
     for (name, findings) in &shards {
         if let Some(what) = difference(&first, findings) {
-            errors.push(MergeError::Other {
-                first: first_name.clone(),
-                name: name.clone(),
-                what,
-            });
+            errors.push(MergeError::Other { first: first_name.clone(), name: name.clone(), what });
             continue;
         }
         let shard = findings.plan.shard;
         if let Some(other) = by_number.insert(shard.number(), name) {
-            errors.push(MergeError::Twice {
-                shard,
-                name: other.to_owned(),
-                other: name.clone(),
-            });
+            errors.push(MergeError::Twice { shard, name: other.to_owned(), other: name.clone() });
         }
     }
-    let missing: Vec<u64> = (1..=of)
-        .filter(|number| !by_number.contains_key(number))
-        .collect();
+    let missing: Vec<u64> = (1..=of).filter(|number| !by_number.contains_key(number)).collect();
     if !missing.is_empty() {
         errors.push(MergeError::Missing { missing, of });
     }
@@ -121,10 +107,7 @@ fn difference(first: &Findings, other: &Findings) -> Option<&'static str> {
     let (one, two) = (&first.plan, &other.plan);
     let same = [
         ("the cluster", first.cluster == other.cluster),
-        (
-            "the configuration",
-            first.configuration == other.configuration,
-        ),
+        ("the configuration", first.configuration == other.configuration),
         ("the number of runs", one.runs == two.runs),
         ("the seed", one.seed == two.seed),
         ("the cycles of a run", one.cycles == two.cycles),
@@ -132,7 +115,5 @@ fn difference(first: &Findings, other: &Findings) -> Option<&'static str> {
         ("the kinds of faults", one.kinds == two.kinds),
         ("the number of shards", one.shard.of() == two.shard.of()),
     ];
-    same.into_iter()
-        .find(|(_, same)| !same)
-        .map(|(what, _)| what)
+    same.into_iter().find(|(_, same)| !same).map(|(what, _)| what)
 }

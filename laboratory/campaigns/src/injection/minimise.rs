@@ -42,12 +42,7 @@ pub(super) fn minimise(
     shortens: bool,
     attempt: &mut Try<'_>,
 ) -> Violating {
-    let mut search = Search {
-        best: found,
-        shortens,
-        trials: 0,
-        attempt,
-    };
+    let mut search = Search { best: found, shortens, trials: 0, attempt };
     search.shorten();
     search.drop_network();
     search.drop_injections();
@@ -81,12 +76,7 @@ impl Search<'_, '_> {
         let Some(symptom) = (self.attempt)(&faultload, cycles, seed) else {
             return false;
         };
-        self.best = Violating {
-            faultload,
-            cycles,
-            seed,
-            symptom,
-        };
+        self.best = Violating { faultload, cycles, seed, symptom };
         true
     }
 
@@ -97,9 +87,7 @@ impl Search<'_, '_> {
         }
         let cycles = self.best.symptom.cycle + 1 + MARGIN_CYCLES;
         let mut faultload = self.best.faultload.clone();
-        faultload
-            .injections
-            .retain(|injection| injection.cycles().start < cycles);
+        faultload.injections.retain(|injection| injection.cycles().start < cycles);
         for injection in &mut faultload.injections {
             injection.steps.retain(|step| step.at_cycle < cycles);
         }
@@ -111,10 +99,7 @@ impl Search<'_, '_> {
 
     fn drop_network(&mut self) {
         if self.best.faultload.network.is_some() {
-            let faultload = Faultload {
-                network: None,
-                ..self.best.faultload.clone()
-            };
+            let faultload = Faultload { network: None, ..self.best.faultload.clone() };
             self.takes(faultload);
         }
     }
@@ -146,9 +131,8 @@ impl Search<'_, '_> {
         let mut simplified = false;
         let mut place = 0;
         // The list of candidates is made anew after each that is taken, and gone on with from there.
-        while let Some(candidate) = candidates(&self.best.faultload, schedule)
-            .into_iter()
-            .nth(place)
+        while let Some(candidate) =
+            candidates(&self.best.faultload, schedule).into_iter().nth(place)
         {
             if self.trials == MAXIMUM_TRIALS {
                 return false;
@@ -179,10 +163,7 @@ fn candidates(faultload: &Faultload, schedule: &Schedule) -> Vec<Faultload> {
         list.extend(
             simpler_networks(disturbance)
                 .into_iter()
-                .map(|network| Faultload {
-                    network: Some(network),
-                    ..faultload.clone()
-                }),
+                .map(|network| Faultload { network: Some(network), ..faultload.clone() }),
         );
     }
     list.extend(simpler_members(faultload, schedule));
@@ -200,10 +181,7 @@ fn is_possible(faultload: &Faultload) -> bool {
 }
 
 fn simpler_injections(injection: &Injection) -> Vec<Injection> {
-    let with = |steps: Vec<Fault>| Injection {
-        steps,
-        ..injection.clone()
-    };
+    let with = |steps: Vec<Fault>| Injection { steps, ..injection.clone() };
     let each = |change: &dyn Fn(Fault) -> Fault| {
         with(injection.steps.iter().copied().map(change).collect())
     };
@@ -219,11 +197,9 @@ fn simpler_injections(injection: &Injection) -> Vec<Injection> {
         list.push(with(injection.steps[..2].to_vec()));
         list.push(with(injection.steps[..count - 2].to_vec()));
     }
-    for earliest in [
-        FIRST_CYCLE,
-        cycles.start.midpoint(FIRST_CYCLE),
-        cycles.start.saturating_sub(1),
-    ] {
+    for earliest in
+        [FIRST_CYCLE, cycles.start.midpoint(FIRST_CYCLE), cycles.start.saturating_sub(1)]
+    {
         if (FIRST_CYCLE..cycles.start).contains(&earliest) {
             list.push(each(&|step| Fault {
                 at_cycle: step.at_cycle - cycles.start + earliest,
@@ -232,50 +208,32 @@ fn simpler_injections(injection: &Injection) -> Vec<Injection> {
         }
     }
     for last in nearer(cycles.start, cycles.end - 1) {
-        list.push(each(&|step| Fault {
-            at_cycle: step.at_cycle.min(last),
-            ..step
-        }));
+        list.push(each(&|step| Fault { at_cycle: step.at_cycle.min(last), ..step }));
     }
     for digits in [0, 1, 2] {
         let scale = 10_f64.powi(digits);
-        list.push(each(&|step| Fault {
-            phase: (step.phase * scale).floor() / scale,
-            ..step
-        }));
+        list.push(each(&|step| Fault { phase: (step.phase * scale).floor() / scale, ..step }));
     }
-    list.push(each(&|step| Fault {
-        action: simpler_action(step.action),
-        ..step
-    }));
+    list.push(each(&|step| Fault { action: simpler_action(step.action), ..step }));
     list
 }
 
 /// The least of each number, but for those that end something.
 fn simpler_action(action: Action) -> Action {
     match action {
-        Action::Slow { by } if by.as_millis() > 1 => Action::Slow {
-            by: Duration::from_millis(by.as_millis() as u64 / 2),
-        },
-        Action::Delay { to, by } if by.as_millis() > 1 => Action::Delay {
-            to,
-            by: Duration::from_millis(by.as_millis() as u64 / 2),
-        },
-        Action::Corrupt { frames } => Action::Corrupt {
-            frames: frames.div_ceil(2),
-        },
-        Action::Replay { age } => Action::Replay {
-            age: age.div_ceil(2),
-        },
+        Action::Slow { by } if by.as_millis() > 1 => {
+            Action::Slow { by: Duration::from_millis(by.as_millis() as u64 / 2) }
+        }
+        Action::Delay { to, by } if by.as_millis() > 1 => {
+            Action::Delay { to, by: Duration::from_millis(by.as_millis() as u64 / 2) }
+        }
+        Action::Corrupt { frames } => Action::Corrupt { frames: frames.div_ceil(2) },
+        Action::Replay { age } => Action::Replay { age: age.div_ceil(2) },
         Action::FlipState { program, .. } => Action::FlipState { program, bit: 0 },
-        Action::FlipSample { frames, .. } => Action::FlipSample {
-            bit: 0,
-            frames: frames.div_ceil(2),
-        },
-        Action::FlipWord { frames, .. } => Action::FlipWord {
-            bit: 0,
-            frames: frames.div_ceil(2),
-        },
+        Action::FlipSample { frames, .. } => {
+            Action::FlipSample { bit: 0, frames: frames.div_ceil(2) }
+        }
+        Action::FlipWord { frames, .. } => Action::FlipWord { bit: 0, frames: frames.div_ceil(2) },
         other => other,
     }
 }
@@ -343,11 +301,7 @@ fn simpler_members(faultload: &Faultload, schedule: &Schedule) -> Vec<Faultload>
                 which => which,
             };
             let mut simpler = faultload.clone();
-            for step in simpler
-                .injections
-                .iter_mut()
-                .flat_map(|injection| &mut injection.steps)
-            {
+            for step in simpler.injections.iter_mut().flat_map(|injection| &mut injection.steps) {
                 step.member = swap(step.member);
                 step.action = match step.action {
                     Action::Cut { to } => Action::Cut { to: swap(to) },
@@ -366,10 +320,7 @@ fn simpler_members(faultload: &Faultload, schedule: &Schedule) -> Vec<Faultload>
 
 /// Who is struck, in the order of the steps; less is simpler.
 fn rank(faultload: &Faultload) -> Vec<(Member, Option<Member>)> {
-    let steps = faultload
-        .injections
-        .iter()
-        .flat_map(|injection| &injection.steps);
+    let steps = faultload.injections.iter().flat_map(|injection| &injection.steps);
     steps
         .map(|step| match step.action {
             Action::Cut { to } | Action::Heal { to } | Action::Delay { to, .. } => {

@@ -46,10 +46,7 @@ pub fn picture(findings: &Findings) -> Result<String, PictureError> {
             cells: row
                 .counts
                 .into_iter()
-                .map(|count| Cell {
-                    count,
-                    heat: ((count as f64).sqrt() / most * 100.0) as u64,
-                })
+                .map(|count| Cell { count, heat: ((count as f64).sqrt() / most * 100.0) as u64 })
                 .collect(),
         })
         .collect();

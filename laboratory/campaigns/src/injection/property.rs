@@ -43,18 +43,9 @@ impl Property {
         let none = Some(0);
         match self {
             Self::Wrong => Expectation::default(),
-            Self::Held => Expectation {
-                held: none,
-                ..Expectation::default()
-            },
-            Self::FailSafe => Expectation {
-                fail_safe: none,
-                ..Expectation::default()
-            },
-            Self::Unprotected => Expectation {
-                protected: true,
-                ..Expectation::default()
-            },
+            Self::Held => Expectation { held: none, ..Expectation::default() },
+            Self::FailSafe => Expectation { fail_safe: none, ..Expectation::default() },
+            Self::Unprotected => Expectation { protected: true, ..Expectation::default() },
         }
     }
 
@@ -71,13 +62,7 @@ impl Property {
 
 fn applied(event: &RemoteIoEvent, wanted: Source) -> Option<String> {
     match event {
-        RemoteIoEvent::Applied {
-            moment,
-            outputs,
-            source,
-            missing,
-            ..
-        } if *source == wanted => {
+        RemoteIoEvent::Applied { moment, outputs, source, missing, .. } if *source == wanted => {
             let why = missing.map_or(String::new(), |missing| format!(" ({missing:?})"));
             Some(format!("applied {outputs} in cycle {moment}{why}"))
         }

@@ -101,17 +101,7 @@ mod tests {
 
     #[test]
     fn what_is_no_shard() {
-        for text in [
-            "",
-            "3",
-            "0/3",
-            "4/3",
-            "1/0",
-            "a/b",
-            "-1/3",
-            "1/3/5",
-            "1/10000000",
-        ] {
+        for text in ["", "3", "0/3", "4/3", "1/0", "a/b", "-1/3", "1/3/5", "1/10000000"] {
             assert!(text.parse::<Shard>().is_err(), "{text}");
         }
     }

@@ -75,10 +75,7 @@ fn threads_and_shards_change_nothing() {
     assert!(expected.runs_failed > 0, "loss holds cycles");
     assert_eq!(run(&whole, 3).to_json(), expected.to_json());
     let shards = ["2/3", "1/3", "3/3"].map(|shard| {
-        let shard = InjectionPlan {
-            shard: shard.parse().expect("a shard"),
-            ..whole.clone()
-        };
+        let shard = InjectionPlan { shard: shard.parse().expect("a shard"), ..whole.clone() };
         let findings = run(&shard, 2);
         // As it is written and read again.
         let findings = Findings::parse(&findings.to_json()).expect("its own text");
@@ -100,11 +97,8 @@ fn shards_of_other_campaigns_are_refused() {
         (format!("{shard} of {seed}"), run(&plan, 1))
     };
     let errors = merge(vec![shard("1/4", 1), shard("1/4", 1), shard("2/4", 2)]);
-    let texts: Vec<String> = errors
-        .expect_err("they differ")
-        .iter()
-        .map(ToString::to_string)
-        .collect();
+    let texts: Vec<String> =
+        errors.expect_err("they differ").iter().map(ToString::to_string).collect();
     let expected = [
         "1/4 of 1 and 1/4 of 1 are both shard 1/4",
         "2/4 of 2 is of another campaign than 1/4 of 1: the seed differs",
@@ -135,11 +129,7 @@ fn small_failures_are_repeated_by_a_scenario() {
         }
     }
     // A crash of an understudy alone holds nothing, so what is left is never one.
-    assert!(
-        held.failures
-            .iter()
-            .all(|failure| failure.faults <= failure.faults_drawn)
-    );
+    assert!(held.failures.iter().all(|failure| failure.faults <= failure.faults_drawn));
     let smallest = held.failures.iter().map(|failure| failure.faults).min();
     assert_eq!(smallest, Some(1));
 }
@@ -167,9 +157,7 @@ fn a_station_that_stays_away_is_one_crash() {
         role: Role::Controller,
         steps: vec![crash],
     });
-    let symptom = bench
-        .run(&faultload, plan.cycles, seed, plan.property)
-        .symptom;
+    let symptom = bench.run(&faultload, plan.cycles, seed, plan.property).symptom;
     let found = Violating {
         faultload,
         cycles: plan.cycles,

@@ -74,11 +74,8 @@ impl Bench {
                 if first.is_none()
                     && let Some(what) = property.violated_by(&record)
                 {
-                    *first = Some(Symptom {
-                        cycle: cycle.unwrap_or(0),
-                        member: Some(member),
-                        what,
-                    });
+                    *first =
+                        Some(Symptom { cycle: cycle.unwrap_or(0), member: Some(member), what });
                 }
             },
             &mut || false,
@@ -91,9 +88,6 @@ impl Bench {
                 what: "not everybody is synchronised again".to_owned(),
             });
         }
-        Outcome {
-            symptom,
-            tallies: simulation.tallies().to_vec(),
-        }
+        Outcome { symptom, tallies: simulation.tallies().to_vec() }
     }
 }

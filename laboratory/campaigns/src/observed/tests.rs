@@ -12,36 +12,17 @@ const MILLISECOND: u64 = 1_000_000;
 
 /// A record of a member, its time in milliseconds.
 fn of(ms: u64, member: Member, event: Happening) -> Record {
-    Record {
-        at_ns: ms * MILLISECOND,
-        name: String::new(),
-        member: Some(member),
-        event,
-    }
+    Record { at_ns: ms * MILLISECOND, name: String::new(), member: Some(member), event }
 }
 
 fn published(ms: u64, rank: u8) -> Record {
-    let event = StationEvent::Published {
-        moment: Moment::default(),
-        words: Default::default(),
-    };
-    of(
-        ms,
-        Member::Station(StationId(rank)),
-        Happening::Station(event),
-    )
+    let event = StationEvent::Published { moment: Moment::default(), words: Default::default() };
+    of(ms, Member::Station(StationId(rank)), Happening::Station(event))
 }
 
 fn flagged(ms: u64, rank: u8) -> Record {
-    let event = RemoteIoEvent::Flagged {
-        moment: Moment::default(),
-        station: StationId(rank),
-    };
-    of(
-        ms,
-        Member::RemoteIo(ProgramId(0)),
-        Happening::RemoteIo(event),
-    )
+    let event = RemoteIoEvent::Flagged { moment: Moment::default(), station: StationId(rank) };
+    of(ms, Member::RemoteIo(ProgramId(0)), Happening::RemoteIo(event))
 }
 
 fn stalled(ms: u64) -> Record {
@@ -49,11 +30,7 @@ fn stalled(ms: u64) -> Record {
         moment: Moment::default(),
         late: std::time::Duration::from_millis(50),
     };
-    of(
-        ms,
-        Member::RemoteIo(ProgramId(1)),
-        Happening::RemoteIo(event),
-    )
+    of(ms, Member::RemoteIo(ProgramId(1)), Happening::RemoteIo(event))
 }
 
 fn applied(ms: u64, program: u8, source: Source) -> Record {
@@ -66,11 +43,7 @@ fn applied(ms: u64, program: u8, source: Source) -> Record {
         missing: None,
         heard: StationSet::EMPTY,
     };
-    of(
-        ms,
-        Member::RemoteIo(ProgramId(program)),
-        Happening::RemoteIo(event),
-    )
+    of(ms, Member::RemoteIo(ProgramId(program)), Happening::RemoteIo(event))
 }
 
 fn killed(ms: u64, rank: u8) -> Record {
@@ -112,22 +85,14 @@ fn milliseconds(hours: f64) -> f64 {
 #[test]
 fn a_station_whose_process_ended_unexpectedly_failed_then() {
     let steps = |taken: fn(u64, u8) -> Record| {
-        view(vec![
-            taken(2_002, 0),
-            flagged(2_032, 0),
-            published(2_532, 0),
-        ])
+        view(vec![taken(2_002, 0), flagged(2_032, 0), published(2_532, 0)])
     };
     assert_eq!(steps(ended), steps(killed));
 }
 
 #[test]
 fn a_killed_station_failed_when_it_was_killed_and_is_repaired_when_it_speaks() {
-    let found = view(vec![
-        killed(2_002, 0),
-        flagged(2_032, 0),
-        published(2_532, 0),
-    ]);
+    let found = view(vec![killed(2_002, 0), flagged(2_032, 0), published(2_532, 0)]);
     let observed = &found.observed;
     assert_eq!((found.controllers, found.understudies), (2, 1));
     assert_eq!(milliseconds(observed.hours), 10_000.0);
@@ -136,10 +101,7 @@ fn a_killed_station_failed_when_it_was_killed_and_is_repaired_when_it_speaks() {
     assert_eq!(milliseconds(observed.detection_hours[0]), 30.0);
     assert_eq!(milliseconds(observed.repairing_hours), 500.0);
     assert_eq!(milliseconds(observed.working_hours), 3.0 * 10_000.0 - 530.0);
-    assert_eq!(
-        (observed.asked, observed.masked, observed.repairs),
-        (1, 1, 1)
-    );
+    assert_eq!((observed.asked, observed.masked, observed.repairs), (1, 1, 1));
 }
 
 #[test]
@@ -161,10 +123,7 @@ fn a_silence_beside_a_stall_is_no_failure() {
 fn a_held_deadline_shows_that_a_failure_was_not_masked_unless_the_system_has_failed() {
     let check = |more: Vec<Record>, asked, masked, fail_safe| {
         let found = view(more);
-        assert_eq!(
-            (found.observed.asked, found.observed.masked),
-            (asked, masked)
-        );
+        assert_eq!((found.observed.asked, found.observed.masked), (asked, masked));
         assert_eq!(found.fail_safe, fail_safe);
     };
     let held = |ms| applied(ms, 0, Source::Held);
@@ -173,12 +132,8 @@ fn a_held_deadline_shows_that_a_failure_was_not_masked_unless_the_system_has_fai
     check([one(), vec![held(2_050)]].concat(), 1, 0, 0);
     check([one(), vec![held(1_900)]].concat(), 1, 1, 0);
     check([one(), vec![held(2_050), stalled(2_060)]].concat(), 1, 1, 0);
-    let second = vec![
-        killed(4_000, 2),
-        held(4_010),
-        flagged(4_040, 2),
-        applied(4_050, 0, Source::FailSafe),
-    ];
+    let second =
+        vec![killed(4_000, 2), held(4_010), flagged(4_040, 2), applied(4_050, 0, Source::FailSafe)];
     check([one(), second].concat(), 1, 1, 1);
 }
 
@@ -189,11 +144,7 @@ fn a_journal_without_a_whole_cluster_or_with_a_broken_line_says_so() {
         found.expect_err("nothing to observe").to_string()
     };
     assert!(refused(Vec::new()).contains("all"));
-    let silent = refused(vec![
-        published(1, 0),
-        flagged(2, 2),
-        applied(3, 0, Source::Direct),
-    ]);
+    let silent = refused(vec![published(1, 0), flagged(2, 2), applied(3, 0, Source::Direct)]);
     assert!(silent.contains("station 2, station 3"), "{silent}");
     let code = |bytes: &[u8]| {
         let broken = observe_journal(understudy_journal::records(bytes));
@@ -211,19 +162,11 @@ fn the_hours_to_come_take_a_repair_from_the_journal_or_from_the_user() {
     let hours = |text: &str| text.parse().expect("a time");
     let undisturbed = || view(Vec::new());
     let refused = look_ahead(undisturbed(), Mode::Full, hours("1h"), None);
-    assert!(
-        refused.expect_err("no repair")[0]
-            .to_string()
-            .contains("--mttr")
-    );
+    assert!(refused.expect_err("no repair")[0].to_string().contains("--mttr"));
     let given = look_ahead(undisturbed(), Mode::Full, hours("1s"), Some(hours("1s")));
     let given = given.expect("an outlook");
     assert!(given.outlook.reliability.estimate.is_some_and(|r| r > 0.8));
-    let seen = view(vec![
-        killed(2_002, 0),
-        flagged(2_032, 0),
-        published(2_532, 0),
-    ]);
+    let seen = view(vec![killed(2_002, 0), flagged(2_032, 0), published(2_532, 0)]);
     let found = look_ahead(seen, Mode::Full, hours("10s"), None).expect("an outlook");
     insta::assert_snapshot!(found.to_text());
 }

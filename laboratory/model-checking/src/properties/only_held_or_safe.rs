@@ -9,10 +9,7 @@ pub(super) const PROPERTY: Property = Property {
     promise: Promise::NothingWrong,
     holds: |_, world| {
         let neither = |violation: &Violation| {
-            matches!(
-                violation,
-                Violation::WronglyHeld { .. } | Violation::NotTheFailSafe { .. }
-            )
+            matches!(violation, Violation::WronglyHeld { .. } | Violation::NotTheFailSafe { .. })
         };
         !world.simulation.violations().iter().any(neither)
     },

@@ -9,24 +9,10 @@ use understudy_simulator::Tally;
 use cell::parts;
 
 /// All that can be done once, and nothing of anything.
-const ONE: Budget = Budget {
-    losses: 1,
-    delays: 1,
-    duplicates: 1,
-    crashes: 1,
-    stops: 1,
-    total: 1,
-    cycles: 4,
-};
-const NONE: Budget = Budget {
-    losses: 0,
-    delays: 0,
-    duplicates: 0,
-    crashes: 0,
-    stops: 0,
-    total: 0,
-    cycles: 0,
-};
+const ONE: Budget =
+    Budget { losses: 1, delays: 1, duplicates: 1, crashes: 1, stops: 1, total: 1, cycles: 4 };
+const NONE: Budget =
+    Budget { losses: 0, delays: 0, duplicates: 0, crashes: 0, stops: 0, total: 0, cycles: 0 };
 
 /// Everything within the budget holds, in so many states.
 fn check_all(understudies: usize, budget: Budget, states: usize) {
@@ -37,10 +23,7 @@ fn check_from(start: Start, understudies: usize, budget: Budget, states: usize) 
     let model = Model::new(parts(understudies), start, budget, &ALL).expect("it comes into step");
     let verdict = check(model, 2);
     assert_eq!(verdict.counterexamples, []);
-    assert_eq!(
-        verdict.states, states,
-        "a protocol that has changed has other states"
-    );
+    assert_eq!(verdict.states, states, "a protocol that has changed has other states");
 }
 
 #[test]
@@ -55,36 +38,19 @@ fn one_of_each_with_two_understudies() {
 
 #[test]
 fn two_losses_in_two_cycles() {
-    let budget = Budget {
-        losses: 2,
-        total: 2,
-        cycles: 2,
-        ..NONE
-    };
+    let budget = Budget { losses: 2, total: 2, cycles: 2, ..NONE };
     check_all(1, budget, 10_750);
 }
 
 #[test]
 fn a_crash_and_a_stop_in_two_cycles() {
-    let budget = Budget {
-        crashes: 1,
-        stops: 1,
-        total: 2,
-        cycles: 2,
-        ..NONE
-    };
+    let budget = Budget { crashes: 1, stops: 1, total: 2, cycles: 2, ..NONE };
     check_all(1, budget, 549_058);
 }
 
 #[test]
 fn a_crash_and_a_loss_in_two_cycles() {
-    let budget = Budget {
-        losses: 1,
-        crashes: 1,
-        total: 2,
-        cycles: 2,
-        ..NONE
-    };
+    let budget = Budget { losses: 1, crashes: 1, total: 2, cycles: 2, ..NONE };
     check_all(1, budget, 87_485);
 }
 

@@ -17,32 +17,17 @@ const fn remote_io(program: u8) -> Member {
 }
 
 fn restarted(members: &[Member]) -> Start {
-    Start {
-        restarted: members.to_vec(),
-        ..Start::default()
-    }
+    Start { restarted: members.to_vec(), ..Start::default() }
 }
 
 fn behind(member: Member) -> Start {
-    Start {
-        behind: vec![member],
-        ..Start::default()
-    }
+    Start { behind: vec![member], ..Start::default() }
 }
 
 /// Anything once, and a crash besides, after links were broken for longer than the history of a sample.
 fn check_broken(broken: &[(Member, Member)], states: usize) {
-    let start = Start {
-        broken: broken.to_vec(),
-        ..Start::default()
-    };
-    let budget = Budget {
-        crashes: 2,
-        losses: 1,
-        total: 2,
-        cycles: 2,
-        ..NONE
-    };
+    let start = Start { broken: broken.to_vec(), ..Start::default() };
+    let budget = Budget { crashes: 2, losses: 1, total: 2, cycles: 2, ..NONE };
     check_from(start, 1, budget, states);
 }
 
@@ -105,13 +90,7 @@ fn a_controller_is_a_cycle_behind() {
 
 #[test]
 fn the_understudy_is_a_cycle_behind_and_a_controller_crashes_under_loss() {
-    let budget = Budget {
-        losses: 1,
-        crashes: 1,
-        total: 2,
-        cycles: 1,
-        ..NONE
-    };
+    let budget = Budget { losses: 1, crashes: 1, total: 2, cycles: 1, ..NONE };
     check_from(behind(station(2)), 1, budget, 12_447);
 }
 

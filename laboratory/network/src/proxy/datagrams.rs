@@ -108,8 +108,7 @@ impl Road {
 
     fn take_due(&mut self, now_ns: u64) -> Option<OnTheWay> {
         let due = self.next_due_ns()? <= now_ns;
-        due.then(|| self.waiting.pop().map(|Reverse(next)| next))
-            .flatten()
+        due.then(|| self.waiting.pop().map(|Reverse(next)| next)).flatten()
     }
 }
 
@@ -145,11 +144,7 @@ impl Lane {
             }
         }
         let towards = Arc::new(socket);
-        self.clients.push(Client {
-            address,
-            towards: Arc::clone(&towards),
-            used_ns: now_ns,
-        });
+        self.clients.push(Client { address, towards: Arc::clone(&towards), used_ns: now_ns });
         Some(towards)
     }
 
@@ -233,9 +228,9 @@ pub(super) fn carry(mut lanes: Vec<Lane>, mut streams: Vec<Way>, shared: &Arc<Sh
         while let Some(next) = road.take_due(now) {
             let sent = match &next.exit {
                 // An answer that nobody listened to the one before spoils one sending, and no more.
-                Exit::Forth(towards) => towards
-                    .send(&next.bytes)
-                    .or_else(|_| towards.send(&next.bytes)),
+                Exit::Forth(towards) => {
+                    towards.send(&next.bytes).or_else(|_| towards.send(&next.bytes))
+                }
                 Exit::Back(lane, client) => lanes[*lane].listener.send_to(&next.bytes, client),
             };
             shared.sent(sent.is_ok());
@@ -261,10 +256,7 @@ fn wait(lanes: &[Lane], streams: &[Way], shared: &Shared, until_ns: Option<u64>)
         TimeSpec::from_duration(wait)
     });
     match ppoll(&mut descriptors, timeout, None) {
-        Ok(_) => descriptors
-            .iter()
-            .map(|descriptor| descriptor.any().unwrap_or(false))
-            .collect(),
+        Ok(_) => descriptors.iter().map(|descriptor| descriptor.any().unwrap_or(false)).collect(),
         Err(Errno::EINTR) => Vec::new(),
         // Without memory for it nothing is readable; the next round may have it.
         Err(_) => Vec::new(),

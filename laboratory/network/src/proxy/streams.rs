@@ -61,8 +61,7 @@ impl Way {
     /// Takes the connections that wait.
     pub(super) fn accept(&mut self, shared: &Arc<Shared>) {
         while let Ok((client, _)) = self.listener.accept() {
-            self.open
-                .retain(|connection| !connection.thread.is_finished());
+            self.open.retain(|connection| !connection.thread.is_finished());
             let room = self.open.len() < MAXIMUM_CONNECTIONS;
             let Some(kept) = client.try_clone().ok().filter(|_| room) else {
                 shared.sent(false);
@@ -75,10 +74,7 @@ impl Way {
                 .name("proxy-stream".into())
                 .spawn(move || join(&client, to, impairments, seed, &shared));
             if let Ok(thread) = thread {
-                self.open.push(Connection {
-                    client: kept,
-                    thread,
-                });
+                self.open.push(Connection { client: kept, thread });
             }
         }
     }
@@ -129,10 +125,7 @@ fn read(mut from: &TcpStream, mut shaper: Shaper, into: &SyncSender<Passed>, sha
             Ok(0) => return,
             Ok(length) => {
                 shared.count(1);
-                if into
-                    .send(shaper.piece(now_ns(), &buffer[..length]))
-                    .is_err()
-                {
+                if into.send(shaper.piece(now_ns(), &buffer[..length])).is_err() {
                     return;
                 }
             }
@@ -189,8 +182,5 @@ fn write_whole(into: &mut &TcpStream, mut bytes: &[u8], shared: &Shared) -> bool
 
 fn is_patience(error: &std::io::Error) -> bool {
     use std::io::ErrorKind;
-    matches!(
-        error.kind(),
-        ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted
-    )
+    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
 }

@@ -38,10 +38,7 @@ impl Descent {
         };
         let others_agree = driven.width() == fail_safe.width()
             && (0..driven.width()).all(|bit| of_ramp(bit) || driven.get(bit) == fail_safe.get(bit));
-        others_agree
-            && ramps
-                .iter()
-                .all(|ramp| self.is_on(*ramp, driven, fail_safe))
+        others_agree && ramps.iter().all(|ramp| self.is_on(*ramp, driven, fail_safe))
     }
 
     /// Whether an output has gone as far as its ramp says, up to rounding.

@@ -59,10 +59,7 @@ fn referee_of_an_operator_input() -> Referee {
 }
 
 fn moment(cycle: u64) -> Moment {
-    Moment {
-        epoch: Epoch(1),
-        cycle: Cycle(cycle),
-    }
+    Moment { epoch: Epoch(1), cycle: Cycle(cycle) }
 }
 
 fn bit(bit: bool) -> Image {
@@ -72,9 +69,7 @@ fn bit(bit: bool) -> Image {
 /// L after these inputs, from the genesis of cycle 0.
 fn after(inputs: &[bool]) -> Lineage {
     let genesis = Lineage::genesis(ProgramHash(5), moment(0));
-    inputs
-        .iter()
-        .fold(genesis, |lineage, &input| lineage.after(&bit(input)))
+    inputs.iter().fold(genesis, |lineage, &input| lineage.after(&bit(input)))
 }
 
 /// The sample of a cycle that extends the state after the inputs `before`.
@@ -117,11 +112,8 @@ fn only_the_true_output_may_be_applied_as_true() {
             (0..8).map(|case| (case & 1 == 1, case & 2 == 2, case & 4 == 4))
         {
             let truth = first ^ second;
-            let events = [
-                sampled(1, &[], first),
-                sampled(2, &[first], second),
-                applied(2, output, source),
-            ];
+            let events =
+                [sampled(1, &[], first), sampled(2, &[first], second), applied(2, output, source)];
             check(&events, output != truth);
         }
         check(&[sampled(1, &[], true), applied(2, true, source)], true);
@@ -196,10 +188,7 @@ fn the_operator_may_choose_an_older_state_once() {
     assert_eq!(referee.observe(&back(3)), Ok(()));
     assert_eq!(referee.observe(&applied(3, true, Source::Direct)), Ok(()));
     let again = referee.observe(&back(4));
-    assert!(
-        matches!(again, Err(Violation::WentBack { .. })),
-        "{again:?}"
-    );
+    assert!(matches!(again, Err(Violation::WentBack { .. })), "{again:?}");
 }
 
 #[test]
@@ -249,20 +238,14 @@ fn what_follows_missing_records_is_not_judged_until_a_state_is_known() {
 #[test]
 fn a_sample_without_a_record_may_have_what_was_written() {
     let write = Write {
-        id: WriteId {
-            session: 1,
-            number: 1,
-        },
+        id: WriteId { session: 1, number: 1 },
         input: 0,
         value: true.into(),
         role: Role::Operator,
         owner: "anna".to_owned(),
         reason: "a test".to_owned(),
     };
-    let written = Event::Written {
-        moment: moment(1),
-        write,
-    };
+    let written = Event::Written { moment: moment(1), write };
     // The remote I/O was killed after the sample of cycle 2, in which the value was; a pulse is over in the next one.
     let resumed = sampled(4, &[false, true], false);
     // Without the record of the write there may be that of the request.
@@ -316,10 +299,7 @@ fn a_state_that_a_station_holds_ends_a_gap() {
 /// Outputs of a program with a ramp, driven one after the other from 10 on: whether the referee permits them all.
 #[track_caller]
 fn descends(driven: &[(bool, u16)], permitted: bool) {
-    let place = PointPlace {
-        bit: 16,
-        of: Elementary::Int,
-    };
+    let place = PointPlace { bit: 16, of: Elementary::Int };
     let ramp = Ramp { place, step: 2.5 };
     let image = |switch: bool, number: u16| {
         let bits = (0..16).map(|bit| switch && bit == 0);

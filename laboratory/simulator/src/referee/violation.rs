@@ -87,7 +87,5 @@ pub enum Violation {
 }
 
 fn text(image: &Option<Image>) -> String {
-    image
-        .as_ref()
-        .map_or_else(|| "none".to_owned(), Image::to_string)
+    image.as_ref().map_or_else(|| "none".to_owned(), Image::to_string)
 }

@@ -42,11 +42,7 @@ impl Simulation {
             }
             (Member::RemoteIo(program), Action::Choose { choice }) => {
                 self.referees[program.index()].operator_chooses();
-                self.give(
-                    member,
-                    Input::RemoteIo(RemoteIoInput::Choose(choice)),
-                    observe,
-                );
+                self.give(member, Input::RemoteIo(RemoteIoInput::Choose(choice)), observe);
             }
             (Member::RemoteIo(_), Action::Set { .. }) => {
                 if let Some(force) = action.force() {
@@ -60,11 +56,7 @@ impl Simulation {
             }
             (Member::RemoteIo(_), Action::Write { .. }) => {
                 if let Some(write) = fault.write() {
-                    self.give(
-                        member,
-                        Input::RemoteIo(RemoteIoInput::Write(&write)),
-                        observe,
-                    );
+                    self.give(member, Input::RemoteIo(RemoteIoInput::Write(&write)), observe);
                 }
             }
             (Member::Station(station), _) => {

@@ -31,13 +31,7 @@ impl Hash for Simulation {
         (links, stations, remote_ios, plants, referees).hash(hasher);
         (ready, arrived, holders, violations.len(), pace, founded).hash(hasher);
         for fault in faults {
-            (
-                fault.at_cycle,
-                fault.phase.to_bits(),
-                fault.member,
-                fault.action,
-            )
-                .hash(hasher);
+            (fault.at_cycle, fault.phase.to_bits(), fault.member, fault.action).hash(hasher);
         }
     }
 }

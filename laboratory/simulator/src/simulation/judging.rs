@@ -37,12 +37,7 @@ impl Simulation {
         }
         if let Some(violation) = found {
             let member = Member::RemoteIo(program);
-            observe(
-                self.now,
-                self.pace.cycle(),
-                member,
-                Record::Violation(&violation),
-            );
+            observe(self.now, self.pace.cycle(), member, Record::Violation(&violation));
             self.violations.push(violation);
         }
         if let Event::Applied { source, heard, .. } = event {

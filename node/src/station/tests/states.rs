@@ -39,10 +39,7 @@ const ALL: [(Happening, &str); 8] = [
     (Happening::OtherMaster, "another station starts cycles"),
     (Happening::ColdStart, "remote I/O: cold start"),
     (Happening::Samples, "remote I/O: samples"),
-    (
-        Happening::SamplesAfterGap,
-        "remote I/O: samples after a gap",
-    ),
+    (Happening::SamplesAfterGap, "remote I/O: samples after a gap"),
     (Happening::Transfer, "state transferred"),
     (Happening::OtherDigest, "other digest published"),
     (Happening::Exclusion, "remote I/O: excludes this station"),
@@ -214,8 +211,5 @@ fn each_state_answers_each_input() {
 fn the_drawing_is_the_table() {
     let drawing = table().drawing("station", "node/src/station/tests/states.rs");
     let drawn = include_str!("../../../../docs/pictures/station.dot");
-    assert!(
-        drawing == drawn,
-        "docs/pictures/station.dot should be\n{drawing}"
-    );
+    assert!(drawing == drawn, "docs/pictures/station.dot should be\n{drawing}");
 }

@@ -20,12 +20,8 @@ impl Metrics {
     /// Sets every metric but the times of cycles.
     pub fn show(&self, model: &Model, snapshot: &Snapshot) {
         self.values.cycle.set(snapshot.cycle.unwrap_or_default());
-        self.values
-            .survives
-            .set(i64::from(snapshot.margin.survives));
-        self.values
-            .open_alarms
-            .set(whole(snapshot.alarms.len() as u64));
+        self.values.survives.set(i64::from(snapshot.margin.survives));
+        self.values.open_alarms.set(whole(snapshot.alarms.len() as u64));
         self.values.records.set(whole(snapshot.records));
         self.values.left_out.set(whole(snapshot.left_out));
         self.station_states(snapshot);
@@ -45,10 +41,7 @@ impl Metrics {
     fn station_states(&self, snapshot: &Snapshot) {
         for station in &snapshot.stations {
             for state in StationState::ALL {
-                let of_state = OfState {
-                    station: station.name.clone(),
-                    state: state.word(),
-                };
+                let of_state = OfState { station: station.name.clone(), state: state.word() };
                 self.values
                     .station_states
                     .get_or_create(&of_state)
@@ -60,10 +53,8 @@ impl Metrics {
     fn remote_io_states(&self, snapshot: &Snapshot) {
         for remote_io in &snapshot.remote_ios {
             for state in RemoteIoState::ALL {
-                let of_state = OfRemoteIo {
-                    remote_io: remote_io.name.clone(),
-                    state: state.word(),
-                };
+                let of_state =
+                    OfRemoteIo { remote_io: remote_io.name.clone(), state: state.word() };
                 self.values
                     .remote_io_states
                     .get_or_create(&of_state)
@@ -74,13 +65,8 @@ impl Metrics {
 
     fn records_received(&self, snapshot: &Snapshot) {
         for (member, link) in snapshot.links() {
-            let of_member = OfMember {
-                member: member.to_owned(),
-            };
-            self.values
-                .records_received
-                .get_or_create(&of_member)
-                .set(i64::from(!link.detached));
+            let of_member = OfMember { member: member.to_owned() };
+            self.values.records_received.get_or_create(&of_member).set(i64::from(!link.detached));
         }
     }
 
@@ -90,15 +76,9 @@ impl Metrics {
             for priority in Priority::ALL {
                 let is_one =
                     |alarm: &&ProcessAlarm| (alarm.state, alarm.priority) == (state, priority);
-                let of_alarms = OfAlarms {
-                    priority: priority.word(),
-                    state: state.word(),
-                };
+                let of_alarms = OfAlarms { priority: priority.word(), state: state.word() };
                 let count = alarms.iter().filter(is_one).count() as u64;
-                self.values
-                    .alarms
-                    .get_or_create(&of_alarms)
-                    .set(whole(count));
+                self.values.alarms.get_or_create(&of_alarms).set(whole(count));
             }
             for alarm in alarms {
                 let of_alarm = OfAlarm {
@@ -116,18 +96,13 @@ impl Metrics {
 
     fn members(&self, counters: &Counters) {
         for (member, name) in self.members.iter() {
-            let of_member = OfMember {
-                member: name.to_owned(),
-            };
+            let of_member = OfMember { member: name.to_owned() };
             let counted = counters.member(member);
             let seconds = counted.stalled.as_secs_f64();
             let stalled = self.values.stall_seconds.get_or_create(&of_member);
             stalled.inner().store(seconds.to_bits(), Ordering::Relaxed);
             drop(stalled);
-            set(
-                &self.values.stalls.get_or_create(&of_member),
-                counted.stalls,
-            );
+            set(&self.values.stalls.get_or_create(&of_member), counted.stalls);
             let refused = self.values.refused_frames.get_or_create(&of_member);
             set(&refused, counted.refused_frames);
             drop(refused);
@@ -138,10 +113,7 @@ impl Metrics {
                 let differences = self.values.digest_differences.get_or_create(&of_member);
                 set(&differences, counted.digest_differences);
                 drop(differences);
-                set(
-                    &self.values.flagged.get_or_create(&of_member),
-                    counted.flagged,
-                );
+                set(&self.values.flagged.get_or_create(&of_member), counted.flagged);
             }
         }
     }
@@ -165,10 +137,7 @@ impl Metrics {
             ("fail-safe", program.fail_safe),
         ];
         for (source, count) in counts {
-            let of_source = OfSource {
-                program: program.program.clone(),
-                source,
-            };
+            let of_source = OfSource { program: program.program.clone(), source };
             set(&self.values.deadlines.get_or_create(&of_source), count);
             self.values
                 .output_sources
@@ -197,21 +166,12 @@ impl Metrics {
             .awaits_release
             .get_or_create(&of_program)
             .set(i64::from(program.awaits_release));
-        self.values
-            .forced
-            .get_or_create(&of_program)
-            .set(whole(program.forced.len() as u64));
+        self.values.forced.get_or_create(&of_program).set(whole(program.forced.len() as u64));
         if let Some(finished) = program.finished {
-            self.values
-                .finished
-                .get_or_create(&of_program)
-                .set(whole(finished));
+            self.values.finished.get_or_create(&of_program).set(whole(finished));
         }
         if let Some(plant_faults) = program.plant_faults {
-            self.values
-                .plant_faults
-                .get_or_create(&of_program)
-                .set(whole(plant_faults));
+            self.values.plant_faults.get_or_create(&of_program).set(whole(plant_faults));
         }
     }
 
@@ -231,28 +191,16 @@ impl Metrics {
     fn protection_of(&self, program: &ProgramSnapshot) {
         let of_program = of(program);
         let lost = program.lost.as_ref();
-        self.values
-            .state_lost
-            .get_or_create(&of_program)
-            .set(i64::from(lost.is_some()));
+        self.values.state_lost.get_or_create(&of_program).set(i64::from(lost.is_some()));
         if let Some(age) = lost.and_then(|lost| lost.age_cycles) {
-            self.values
-                .lost_state_age
-                .get_or_create(&of_program)
-                .set(whole(age));
+            self.values.lost_state_age.get_or_create(&of_program).set(whole(age));
         }
         let Some(protection) = &program.protection else {
             return;
         };
-        self.values
-            .protected
-            .get_or_create(&of_program)
-            .set(i64::from(protection.protected));
+        self.values.protected.get_or_create(&of_program).set(i64::from(protection.protected));
         if !protection.protected {
-            self.values
-                .unprotected_since
-                .get_or_create(&of_program)
-                .set(protection.since);
+            self.values.unprotected_since.get_or_create(&of_program).set(protection.since);
         }
         for lacking in &protection.lacking {
             let of_lacking = OfLacking {
@@ -267,9 +215,7 @@ impl Metrics {
 }
 
 fn of(program: &ProgramSnapshot) -> OfProgram {
-    OfProgram {
-        program: program.program.clone(),
-    }
+    OfProgram { program: program.program.clone() }
 }
 
 /// The model counts; the metric shows the count.

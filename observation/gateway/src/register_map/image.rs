@@ -53,11 +53,7 @@ impl RegisterMap {
             (_, RunState::Finished) => 2,
             (_, RunState::Interrupted) => 3,
         };
-        set(
-            registers,
-            2,
-            snapshot.cycle.unwrap_or_default().max(0) as u64,
-        );
+        set(registers, 2, snapshot.cycle.unwrap_or_default().max(0) as u64);
         set(registers, 4, snapshot.period_us);
         registers[6] = u16::from(snapshot.margin.survives);
         registers[OPEN_ALARMS] = small(snapshot.alarms.len());
@@ -66,12 +62,7 @@ impl RegisterMap {
         for (rank, station) in snapshot.stations.iter().enumerate().take(self.stations) {
             registers[STATIONS + rank] = state_number(station.state);
         }
-        for (index, program) in snapshot
-            .programs
-            .iter()
-            .enumerate()
-            .take(self.interfaces.len())
-        {
+        for (index, program) in snapshot.programs.iter().enumerate().take(self.interfaces.len()) {
             let base = PROGRAMS + index * OF_PROGRAM;
             registers[base] = match program.source {
                 None => 0,
@@ -93,29 +84,15 @@ impl RegisterMap {
             set(registers, base + 8, program.held);
             set(registers, base + 10, program.fail_safe);
             set(registers, base + 12, program.finished.unwrap_or_default());
-            set(
-                registers,
-                base + 14,
-                program.plant_faults.unwrap_or_default(),
-            );
+            set(registers, base + 14, program.plant_faults.unwrap_or_default());
         }
         if self.numbers > 0 {
             image.registers.resize(NUMBERS, 0);
         }
         for (interface, program) in self.interfaces.iter().zip(&snapshot.programs) {
             let (inputs, outputs) = (program.inputs.as_deref(), program.outputs.as_deref());
-            add_points(
-                &interface.inputs,
-                inputs,
-                &mut image.inputs,
-                &mut image.registers,
-            );
-            add_points(
-                &interface.outputs,
-                outputs,
-                &mut image.coils,
-                &mut image.registers,
-            );
+            add_points(&interface.inputs, inputs, &mut image.inputs, &mut image.registers);
+            add_points(&interface.outputs, outputs, &mut image.coils, &mut image.registers);
         }
         for target in &self.coils {
             let Member::RemoteIo(program) = target.member else {
@@ -133,9 +110,7 @@ impl RegisterMap {
 /// The points of an image that is written as bits, such as `0110`: BOOLs as bits, numbers as registers; 0 where nothing is known.
 fn add_points(points: &Points, text: Option<&str>, bits: &mut Vec<bool>, registers: &mut Vec<u16>) {
     for point in points {
-        let stored = text
-            .and_then(|text| stored(point, text))
-            .unwrap_or_default();
+        let stored = text.and_then(|text| stored(point, text)).unwrap_or_default();
         if point.of == Elementary::Bool {
             bits.push(stored != 0);
             continue;

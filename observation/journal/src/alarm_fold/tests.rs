@@ -75,13 +75,7 @@ enum Step {
 
 fn step() -> impl Strategy<Value = Step> {
     let levels = [5.0, 10.0, 50.0, 85.0, 87.0, 90.0, 91.0, f32::NAN];
-    let missing = [
-        None,
-        None,
-        None,
-        Some(Missing::NoCycle),
-        Some(Missing::BadQuality),
-    ];
+    let missing = [None, None, None, Some(Missing::NoCycle), Some(Missing::BadQuality)];
     let applied = (
         1i64..4,
         proptest::sample::select(levels.to_vec()),
@@ -110,8 +104,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
     let runs = proptest::collection::vec((step(), 1usize..5), 1..40);
     runs.prop_map(|runs| {
         let runs = runs.into_iter();
-        runs.flat_map(|(step, times)| std::iter::repeat_n(step, times))
-            .collect()
+        runs.flat_map(|(step, times)| std::iter::repeat_n(step, times)).collect()
     })
 }
 
@@ -140,33 +133,20 @@ fn journal(cluster: &Cluster, steps: &[Step]) -> Vec<(i64, Record)> {
     let of_member = |event| Record::of_member(0, member, &members, Happening::RemoteIo(event));
     let fault = |action| {
         let asked = 0;
-        let event = RunEvent::Fault {
-            action,
-            member,
-            asked,
-        };
+        let event = RunEvent::Fault { action, member, asked };
         Record::of_run(0, event)
     };
     let (mut cycle, mut runs) = (0, true);
     let mut records = Vec::new();
     for step in steps {
-        let moment = |cycle: i64| Moment {
-            epoch: Epoch(1),
-            cycle: Cycle(cycle as u64),
-        };
+        let moment = |cycle: i64| Moment { epoch: Epoch(1), cycle: Cycle(cycle as u64) };
         let record = match step {
             Step::Started => {
                 runs = true;
                 fault(Action::Restart)
             }
             _ if !runs => continue,
-            Step::Applied {
-                after,
-                level,
-                full,
-                inlet,
-                missing,
-            } => {
+            Step::Applied { after, level, full, inlet, missing } => {
                 cycle += after;
                 let (inputs, outputs) = images(cluster, *level, *full, *inlet);
                 of_member(RemoteIoEvent::Applied {
@@ -179,10 +159,9 @@ fn journal(cluster: &Cluster, steps: &[Step]) -> Vec<(i64, Record)> {
                     heard: StationSet::EMPTY,
                 })
             }
-            Step::StartedCold => of_member(RemoteIoEvent::StartedCold {
-                born: moment(cycle),
-                awaits_release: false,
-            }),
+            Step::StartedCold => {
+                of_member(RemoteIoEvent::StartedCold { born: moment(cycle), awaits_release: false })
+            }
             Step::Killed => {
                 runs = false;
                 fault(Action::Crash)
@@ -207,16 +186,10 @@ fn naive(records: &[(i64, Record)], alarm: &AlarmDeclaration) -> Option<bool> {
     };
     let start = records.iter().rposition(is_end).map_or(0, |end| end + 1);
     let is_applied = |(_, record): &(i64, Record)| {
-        matches!(
-            record.event,
-            Happening::RemoteIo(RemoteIoEvent::Applied { .. })
-        )
+        matches!(record.event, Happening::RemoteIo(RemoteIoEvent::Applied { .. }))
     };
     let is_cold = |(_, record): &(i64, Record)| {
-        matches!(
-            record.event,
-            Happening::RemoteIo(RemoteIoEvent::StartedCold { .. })
-        )
+        matches!(record.event, Happening::RemoteIo(RemoteIoEvent::StartedCold { .. }))
     };
     let first_applied = records.iter().position(is_applied);
     let first_cold = records.iter().position(is_cold);
@@ -226,23 +199,15 @@ fn naive(records: &[(i64, Record)], alarm: &AlarmDeclaration) -> Option<bool> {
     let mut values: Vec<(i64, Option<u64>)> = Vec::new();
     let mut inputs = None;
     for (cycle, record) in &records[start..] {
-        let Happening::RemoteIo(RemoteIoEvent::Applied {
-            sampled,
-            outputs,
-            missing,
-            ..
-        }) = &record.event
+        let Happening::RemoteIo(RemoteIoEvent::Applied { sampled, outputs, missing, .. }) =
+            &record.event
         else {
             continue;
         };
         if *missing != Some(Missing::NoCycle) {
             inputs.clone_from(sampled);
         }
-        let image = if alarm.is_output {
-            Some(outputs)
-        } else {
-            inputs.as_ref()
-        };
+        let image = if alarm.is_output { Some(outputs) } else { inputs.as_ref() };
         values.push((*cycle, image.map(|image| alarm.point.get(image.words()))));
     }
     let held: Vec<(i64, Option<bool>)> = (0..values.len())
@@ -347,17 +312,9 @@ proptest! {
 #[test]
 fn an_alarm_of_a_run_begins_in_its_cycle() {
     let cluster = cluster();
-    let applied = |level| Step::Applied {
-        after: 1,
-        level,
-        full: true,
-        inlet: 0,
-        missing: None,
-    };
+    let applied = |level| Step::Applied { after: 1, level, full: true, inlet: 0, missing: None };
     let levels = [50.0, 91.0, 91.0, 91.0, 91.0, 87.0, 85.0, 85.0, 85.0];
-    let steps: Vec<Step> = std::iter::once(Step::StartedCold)
-        .chain(levels.map(applied))
-        .collect();
+    let steps: Vec<Step> = std::iter::once(Step::StartedCold).chain(levels.map(applied)).collect();
     let mut fold = fold(&cluster);
     let mut changes = Vec::new();
     for (cycle, record) in journal(&cluster, &steps) {

@@ -24,9 +24,7 @@ const PAUSE: Duration = Duration::from_millis(250);
 const UNUSED_FOR: Duration = Duration::from_secs(30);
 
 /// Refusals of the write itself: it has no effect, however often it was sent. All others say that a remote I/O did not take it now.
-const FINAL: [&str; 7] = [
-    "U0556", "U0640", "U0641", "U0642", "U0643", "U0644", "U0647",
-];
+const FINAL: [&str; 7] = ["U0556", "U0640", "U0641", "U0642", "U0643", "U0644", "U0647"];
 
 impl Refusal {
     /// Its code in the documentation of errors.
@@ -94,10 +92,7 @@ pub struct WriteSessions {
 impl WriteSessions {
     /// Sessions that write by `commander`.
     pub fn new(commander: Commander) -> Self {
-        Self {
-            commander,
-            sessions: Mutex::default(),
-        }
+        Self { commander, sessions: Mutex::default() }
     }
 
     /// As [`Commander::write`], under the next identifier of the session.
@@ -152,10 +147,7 @@ mod tests {
 
     fn id_of(commanded: &Commanded) -> WriteId {
         match &commanded.action {
-            OperatorAction::Command {
-                command: Command::Write(write),
-                ..
-            } => write.id,
+            OperatorAction::Command { command: Command::Write(write), .. } => write.id,
             other => panic!("{other:?}"),
         }
     }
@@ -171,10 +163,8 @@ mod tests {
     /// Writes once for each list of answers, each of which is the answer to one attempt. Answers with the outcomes and the
     /// identifiers of the attempts.
     fn run(answers: &[&[Result<Done, Refusal>]]) -> (Vec<Result<Done, Refusal>>, Vec<WriteId>) {
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build()
-            .expect("a runtime");
+        let runtime =
+            tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
         let (commander, mut commands) = commands();
         let sessions = WriteSessions::new(commander);
         runtime.block_on(async {

@@ -135,9 +135,7 @@ mod tests {
                 at_unix_s: 0,
             };
             let checked = shelving.check(cluster.alarms());
-            checked
-                .err()
-                .map(|refusal| refusal.to_string()[..5].to_owned())
+            checked.err().map(|refusal| refusal.to_string()[..5].to_owned())
         };
         let refused = |code: &str| Some(code.to_owned());
         assert_eq!(code("tank.full", 600, "repair"), None);

@@ -93,9 +93,7 @@ impl Drop for RunSocket {
 async fn take(mut stream: UnixStream, commander: &Commander) -> io::Result<()> {
     let (reading, mut writing) = stream.split();
     let mut line = String::new();
-    BufReader::new(reading.take(LINE_BYTES))
-        .read_line(&mut line)
-        .await?;
+    BufReader::new(reading.take(LINE_BYTES)).read_line(&mut line).await?;
     let done = match serde_json::from_str::<OperatorAction>(&line) {
         Ok(action) => commander.act(action).await,
         Err(error) => Err(Refusal::Said(format!("U0557: this is no command: {error}"))),
@@ -133,19 +131,11 @@ pub(super) async fn ask(run: &Path, action: &OperatorAction) -> Result<Done, Ref
         (Err(_), _) => return Err(Refusal::Busy),
     };
     match told {
-        Ok(Ok(Answer {
-            refused: None,
-            cycle,
-        })) => Ok(Done { cycle }),
-        Ok(Ok(Answer {
-            refused: Some(why), ..
-        })) => Err(Refusal::Said(why)),
+        Ok(Ok(Answer { refused: None, cycle })) => Ok(Done { cycle }),
+        Ok(Ok(Answer { refused: Some(why), .. })) => Err(Refusal::Said(why)),
         // A write may have been taken before the answer was lost.
         Ok(Err(_)) | Err(_) => Err(match action {
-            OperatorAction::Command {
-                command: Command::Write(_),
-                ..
-            } => Refusal::Undecided,
+            OperatorAction::Command { command: Command::Write(_), .. } => Refusal::Undecided,
             _ => Refusal::Busy,
         }),
     }
@@ -156,9 +146,7 @@ async fn tell(mut stream: UnixStream, action: &OperatorAction) -> io::Result<Ans
     line.push(b'\n');
     stream.write_all(&line).await?;
     let mut answer = String::new();
-    BufReader::new((&mut stream).take(LINE_BYTES))
-        .read_line(&mut answer)
-        .await?;
+    BufReader::new((&mut stream).take(LINE_BYTES)).read_line(&mut answer).await?;
     Ok(serde_json::from_str(&answer)?)
 }
 
@@ -201,10 +189,8 @@ mod tests {
     }
 
     fn runtime() -> tokio::runtime::Runtime {
-        let runtime = tokio::runtime::Builder::new_multi_thread()
-            .worker_threads(2)
-            .enable_all()
-            .build();
+        let runtime =
+            tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build();
         runtime.expect("a runtime")
     }
 

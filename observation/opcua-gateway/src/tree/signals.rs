@@ -28,9 +28,7 @@ impl Tree {
             let (name, own) = (point.name.clone(), point.clone());
             let source = sources.iter().find(|source| source.name == point.name);
             let writable = source.and_then(|source| written(place, point, source));
-            let meaning = writable
-                .as_ref()
-                .map_or_else(|| sampled(point), |(meaning, _)| *meaning);
+            let meaning = writable.as_ref().map_or_else(|| sampled(point), |(meaning, _)| *meaning);
             self.add(&name, kind_of(point.of), meaning, move |seen| {
                 let program = seen.program(place);
                 let image = program.and_then(|program| program.inputs.as_deref());
@@ -58,24 +56,16 @@ impl Tree {
         }
         self.enter(&["Programs", &controller.name, "Markers"]);
         let registers = controller.circuit().map_or(&[][..], Circuit::registers);
-        let names: Vec<&str> = registers
-            .iter()
-            .map(|register| register.name.as_str())
-            .collect();
+        let names: Vec<&str> = registers.iter().map(|register| register.name.as_str()).collect();
         for word in words(&names) {
             let (kind, bits) = (word.kind, word.bits);
-            self.add(
-                &word.name,
-                kind,
-                "value in the state before the last sample",
-                move |seen| {
-                    let states = &seen.observation.states;
-                    let state = states.get(place).and_then(Option::as_deref);
-                    let value = state.and_then(|state| word_of(kind, &bits, state));
-                    let own = seen.program(place).map(trust::state);
-                    seen.present(value, own.unwrap_or_default())
-                },
-            );
+            self.add(&word.name, kind, "value in the state before the last sample", move |seen| {
+                let states = &seen.observation.states;
+                let state = states.get(place).and_then(Option::as_deref);
+                let value = state.and_then(|state| word_of(kind, &bits, state));
+                let own = seen.program(place).map(trust::state);
+                seen.present(value, own.unwrap_or_default())
+            });
         }
     }
 }
@@ -135,9 +125,8 @@ struct Word {
 fn words(names: &[&str]) -> Vec<Word> {
     let mut words: Vec<Word> = Vec::new();
     for (place, name) in names.iter().enumerate() {
-        let numbered = name
-            .rsplit_once('.')
-            .and_then(|(word, bit)| Some((word, bit.parse::<usize>().ok()?)));
+        let numbered =
+            name.rsplit_once('.').and_then(|(word, bit)| Some((word, bit.parse::<usize>().ok()?)));
         let continued = numbered.and_then(|(word, bit)| {
             words.iter_mut().find(|known| {
                 known.kind == Kind::UInt64
@@ -148,11 +137,9 @@ fn words(names: &[&str]) -> Vec<Word> {
         });
         match (continued, numbered) {
             (Some(known), _) => known.bits.push(place),
-            (None, Some((word, 0))) if !names.contains(&word) => words.push(Word {
-                name: word.to_owned(),
-                kind: Kind::UInt64,
-                bits: vec![place],
-            }),
+            (None, Some((word, 0))) if !names.contains(&word) => {
+                words.push(Word { name: word.to_owned(), kind: Kind::UInt64, bits: vec![place] })
+            }
             _ => words.push(Word {
                 name: (*name).to_owned(),
                 kind: Kind::Boolean,
@@ -164,18 +151,12 @@ fn words(names: &[&str]) -> Vec<Word> {
 }
 
 fn word_of(kind: Kind, bits: &[usize], state: &[bool]) -> Option<Variant> {
-    let bits: Option<Vec<bool>> = bits
-        .iter()
-        .map(|place| state.get(*place).copied())
-        .collect();
+    let bits: Option<Vec<bool>> = bits.iter().map(|place| state.get(*place).copied()).collect();
     let bits = bits?;
     if kind == Kind::Boolean {
         return bits.first().copied().map(Variant::from);
     }
-    let number = bits
-        .iter()
-        .rev()
-        .fold(0, |number: u64, bit| number << 1 | u64::from(*bit));
+    let number = bits.iter().rev().fold(0, |number: u64, bit| number << 1 | u64::from(*bit));
     Some(number.into())
 }
 
@@ -211,10 +192,8 @@ mod tests {
     #[test]
     fn numbered_bits_are_one_number() {
         let names = ["a", "t.et.0", "t.et.1", "t.et.2", "x.1", "b", "b.0"];
-        let found: Vec<(String, Kind, Vec<usize>)> = words(&names)
-            .into_iter()
-            .map(|word| (word.name, word.kind, word.bits))
-            .collect();
+        let found: Vec<(String, Kind, Vec<usize>)> =
+            words(&names).into_iter().map(|word| (word.name, word.kind, word.bits)).collect();
         let bit = |name: &str, place| (name.to_owned(), Kind::Boolean, vec![place]);
         let expected = [
             bit("a", 0),

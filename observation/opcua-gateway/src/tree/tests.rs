@@ -43,10 +43,7 @@ fn reading(cluster: &Cluster, seen: &Seen<'_>, path: &str) -> Reading {
 fn check(faults: &str, cycle: i64, feed: Feed, source: &str, statuses: [StatusCode; 3]) {
     let cluster = cell();
     let observation = observed(&cluster, faults, cycle);
-    let seen = Seen {
-        observation: &observation,
-        feed,
-    };
+    let seen = Seen { observation: &observation, feed };
     let of = |path: &str| reading(&cluster, &seen, path);
     assert_eq!(of("Programs/robot/Source").value, Some(text(source)));
     let robot = cluster.controllers()[0].circuit().expect("a ladder");
@@ -117,11 +114,7 @@ fn the_service_level_is_that_of_the_worst_that_is_so() {
     check(&whole, Feed::Waiting, level::NO_DATA);
     check(&whole, Feed::Ended, level::ENDED);
     assert_eq!(trust::service_level(None), level::NO_DATA);
-    check(
-        &observed(&cluster, robot, 30),
-        Feed::Live,
-        level::UNPROTECTED,
-    );
+    check(&observed(&cluster, robot, 30), Feed::Live, level::UNPROTECTED);
     let lost = observed(&cluster, &both, 30);
     check(&lost, Feed::Live, level::WITHOUT_OUTPUTS);
 
@@ -159,10 +152,7 @@ fn before_a_run_nothing_is_known() {
     let cluster = cell();
     let model = Model::new(Arc::new(cluster.clone()), BOUNDS);
     let observation = Observation::new(&model, model.snapshot(), Instant::now());
-    let seen = Seen {
-        observation: &observation,
-        feed: observation.feed(observation.heard),
-    };
+    let seen = Seen { observation: &observation, feed: observation.feed(observation.heard) };
     assert_eq!(seen.feed, Feed::Waiting);
     for variable in variables(&cluster) {
         let reading = variable.read(&seen);
@@ -178,10 +168,7 @@ fn before_a_run_nothing_is_known() {
 fn every_signal_has_one_place_and_a_value_of_its_kind() {
     let cluster = cell();
     let observation = observed(&cluster, "", 30);
-    let seen = Seen {
-        observation: &observation,
-        feed: Feed::Live,
-    };
+    let seen = Seen { observation: &observation, feed: Feed::Live };
     let variables = variables(&cluster);
     let paths: BTreeSet<String> = variables.iter().map(Variable::path).collect();
     assert_eq!(paths.len(), variables.len());

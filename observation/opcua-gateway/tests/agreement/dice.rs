@@ -54,10 +54,7 @@ pub(crate) fn journal(cluster: &Cluster, seed: u64, cycles: usize) -> Vec<Entry>
         number: FIRST as i64 - 1,
         latest: None,
         reported: vec![None; cluster.controllers().len()],
-        moment: Moment {
-            epoch: Epoch(1),
-            cycle: Cycle(FIRST - 1),
-        },
+        moment: Moment { epoch: Epoch(1), cycle: Cycle(FIRST - 1) },
         has_origin: false,
         entries: Vec::new(),
     };
@@ -183,10 +180,8 @@ impl Dice<'_> {
     }
 
     fn deadline(&mut self, program: ProgramId, published: StationSet) {
-        let heard: StationSet = published
-            .iter()
-            .filter(|_| self.chance.random_range(0..8) > 0)
-            .collect();
+        let heard: StationSet =
+            published.iter().filter(|_| self.chance.random_range(0..8) > 0).collect();
         let reasons = [
             Missing::TooLate,
             Missing::BadQuality,
@@ -253,21 +248,14 @@ impl Dice<'_> {
                     reason: "a test".to_owned(),
                 },
             },
-            3 => RemoteIoEvent::Unforced {
-                moment,
-                signal,
-                expired: false,
-            },
+            3 => RemoteIoEvent::Unforced { moment, signal, expired: false },
             4 => RemoteIoEvent::Protected { moment },
             5 => RemoteIoEvent::Unprotected {
                 moment,
                 since: moment,
-                lacking: [Lacking {
-                    station,
-                    reason: LackingReason::NotReceived,
-                }]
-                .into_iter()
-                .collect(),
+                lacking: [Lacking { station, reason: LackingReason::NotReceived }]
+                    .into_iter()
+                    .collect(),
             },
             6 => RemoteIoEvent::StateLost {
                 moment,
@@ -276,14 +264,8 @@ impl Dice<'_> {
                 holder: station,
                 asks: true,
             },
-            7 => RemoteIoEvent::StateRecovered {
-                moment,
-                from: station,
-            },
-            8 => RemoteIoEvent::StartedCold {
-                born: moment,
-                awaits_release: true,
-            },
+            7 => RemoteIoEvent::StateRecovered { moment, from: station },
+            8 => RemoteIoEvent::StartedCold { born: moment, awaits_release: true },
             9 => RemoteIoEvent::Released { moment },
             10 => RemoteIoEvent::ValueFault {
                 moment,
@@ -297,10 +279,7 @@ impl Dice<'_> {
                 theirs: ConfigurationHash::default(),
                 ours: ConfigurationHash::default(),
             },
-            13 => RemoteIoEvent::Stalled {
-                moment,
-                late: Duration::from_millis(7),
-            },
+            13 => RemoteIoEvent::Stalled { moment, late: Duration::from_millis(7) },
             _ => return,
         };
         let event = Happening::RemoteIo(event);
@@ -323,22 +302,13 @@ impl Dice<'_> {
             } else {
                 own
             };
-            let word = Word {
-                mask,
-                sum: self.image(3),
-            };
-            let event = StationEvent::Published {
-                moment,
-                words: std::iter::once(word).collect(),
-            };
+            let word = Word { mask, sum: self.image(3) };
+            let event = StationEvent::Published { moment, words: std::iter::once(word).collect() };
             self.write(member, Happening::Station(event), at);
         }
         let program = ProgramId(self.chance.random_range(0..2));
         let event = match self.chance.random_range(0..40) {
-            0 => StationEvent::Joins {
-                moment,
-                wants: ProgramSet::only(program),
-            },
+            0 => StationEvent::Joins { moment, wants: ProgramSet::only(program) },
             1 => StationEvent::Adopted {
                 moment,
                 program,
@@ -349,10 +319,7 @@ impl Dice<'_> {
             3 => StationEvent::BecameCycleMaster { moment },
             4 => StationEvent::Excluded { moment, program },
             5 => StationEvent::Readmitted { moment, program },
-            6 => StationEvent::Stalled {
-                moment,
-                late: Duration::from_millis(3),
-            },
+            6 => StationEvent::Stalled { moment, late: Duration::from_millis(3) },
             _ => return,
         };
         self.write(member, Happening::Station(event), at);
@@ -380,27 +347,18 @@ impl Dice<'_> {
 
     fn fault(&mut self) {
         let member = self.member();
-        let fault = |action| RunEvent::Fault {
-            action,
-            member,
-            asked: 0,
-        };
+        let fault = |action| RunEvent::Fault { action, member, asked: 0 };
         let to = self.member();
         let works = self.works(member);
         let event = match self.chance.random_range(0..10) {
             0 if works => fault(Action::Crash),
             1 if works => fault(Action::Stop),
-            2 if works => RunEvent::Ended {
-                member,
-                how: "signal: 9 (SIGKILL)".to_owned(),
-                said: Vec::new(),
-            },
+            2 if works => {
+                RunEvent::Ended { member, how: "signal: 9 (SIGKILL)".to_owned(), said: Vec::new() }
+            }
             3 => fault(Action::Cut { to }),
             4 => fault(Action::Heal { to }),
-            5 => RunEvent::Detached {
-                member,
-                reason: "a test".to_owned(),
-            },
+            5 => RunEvent::Detached { member, reason: "a test".to_owned() },
             6 => RunEvent::Attached { member },
             7 if works => {
                 let lost = HostEvent::JournalLost { records: 3 };
@@ -408,9 +366,7 @@ impl Dice<'_> {
                 self.write(Some(member), Happening::Host(lost), at);
                 return;
             }
-            8 if self.one_in(8) => RunEvent::ScenarioOver {
-                verdict: "passed".to_owned(),
-            },
+            8 if self.one_in(8) => RunEvent::ScenarioOver { verdict: "passed".to_owned() },
             _ if self.suspended.contains(&member) => fault(Action::Continue),
             _ if self.down.contains(&member) && self.one_in(2) => fault(Action::Restart),
             _ if self.down.contains(&member) => RunEvent::Started { member },

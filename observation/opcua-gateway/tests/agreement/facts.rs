@@ -50,12 +50,7 @@ impl Facts {
         let programs = both.map(|(program, remote_io)| ProgramFacts {
             source: program.source.map(str::to_owned),
             outputs: program.outputs.clone(),
-            counts: [
-                program.direct,
-                program.reconstructed,
-                program.held,
-                program.fail_safe,
-            ],
+            counts: [program.direct, program.reconstructed, program.held, program.fail_safe],
             awaits_release: program.awaits_release,
             forced: program.forced.len(),
             protected: program.protection.as_ref().map(|of| of.protected),
@@ -65,11 +60,7 @@ impl Facts {
         });
         Self {
             cycle: snapshot.cycle.unwrap_or_default(),
-            cycle_master: snapshot
-                .cycle_master
-                .as_ref()
-                .and_then(rank)
-                .map(|rank| rank as u8),
+            cycle_master: snapshot.cycle_master.as_ref().and_then(rank).map(|rank| rank as u8),
             stations: stations.collect(),
             programs: programs.collect(),
             host_stalls: snapshot.host_stalls,

@@ -1,10 +1,7 @@
 //! Every viewer shows the same: on random journals the page, `top`, Prometheus, Modbus and OPC UA agree in every fact that they share, and
 //! with a naive fold of the records.
 
-#![allow(
-    clippy::disallowed_methods,
-    reason = "the age of a record is not compared"
-)]
+#![allow(clippy::disallowed_methods, reason = "the age of a record is not compared")]
 
 mod dice;
 mod facts;
@@ -99,10 +96,7 @@ fn check(
             0 => newest,
             _ => chance.random_range(oldest..=newest),
         };
-        let context = format!(
-            "seed {seed}, {} records, cycle {cycle} of {newest}",
-            told.len()
-        );
+        let context = format!("seed {seed}, {} records, cycle {cycle} of {newest}", told.len());
         let snapshot = model_of_page.snapshot_at(cycle).expect("it is remembered");
         let (stations, programs) = (snapshot.stations.len(), snapshot.programs.len());
         let expected = naive.facts(cycle, stations as u8, programs as u8);
@@ -112,11 +106,7 @@ fn check(
     }
     let top = model_of_page.snapshot();
     let context = format!("seed {seed}, {} records, the present", told.len());
-    assert_eq!(
-        model_of_page.snapshot_at(newest).as_ref(),
-        Some(&top),
-        "{context}"
-    );
+    assert_eq!(model_of_page.snapshot_at(newest).as_ref(), Some(&top), "{context}");
     let model_of_gateways = model(cluster, BOUNDS, told);
     let snapshot = model_of_gateways.snapshot();
     assert_eq!(Facts::of(&snapshot), Facts::of(&top), "{context}");
@@ -134,26 +124,10 @@ fn check(
 
 fn check_page(page: &Value, snapshot: &Snapshot, context: &str) {
     assert_eq!(page["cycle"], json!(snapshot.cycle), "{context}");
-    assert_eq!(
-        page["cycle_master"],
-        json!(snapshot.cycle_master),
-        "{context}"
-    );
-    assert_eq!(
-        page["timing"]["stalls"],
-        json!(snapshot.host_stalls),
-        "{context}"
-    );
-    assert_eq!(
-        page["open_alarms"],
-        json!(snapshot.alarms.len()),
-        "{context}"
-    );
-    assert_eq!(
-        page["process_alarms"],
-        json!(snapshot.process_alarms),
-        "{context}"
-    );
+    assert_eq!(page["cycle_master"], json!(snapshot.cycle_master), "{context}");
+    assert_eq!(page["timing"]["stalls"], json!(snapshot.host_stalls), "{context}");
+    assert_eq!(page["open_alarms"], json!(snapshot.alarms.len()), "{context}");
+    assert_eq!(page["process_alarms"], json!(snapshot.process_alarms), "{context}");
     let survives = &page["redundancy"]["survives"];
     assert_eq!(*survives, json!(snapshot.margin.survives), "{context}");
     let members = page["members"].as_array().expect("members");
@@ -182,19 +156,11 @@ fn check_page(page: &Value, snapshot: &Snapshot, context: &str) {
             "fail_safe": program.fail_safe,
         });
         assert_eq!(shown["counts"], counts, "{context}");
-        assert_eq!(
-            shown["awaits_release"],
-            json!(program.awaits_release),
-            "{context}"
-        );
+        assert_eq!(shown["awaits_release"], json!(program.awaits_release), "{context}");
         let forced = shown["forced"].as_array().map(Vec::len);
         assert_eq!(forced, Some(program.forced.len()), "{context}");
         let protected = program.protection.as_ref().map(|of| of.protected);
-        assert_eq!(
-            shown["protection"]["protected"],
-            json!(protected),
-            "{context}"
-        );
+        assert_eq!(shown["protection"]["protected"], json!(protected), "{context}");
         assert_eq!(shown["lost"].is_null(), program.lost.is_none(), "{context}");
     }
 }
@@ -229,27 +195,18 @@ fn check_metrics(exposition: &str, top: &Snapshot, context: &str) {
             let expected = u64::from(alarm.state == state);
             check("alarm_state", &labels, Some(expected));
         }
-        let labels = [
-            ("priority", Priority::Medium.word()),
-            ("state", state.word()),
-        ];
+        let labels = [("priority", Priority::Medium.word()), ("state", state.word())];
         let alarms = top.process_alarms.iter();
         let count = alarms.filter(|alarm| is_medium(alarm, state)).count();
         check("alarms", &labels, Some(count as u64));
     }
-    let stalls = exposition
-        .lines()
-        .filter(|line| line.starts_with("understudy_host_stalls_total"));
+    let stalls = exposition.lines().filter(|line| line.starts_with("understudy_host_stalls_total"));
     let stalls = stalls.filter_map(|line| line.rsplit_once(' ')?.1.parse::<u64>().ok());
     assert_eq!(stalls.sum::<u64>(), top.host_stalls, "{context}");
     for station in &top.stations {
         for state in StationState::ALL {
             let labels = [("station", station.name.as_str()), ("state", state.word())];
-            check(
-                "station_state",
-                &labels,
-                Some(u64::from(state == station.state)),
-            );
+            check("station_state", &labels, Some(u64::from(state == station.state)));
         }
     }
     for program in &top.programs {
@@ -262,21 +219,10 @@ fn check_metrics(exposition: &str, top: &Snapshot, context: &str) {
         ] {
             check("deadlines_total", &[own, ("source", source)], Some(count));
         }
-        let protected = program
-            .protection
-            .as_ref()
-            .map(|of| u64::from(of.protected));
+        let protected = program.protection.as_ref().map(|of| u64::from(of.protected));
         check("protected", &[own], protected);
-        check(
-            "state_lost",
-            &[own],
-            Some(u64::from(program.lost.is_some())),
-        );
-        check(
-            "awaits_release",
-            &[own],
-            Some(u64::from(program.awaits_release)),
-        );
+        check("state_lost", &[own], Some(u64::from(program.lost.is_some())));
+        check("awaits_release", &[own], Some(u64::from(program.awaits_release)));
         check("forced_signals", &[own], Some(program.forced.len() as u64));
         check("plant_finished", &[own], program.finished);
         check("plant_faults", &[own], program.plant_faults);
@@ -284,10 +230,7 @@ fn check_metrics(exposition: &str, top: &Snapshot, context: &str) {
 }
 
 fn bits(image: Option<&str>, width: usize) -> Vec<bool> {
-    image.map_or_else(
-        || vec![false; width],
-        |image| image.bytes().map(|bit| bit == b'1').collect(),
-    )
+    image.map_or_else(|| vec![false; width], |image| image.bytes().map(|bit| bit == b'1').collect())
 }
 
 fn check_modbus(cluster: &Cluster, top: &Snapshot, snapshot: &Snapshot, context: &str) {
@@ -298,9 +241,7 @@ fn check_modbus(cluster: &Cluster, top: &Snapshot, snapshot: &Snapshot, context:
         let place = places.find(|place| place.name == name).expect(name);
         let first = usize::from(place.address);
         let registers = &image.registers[first..first + usize::from(place.width)];
-        let value = registers
-            .iter()
-            .fold(0, |value, next| value << 16 | u64::from(*next));
+        let value = registers.iter().fold(0, |value, next| value << 16 | u64::from(*next));
         (value, place.meaning.clone())
     };
     let check = |name: &str, expected: u64| {
@@ -338,10 +279,7 @@ fn check_modbus(cluster: &Cluster, top: &Snapshot, snapshot: &Snapshot, context:
         check(&name("held"), program.held);
         check(&name("fail_safe"), program.fail_safe);
         check(&name("finished"), program.finished.unwrap_or_default());
-        check(
-            &name("plant_faults"),
-            program.plant_faults.unwrap_or_default(),
-        );
+        check(&name("plant_faults"), program.plant_faults.unwrap_or_default());
         let interface = &controller.interface;
         inputs.extend(bits(program.inputs.as_deref(), interface.inputs.width()));
         coils.extend(bits(program.outputs.as_deref(), interface.outputs.width()));
@@ -361,10 +299,7 @@ fn check_opcua(cluster: &Cluster, top: &Snapshot, observation: &Observation, con
     let text = |text: &str| Some(Variant::from(opcua::types::UAString::from(text)));
     check("Run/Cycle", top.cycle.map(Variant::from));
     check("Run/State", text(top.run.word()));
-    check(
-        "Margin/Survives",
-        Some(u64::from(top.margin.survives).into()),
-    );
+    check("Margin/Survives", Some(u64::from(top.margin.survives).into()));
     check("Alarms/Open", Some((top.alarms.len() as u64).into()));
     for alarm in &top.process_alarms {
         let path = |name: &str| format!("Alarms/Signals/{}/{name}", alarm.name);
@@ -380,15 +315,9 @@ fn check_opcua(cluster: &Cluster, top: &Snapshot, observation: &Observation, con
         let path = |name: &str| format!("Programs/{}/{name}", program.program);
         check(&path("Source"), program.source.and_then(text));
         check(&path("Since"), program.since.map(Variant::from));
-        check(
-            &path("WordOf"),
-            text(program.word_of.as_deref().unwrap_or_default()),
-        );
+        check(&path("WordOf"), text(program.word_of.as_deref().unwrap_or_default()));
         check(&path("Missing"), text(program.missing.unwrap_or_default()));
-        check(
-            &path("Fault"),
-            text(program.fault.as_deref().unwrap_or_default()),
-        );
+        check(&path("Fault"), text(program.fault.as_deref().unwrap_or_default()));
         check(&path("AwaitsRelease"), Some(program.awaits_release.into()));
         let protected = program.protection.as_ref().map(|of| of.protected.into());
         check(&path("Protected"), protected);
@@ -402,10 +331,7 @@ fn check_opcua(cluster: &Cluster, top: &Snapshot, observation: &Observation, con
         for (place, output) in outputs {
             let image = program.outputs.as_deref();
             let bit = image.map(|image| image.as_bytes()[place] == b'1');
-            check(
-                &path(&format!("Outputs/{}", output.name)),
-                bit.map(Variant::from),
-            );
+            check(&path(&format!("Outputs/{}", output.name)), bit.map(Variant::from));
         }
     }
 }

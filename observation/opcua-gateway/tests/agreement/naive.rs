@@ -56,10 +56,8 @@ impl<'e> Naive<'e> {
             _ => None,
         });
         let origin = origin.unwrap_or(0);
-        let deadlines: Vec<Deadline> = entries
-            .iter()
-            .filter_map(|entry| deadline(entry, origin))
-            .collect();
+        let deadlines: Vec<Deadline> =
+            entries.iter().filter_map(|entry| deadline(entry, origin)).collect();
         let mut first: BTreeMap<ProgramId, i64> = BTreeMap::new();
         let mut last: BTreeMap<ProgramId, i64> = BTreeMap::new();
         for deadline in &deadlines {
@@ -120,9 +118,7 @@ impl<'e> Naive<'e> {
         };
         let stalls = self.entries.iter().filter(is_stall);
         let is_present = self.newest == Some(cycle);
-        stalls
-            .filter(|entry| is_present || entry.at - self.origin <= cycle)
-            .count() as u64
+        stalls.filter(|entry| is_present || entry.at - self.origin <= cycle).count() as u64
     }
 
     fn heard(&self, cycle: i64) -> StationSet {
@@ -238,13 +234,7 @@ fn reports(entry: &Entry) -> bool {
 fn deadline(entry: &Entry, origin: i64) -> Option<Deadline> {
     match (&entry.record.event, entry.record.member?) {
         (
-            Happening::RemoteIo(RemoteIoEvent::Applied {
-                outputs,
-                source,
-                missing,
-                heard,
-                ..
-            }),
+            Happening::RemoteIo(RemoteIoEvent::Applied { outputs, source, missing, heard, .. }),
             Member::RemoteIo(program),
         ) => Some(Deadline {
             program,
@@ -304,9 +294,7 @@ impl Now {
                 _ => {}
             },
             (Happening::Station(event), Some(Member::Station(station))) => {
-                self.processes
-                    .entry(Member::Station(station))
-                    .or_insert("running");
+                self.processes.entry(Member::Station(station)).or_insert("running");
                 self.station(station, event);
             }
             (Happening::RemoteIo(event), Some(Member::RemoteIo(program))) => {
@@ -337,11 +325,7 @@ impl Now {
             StationEvent::Joins { .. } => {
                 self.joining.insert(station);
             }
-            StationEvent::Adopted {
-                program,
-                from: Some(_),
-                ..
-            } => {
+            StationEvent::Adopted { program, from: Some(_), .. } => {
                 self.shadow.insert((station, *program));
             }
             StationEvent::BecameCycleMaster { .. } => {
@@ -365,10 +349,7 @@ impl Now {
                     self.refused.remove(&station);
                 }
             }
-            RemoteIoEvent::Refused {
-                member: Member::Station(station),
-                ..
-            } => {
+            RemoteIoEvent::Refused { member: Member::Station(station), .. } => {
                 self.refused.insert(*station);
             }
             RemoteIoEvent::Flagged { station, .. } => {
@@ -406,11 +387,9 @@ impl Now {
                 self.awaits_release.remove(&program);
                 self.excluded.retain(|(by, _)| *by != program);
             }
-            RemoteIoEvent::ValueFault {
-                accused,
-                located: true,
-                ..
-            } => self.exclude(program, *accused),
+            RemoteIoEvent::ValueFault { accused, located: true, .. } => {
+                self.exclude(program, *accused)
+            }
             RemoteIoEvent::RecalledExclusion { stations, .. } => self.exclude(program, *stations),
             _ => {}
         }
@@ -418,7 +397,6 @@ impl Now {
 
     fn exclude(&mut self, program: ProgramId, stations: StationSet) {
         let stations = stations.iter();
-        self.excluded
-            .extend(stations.map(|station| (program, station)));
+        self.excluded.extend(stations.map(|station| (program, station)));
     }
 }

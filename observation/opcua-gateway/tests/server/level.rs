@@ -43,10 +43,7 @@ fn the_service_level_and_the_state_of_the_run_are_true() {
         }
     };
     let healthy = ["level 255", "level 200"];
-    let silent = [
-        "level 1",
-        "state not-current UncertainNoCommunicationLastUsableValue",
-    ];
+    let silent = ["level 1", "state not-current UncertainNoCommunicationLastUsableValue"];
     let running = "state running Good";
     until(&silent[..1], &healthy);
     let mut file = fs::OpenOptions::new().append(true).open(&journal);

@@ -35,9 +35,7 @@ const DEADLINE: Duration = Duration::from_secs(60);
 const BINARY: &str = env!("CARGO_BIN_EXE_understudy-opcua");
 
 fn empty_folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
-        .join("opcua")
-        .join(name);
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("opcua").join(name);
     if folder.exists() {
         fs::remove_dir_all(&folder).expect("an old folder goes");
     }
@@ -83,11 +81,7 @@ fn finished_run_with(name: &str, cycles: u64, steps: &str) -> PathBuf {
 }
 
 fn answer(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
-    let Output {
-        status,
-        stdout,
-        stderr,
-    } = Command::new(BINARY)
+    let Output { status, stdout, stderr } = Command::new(BINARY)
         .args(arguments)
         .current_dir(folder)
         .env_remove("COLUMNS")
@@ -122,13 +116,9 @@ impl Server {
             .expect("the binary is built");
         let errors = child.stderr.take().expect("piped");
         let mut line = String::new();
-        BufReader::new(errors)
-            .read_line(&mut line)
-            .expect("it says where it listens");
+        BufReader::new(errors).read_line(&mut line).expect("it says where it listens");
         let address = line.trim().rsplit(' ').next().expect("an address");
-        let address = address
-            .parse()
-            .unwrap_or_else(|error| panic!("{line}: {error}"));
+        let address = address.parse().unwrap_or_else(|error| panic!("{line}: {error}"));
         Self { child, address }
     }
 
@@ -230,10 +220,7 @@ fn what_is_wrong_is_said_and_nothing_is_started() {
     check(&["serve", "run", "--user", "a"], "--password-file");
     let login = |file: &str| {
         let arguments = ["serve", "run", "--certificates", "c", "--user", "reader"];
-        check(
-            &[&arguments[..], &["--password-file", file]].concat(),
-            "U0595",
-        );
+        check(&[&arguments[..], &["--password-file", file]].concat(), "U0595");
     };
     login("gone");
     let write = |name: &str, text: &str, mode: u32| {
@@ -254,10 +241,7 @@ fn what_is_wrong_is_said_and_nothing_is_started() {
     logins("operator anna\n");
     logins("operator anna secret\nviewer anna secret\n");
     write("logins", "operator anna secret\n", 0o644);
-    check(
-        &["serve", "run", "--certificates", "c", "--logins", "logins"],
-        "U0595",
-    );
+    check(&["serve", "run", "--certificates", "c", "--logins", "logins"], "U0595");
     check(&["serve", "run", "--logins", "logins"], "--certificates");
     assert!(!folder.join("c").exists(), "nothing is half made");
 
@@ -324,10 +308,7 @@ fn another_projects_client_reads_subscribes_and_may_not_write() {
     let Some(python) = python() else { return };
     let folder = finished_run("asyncua");
     let server = Server::start(&folder, &[]);
-    reader(
-        &python,
-        &["clear", &format!("opc.tcp://{}/", server.address)],
-    );
+    reader(&python, &["clear", &format!("opc.tcp://{}/", server.address)]);
     server.stop();
 }
 
@@ -356,14 +337,10 @@ fn another_projects_client_follows_a_run_that_is_written() {
     let mut next = || said.next().and_then(Result::ok).unwrap_or_default();
     // It subscribes while nothing is known, and is then shown one half of the run after the other.
     assert_eq!(next(), "subscribed");
-    let mut file = fs::OpenOptions::new()
-        .append(true)
-        .open(&journal)
-        .expect("the journal");
+    let mut file = fs::OpenOptions::new().append(true).open(&journal).expect("the journal");
     let halves: Vec<&[&str]> = lines.chunks(lines.len().div_ceil(2)).collect();
     for (number, half) in halves.iter().enumerate() {
-        file.write_all((half.join("\n") + "\n").as_bytes())
-            .expect("written");
+        file.write_all((half.join("\n") + "\n").as_bytes()).expect("written");
         if number == 1 {
             fs::write(&results, "{}").expect("written");
         }
@@ -408,14 +385,7 @@ fn with_certificates_only_who_is_trusted_and_has_a_login_reads() {
     fs::set_permissions(folder.join("password"), Permissions::from_mode(0o600)).expect("changed");
     let server = Server::start(
         &folder,
-        &[
-            "--certificates",
-            "certificates",
-            "--user",
-            "reader",
-            "--password-file",
-            "password",
-        ],
+        &["--certificates", "certificates", "--user", "reader", "--password-file", "password"],
     );
     let mode = |path: &str| {
         let metadata = fs::metadata(folder.join(path)).expect("it was made");
@@ -427,13 +397,7 @@ fn with_certificates_only_who_is_trusted_and_has_a_login_reads() {
     let certificates = folder.join("certificates");
     reader(
         &python,
-        &[
-            "secure",
-            &url,
-            certificates.to_str().expect("text"),
-            "reader",
-            "not a good one",
-        ],
+        &["secure", &url, certificates.to_str().expect("text"), "reader", "not a good one"],
     );
     server.stop();
     // The same certificate serves again.
@@ -441,17 +405,8 @@ fn with_certificates_only_who_is_trusted_and_has_a_login_reads() {
     Server::start(&folder, &["--certificates", "certificates"]).stop();
     let after = fs::read(folder.join("certificates/own/cert.der")).expect("a certificate");
     assert_eq!(before, after);
-    let (status, _, errors) = answer(
-        &folder,
-        &[
-            "serve",
-            "run",
-            "--certificates",
-            "certificates",
-            "--host",
-            "elsewhere",
-        ],
-    );
+    let (status, _, errors) =
+        answer(&folder, &["serve", "run", "--certificates", "certificates", "--host", "elsewhere"]);
     assert_eq!(status, 2, "{errors}");
     assert!(errors.contains("U0596"), "{errors}");
 }

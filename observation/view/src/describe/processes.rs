@@ -53,10 +53,7 @@ descriptions! { host: HostEvent, members: Members;
 fn nothing_of(peer: Option<Member>, members: &Members) -> String {
     match peer {
         None => "no member".to_owned(),
-        Some(peer) => format!(
-            "nothing from {}, to which it was connected,",
-            members.name(peer)
-        ),
+        Some(peer) => format!("nothing from {}, to which it was connected,", members.name(peer)),
     }
 }
 
@@ -153,9 +150,9 @@ pub(crate) fn fault_text(action: Action, member: Member, members: &Members) -> S
             let input = signal.map_or("an input", |signal| &signal.name);
             format!("{input} of {name} is the field's again")
         }
-        Action::Choose {
-            choice: StateChoice::Cold,
-        } => format!("the operator starts the program of {name} cold"),
+        Action::Choose { choice: StateChoice::Cold } => {
+            format!("the operator starts the program of {name} cold")
+        }
         Action::Choose { .. } => {
             format!("the operator continues the program of {name} from the newest available state")
         }

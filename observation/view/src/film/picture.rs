@@ -72,9 +72,7 @@ impl Film {
     fn still(&self) -> i64 {
         let mut spans = self.sources.iter();
         let other = spans.find(|span| span.value.source != Source::Direct);
-        other.map_or(self.cycles.1 - 1, |span| {
-            span.from + (span.to - span.from) / 2
-        })
+        other.map_or(self.cycles.1 - 1, |span| span.from + (span.to - span.from) / 2)
     }
 }
 
@@ -88,12 +86,7 @@ struct Drawing<'f> {
 
 impl<'f> Drawing<'f> {
     fn new(film: &'f Film) -> Self {
-        Self {
-            film,
-            style: String::new(),
-            body: String::new(),
-            count: 0,
-        }
+        Self { film, style: String::new(), body: String::new(), count: 0 }
     }
 
     fn bottom(&self) -> f64 {
@@ -102,10 +95,8 @@ impl<'f> Drawing<'f> {
 
     fn text(&mut self, (x, y): (f64, f64), class: &str, text: &str) {
         let text = escaped(text);
-        let _ = writeln!(
-            self.body,
-            "<text x=\"{x:.1}\" y=\"{y:.1}\" class=\"{class}\">{text}</text>"
-        );
+        let _ =
+            writeln!(self.body, "<text x=\"{x:.1}\" y=\"{y:.1}\" class=\"{class}\">{text}</text>");
     }
 
     fn upright(&mut self, x: f64, (top, bottom): (f64, f64), class: &str) {
@@ -211,11 +202,7 @@ impl<'f> Drawing<'f> {
                 drawing.frame((x, REMOTE_IO_TOP, REMOTE_IO_WIDTH), &sign, word);
             });
         }
-        self.name(
-            (x, REMOTE_IO_TOP),
-            &film.remote_io,
-            "remote I/O, drives the outputs",
-        );
+        self.name((x, REMOTE_IO_TOP), &film.remote_io, "remote I/O, drives the outputs");
     }
 
     /// From the station whose frame the outputs come from to the remote I/O.
@@ -267,10 +254,8 @@ impl<'f> Drawing<'f> {
             for source in &film.sources {
                 let path = self.trace(&output.values, source, zero);
                 let colour = of_source(source.value.source).colour;
-                let _ = writeln!(
-                    self.body,
-                    "<path d=\"{path}\" class=\"trace\" stroke=\"{colour}\"/>"
-                );
+                let _ =
+                    writeln!(self.body, "<path d=\"{path}\" class=\"trace\" stroke=\"{colour}\"/>");
             }
         }
     }
@@ -283,11 +268,7 @@ impl<'f> Drawing<'f> {
             if from >= to {
                 continue;
             }
-            let y = if value.value {
-                zero - STEP_HEIGHT
-            } else {
-                zero
-            };
+            let y = if value.value { zero - STEP_HEIGHT } else { zero };
             let (left, right) = (self.film.x(from), self.film.x(to));
             let _ = match path.is_empty() {
                 true => write!(path, "M{left:.1} {y:.1}H{right:.1}"),

@@ -62,9 +62,7 @@ impl Model {
     /// Deadlines of a program by source, from the origin up to a cycle.
     pub(crate) fn source_counts(&self, program: ProgramId, cycle: Option<i64>) -> SourceCounts {
         let track = self.programs.get(program.index()).zip(cycle);
-        track.map_or_else(SourceCounts::default, |(track, cycle)| {
-            track.tally.counts(cycle)
-        })
+        track.map_or_else(SourceCounts::default, |(track, cycle)| track.tally.counts(cycle))
     }
 
     /// The first cycle of those in a row that have the source of `cycle`.
@@ -139,9 +137,7 @@ impl Model {
     /// Where the cycle or the state is not known.
     pub fn evaluation(&self, program: ProgramId, cycle: i64) -> Result<Evaluation, ViewError> {
         let history = self.history_of(program)?;
-        let place = history
-            .place_of(cycle)
-            .ok_or_else(|| self.no_cycle(program, cycle))?;
+        let place = history.place_of(cycle).ok_or_else(|| self.no_cycle(program, cycle))?;
         self.evaluation_at(history, place)
     }
 
@@ -171,9 +167,7 @@ impl Model {
     /// Where the cycle or the state is not known, or the program is Boolean.
     pub fn trace(&self, program: ProgramId, cycle: i64) -> Result<Trace, ViewError> {
         let history = self.history_of(program)?;
-        let place = history
-            .place_of(cycle)
-            .ok_or_else(|| self.no_cycle(program, cycle))?;
+        let place = history.place_of(cycle).ok_or_else(|| self.no_cycle(program, cycle))?;
         self.trace_at(history, place)
     }
 

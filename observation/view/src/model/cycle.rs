@@ -43,9 +43,7 @@ impl Received {
 
     pub(super) fn shift(&mut self, by: i64) {
         let cycles = std::mem::take(&mut self.0).into_iter();
-        self.0 = cycles
-            .map(|(cycle, received)| (cycle.saturating_add(by), received))
-            .collect();
+        self.0 = cycles.map(|(cycle, received)| (cycle.saturating_add(by), received)).collect();
     }
 }
 
@@ -88,20 +86,13 @@ impl Model {
     pub fn newest(&self) -> Option<i64> {
         let latest = self.cycles.latest()?;
         let reported = self.programs.iter().filter_map(|program| program.reported);
-        Some(
-            reported
-                .min()
-                .unwrap_or(latest)
-                .max(latest.saturating_sub(LAG_CYCLES)),
-        )
+        Some(reported.min().unwrap_or(latest).max(latest.saturating_sub(LAG_CYCLES)))
     }
 
     /// The oldest cycle that is remembered; cycles before the origin are not shown.
     pub fn oldest(&self) -> Option<i64> {
-        let oldest = self
-            .histories
-            .iter()
-            .filter_map(|history| Some(history.steps().front()?.cycle));
+        let oldest =
+            self.histories.iter().filter_map(|history| Some(history.steps().front()?.cycle));
         Some(oldest.max()?.max(0))
     }
 
@@ -157,13 +148,9 @@ impl Model {
 
     /// The moments that a cycle has at the remote I/Os, the newest first. A deadline without a cycle has the moment of the last one.
     fn moments(&self, cycle: i64) -> Vec<Moment> {
-        let steps = self
-            .program_ids()
-            .filter_map(|program| self.history(program)?.at(cycle));
-        let mut moments: Vec<Moment> = steps
-            .filter(|step| has_begun(step))
-            .map(|step| step.moment)
-            .collect();
+        let steps = self.program_ids().filter_map(|program| self.history(program)?.at(cycle));
+        let mut moments: Vec<Moment> =
+            steps.filter(|step| has_begun(step)).map(|step| step.moment).collect();
         moments.sort_by(|one, other| other.cmp(one));
         moments.dedup();
         moments
@@ -185,11 +172,7 @@ impl Model {
             masks.fold(ProgramSet::EMPTY, ProgramSet::or)
         };
         let own = of(cycle);
-        if own.is_empty() {
-            of(cycle.saturating_sub(1))
-        } else {
-            own
-        }
+        if own.is_empty() { of(cycle.saturating_sub(1)) } else { own }
     }
 
     /// The station that starts the cycles: the first by rank that has started some, and publishes.
@@ -233,9 +216,7 @@ impl Model {
                 heard.fold(StationSet::EMPTY, StationSet::or)
             })
             .collect();
-        let received = heard
-            .iter()
-            .fold(StationSet::EMPTY, |all, heard| all.or(*heard));
+        let received = heard.iter().fold(StationSet::EMPTY, |all, heard| all.or(*heard));
         let holds = self.station_ids().map(|station| {
             let process = standing.process(Member::Station(station));
             if received.contains(station) && process.is_none_or(|process| process.is_running()) {
@@ -245,14 +226,11 @@ impl Model {
                 ProgramSet::EMPTY
             }
         });
-        let excluded = self.program_ids().map(|program| {
-            standing
-                .program(program)
-                .map_or(StationSet::EMPTY, |own| own.excluded)
-        });
-        let blocked = self
+        let excluded = self
             .program_ids()
-            .filter(|&program| self.is_blocked(standing, program, cycle));
+            .map(|program| standing.program(program).map_or(StationSet::EMPTY, |own| own.excluded));
+        let blocked =
+            self.program_ids().filter(|&program| self.is_blocked(standing, program, cycle));
         Holders {
             mode: self.cluster.agreement().mode,
             widths: self

@@ -23,12 +23,7 @@ impl Model {
                 self.check_words(*moment);
                 return;
             }
-            StationEvent::Holds {
-                moment,
-                program,
-                lineage,
-                state,
-            } => {
+            StationEvent::Holds { moment, program, lineage, state } => {
                 if let Some(history) = self.histories.get_mut(program.index()) {
                     history.holds(*moment, *lineage, state);
                 }
@@ -40,11 +35,9 @@ impl Model {
         let own = |change| Some(Change::Station(station, change));
         let change = match event {
             StationEvent::Joins { .. } => own(StationChange::Joins),
-            StationEvent::Adopted {
-                program,
-                from: Some(_),
-                ..
-            } => own(StationChange::Adopted(*program)),
+            StationEvent::Adopted { program, from: Some(_), .. } => {
+                own(StationChange::Adopted(*program))
+            }
             StationEvent::BecameCycleMaster { .. } => Some(Change::BecameCycleMaster(station)),
             StationEvent::Excluded { program, .. } => {
                 let excluded = ProgramChange::Excluded(StationSet::only(station));
@@ -58,8 +51,7 @@ impl Model {
         };
         self.is_alive(Member::Station(station), cycle);
         if let Some(change) = change {
-            self.changes
-                .reported(Member::Station(station), cycle, change);
+            self.changes.reported(Member::Station(station), cycle, change);
         }
         self.exclusion_alarm(record, station, cycle, event);
         let cause = match event {
@@ -162,8 +154,7 @@ impl Model {
         match event {
             HostEvent::FieldLost { .. } | HostEvent::FieldContested if is_remote_io => {
                 let described = describe(record, &self.members, &self.writes);
-                self.alarms
-                    .raise(own(described.event), cycle, described.text);
+                self.alarms.raise(own(described.event), cycle, described.text);
             }
             HostEvent::FieldRegained if is_remote_io => {
                 self.alarms.over(&own("field-lost"), cycle);

@@ -87,8 +87,7 @@ impl Model {
                 let remote_io = self.members.name(Member::RemoteIo(program));
                 let text = "its outputs are fail-safe".to_owned();
                 self.alarms.now_ns = deadlines.since_ns;
-                self.alarms
-                    .raise((remote_io.to_owned(), FAIL_SAFE), deadlines.since, text);
+                self.alarms.raise((remote_io.to_owned(), FAIL_SAFE), deadlines.since, text);
             }
         }
     }

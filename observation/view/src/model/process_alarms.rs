@@ -62,7 +62,6 @@ impl Model {
             owner: shelving.owner.clone(),
             reason: shelving.reason.clone(),
         };
-        self.process_alarms
-            .shelve(&shelving.name, Some(shelved), cycle);
+        self.process_alarms.shelve(&shelving.name, Some(shelved), cycle);
     }
 }

@@ -64,9 +64,7 @@ impl Model {
             return;
         }
         let cycle = match event {
-            RemoteIoEvent::Applied {
-                moment, missing, ..
-            } => {
+            RemoteIoEvent::Applied { moment, missing, .. } => {
                 let idle = *missing == Some(Missing::NoCycle);
                 let cycle = self.cycles.deadline(program, *moment, idle);
                 // Its epoch may be the awaited one of the origin: earlier cycles move, and this cycle is counted from the origin already.
@@ -105,9 +103,9 @@ impl Model {
         self.changed(record, program, cycle, event);
         let cause = match event {
             RemoteIoEvent::Flagged { station, .. } => self.cause_of_silence(*station),
-            RemoteIoEvent::Unprotected { lacking, .. } => lacking
-                .iter()
-                .find_map(|lacking| self.cause_of_silence(lacking.station)),
+            RemoteIoEvent::Unprotected { lacking, .. } => {
+                lacking.iter().find_map(|lacking| self.cause_of_silence(lacking.station))
+            }
             _ => None,
         };
         self.happened(record, cycle, cause);
@@ -119,18 +117,16 @@ impl Model {
         let own = |change| Some(Change::Program(program, change));
         let mut alarm = None;
         let change = match event {
-            RemoteIoEvent::StartedCold { awaits_release, .. } => own(ProgramChange::StartedCold {
-                awaits_release: *awaits_release,
-            }),
+            RemoteIoEvent::StartedCold { awaits_release, .. } => {
+                own(ProgramChange::StartedCold { awaits_release: *awaits_release })
+            }
             RemoteIoEvent::Released { .. } => {
                 let over = ["value-fault", "disputed", PROGRAM_FAULT];
                 self.alarms.all_over(&record.name, &over, cycle);
                 self.programs[program.index()].stop.released();
                 own(ProgramChange::Released)
             }
-            RemoteIoEvent::ValueFault {
-                accused, located, ..
-            } => {
+            RemoteIoEvent::ValueFault { accused, located, .. } => {
                 alarm = Some("value-fault");
                 let excluded = own(ProgramChange::Excluded(*accused));
                 excluded.filter(|_| *located)
@@ -170,8 +166,7 @@ impl Model {
             _ => None,
         };
         if let Some(change) = change {
-            self.changes
-                .reported(Member::RemoteIo(program), cycle, change);
+            self.changes.reported(Member::RemoteIo(program), cycle, change);
         }
         let standing = self.changes.now().program(program);
         if standing.is_none_or(|own| own.forced.is_empty()) {
@@ -191,20 +186,11 @@ impl Model {
         moment: Moment,
         event: &RemoteIoEvent,
     ) {
-        let RemoteIoEvent::Applied {
-            sampled,
-            outputs,
-            source,
-            missing,
-            heard,
-            ..
-        } = event
-        else {
+        let RemoteIoEvent::Applied { sampled, outputs, source, missing, heard, .. } = event else {
             return;
         };
         self.timings.decided(moment, cycle);
-        self.series
-            .applied(program, cycle, sampled.as_ref(), outputs, *source);
+        self.series.applied(program, cycle, sampled.as_ref(), outputs, *source);
         self.received_at(cycle, *heard);
         let track = &mut self.programs[program.index()];
         track.tally.push(cycle, *source, record.at_ns);
@@ -222,9 +208,8 @@ impl Model {
         if before != Some(*source) && (was_served || missing.is_none()) {
             // A source that was there before the first record was read has changed when the journal says.
             let counted = track.tally.deadlines().filter(|_| before.is_none());
-            let (cycle, at_ns) = counted.map_or((cycle, record.at_ns), |counted| {
-                (counted.since, counted.since_ns)
-            });
+            let (cycle, at_ns) =
+                counted.map_or((cycle, record.at_ns), |counted| (counted.since, counted.since_ns));
             self.alarms.now_ns = at_ns;
             self.source_changed(record, program, cycle, event);
         }
@@ -268,14 +253,7 @@ impl Model {
         cycle: i64,
         event: &RemoteIoEvent,
     ) {
-        let RemoteIoEvent::Applied {
-            source,
-            word_of,
-            missing,
-            heard,
-            ..
-        } = event
-        else {
+        let RemoteIoEvent::Applied { source, word_of, missing, heard, .. } = event else {
             return;
         };
         let source = *source;

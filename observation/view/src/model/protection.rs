@@ -33,38 +33,22 @@ impl Model {
         let subject = |alarm| (record.name.clone(), alarm);
         match event {
             RemoteIoEvent::Protected { .. } => {
-                let protection = Protection {
-                    protected: true,
-                    since: cycle,
-                    lacking: Vec::new(),
-                };
+                let protection = Protection { protected: true, since: cycle, lacking: Vec::new() };
                 self.alarms.over(&subject(UNPROTECTED), cycle);
                 self.protection_is(program, cycle, protection);
             }
             RemoteIoEvent::Unprotected { since, lacking, .. } => {
                 let since = self.cycles.of_known(*since).unwrap_or(cycle);
                 let lacking = lacking.iter().map(|one| self.lacking(program, one));
-                let protection = Protection {
-                    protected: false,
-                    since,
-                    lacking: lacking.collect(),
-                };
+                let protection = Protection { protected: false, since, lacking: lacking.collect() };
                 let text = protection.text();
                 self.alarms.raise(subject(UNPROTECTED), cycle, text);
                 self.protection_is(program, cycle, protection);
             }
-            RemoteIoEvent::StateLost {
-                applied,
-                newest,
-                holder,
-                asks,
-                ..
-            } => {
+            RemoteIoEvent::StateLost { applied, newest, holder, asks, .. } => {
                 let known = |moment| self.cycles.of_known(moment);
                 let until = applied.map_or(Some(cycle), known);
-                let age = until
-                    .zip(known(*newest))
-                    .map(|(until, newest)| until - newest);
+                let age = until.zip(known(*newest)).map(|(until, newest)| until - newest);
                 let lost = LostState {
                     since: cycle,
                     newest: newest.cycle.0,
@@ -76,10 +60,7 @@ impl Model {
                 self.lost_is(program, cycle, Some(lost));
             }
             // A newer state has become available since.
-            RemoteIoEvent::ChoiceRefused {
-                newest: Some(newest),
-                ..
-            } => {
+            RemoteIoEvent::ChoiceRefused { newest: Some(newest), .. } => {
                 let standing = self.changes.now().program(program);
                 if let Some(mut lost) = standing.and_then(|own| own.lost.clone()) {
                     let newer = newest.cycle.0.saturating_sub(lost.newest);
@@ -104,14 +85,12 @@ impl Model {
     fn protection_is(&mut self, program: ProgramId, cycle: i64, protection: Protection) {
         let change = ProgramChange::Protection(Box::new(protection));
         let change = Change::Program(program, change);
-        self.changes
-            .reported(Member::RemoteIo(program), cycle, change);
+        self.changes.reported(Member::RemoteIo(program), cycle, change);
     }
 
     fn lost_is(&mut self, program: ProgramId, cycle: i64, lost: Option<LostState>) {
         let change = Change::Program(program, ProgramChange::Lost(lost.map(Box::new)));
-        self.changes
-            .reported(Member::RemoteIo(program), cycle, change);
+        self.changes.reported(Member::RemoteIo(program), cycle, change);
     }
 
     /// Why a station cannot prove the outputs of a program: the station itself, or a link, as far as others report it.
@@ -145,29 +124,22 @@ impl Model {
             LackingReason::Joining => ("joining", format!("{name} requests the state")),
             LackingReason::Behind { stepped } => {
                 link = Some(format!("{remote_io} → {name}"));
-                let last = self.cycles.of_known(stepped).map_or_else(
-                    || "yet".to_owned(),
-                    |stepped| format!("since cycle {stepped}"),
-                );
+                let last = self
+                    .cycles
+                    .of_known(stepped)
+                    .map_or_else(|| "yet".to_owned(), |stepped| format!("since cycle {stepped}"));
                 let text = format!(
                     "the state of {name} is too old: no sample received {last} (link {remote_io} → {name})"
                 );
                 ("behind", text)
             }
-            LackingReason::Excluded => (
-                "excluded",
-                format!("{name} is excluded until the operator releases it"),
-            ),
-            LackingReason::Failed => (
-                "failed",
-                format!("{name} has failed, and mode `paper` masks one failure only"),
-            ),
+            LackingReason::Excluded => {
+                ("excluded", format!("{name} is excluded until the operator releases it"))
+            }
+            LackingReason::Failed => {
+                ("failed", format!("{name} has failed, and mode `paper` masks one failure only"))
+            }
         };
-        LackingStation {
-            station: name.to_owned(),
-            reason,
-            link,
-            text,
-        }
+        LackingStation { station: name.to_owned(), reason, link, text }
     }
 }

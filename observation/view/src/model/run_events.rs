@@ -16,10 +16,7 @@ impl Model {
             | RunEvent::Acknowledged(_)
             | RunEvent::Shelved(_)
             | RunEvent::Unshelved(_) => self.cycles.of(None),
-            _ => self
-                .cycles
-                .of(None)
-                .saturating_add(i64::from(self.cycles.latest().is_some())),
+            _ => self.cycles.of(None).saturating_add(i64::from(self.cycles.latest().is_some())),
         };
         self.fold_process_alarms(record, cycle);
         match event {
@@ -42,8 +39,7 @@ impl Model {
                 self.cycles.origin_is(*moment, cycle);
             }
             RunEvent::ScenarioOver { verdict } => {
-                self.changes
-                    .push(cycle, Change::ScenarioOver(verdict.clone()));
+                self.changes.push(cycle, Change::ScenarioOver(verdict.clone()));
             }
             RunEvent::Interrupted => self.interrupted = true,
             RunEvent::Finished => self.finished = true,

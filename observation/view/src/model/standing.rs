@@ -59,8 +59,7 @@ impl Standing {
     /// The members that the frames of a member do not reach.
     pub(crate) fn cut_from(&self, member: Member) -> impl Iterator<Item = Member> {
         let cuts = self.cuts.iter();
-        cuts.filter(move |(from, _)| *from == member)
-            .map(|(_, to)| *to)
+        cuts.filter(move |(from, _)| *from == member).map(|(_, to)| *to)
     }
 
     /// The stations that have started cycles, by rank. A host stall makes another station start a cycle now and then, and the first
@@ -143,10 +142,7 @@ impl Standing {
             }
             Member::RemoteIo(program) if process != Process::Suspended => {
                 if let Some(own) = self.programs.get_mut(program.index()) {
-                    *own = ProgramStanding {
-                        plant: own.plant,
-                        ..ProgramStanding::default()
-                    };
+                    *own = ProgramStanding { plant: own.plant, ..ProgramStanding::default() };
                 }
                 for station in &mut self.stations {
                     station.flagged_by.remove(program);
@@ -266,10 +262,7 @@ impl ProgramChange {
             }
             Self::Protection(protection) => own.protection = Some(protection.as_ref().clone()),
             Self::Lost(lost) => own.lost = lost.as_deref().cloned(),
-            Self::Plant {
-                finished,
-                plant_faults,
-            } => own.plant = Some((*finished, *plant_faults)),
+            Self::Plant { finished, plant_faults } => own.plant = Some((*finished, *plant_faults)),
         }
     }
 

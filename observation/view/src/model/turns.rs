@@ -69,11 +69,8 @@ impl Model {
             return;
         };
         for turn in turns.iter_mut().filter(|turn| !turn.checked) {
-            let compared: Option<Vec<(&Word, Image)>> = turn
-                .words
-                .iter()
-                .map(|word| Some((word, self.sum_of(word, moment)?)))
-                .collect();
+            let compared: Option<Vec<(&Word, Image)>> =
+                turn.words.iter().map(|word| Some((word, self.sum_of(word, moment)?))).collect();
             let Some(compared) = compared else {
                 continue;
             };

@@ -28,12 +28,7 @@ impl Model {
     pub fn snapshot(&self) -> Snapshot {
         let cycle = self.newest();
         let standing = self.standing(cycle.unwrap_or(i64::MAX));
-        Picture {
-            model: self,
-            standing: &standing,
-            cycle,
-        }
-        .taken()
+        Picture { model: self, standing: &standing, cycle }.taken()
     }
 
     /// The state of a cycle; nothing where it is not remembered. The newest cycle is the present.
@@ -42,11 +37,7 @@ impl Model {
         if !(oldest.min(newest)..=newest).contains(&cycle) {
             return None;
         }
-        let picture = Picture {
-            model: self,
-            standing: &self.standing(cycle),
-            cycle: Some(cycle),
-        };
+        let picture = Picture { model: self, standing: &self.standing(cycle), cycle: Some(cycle) };
         Some(picture.taken())
     }
 
@@ -67,9 +58,9 @@ impl Model {
         let alarms: Vec<Alarm> = self.alarms_at(cycle).collect();
         let until = self.recorded_until(cycle);
         let cycle = cycle.min(self.newest().unwrap_or(0));
-        let process = self.process_alarms.at(cycle, until, &alarms, |alarm| {
-            self.program_name(alarm.program).to_owned()
-        });
+        let process = self
+            .process_alarms
+            .at(cycle, until, &alarms, |alarm| self.program_name(alarm.program).to_owned());
         (alarms, process)
     }
 
@@ -82,16 +73,12 @@ impl Model {
 
 /// Alarms that last or are not acknowledged, without the shelved ones.
 fn open_alarms(alarms: Vec<Alarm>, process: &[ProcessAlarm]) -> Vec<Alarm> {
-    let shelved = process
-        .iter()
-        .filter(|alarm| alarm.state == AlarmState::Shelved);
+    let shelved = process.iter().filter(|alarm| alarm.state == AlarmState::Shelved);
     let shelved: BTreeSet<&str> = shelved.map(|alarm| alarm.name.as_str()).collect();
     let is_shelved =
         |alarm: &Alarm| alarm.alarm == PROCESS && shelved.contains(alarm.name.as_str());
     let alarms = alarms.into_iter();
-    alarms
-        .filter(|alarm| alarm.is_open() && !is_shelved(alarm))
-        .collect()
+    alarms.filter(|alarm| alarm.is_open() && !is_shelved(alarm)).collect()
 }
 
 /// A cycle that a snapshot is taken of.
@@ -108,9 +95,7 @@ impl Picture<'_> {
         let (records, left_out) = model.records();
         let cycle = self.cycle.unwrap_or(i64::MAX);
         let margin = model.margin_in(self.standing, self.cycle.unwrap_or(0));
-        let master = self
-            .cycle
-            .and_then(|cycle| model.cycle_master(self.standing, cycle));
+        let master = self.cycle.and_then(|cycle| model.cycle_master(self.standing, cycle));
         let (alarms, process_alarms) = model.open_alarms_at(cycle);
         let timing = model.timings().rfind(|timing| timing.cycle <= cycle);
         Snapshot {
@@ -128,10 +113,7 @@ impl Picture<'_> {
             stations: model.station_ids().map(|id| self.station(id)).collect(),
             programs: model.program_ids().map(|id| self.program(id)).collect(),
             remote_ios: model.program_ids().map(|id| self.remote_io(id)).collect(),
-            plants: model
-                .program_ids()
-                .filter_map(|id| self.plant(id))
-                .collect(),
+            plants: model.program_ids().filter_map(|id| self.plant(id)).collect(),
             margin: self.margin(&margin),
             timing: timing.map(|timing| TimingSnapshot {
                 cycle: timing.cycle,
@@ -207,9 +189,7 @@ impl Picture<'_> {
             flagged: own.is_flagged(),
             publishes_for: self.program_names(covers),
             excluded_from: self.program_names(self.standing.excluded_from(station)),
-            done: own
-                .done
-                .map(|(what, cycle)| format!("{what} in cycle {cycle}")),
+            done: own.done.map(|(what, cycle)| format!("{what} in cycle {cycle}")),
             words: words
                 .map(|word| WordSnapshot {
                     mask: self.program_names(word.mask),
@@ -235,12 +215,8 @@ impl Picture<'_> {
         let own = self.standing.program(program).cloned().unwrap_or_default();
         let plant = Member::Plant(program);
         let has_plant = model.cluster().member_name(plant).is_some();
-        let SourceCounts {
-            direct,
-            reconstructed,
-            held,
-            fail_safe,
-        } = model.source_counts(program, self.cycle);
+        let SourceCounts { direct, reconstructed, held, fail_safe } =
+            model.source_counts(program, self.cycle);
         let source = driven.map(|driven| driven.source);
         let since = self.cycle.and_then(|cycle| model.since(program, cycle));
         ProgramSnapshot {
@@ -254,9 +230,7 @@ impl Picture<'_> {
                 .map(|station| self.name(Member::Station(station))),
             missing: driven.and_then(|driven| driven.missing).map(missing_text),
             fault: self.fault(program),
-            inputs: driven
-                .and_then(|driven| driven.inputs.as_ref())
-                .map(ToString::to_string),
+            inputs: driven.and_then(|driven| driven.inputs.as_ref()).map(ToString::to_string),
             outputs: driven.map(|driven| driven.outputs.to_string()),
             values: self.values(program, driven),
             direct,
@@ -325,11 +299,7 @@ impl Picture<'_> {
             _ if driven.is_none() => RemoteIoState::Listening,
             _ => RemoteIoState::Serving,
         };
-        RemoteIoSnapshot {
-            name: self.name(member),
-            state,
-            link: self.link(member),
-        }
+        RemoteIoSnapshot { name: self.name(member), state, link: self.link(member) }
     }
 
     fn plant(&self, program: ProgramId) -> Option<PlantSnapshot> {

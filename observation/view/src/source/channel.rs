@@ -45,16 +45,8 @@ pub(super) struct Channel {
 pub(super) fn bounded(most: usize) -> (Feed, Channel) {
     let (sender, receiver) = sync_channel(most.max(1));
     let lost = Arc::new(AtomicU64::new(0));
-    let feed = Feed {
-        sender,
-        lost: Arc::clone(&lost),
-    };
-    let channel = Channel {
-        receiver,
-        lost,
-        read: 0,
-        progress: Progress::default(),
-    };
+    let feed = Feed { sender, lost: Arc::clone(&lost) };
+    let channel = Channel { receiver, lost, read: 0, progress: Progress::default() };
     (feed, channel)
 }
 
@@ -76,8 +68,7 @@ impl Channel {
         }
         self.read += taken as u64;
         // How many wait is not known.
-        self.progress
-            .polled(began, self.read, u64::from(taken == AT_ONCE));
+        self.progress.polled(began, self.read, u64::from(taken == AT_ONCE));
         if taken > 0 {
             self.progress.grew = Some(began);
         }

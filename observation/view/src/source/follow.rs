@@ -138,10 +138,8 @@ impl Follower {
                 taken
             }
             Err(error) => {
-                self.failure = Some(Trouble::Read {
-                    path: self.path.clone(),
-                    reason: error.to_string(),
-                });
+                self.failure =
+                    Some(Trouble::Read { path: self.path.clone(), reason: error.to_string() });
                 0
             }
         }
@@ -184,11 +182,7 @@ impl Follower {
     fn age(&self) -> Option<Duration> {
         let written = self.open.as_ref()?.file.modified().ok()?;
         // A clock that was set back makes no age.
-        Some(
-            SystemTime::now()
-                .duration_since(written)
-                .unwrap_or_default(),
-        )
+        Some(SystemTime::now().duration_since(written).unwrap_or_default())
     }
 
     fn try_poll(&mut self, take: &mut dyn FnMut(Result<Record, Trouble>)) -> io::Result<usize> {
@@ -237,13 +231,8 @@ impl Follower {
     fn open(&mut self, path: &Path, number: Option<u64>) -> io::Result<bool> {
         match SegmentFile::open(path) {
             Ok(file) => {
-                self.open = Some(Open {
-                    file,
-                    number,
-                    promised: None,
-                    read: 0,
-                    header: Header::Unread,
-                });
+                self.open =
+                    Some(Open { file, number, promised: None, read: 0, header: Header::Unread });
                 Ok(true)
             }
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),

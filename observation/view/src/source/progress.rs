@@ -50,9 +50,7 @@ impl Progress {
         }
         let behind = |end: Instant| now.saturating_duration_since(end) > BEHIND;
         if self.at_end.is_none_or(behind) {
-            return Err(Reading {
-                percent: self.percent,
-            });
+            return Err(Reading { percent: self.percent });
         }
         Ok(())
     }

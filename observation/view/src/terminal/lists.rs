@@ -35,11 +35,7 @@ pub(super) fn draw(
         } else {
             Style::new()
         };
-        [
-            " ".into(),
-            ratatui::text::Span::styled(text, style),
-            "  ".into(),
-        ]
+        [" ".into(), ratatui::text::Span::styled(text, style), "  ".into()]
     });
     frame.render_widget(Line::from(spans.collect::<Vec<_>>()), head);
     let lines: Vec<Line<'static>> = match bottom {
@@ -68,10 +64,7 @@ fn colour(level: Level) -> Style {
 }
 
 fn event(event: &Event) -> Line<'static> {
-    let cause = event
-        .cause
-        .as_ref()
-        .map_or(String::new(), |cause| format!(" <- {cause}"));
+    let cause = event.cause.as_ref().map_or(String::new(), |cause| format!(" <- {cause}"));
     let text = format!("{:>7} {:12} {}{cause}", event.cycle, event.name, event.text);
     Line::styled(text, colour(event.level))
 }
@@ -84,22 +77,14 @@ fn alarm(alarm: &Alarm) -> Line<'static> {
         (Some(over), Some(by)) => format!("over in {over}, acknowledged by {by}"),
     };
     let kind = alarm.priority.map_or(alarm.alarm, Priority::word);
-    let before = if alarm.since_before {
-        ", perhaps since an earlier cycle"
-    } else {
-        ""
-    };
+    let before = if alarm.since_before { ", perhaps since an earlier cycle" } else { "" };
     let action = alarm.action.as_ref();
     let action = action.map_or(String::new(), |action| format!(" -> {action}"));
     let text = format!(
         "{:>7} {:12} {kind:12} {} ({state}{before}){action}",
         alarm.cycle, alarm.name, alarm.text
     );
-    let style = if alarm.is_open() {
-        colour(Level::Alarm)
-    } else {
-        Style::new()
-    };
+    let style = if alarm.is_open() { colour(Level::Alarm) } else { Style::new() };
     Line::styled(text, style)
 }
 

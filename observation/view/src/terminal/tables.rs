@@ -24,10 +24,7 @@ fn head(words: &[&'static str]) -> Row<'static> {
 }
 
 pub(super) fn stations(snapshot: &Snapshot, above: usize) -> Table<'static> {
-    let rows = snapshot
-        .stations
-        .iter()
-        .skip(clamped(above, snapshot.stations.len()));
+    let rows = snapshot.stations.iter().skip(clamped(above, snapshot.stations.len()));
     let rows = rows.map(|station| {
         let colour = match station.state {
             StationState::Publishing => GOOD,
@@ -75,11 +72,7 @@ pub(super) fn programs(snapshot: &Snapshot, model: &Model, above: usize) -> Tabl
         Row::new([
             Cell::from(format!(" {}", found.program)),
             Cell::from(source).style(Style::new().fg(colour)),
-            Cell::from(
-                found
-                    .since
-                    .map_or("-".to_owned(), |since| since.to_string()),
-            ),
+            Cell::from(found.since.map_or("-".to_owned(), |since| since.to_string())),
             Cell::from(found.direct.to_string()),
             Cell::from(found.reconstructed.to_string()),
             Cell::from(found.held.to_string()),
@@ -140,9 +133,8 @@ pub(super) fn protection(snapshot: &Snapshot) -> Vec<Line<'static>> {
         };
         Some(format!("{}: {text}", program.program))
     });
-    let mut lines: Vec<Line<'static>> = texts
-        .map(|text| Line::from(vec![label("protected"), text.into()]).style(alarm))
-        .collect();
+    let mut lines: Vec<Line<'static>> =
+        texts.map(|text| Line::from(vec![label("protected"), text.into()]).style(alarm)).collect();
     if lines.is_empty() {
         let mut programs = snapshot.programs.iter();
         let text = if programs.all(|program| program.protection.is_some()) {
@@ -159,10 +151,8 @@ pub(super) fn protection(snapshot: &Snapshot) -> Vec<Line<'static>> {
 pub(super) fn survives(snapshot: &Snapshot) -> Paragraph<'static> {
     let margin = &snapshot.margin;
     let programs = snapshot.programs.iter().map(|program| &program.program);
-    let lost: Vec<&str> = programs
-        .filter(|program| !margin.served.contains(program))
-        .map(String::as_str)
-        .collect();
+    let lost: Vec<&str> =
+        programs.filter(|program| !margin.served.contains(program)).map(String::as_str).collect();
     let sentence = match (margin.served.is_empty(), lost.is_empty()) {
         (true, _) | (_, true) => sentence(margin),
         _ => format!(
@@ -180,19 +170,14 @@ fn sentence(margin: &MarginSnapshot) -> String {
         return "no program has provable outputs".to_owned();
     }
     let stations = |outcomes: &[crate::snapshot::OutcomeSnapshot], count: usize| -> Vec<String> {
-        let fatal = outcomes
-            .iter()
-            .filter(|outcome| !outcome.masked && outcome.failed.len() == count);
+        let fatal =
+            outcomes.iter().filter(|outcome| !outcome.masked && outcome.failed.len() == count);
         fatal.map(|outcome| outcome.failed.join("+")).collect()
     };
     let most = |mut fatal: Vec<String>| {
         let more = fatal.len().saturating_sub(6);
         fatal.truncate(6);
-        let more = if more > 0 {
-            format!(" and {more} more")
-        } else {
-            String::new()
-        };
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
         format!("{}{more}", fatal.join(", "))
     };
     match margin.survives {
@@ -212,9 +197,6 @@ fn sentence(margin: &MarginSnapshot) -> String {
 /// The remote I/Os of served programs come behind the stations.
 fn is_remote_io(single: &crate::snapshot::OutcomeSnapshot, margin: &MarginSnapshot) -> bool {
     let stations = margin.singles.len() - margin.served.len();
-    let place = margin
-        .singles
-        .iter()
-        .position(|other| other.failed == single.failed);
+    let place = margin.singles.iter().position(|other| other.failed == single.failed);
     place.is_some_and(|place| place >= stations)
 }

@@ -55,9 +55,7 @@ impl<'m> Explainer<'m> {
     pub(super) fn root(&mut self, name: &str, place: usize) -> Result<Reason, ViewError> {
         let evaluation = self.model.evaluation_at(self.history, place)?;
         let of = |signals: &[understudy_ladder::Signal], values: &[bool]| {
-            let found = signals
-                .iter()
-                .position(|signal| signal.name.as_str() == name);
+            let found = signals.iter().position(|signal| signal.name.as_str() == name);
             found.and_then(|found| values.get(found).copied())
         };
         let value = of(&self.program.outputs, &evaluation.outputs)
@@ -105,11 +103,8 @@ impl<'m> Explainer<'m> {
         below: usize,
         depth: usize,
     ) -> Reason {
-        if let Some(input) = self
-            .program
-            .inputs
-            .iter()
-            .position(|input| input.name.as_str() == name)
+        if let Some(input) =
+            self.program.inputs.iter().position(|input| input.name.as_str() == name)
         {
             return self.input(name, input, value, place);
         }
@@ -302,10 +297,7 @@ impl<'m> Explainer<'m> {
         place: usize,
         depth: usize,
     ) -> Vec<Reason> {
-        elements
-            .iter()
-            .map(|node| self.element(node, rung, place, depth))
-            .collect()
+        elements.iter().map(|node| self.element(node, rung, place, depth)).collect()
     }
 
     fn element(&mut self, node: &Node<'_>, rung: usize, place: usize, depth: usize) -> Reason {
@@ -332,10 +324,8 @@ impl<'m> Explainer<'m> {
                 let signal = format!("{}.CV {relation} {}", comparison.counter, comparison.value);
                 let mut reason =
                     self.leaf(&signal, node.flow.passes, place, format!("CV is {number}"));
-                reason.because = self
-                    .block(&comparison.counter, rung, place, depth + 1)
-                    .into_iter()
-                    .collect();
+                reason.because =
+                    self.block(&comparison.counter, rung, place, depth + 1).into_iter().collect();
                 reason
             }
             Element::Block(block) => {
@@ -357,11 +347,7 @@ impl<'m> Explainer<'m> {
         let block = operand.split_once('.').map(|(block, _)| block);
         let explained = block.and_then(|block| self.block(block, rung, place, depth));
         match explained {
-            Some(reason) => Reason {
-                signal: operand.to_owned(),
-                value: value.into(),
-                ..reason
-            },
+            Some(reason) => Reason { signal: operand.to_owned(), value: value.into(), ..reason },
             None => self.signal(operand, value, place, rung, depth + 1),
         }
     }

@@ -28,11 +28,7 @@ pub(super) fn nodes<'e>(
             Element::Contact(_) | Element::Comparison(_) => Vec::new(),
         };
         if let Some(flow) = flows.next() {
-            found.push(Node {
-                element,
-                flow,
-                parts,
-            });
+            found.push(Node { element, flow, parts });
         }
     }
     found
@@ -44,11 +40,10 @@ pub(super) fn conducting<'n, 'e>(series: &'n [Node<'e>]) -> Vec<&'n Node<'e>> {
     for node in series {
         match node.element {
             Element::Branches(_) => {
-                let through = node.parts.iter().find(|branch| {
-                    branch
-                        .last()
-                        .map_or(node.flow.enters, |last| last.flow.leaves)
-                });
+                let through = node
+                    .parts
+                    .iter()
+                    .find(|branch| branch.last().map_or(node.flow.enters, |last| last.flow.leaves));
                 way.extend(through.map(|branch| conducting(branch)).unwrap_or_default());
             }
             _ => way.push(node),
@@ -59,10 +54,7 @@ pub(super) fn conducting<'n, 'e>(series: &'n [Node<'e>]) -> Vec<&'n Node<'e>> {
 
 /// The elements at which all the power of a series ends: in each branch the first that does not pass it.
 pub(super) fn blocking<'n, 'e>(series: &'n [Node<'e>]) -> Vec<&'n Node<'e>> {
-    let Some(node) = series
-        .iter()
-        .find(|node| node.flow.enters && !node.flow.leaves)
-    else {
+    let Some(node) = series.iter().find(|node| node.flow.enters && !node.flow.leaves) else {
         return Vec::new();
     };
     match node.element {
@@ -76,11 +68,7 @@ pub(super) fn blocking<'n, 'e>(series: &'n [Node<'e>]) -> Vec<&'n Node<'e>> {
 
 /// Why there is power behind a series, or why not.
 pub(super) fn behind<'n, 'e>(series: &'n [Node<'e>], power: bool) -> Vec<&'n Node<'e>> {
-    if power {
-        conducting(series)
-    } else {
-        blocking(series)
-    }
+    if power { conducting(series) } else { blocking(series) }
 }
 
 /// A block, and why there is power at its wire or why not.
@@ -96,11 +84,7 @@ pub(super) fn at_block<'n, 'e>(series: &'n [Node<'e>], name: &str) -> Option<AtB
         let before = &series[..place];
         match node.element {
             Element::Block(block) if block.name.as_str() == name => {
-                return Some(AtBlock {
-                    block,
-                    node,
-                    wire: behind(before, node.flow.enters),
-                });
+                return Some(AtBlock { block, node, wire: behind(before, node.flow.enters) });
             }
             Element::Branches(_) => {
                 let inside = node.parts.iter().find_map(|branch| at_block(branch, name));
@@ -129,11 +113,7 @@ pub(super) fn at_block<'n, 'e>(series: &'n [Node<'e>], name: &str) -> Option<AtB
 impl<'e> AtBlock<'_, 'e> {
     /// What feeds a pin, and whether there is power behind it; a pin that nothing feeds has none.
     pub(super) fn feed(&self, pin: &str) -> (bool, Vec<&Node<'e>>) {
-        let place = self
-            .block
-            .pins
-            .iter()
-            .position(|feed| feed.pin.as_str() == pin);
+        let place = self.block.pins.iter().position(|feed| feed.pin.as_str() == pin);
         let Some(nodes) = place.and_then(|place| self.node.parts.get(place)) else {
             return (false, Vec::new());
         };

@@ -95,10 +95,7 @@ impl<'m> Explainer<'m> {
         let text = format!("program fault: {}", fault.describe(self.program));
         let mut reason = Reason {
             value,
-            of: self
-                .program
-                .part(name)
-                .and_then(|part| part.of.elementary()),
+            of: self.program.part(name).and_then(|part| part.of.elementary()),
             ..self.leaf(name, None, at, text)
         };
         if let Some(routine) = fault.routine {
@@ -226,10 +223,7 @@ impl<'m> Explainer<'m> {
         let routine = self.program.routine(choice.routine);
         match self.text.declares(&routine.name) {
             true => format!("; read by the condition in line {}", choice.line),
-            false => format!(
-                "; read by a condition of the library block {}",
-                routine.name
-            ),
+            false => format!("; read by a condition of the library block {}", routine.name),
         }
     }
 
@@ -339,9 +333,7 @@ impl<'m> Explainer<'m> {
         let done = &trace.done[write];
         self.locate(&mut reason, done.routine, done.line);
         if is_followed {
-            reason.because = self
-                .written(&part.name, &trace, write, writer, depth + 1)
-                .because;
+            reason.because = self.written(&part.name, &trace, write, writer, depth + 1).because;
         }
         reason
     }

@@ -13,15 +13,10 @@ impl Why {
     pub fn to_text(&self) -> String {
         let mut text = String::new();
         let value = shown(&self.value, self.of);
-        let _ = writeln!(
-            text,
-            "{}.{} is {value} in cycle {}",
-            self.program, self.signal, self.cycle
-        );
+        let _ =
+            writeln!(text, "{}.{} is {value} in cycle {}", self.program, self.signal, self.cycle);
         if let Some(source) = self.source {
-            let why = self
-                .missing
-                .map_or(String::new(), |missing| format!(": {missing}"));
+            let why = self.missing.map_or(String::new(), |missing| format!(": {missing}"));
             let _ = writeln!(text, "  {} drives it, {source}{why}", self.remote_io);
         }
         if let Some(scanned) = &self.scanned {
@@ -55,21 +50,14 @@ impl Why {
             } else {
                 "NOT the outputs that the samples yield"
             };
-            let _ = writeln!(
-                text,
-                "  = {}, {proof}; lineage {}",
-                restored.sum, restored.lineage
-            );
+            let _ = writeln!(text, "  = {}, {proof}; lineage {}", restored.sum, restored.lineage);
             if let Some(values) = &restored.values_text {
                 let _ = writeln!(text, "    {values}");
             }
         }
         if let Some(configured) = &self.ramp_to {
             let configured = shown(configured, self.of);
-            let _ = writeln!(
-                text,
-                "  it is on its ramp to the fail-safe value {configured}"
-            );
+            let _ = writeln!(text, "  it is on its ramp to the fail-safe value {configured}");
         } else if self.because.is_none() || self.source == Some(FAIL_SAFE) {
             let _ = writeln!(text, "  it is the configured fail-safe value");
         }
@@ -95,11 +83,7 @@ fn shown(value: &Value, of: Option<Elementary>) -> String {
 fn children(text: &mut String, reason: &Reason, indent: &str) {
     let last = reason.because.len().saturating_sub(1);
     for (place, child) in reason.because.iter().enumerate() {
-        let (branch, below) = if place == last {
-            ("└ ", "  ")
-        } else {
-            ("├ ", "│ ")
-        };
+        let (branch, below) = if place == last { ("└ ", "  ") } else { ("├ ", "│ ") };
         let _ = write!(text, "{indent}{branch}");
         line(text, child, reason.cycle, "");
         children(text, child, &format!("{indent}{below}"));
@@ -108,11 +92,8 @@ fn children(text: &mut String, reason: &Reason, indent: &str) {
 
 fn line(text: &mut String, reason: &Reason, parent: i64, indent: &str) {
     let value = shown(&reason.value, reason.of);
-    let when = if reason.cycle == parent {
-        String::new()
-    } else {
-        format!(" in cycle {}", reason.cycle)
-    };
+    let when =
+        if reason.cycle == parent { String::new() } else { format!(" in cycle {}", reason.cycle) };
     let rung = reason.rung.map_or(String::new(), |rung| {
         let title = reason.title.as_ref();
         let title = title.map_or(String::new(), |title| format!(" \"{title}\""));
@@ -122,9 +103,6 @@ fn line(text: &mut String, reason: &Reason, parent: i64, indent: &str) {
         (Some(line), Some(statement)) => format!(" [line {line} \"{statement}\"]"),
         _ => String::new(),
     };
-    let _ = writeln!(
-        text,
-        "{indent}{} = {value}{when}: {}{rung}{written}",
-        reason.signal, reason.text
-    );
+    let _ =
+        writeln!(text, "{indent}{} = {value}{when}: {}{rung}{written}", reason.signal, reason.text);
 }

@@ -19,19 +19,12 @@ fn a_run_does_not_differ_from_itself() {
 #[test]
 fn a_masked_failure_changes_sources_only() {
     let cell = cell();
-    let undisturbed = Scenario {
-        title: "quiet".into(),
-        cycles: 300,
-        ..Scenario::default()
-    };
+    let undisturbed = Scenario { title: "quiet".into(), cycles: 300, ..Scenario::default() };
     let killed = model(&cell, &scenario(&cell, KILL_EACH), 1);
     let found = diff(&model(&cell, &undisturbed, 1), &killed);
     let images = [Differing::Inputs, Differing::Outputs];
-    let differing: Vec<_> = found
-        .differences
-        .iter()
-        .filter(|difference| images.contains(&difference.what))
-        .collect();
+    let differing: Vec<_> =
+        found.differences.iter().filter(|difference| images.contains(&difference.what)).collect();
     assert_eq!(differing, Vec::<&understudy_view::Difference>::new());
     let source = found
         .differences
@@ -51,26 +44,17 @@ fn a_lost_program_differs_in_its_outputs() {
                 [[step]]\nat = 20\naction = \"crash\"\nstation = \"understudy\"\n\
                 [[step]]\nat = 30\naction = \"crash\"\nstation = \"robot\"\n";
     let lost = model(&cell, &scenario(&cell, text), 1);
-    let undisturbed = Scenario {
-        title: "quiet".into(),
-        cycles: 300,
-        ..Scenario::default()
-    };
+    let undisturbed = Scenario { title: "quiet".into(), cycles: 300, ..Scenario::default() };
     let found = diff(&lost, &model(&cell, &undisturbed, 1));
-    let first = found
-        .differences
-        .iter()
-        .find(|difference| difference.what == Differing::Outputs);
+    let first = found.differences.iter().find(|difference| difference.what == Differing::Outputs);
     let first = first.expect("its outputs fell safe");
     assert_eq!(first.name, "robot");
     assert!(first.cycle >= 30, "{first:?}");
     // Outputs by name, only those that differ, with opposite values.
     let robot = cell.controllers()[0].interface.outputs.iter();
     let names: Vec<&str> = robot.map(|output| output.name.as_str()).collect();
-    let (left, right): (Vec<&str>, Vec<&str>) = (
-        first.left.split(", ").collect(),
-        first.right.split(", ").collect(),
-    );
+    let (left, right): (Vec<&str>, Vec<&str>) =
+        (first.left.split(", ").collect(), first.right.split(", ").collect());
     assert_eq!(left.len(), right.len(), "{first:?}");
     for (left, right) in left.into_iter().zip(right) {
         let (name, value) = left.split_once(" = ").expect("a name and a value");
@@ -78,9 +62,5 @@ fn a_lost_program_differs_in_its_outputs() {
         let opposite = if value == "0" { "1" } else { "0" };
         assert_eq!(right, format!("{name} = {opposite}"));
     }
-    assert!(
-        found
-            .differences
-            .is_sorted_by_key(|difference| difference.cycle)
-    );
+    assert!(found.differences.is_sorted_by_key(|difference| difference.cycle));
 }

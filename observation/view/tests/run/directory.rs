@@ -50,20 +50,12 @@ fn a_run_is_followed_while_it_is_written() {
     assert_eq!(events(&handed), events(&read));
 
     // What is asked of one cycle needs no more than the cycles before it.
-    let few = Bounds {
-        cycles: 200,
-        ..Bounds::default()
-    };
+    let few = Bounds { cycles: 200, ..Bounds::default() };
     let part = run.read_until(few, 140).expect("readable");
     let why = part.why("press.move_down", Some(140)).expect("known");
     assert_eq!(why, read.why("press.move_down", Some(140)).expect("known"));
     let late = run.read(few).expect("readable");
-    assert_eq!(
-        late.why("press.move_down", Some(20))
-            .expect_err("forgotten")
-            .code(),
-        "U0575"
-    );
+    assert_eq!(late.why("press.move_down", Some(20)).expect_err("forgotten").code(), "U0575");
 
     // A list counts cycles from the origin also before it was told.
     let first = run
@@ -77,11 +69,7 @@ fn a_run_is_followed_while_it_is_written() {
             first
         })
         .expect("no filter");
-    assert!(
-        first
-            .and_then(|line| line.cycle)
-            .is_some_and(|cycle| cycle < 0)
-    );
+    assert!(first.and_then(|line| line.cycle).is_some_and(|cycle| cycle < 0));
     let found = find_run_of(&folder.join("runs"), &cell).expect("the newest");
     assert_eq!(found.path(), path);
 }
@@ -113,28 +101,16 @@ fn a_cycle_is_found_without_reading_what_is_before() {
         let place = place_before(&journal, cycle).expect("readable");
         if cycle >= 700 {
             let found = place.expect("a checkpoint").cycle;
-            assert!(
-                (cycle - 400..=cycle).contains(&found),
-                "{found} for {cycle}"
-            );
+            assert!((cycle - 400..=cycle).contains(&found), "{found} for {cycle}");
         }
         for signal in ["press.move_down", "robot.grip"] {
             let (near, far) = (run.why(signal, Some(cycle)), whole.why(signal, Some(cycle)));
-            assert_eq!(
-                near.expect("known"),
-                far.expect("known"),
-                "{signal} in {cycle}"
-            );
+            assert_eq!(near.expect("known"), far.expect("known"), "{signal} in {cycle}");
         }
     }
     // A list of some cycles begins there, and is the same as the part of a list of all.
     let lines = |from, to| {
-        let filter = Filter {
-            from,
-            to,
-            ordinary: true,
-            ..Filter::default()
-        };
+        let filter = Filter { from, to, ordinary: true, ..Filter::default() };
         let (mut listing, mut source) = run.listing(filter).expect("no names");
         let (mut lines, mut records) = (Vec::new(), 0);
         let mut taken = 1;
@@ -154,10 +130,7 @@ fn a_cycle_is_found_without_reading_what_is_before() {
             (from..=from + 5).contains(&cycle)
         });
         assert_eq!(some, part.cloned().collect::<Vec<_>>(), "from {from}");
-        assert!(
-            from < 3000 || read < whole_journal / 3,
-            "{read} of {whole_journal}"
-        );
+        assert!(from < 3000 || read < whole_journal / 3, "{read} of {whole_journal}");
     }
     let newest = run.why("robot.grip", None).expect("known");
     assert_eq!(newest, whole.why("robot.grip", None).expect("known"));

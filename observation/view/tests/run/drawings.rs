@@ -102,19 +102,14 @@ const RUNGS: &str = r#"<project xmlns="http://www.plcopen.org/xml/tc6_0201"><typ
 </LD></body></pou></pous></types><instances><configurations/></instances></project>"#;
 
 fn cluster(text: &str) -> Cluster {
-    let loaded = read_with(
-        "cluster.toml",
-        text,
-        Overrides::default(),
-        &mut |name| match name {
-            "blocks.st" => Ok(BLOCKS.to_owned()),
-            "belt.st" => Ok(BELT.to_owned()),
-            "chart.st" => Ok(CHART.to_owned()),
-            "gate.st" => Ok(GATE.to_owned()),
-            "rungs.xml" => Ok(RUNGS.to_owned()),
-            _ => Err("no such file".to_owned()),
-        },
-    );
+    let loaded = read_with("cluster.toml", text, Overrides::default(), &mut |name| match name {
+        "blocks.st" => Ok(BLOCKS.to_owned()),
+        "belt.st" => Ok(BELT.to_owned()),
+        "chart.st" => Ok(CHART.to_owned()),
+        "gate.st" => Ok(GATE.to_owned()),
+        "rungs.xml" => Ok(RUNGS.to_owned()),
+        _ => Err("no such file".to_owned()),
+    });
     let reports = loaded.reports.iter().flat_map(|it| &it.diagnostics);
     let found: Vec<String> = reports.map(|found| found.message.clone()).collect();
     loaded.cluster.unwrap_or_else(|| panic!("{found:?}"))
@@ -135,14 +130,9 @@ fn values_behind<'s>(svg: &'s str, of: &str) -> Vec<&'s str> {
     let (_, behind) = svg.split_once(&format!(">{of}</text>")).expect(of);
     let own = behind.split("<rect").next().unwrap_or_default();
     let texts = own.lines().filter(|line| {
-        ["title", "one", "zero"]
-            .iter()
-            .any(|class| line.contains(&format!("class=\"{class}\"")))
+        ["title", "one", "zero"].iter().any(|class| line.contains(&format!("class=\"{class}\"")))
     });
-    let text = |line: &'s str| {
-        line.split_once('>')
-            .and_then(|(_, text)| text.split_once('<'))
-    };
+    let text = |line: &'s str| line.split_once('>').and_then(|(_, text)| text.split_once('<'));
     texts.filter_map(text).map(|(text, _)| text).collect()
 }
 
@@ -152,19 +142,13 @@ fn connections_show_what_the_scan_computed() {
     let model = model(CLUSTER);
     let (mut ran, mut waited) = (0, 0);
     for cycle in 20..150 {
-        let (svg, error) = model
-            .drawing_at(ProgramId(0), cycle)
-            .expect("it has numbers");
+        let (svg, error) = model.drawing_at(ProgramId(0), cycle).expect("it has numbers");
         assert!(error.is_none(), "{error:?}");
         let values = &model.snapshot_at(cycle).expect("known").programs[0].values;
         let number = |name: &str| values[name].as_i64().expect("a number");
         let bit = |name: &str| values[name].as_bool().expect("a bit");
         let (speed, run, y) = (number("speed"), bit("run"), number("y"));
-        assert_eq!(
-            values_behind(&svg, "MUL"),
-            [(speed * 3).to_string()],
-            "cycle {cycle}"
-        );
+        assert_eq!(values_behind(&svg, "MUL"), [(speed * 3).to_string()], "cycle {cycle}");
         let n = number("n") - i64::from(run);
         assert_eq!(y, speed * 3 + 1000 - n);
         assert_eq!(values_behind(&svg, "SUB"), [y.to_string()]);
@@ -185,9 +169,7 @@ fn the_active_step_is_marked() {
     let model = model(CLUSTER);
     let mut seen = [0, 0];
     for cycle in 20..150 {
-        let (svg, _) = model
-            .drawing_at(ProgramId(1), cycle)
-            .expect("it has numbers");
+        let (svg, _) = model.drawing_at(ProgramId(1), cycle).expect("it has numbers");
         let values = &model.snapshot_at(cycle).expect("known").programs[1].values;
         let open = values["open"].as_bool().expect("a bit");
         let (_, behind) = svg.split_once("class=\"active\"").expect("an active step");
@@ -202,15 +184,11 @@ fn the_active_step_is_marked() {
 /// In many cycles: the power of a ladder goes where the scan computed it.
 #[test]
 fn contacts_and_wires_show_the_power() {
-    let text = CLUSTER
-        .replace("\"blocks.st\"", "\"rungs.xml\"")
-        .replace("\"blocks\"", "\"rungs\"");
+    let text = CLUSTER.replace("\"blocks.st\"", "\"rungs.xml\"").replace("\"blocks\"", "\"rungs\"");
     let model = model(&text);
     let mut seen = [0; 4];
     for cycle in 20..150 {
-        let (svg, error) = model
-            .drawing_at(ProgramId(0), cycle)
-            .expect("it has numbers");
+        let (svg, error) = model.drawing_at(ProgramId(0), cycle).expect("it has numbers");
         assert!(error.is_none(), "{error:?}");
         let values = &model.snapshot_at(cycle).expect("known").programs[0].values;
         let bit = |name: &str| values[name].as_bool().expect("a bit");

@@ -9,9 +9,8 @@ use crate::support::{KILL_EACH, cell, model, scenario};
 
 /// What the trends say of a station or a source, cycle ranges and words.
 fn spans<T: std::fmt::Debug>(spans: impl Iterator<Item = understudy_view::Span<T>>) -> String {
-    let texts: Vec<String> = spans
-        .map(|span| format!("{:?} {}-{}", span.value, span.from, span.to))
-        .collect();
+    let texts: Vec<String> =
+        spans.map(|span| format!("{:?} {}-{}", span.value, span.from, span.to)).collect();
     texts.join(", ")
 }
 
@@ -20,63 +19,29 @@ fn each_station_is_seen_to_be_killed_and_repaired() {
     let cell = cell();
     let model = model(&cell, &scenario(&cell, KILL_EACH), 1);
     let series = model.series();
-    let of_station = |rank| {
-        spans(
-            series
-                .station(StationId(rank))
-                .expect("it is there")
-                .spans(0, 299),
-        )
-    };
+    let of_station =
+        |rank| spans(series.station(StationId(rank)).expect("it is there").spans(0, 299));
     let sources = |program| {
         let sources = series.sources(ProgramId(program)).expect("it is there");
         spans(sources.spans(0, 299))
     };
-    let bands = [
-        of_station(0),
-        of_station(1),
-        of_station(2),
-        sources(0),
-        sources(1),
-    ];
+    let bands = [of_station(0), of_station(1), of_station(2), sources(0), sources(1)];
     insta::assert_snapshot!(bands.join("\n"));
-    let Snapshot {
-        run,
-        cycle,
-        from_origin,
-        stations,
-        alarms,
-        margin,
-        ..
-    } = model.snapshot();
+    let Snapshot { run, cycle, from_origin, stations, alarms, margin, .. } = model.snapshot();
     assert_eq!(run, RunState::Running);
     assert!(from_origin);
     assert_eq!(cycle, Some(299));
-    assert!(
-        stations
-            .iter()
-            .all(|station| station.state == StationState::Publishing)
-    );
+    assert!(stations.iter().all(|station| station.state == StationState::Publishing));
     // Each kill cost the protection of programs, and each return brought it back.
     assert_eq!(alarms.len(), 4, "{alarms:?}");
-    assert!(
-        alarms
-            .iter()
-            .all(|alarm| alarm.alarm == "unprotected" && alarm.over.is_some())
-    );
+    assert!(alarms.iter().all(|alarm| alarm.alarm == "unprotected" && alarm.over.is_some()));
     assert_eq!(margin.survives, 1);
     let events: Vec<String> = model
         .events()
         .filter(|event| event.cycle >= 0)
         .map(|event| {
-            let cause = event
-                .cause
-                .as_ref()
-                .map_or(String::new(), |cause| format!("  <- {cause}"));
-            format!(
-                "{:>4} {:10} {:9} {}{cause}",
-                event.cycle, event.name, event.event, event.text
-            )
+            let cause = event.cause.as_ref().map_or(String::new(), |cause| format!("  <- {cause}"));
+            format!("{:>4} {:10} {:9} {}{cause}", event.cycle, event.name, event.event, event.text)
         })
         .collect();
     insta::assert_snapshot!("events", events.join("\n"));
@@ -93,18 +58,12 @@ fn a_value_fault_is_an_alarm() {
     assert!(alarms.contains(&"value-fault"), "{alarms:?}");
     assert!(alarms.contains(&"word-differs"), "{alarms:?}");
     let mut model = model;
-    let seen: Vec<_> = model
-        .alarms()
-        .map(|alarm| alarm.acknowledgement("anna".to_owned(), 0))
-        .collect();
+    let seen: Vec<_> =
+        model.alarms().map(|alarm| alarm.acknowledgement("anna".to_owned(), 0)).collect();
     for seen in seen {
         model.note(&Record::of_run(0, RunEvent::Acknowledged(seen)));
     }
-    assert!(
-        model
-            .alarms()
-            .all(|alarm| alarm.acknowledged_by.as_deref() == Some("anna"))
-    );
+    assert!(model.alarms().all(|alarm| alarm.acknowledged_by.as_deref() == Some("anna")));
 }
 
 /// With the controller and the understudy gone nothing true is there: held, then fail-safe, with its cause; and nothing is
@@ -124,18 +83,11 @@ fn a_loss_is_an_alarm_with_its_cause() {
     let alarm = model.alarms().find(|alarm| alarm.alarm == "fail-safe");
     let alarm = alarm.expect("an alarm");
     assert_eq!((alarm.name.as_str(), alarm.over), ("press-io", None));
-    assert_eq!(
-        alarm.text,
-        "press is not received: press is killed in cycle 30"
-    );
+    assert_eq!(alarm.text, "press is not received: press is killed in cycle 30");
     let snapshot = model.snapshot();
     assert_eq!(snapshot.margin.survives, 0);
     assert_eq!(snapshot.margin.served, ["robot"]);
-    let states: Vec<&str> = snapshot
-        .stations
-        .iter()
-        .map(|station| station.state.word())
-        .collect();
+    let states: Vec<&str> = snapshot.stations.iter().map(|station| station.state.word()).collect();
     assert_eq!(states, ["publishing", "killed", "killed"]);
     let lost = model.why("press.move_down", Some(50)).expect("it is known");
     assert_eq!((lost.source, lost.because), (Some("fail-safe"), None));
@@ -181,25 +133,16 @@ fn an_unexpected_end_is_an_alarm_until_the_member_is_started_again() {
 #[test]
 fn a_quiet_run_is_quiet() {
     let cell = cell();
-    let undisturbed = Scenario {
-        title: "quiet".into(),
-        cycles: 50,
-        ..Scenario::default()
-    };
+    let undisturbed = Scenario { title: "quiet".into(), cycles: 50, ..Scenario::default() };
     let model = model(&cell, &undisturbed, 1);
-    let loud: Vec<_> = model
-        .events()
-        .filter(|event| event.cycle > 0 && event.event != "origin")
-        .collect();
+    let loud: Vec<_> =
+        model.events().filter(|event| event.cycle > 0 && event.event != "origin").collect();
     assert_eq!(loud, Vec::<&understudy_view::Event>::new());
     let timings: Vec<_> = model.timings().filter(|timing| timing.cycle > 0).collect();
     assert!(timings.len() > 30);
     let period_ns = 10_000_000;
     for timing in timings {
         assert_eq!(timing.cycle_ns, Some(period_ns));
-        assert!(
-            timing.margin_ns > 0 && timing.margin_ns < 6_500_000,
-            "{timing:?}"
-        );
+        assert!(timing.margin_ns > 0 && timing.margin_ns < 6_500_000, "{timing:?}");
     }
 }

@@ -20,21 +20,8 @@ fn a_changed_journal_is_read_without_a_panic() {
         .map(|record| serde_json::to_string(record).expect("JSON"))
         .collect();
     let cluster = Arc::new(cell.clone());
-    let numbers = [
-        "0",
-        "1",
-        "63",
-        "64",
-        "255",
-        "18446744073709551615",
-        "9223372036854775807",
-    ];
-    let bounds = Bounds {
-        cycles: 32,
-        events: 50,
-        changes: 20,
-        timings: 10,
-    };
+    let numbers = ["0", "1", "63", "64", "255", "18446744073709551615", "9223372036854775807"];
+    let bounds = Bounds { cycles: 32, events: 50, changes: 20, timings: 10 };
     for seed in 0..40 {
         let mut chance = Pcg64Mcg::seed_from_u64(seed);
         let mut model = Model::new(Arc::clone(&cluster), bounds);
@@ -77,8 +64,6 @@ fn a_changed_journal_is_read_without_a_panic() {
         diff(&model, &model);
         let mut terminal = Terminal::new(TestBackend::new(80, 24)).expect("a terminal");
         let mut screen = Screen::default();
-        terminal
-            .draw(|frame| screen.draw(frame, &model))
-            .expect("drawn");
+        terminal.draw(|frame| screen.draw(frame, &model)).expect("drawn");
     }
 }

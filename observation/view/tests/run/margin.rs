@@ -14,12 +14,7 @@ const FAILS_AT: u64 = 42;
 const ENDS_AT: u64 = 60;
 
 fn crash(station: StationId, at_cycle: u64, phase: f64) -> Fault {
-    Fault {
-        at_cycle,
-        phase,
-        member: Member::Station(station),
-        action: Action::Crash,
-    }
+    Fault { at_cycle, phase, member: Member::Station(station), action: Action::Crash }
 }
 
 /// Every station killed before or none, then every single and every pair of those that are left, at three places of a cycle.
@@ -29,10 +24,7 @@ fn check(controllers: usize, understudies: usize, mode: Mode) {
     let befores =
         std::iter::once(None).chain((0..stations as u8).map(|rank| Some(StationId(rank))));
     for before in befores {
-        let steps: Vec<Fault> = before
-            .map(|station| crash(station, 10, 0.0))
-            .into_iter()
-            .collect();
+        let steps: Vec<Fault> = before.map(|station| crash(station, 10, 0.0)).into_iter().collect();
         let scenario = Scenario {
             title: "before".into(),
             cycles: LOOKED_AT,
@@ -44,14 +36,9 @@ fn check(controllers: usize, understudies: usize, mode: Mode) {
         for step in steps {
             simulation.schedule(step);
         }
-        simulation
-            .run(LOOKED_AT, 1000, &mut |_, _, _, _| {})
-            .expect("it comes into step");
+        simulation.run(LOOKED_AT, 1000, &mut |_, _, _, _| {}).expect("it comes into step");
         let of_stations = |outcome: &&Outcome| {
-            outcome
-                .failed
-                .iter()
-                .all(|member| matches!(member, Member::Station(_)))
+            outcome.failed.iter().all(|member| matches!(member, Member::Station(_)))
         };
         for outcome in singles.iter().filter(of_stations).chain(&pairs) {
             for phase in [0.0, 0.3, 0.5] {
@@ -76,10 +63,7 @@ fn happens(mut simulation: Simulation, outcome: &Outcome, phase: f64, context: &
     for (program, (before, after)) in before.iter().zip(losses(&simulation)).enumerate() {
         // What was lost already is none of this failure's.
         let was_lost = before.1 > 0;
-        let lost = outcome
-            .lost
-            .iter()
-            .any(|loss| loss.program.index() == program);
+        let lost = outcome.lost.iter().any(|loss| loss.program.index() == program);
         assert!(!(lost && was_lost), "{context}");
         if !was_lost {
             assert_eq!(

@@ -75,17 +75,12 @@ END_PROGRAM
 
 fn feed() -> Cluster {
     let steady = BELT.replace("n = 60", "n = -1");
-    let loaded = read_with(
-        "cluster.toml",
-        CLUSTER,
-        Overrides::default(),
-        &mut |name| match name {
-            "feed.st" => Ok(FEED.to_owned()),
-            "belt.st" => Ok(BELT.to_owned()),
-            "steady.st" => Ok(steady.clone()),
-            _ => Err("no such file".to_owned()),
-        },
-    );
+    let loaded = read_with("cluster.toml", CLUSTER, Overrides::default(), &mut |name| match name {
+        "feed.st" => Ok(FEED.to_owned()),
+        "belt.st" => Ok(BELT.to_owned()),
+        "steady.st" => Ok(steady.clone()),
+        _ => Err("no such file".to_owned()),
+    });
     let reports = loaded.reports.iter().flat_map(|it| &it.diagnostics);
     let found: Vec<String> = reports.map(|found| found.message.clone()).collect();
     loaded.cluster.unwrap_or_else(|| panic!("{found:?}"))
@@ -125,25 +120,16 @@ const FAULT: &str = "program fault in feed: feed, line 15: division of 600 by ze
 fn a_program_fault_is_an_alarm_until_the_release() {
     let cluster = feed();
     let model = seen(&cluster, RELEASED);
-    let events: Vec<_> = model
-        .events()
-        .filter(|event| event.event == "program-fault")
-        .collect();
+    let events: Vec<_> = model.events().filter(|event| event.event == "program-fault").collect();
     let [event] = events.as_slice() else {
         panic!("{events:?}");
     };
     assert_eq!((event.text.as_str(), event.level), (FAULT, Level::Alarm));
-    let alarms: Vec<_> = model
-        .alarms()
-        .filter(|alarm| alarm.alarm == "program-fault")
-        .collect();
+    let alarms: Vec<_> = model.alarms().filter(|alarm| alarm.alarm == "program-fault").collect();
     let [alarm] = alarms.as_slice() else {
         panic!("{alarms:?}");
     };
-    assert_eq!(
-        (alarm.text.as_str(), alarm.name.as_str()),
-        (FAULT, "feed-io")
-    );
+    assert_eq!((alarm.text.as_str(), alarm.name.as_str()), (FAULT, "feed-io"));
     assert_eq!(alarm.cycle, event.cycle);
     let over = alarm.over.expect("the operator released it");
     assert!((119..=122).contains(&over), "{alarm:?}");
@@ -167,10 +153,7 @@ fn a_program_fault_is_an_alarm_until_the_release() {
     let lines = records.iter().flat_map(|record| listing.take(record));
     let faults: Vec<_> = lines.filter(|line| line.event == "program-fault").collect();
     assert_eq!(faults.len(), 1, "{faults:?}");
-    assert_eq!(
-        (faults[0].text.as_str(), faults[0].cycle),
-        (FAULT, Some(event.cycle))
-    );
+    assert_eq!((faults[0].text.as_str(), faults[0].cycle), (FAULT, Some(event.cycle)));
 }
 
 fn find<'r>(reason: &'r Reason, signal: &str) -> Option<&'r Reason> {
@@ -185,19 +168,13 @@ fn find<'r>(reason: &'r Reason, signal: &str) -> Option<&'r Reason> {
 fn an_output_is_explained_by_statements_and_inputs() {
     let model = seen(&feed(), RELEASED);
     let why = model.why("feed.rate", Some(30)).expect("known");
-    assert_eq!(
-        (&why.value, why.source),
-        (&json!(10.0), Some("reconstructed"))
-    );
+    assert_eq!((&why.value, why.source), (&json!(10.0), Some("reconstructed")));
     assert_eq!(why.inputs["speed"], json!(30));
     let reconstructed = why.reconstructed.as_ref().expect("feed is killed");
     assert!(reconstructed.proved);
     assert_eq!(reconstructed.values["rate"], json!(10.0));
     let root = why.because.as_ref().expect("a statement");
-    assert_eq!(
-        (root.line, root.statement.as_deref()),
-        (Some(18), Some("rate := part;"))
-    );
+    assert_eq!((root.line, root.statement.as_deref()), (Some(18), Some("rate := part;")));
     let part = find(root, "part").expect("read");
     assert_eq!((part.line, &part.value), (Some(16), &json!(10.0)));
     let share = find(part, "share").expect("read");
@@ -205,35 +182,21 @@ fn an_output_is_explained_by_statements_and_inputs() {
     let speed = find(share, "speed").expect("read");
     assert!(speed.text.starts_with("input"), "{}", speed.text);
     let run = find(root, "run").expect("the condition");
-    assert!(
-        run.text.ends_with("read by the condition in line 14"),
-        "{}",
-        run.text
-    );
+    assert!(run.text.ends_with("read by the condition in line 14"), "{}", run.text);
 
     let sum = model.why("feed.sum", Some(30)).expect("known");
     let root = sum.because.expect("a statement");
     assert_eq!(root.value, sum.value);
-    let before = root
-        .because
-        .iter()
-        .find(|it| it.signal == "sum")
-        .expect("read");
+    let before = root.because.iter().find(|it| it.signal == "sum").expect("read");
     assert_eq!(before.text, "assigned in cycle 29");
     let input = model.why("feed.speed", Some(30)).expect("known");
     assert_eq!(input.value, json!(30));
 
     let stopped = model.why("feed.rate", Some(100)).expect("known");
-    assert_eq!(
-        (&stopped.value, stopped.source),
-        (&json!(0.5), Some("fail-safe"))
-    );
+    assert_eq!((&stopped.value, stopped.source), (&json!(0.5), Some("fail-safe")));
     let fault = stopped.because.as_ref().expect("the program fault");
     assert_eq!(fault.line, Some(15));
-    assert_eq!(
-        find(fault, "speed").map(|speed| &speed.value),
-        Some(&json!(0))
-    );
+    assert_eq!(find(fault, "speed").map(|speed| &speed.value), Some(&json!(0)));
     let text = stopped.to_text();
     assert!(text.contains("division of 600 by zero"), "{text}");
     let error = model.why("feed.rat", None).expect_err("no such variable");
@@ -252,14 +215,8 @@ fn the_text_shows_the_values_of_its_scan() {
             assert_eq!(lines.len(), FEED.lines().count());
             let values = &model.snapshot_at(cycle).expect("known").programs[program.index()].values;
             let line = |number: usize| &lines[number - 1];
-            assert_eq!(
-                line(15).values[0],
-                ("share".to_owned(), values["share"].clone())
-            );
-            assert_eq!(
-                line(15).values[1],
-                ("speed".to_owned(), values["speed"].clone())
-            );
+            assert_eq!(line(15).values[0], ("share".to_owned(), values["share"].clone()));
+            assert_eq!(line(15).values[1], ("speed".to_owned(), values["speed"].clone()));
             assert!(line(15).executed && !line(13).executed);
             let part: Vec<&Value> = line(16).values.iter().map(|(_, value)| value).collect();
             assert_eq!(part, [&values["rate"], &values["share"]]);
@@ -271,10 +228,7 @@ fn the_text_shows_the_values_of_its_scan() {
     let (at_stop, _) = model.text_at(ProgramId(0), stop).expect("it has numbers");
     assert!(at_stop[14].failed && !lines[13].failed);
     let uses = model.uses(ProgramId(0)).expect("it has numbers");
-    let share = uses
-        .iter()
-        .find(|own| own.name == "share")
-        .expect("declared");
+    let share = uses.iter().find(|own| own.name == "share").expect("declared");
     assert_eq!((&share.written, &share.read), (&vec![15], &vec![16]));
 }
 

@@ -100,14 +100,7 @@ fn read(run: &Run, mut source: Source) -> Model {
 fn present(model: &Model) -> Value {
     let mut snapshot = serde_json::to_value(model.snapshot()).expect("JSON");
     let fields = snapshot.as_object_mut().expect("an object");
-    for of_what_was_read in [
-        "alarms",
-        "events",
-        "host_stalls",
-        "read_from",
-        "records",
-        "timing",
-    ] {
+    for of_what_was_read in ["alarms", "events", "host_stalls", "read_from", "records", "timing"] {
         assert!(fields.remove(of_what_was_read).is_some());
     }
     // Whether another remote I/O received the station when it was said: otherwise both causes are named.
@@ -128,9 +121,7 @@ fn lasting(model: &Model) -> Vec<(String, &'static str)> {
     let alarms = model
         .alarms()
         .filter(|alarm| alarm.over.is_none() && !found_with_samples.contains(&alarm.alarm));
-    let mut found: Vec<_> = alarms
-        .map(|alarm| (alarm.name.clone(), alarm.alarm))
-        .collect();
+    let mut found: Vec<_> = alarms.map(|alarm| (alarm.name.clone(), alarm.alarm)).collect();
     found.sort();
     found
 }
@@ -188,11 +179,7 @@ fn the_past_of_a_long_run_is_read_behind_its_present() {
     assert!(following.progress().is_at_end());
     assert!(model.read_from() > whole.read_from(), "{model:?}");
     pretty(&present(&whole), &present(&model), &text);
-    assert!(
-        following
-            .past_percent()
-            .is_some_and(|percent| percent < 100)
-    );
+    assert!(following.past_percent().is_some_and(|percent| percent < 100));
     let read = loop {
         if let Some(read) = following.read_past() {
             break read;

@@ -66,16 +66,11 @@ const KILLED: &str = "title = \"a ramp\"\ncycles = 300\n\
     [[step]]\nat = 220\naction = \"restart\"\nstation = \"keep-io\"\n";
 
 fn ramp() -> Cluster {
-    let loaded = read_with(
-        "cluster.toml",
-        CLUSTER,
-        Overrides::default(),
-        &mut |name| match name {
-            "keep.st" => Ok(KEEP.to_owned()),
-            "ramp.st" => Ok(RAMP.to_owned()),
-            _ => Err("no such file".to_owned()),
-        },
-    );
+    let loaded = read_with("cluster.toml", CLUSTER, Overrides::default(), &mut |name| match name {
+        "keep.st" => Ok(KEEP.to_owned()),
+        "ramp.st" => Ok(RAMP.to_owned()),
+        _ => Err("no such file".to_owned()),
+    });
     let reports = loaded.reports.iter().flat_map(|it| &it.diagnostics);
     let found: Vec<String> = reports.map(|found| found.message.clone()).collect();
     loaded.cluster.unwrap_or_else(|| panic!("{found:?}"))
@@ -121,11 +116,8 @@ fn an_alarm_is_raised_after_its_delay_and_over_behind_its_hysteresis() {
     let records = records(&cluster, &scenario(&cluster, PLAIN), 1);
     let model = model_of(&cluster, &records);
     let newest = model.newest().expect("cycles");
-    let raised: Vec<i64> = model
-        .alarms()
-        .filter(|alarm| alarm.name == "high")
-        .map(|alarm| alarm.cycle)
-        .collect();
+    let raised: Vec<i64> =
+        model.alarms().filter(|alarm| alarm.name == "high").map(|alarm| alarm.cycle).collect();
     assert!((3..=5).contains(&raised.len()), "{raised:?}");
     for cycle in &raised[1..] {
         // The condition holds from 61 on; five cycles later the alarm is active.
@@ -150,10 +142,7 @@ fn an_alarm_is_raised_after_its_delay_and_over_behind_its_hysteresis() {
     }
     assert!(active > 60 && over > 100, "{active} {over}");
     let high = find(&model.snapshot(), "high").clone();
-    assert_eq!(
-        (high.program.as_str(), high.signal.as_str()),
-        ("keep", "level")
-    );
+    assert_eq!((high.program.as_str(), high.signal.as_str()), ("keep", "level"));
     assert_eq!(high.priority, Priority::High);
     assert_eq!(high.newest.map(|alarm| alarm.since_before), Some(false));
 }
@@ -164,43 +153,28 @@ fn an_acknowledged_alarm_is_normal_when_it_is_over() {
     let records = records(&cluster, &scenario(&cluster, PLAIN), 1);
     let whole = model_of(&cluster, &records);
     // In the second time that it is active.
-    let raised: Vec<i64> = whole
-        .alarms()
-        .filter(|alarm| alarm.name == "high")
-        .map(|alarm| alarm.cycle)
-        .collect();
+    let raised: Vec<i64> =
+        whole.alarms().filter(|alarm| alarm.name == "high").map(|alarm| alarm.cycle).collect();
     let mut model = Model::new(Arc::new(cluster.clone()), Bounds::default());
     let mut seen = None;
     for record in &records {
         model.note(record);
         if seen.is_none() && model.cycle() == Some(raised[1] + 10) {
             let newest = model.alarms().rfind(|alarm| alarm.name == "high");
-            let record = newest
-                .expect("raised")
-                .acknowledgement("anna".to_owned(), 0);
+            let record = newest.expect("raised").acknowledgement("anna".to_owned(), 0);
             seen = model.cycle();
             model.note(&Record::of_run(0, RunEvent::Acknowledged(record)));
         }
     }
     let seen = seen.expect("acknowledged");
-    assert_eq!(
-        state_at(&model, seen - 1, "high"),
-        AlarmState::Unacknowledged
-    );
+    assert_eq!(state_at(&model, seen - 1, "high"), AlarmState::Unacknowledged);
     assert_eq!(state_at(&model, seen, "high"), AlarmState::Acknowledged);
-    let over = (seen..)
-        .find(|cycle| level(&model, *cycle) < 40.0)
-        .expect("it falls");
+    let over = (seen..).find(|cycle| level(&model, *cycle) < 40.0).expect("it falls");
     assert_eq!(state_at(&model, over, "high"), AlarmState::Normal);
-    assert_eq!(
-        state_at(&model, raised[2], "high"),
-        AlarmState::Unacknowledged
-    );
+    assert_eq!(state_at(&model, raised[2], "high"), AlarmState::Unacknowledged);
     // The first time that it was raised is acknowledged with the second.
     let mut of_high = model.alarms().filter(|alarm| alarm.name == "high");
-    let by = of_high
-        .next()
-        .and_then(|alarm| alarm.acknowledged_by.clone());
+    let by = of_high.next().and_then(|alarm| alarm.acknowledged_by.clone());
     assert_eq!(by.as_deref(), Some("anna"));
 }
 
@@ -227,18 +201,10 @@ fn a_shelved_alarm_is_not_open_until_its_time_is_over() {
     }
     assert!(shelved.is_some());
     for cycle in [121, 150, 219] {
-        assert_eq!(
-            state_at(&model, cycle, "high"),
-            AlarmState::Shelved,
-            "{cycle}"
-        );
+        assert_eq!(state_at(&model, cycle, "high"), AlarmState::Shelved, "{cycle}");
     }
     for cycle in [119, 220, 300] {
-        assert_ne!(
-            state_at(&model, cycle, "high"),
-            AlarmState::Shelved,
-            "{cycle}"
-        );
+        assert_ne!(state_at(&model, cycle, "high"), AlarmState::Shelved, "{cycle}");
     }
     let mut present = model.clone();
     present.note(&shelving(60));
@@ -281,9 +247,7 @@ fn a_reader_that_begins_later_agrees_and_claims_no_beginning() {
         });
         late.origin_is(origin.expect("synchronised"), 0);
         late.trouble(&Trouble::Gone { count: None });
-        records[skipped..]
-            .iter()
-            .for_each(|record| late.note(record));
+        records[skipped..].iter().for_each(|record| late.note(record));
         let (Some(oldest), Some(newest)) = (late.oldest(), late.newest()) else {
             continue;
         };
@@ -321,20 +285,12 @@ fn the_list_of_the_journal_tells_the_same_alarms() {
         .collect();
     let mut listing = Listing::new(&cluster, Filter::default()).expect("no names");
     let lines = records.iter().flat_map(|record| listing.take(record));
-    let lines: Vec<(&str, String)> = lines
-        .filter(|line| is_of_alarm(line.event))
-        .map(|line| (line.event, line.text))
-        .collect();
+    let lines: Vec<(&str, String)> =
+        lines.filter(|line| is_of_alarm(line.event)).map(|line| (line.event, line.text)).collect();
     assert_eq!(lines, events);
     let raised = "the alarm high (high) is active: Level is too high";
-    assert!(
-        lines.contains(&("alarm-raised", raised.to_owned())),
-        "{lines:?}"
-    );
-    let filter = Filter {
-        events: vec!["alarm-over".to_owned()],
-        ..Filter::default()
-    };
+    assert!(lines.contains(&("alarm-raised", raised.to_owned())), "{lines:?}");
+    let filter = Filter { events: vec!["alarm-over".to_owned()], ..Filter::default() };
     let mut listing = Listing::new(&cluster, filter).expect("it is an event");
     let over = records.iter().flat_map(|record| listing.take(record));
     assert!(over.count() > 1);

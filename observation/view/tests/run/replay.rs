@@ -31,11 +31,7 @@ fn every_scan_is_the_one_that_was_evaluated() {
             let inputs: Vec<bool> = sampled.inputs.bits().collect();
             let expected = naive.scan_observed(&inputs);
             let found = model.evaluation(program, step.cycle).expect("it is known");
-            assert_eq!(
-                found, expected,
-                "{} in cycle {}",
-                controller.name, step.cycle
-            );
+            assert_eq!(found, expected, "{} in cycle {}", controller.name, step.cycle);
             let outputs: Vec<bool> = sampled.outputs.bits().collect();
             assert_eq!(outputs, expected.outputs);
             if let Some(driven) = &step.driven {
@@ -53,10 +49,7 @@ fn every_scan_is_the_one_that_was_evaluated() {
 fn loss_is_no_value_fault() {
     let cell = cell();
     for seed in 0..20 {
-        let network = Network {
-            loss: 0.2,
-            ..Network::default()
-        };
+        let network = Network { loss: 0.2, ..Network::default() };
         let lossy = Scenario {
             title: "lossy".into(),
             cycles: 120,
@@ -100,9 +93,7 @@ fn a_journal_that_begins_in_the_middle_is_followed_from_a_state_that_was_told() 
     };
     // At several places between two of the records that tell of states.
     for begins in [100, 199, 200, 201, 255, 390] {
-        let first = all
-            .iter()
-            .position(|record| moment(&record.event) == Some(moment_of(begins)));
+        let first = all.iter().position(|record| moment(&record.event) == Some(moment_of(begins)));
         let mut heard = Model::new(Arc::new(cell.clone()), Bounds::default());
         for record in all.iter().skip(first.expect("it is told of")) {
             heard.note(record);
@@ -126,10 +117,6 @@ fn a_journal_that_begins_in_the_middle_is_followed_from_a_state_that_was_told() 
             assert!(known >= 290, "{known} of those after {begins}");
         }
         let alarms: Vec<&str> = heard.alarms().map(|alarm| alarm.alarm).collect();
-        assert_eq!(
-            alarms,
-            ["unprotected"],
-            "what was not heard is no violation"
-        );
+        assert_eq!(alarms, ["unprotected"], "what was not heard is no violation");
     }
 }

@@ -11,9 +11,7 @@ use crate::support::{KILL_EACH, cell, line, model, scenario};
 
 fn shown(screen: &mut Screen, model: &understudy_view::Model, width: u16, height: u16) -> String {
     let mut terminal = Terminal::new(TestBackend::new(width, height)).expect("a terminal");
-    terminal
-        .draw(|frame| screen.draw(frame, model))
-        .expect("drawn");
+    terminal.draw(|frame| screen.draw(frame, model)).expect("drawn");
     terminal.backend().to_string()
 }
 
@@ -30,10 +28,7 @@ fn a_run_fits_a_terminal_of_eighty_columns() {
     screen.press(Key::Pause, &model);
     assert!(screen.is_paused());
     let help = shown(&mut screen, &model, 80, 24);
-    assert!(
-        help.contains("paused") && help.contains("acknowledge all alarms"),
-        "{help}"
-    );
+    assert!(help.contains("paused") && help.contains("acknowledge all alarms"), "{help}");
 }
 
 /// While the journal is being read no value is shown, only how much of it was; a run that was not written lately says so.
@@ -44,9 +39,7 @@ fn a_journal_that_is_being_read_shows_no_values() {
     let mut screen = Screen::default();
     let drawn = |screen: &mut Screen, progress, now| {
         let mut terminal = Terminal::new(TestBackend::new(80, 24)).expect("a terminal");
-        terminal
-            .draw(|frame| screen.draw_live(frame, &model, progress, None, now))
-            .expect("drawn");
+        terminal.draw(|frame| screen.draw_live(frame, &model, progress, None, now)).expect("drawn");
         terminal.backend().to_string()
     };
     let (feed, mut source) = Source::channel(10);
@@ -58,35 +51,22 @@ fn a_journal_that_is_being_read_shows_no_values() {
     source.poll(&mut |_| ());
     let now = Instant::now();
     let present = drawn(&mut screen, source.progress(), now);
-    assert!(
-        present.contains("robot") && !present.contains("NO RECORD"),
-        "{present}"
-    );
+    assert!(present.contains("robot") && !present.contains("NO RECORD"), "{present}");
     let later = now + Duration::from_secs(60);
     let suspended = drawn(&mut screen, source.progress(), later);
     assert!(!suspended.contains("robot"), "{suspended}");
     source.poll(&mut |_| ());
-    let silent = drawn(
-        &mut screen,
-        source.progress(),
-        now + Duration::from_millis(2_500),
-    );
+    let silent = drawn(&mut screen, source.progress(), now + Duration::from_millis(2_500));
     // The reader was at the end a moment ago, or on a busy machine a little longer.
-    assert!(
-        silent.contains("NO RECORD FOR 2 s") || silent.contains("reading"),
-        "{silent}"
-    );
+    assert!(silent.contains("NO RECORD FOR 2 s") || silent.contains("reading"), "{silent}");
 }
 
 /// Any size, any key, nothing panics; also before the first record and with many stations.
 #[test]
 fn no_size_is_too_small() {
     let large = line(12, 3, understudy_cycle::Mode::Full);
-    let quiet = understudy_scenarios::Scenario {
-        title: "quiet".into(),
-        cycles: 20,
-        ..Default::default()
-    };
+    let quiet =
+        understudy_scenarios::Scenario { title: "quiet".into(), cycles: 20, ..Default::default() };
     let mut large = model(&large, &quiet, 1);
     let mut empty = understudy_view::Model::new(std::sync::Arc::new(cell()), Default::default());
     let keys = [

@@ -11,11 +11,7 @@ use understudy_wire::ProgramId;
 use crate::support::{KILL_EACH, example, model, scenario, shuttles};
 
 fn quiet(cycles: u64) -> Scenario {
-    Scenario {
-        title: "quiet".into(),
-        cycles,
-        ..Scenario::default()
-    }
+    Scenario { title: "quiet".into(), cycles, ..Scenario::default() }
 }
 
 #[test]
@@ -58,11 +54,7 @@ fn the_state_of_a_ladder_is_that_of_the_naive_scan() {
             let expected: Vec<Value> = signals.iter().map(expected).collect();
             let found = model.state_values(program, step.cycle, &signals);
             let found = found.expect("it is known");
-            assert_eq!(
-                found, expected,
-                "{} in cycle {}",
-                controller.name, step.cycle
-            );
+            assert_eq!(found, expected, "{} in cycle {}", controller.name, step.cycle);
             for (signal, value) in signals.iter().zip(&found) {
                 kinds.insert(signal.kind.word());
                 if !matches!(value, Value::Bool(false)) && *value != 0 {
@@ -73,10 +65,8 @@ fn the_state_of_a_ladder_is_that_of_the_naive_scan() {
         }
         assert!(all.len() >= 300, "{}", all.len());
         let trend = model.state_trend(program, (10, 200), &signals, usize::MAX);
-        let expected: Vec<_> = all
-            .into_iter()
-            .filter(|(cycle, _)| (10..=200).contains(cycle))
-            .collect();
+        let expected: Vec<_> =
+            all.into_iter().filter(|(cycle, _)| (10..=200).contains(cycle)).collect();
         assert_eq!(trend, expected);
         let newest = model.state_trend(program, (10, 200), &signals, 7);
         assert_eq!(newest, expected[expected.len() - 7..]);
@@ -92,11 +82,7 @@ fn the_variables_of_a_program_with_numbers_are_those_of_its_trace() {
     let program = ProgramId(0);
     let signals = model.state_signals(program);
     let names: Vec<&str> = signals.iter().map(|signal| signal.name.as_str()).collect();
-    assert_eq!(
-        names,
-        ["forward", "granted", "may_enter"],
-        "no input and no output"
-    );
+    assert_eq!(names, ["forward", "granted", "may_enter"], "no input and no output");
     let mut seen = BTreeSet::new();
     for cycle in 10..680 {
         let (lines, error) = model.text_at(program, cycle).expect("a text");
@@ -105,18 +91,11 @@ fn the_variables_of_a_program_with_numbers_are_those_of_its_trace() {
         for (name, value) in names.iter().zip(values) {
             let mut shown = lines.iter().flat_map(|line| &line.values);
             let traced = shown.find(|(own, _)| own == name);
-            assert_eq!(
-                Some(&value),
-                traced.map(|(_, value)| value),
-                "cycle {cycle}"
-            );
+            assert_eq!(Some(&value), traced.map(|(_, value)| value), "cycle {cycle}");
             seen.insert((*name, value.as_bool()));
         }
     }
-    assert!(
-        seen.contains(&("forward", Some(false))),
-        "it came to the end of its track: {seen:?}"
-    );
+    assert!(seen.contains(&("forward", Some(false))), "it came to the end of its track: {seen:?}");
     assert!(model.state_values(program, 9999, &signals).is_err());
 }
 

@@ -30,9 +30,7 @@ pub(crate) fn example(name: &str) -> Cluster {
     let file = text("cluster.toml").expect("an example");
     let mut open = |name: &str| text(name).map_err(|error| error.to_string());
     let loaded = understudy_cluster::read("cluster.toml", &file, &mut open);
-    loaded
-        .cluster
-        .unwrap_or_else(|| panic!("{:?}", loaded.reports))
+    loaded.cluster.unwrap_or_else(|| panic!("{:?}", loaded.reports))
 }
 
 pub(crate) fn scenario(cluster: &Cluster, text: &str) -> Scenario {

@@ -8,9 +8,7 @@ use crate::support::{KILL_EACH, cell, model, scenario};
 fn a_reconstructed_output_names_parity_word_mask_and_lineage() {
     let cell = cell();
     let model = model(&cell, &scenario(&cell, KILL_EACH), 1);
-    let why = model
-        .why("press.move_down", Some(140))
-        .expect("it is known");
+    let why = model.why("press.move_down", Some(140)).expect("it is known");
     insta::assert_snapshot!(why.to_text());
     let reconstructed = why.reconstructed.expect("the press is killed");
     assert!(reconstructed.proved);
@@ -66,8 +64,6 @@ fn what_is_not_there_is_said() {
         "robot and press have an output `%QX0.0`; name the program too, for example `robot.%QX0.0`",
     );
     assert!(model.why("press.%QX0.0", None).is_ok());
-    let error = model
-        .why("press.move_down", Some(5000))
-        .expect_err("it has no answer");
+    let error = model.why("press.move_down", Some(5000)).expect_err("it has no answer");
     assert_eq!(error.code(), "U0575");
 }

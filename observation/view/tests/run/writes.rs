@@ -20,10 +20,7 @@ const STEPS: &str = "title = \"writes\"\ncycles = 120\n\
 
 fn refused() -> Record {
     let write = Write {
-        id: WriteId {
-            session: 9,
-            number: 1,
-        },
+        id: WriteId { session: 9, number: 1 },
         input: 64,
         value: PointValue::new(32, u64::from(250.0f32.to_bits())),
         role: Role::Operator,
@@ -82,10 +79,7 @@ fn events_of_writes_and_signals_have_names_and_units() {
         ]
     );
     let faults = texts("fault");
-    assert!(
-        faults.contains(&"speed = 180.0 mm/s is written to left-io".to_owned()),
-        "{faults:?}"
-    );
+    assert!(faults.contains(&"speed = 180.0 mm/s is written to left-io".to_owned()), "{faults:?}");
     let validity = texts("signal-validity");
     for text in [
         "the signal right.inside is valid at input right_inside",

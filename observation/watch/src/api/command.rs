@@ -107,11 +107,7 @@ pub(super) async fn command(
 ) -> Answered<Json<Value>> {
     let Json(asked) = body?;
     let is_write = matches!(asked.command, AskedCommand::Write { .. });
-    let why = if is_write {
-        app.why_not_write(&person)
-    } else {
-        app.why_not(&person)
-    };
+    let why = if is_write { app.why_not_write(&person) } else { app.why_not(&person) };
     if let Some(why) = why {
         return Err(Problem::forbidden(why));
     }
@@ -125,11 +121,7 @@ pub(super) async fn command(
         })?;
         let started = || Problem::unknown("the run has not started");
         let cluster = model.cluster().ok_or_else(started)?;
-        let by = By {
-            role: person.role,
-            owner: &owner,
-            reason: &reason,
-        };
+        let by = By { role: person.role, owner: &owner, reason: &reason };
         (member, asked.command.given(cluster, member, by)?)
     };
     let done: Result<Done, Refusal> = match command {
@@ -186,11 +178,7 @@ impl AskedCommand {
                 })?;
                 Command::Write(write)
             }
-            Self::Force {
-                signal,
-                value,
-                seconds,
-            } => Command::Force(Force {
+            Self::Force { signal, value, seconds } => Command::Force(Force {
                 signal,
                 value: value.of(cluster, member, signal)?,
                 seconds,
@@ -216,9 +204,7 @@ fn readable(text: String, most: usize, what: &str) -> Answered<String> {
     if fits && !text.chars().any(char::is_control) {
         Ok(text)
     } else {
-        Err(Problem::bad(format!(
-            "{what} needs 1 to {most} printable characters"
-        )))
+        Err(Problem::bad(format!("{what} needs 1 to {most} printable characters")))
     }
 }
 
@@ -245,22 +231,13 @@ mod tests {
             .members()
             .find(|found| cluster.member_name(*found) == Some(member))
             .expect("a member");
-        let by = By {
-            role: Role::Operator,
-            owner: "anna",
-            reason: "a test",
-        };
+        let by = By { role: Role::Operator, owner: "anna", reason: "a test" };
         let asked: AskedCommand = serde_json::from_value(request).expect("a request");
-        asked
-            .given(&cluster, member, by)
-            .map_err(|problem| format!("{problem:?}"))
+        asked.given(&cluster, member, by).map_err(|problem| format!("{problem:?}"))
     }
 
     fn write(member: &str, input: &str, value: &str) -> Result<Command, String> {
-        given(
-            member,
-            json!({ "command": "write", "input": input, "value": value }),
-        )
+        given(member, json!({ "command": "write", "input": input, "value": value }))
     }
 
     fn has(found: Result<Command, String>, wanted: &[&str]) {
@@ -277,14 +254,8 @@ mod tests {
         };
         assert_eq!(found.role, Role::Operator);
         assert_eq!((&*found.owner, &*found.reason), ("anna", "a test"));
-        assert_eq!(
-            found.value,
-            PointValue::new(32, u64::from(120.5f32.to_bits()))
-        );
-        has(
-            write("left-io", "speed", "201"),
-            &["U0642", "from 0.0 to 200.0"],
-        );
+        assert_eq!(found.value, PointValue::new(32, u64::from(120.5f32.to_bits())));
+        has(write("left-io", "speed", "201"), &["U0642", "from 0.0 to 200.0"]);
         has(write("left-io", "speed", "fast"), &["U0641", "fast"]);
         has(write("left-io", "start", "2"), &["U0641"]);
         has(write("left-io", "stard", "true"), &["U0640", "start"]);
@@ -311,20 +282,11 @@ mod tests {
         assert_eq!(value(force("left-io", speed(), json!("12.5"))), stored);
         assert_eq!(value(force("left-io", speed(), json!(stored))), stored);
         let start = json!({ "input": 32 });
-        assert_eq!(
-            value(force("left-io", start.clone(), json!("1"))),
-            PointValue::Bit(true)
-        );
-        has(
-            force("left-io", speed(), json!("fast")),
-            &["U0556", "finite number"],
-        );
+        assert_eq!(value(force("left-io", start.clone(), json!("1"))), PointValue::Bit(true));
+        has(force("left-io", speed(), json!("fast")), &["U0556", "finite number"]);
         has(force("left-io", start, json!("12.5")), &["U0556"]);
         let nothing = json!({ "output": 7000 });
-        has(
-            force("left-io", nothing, json!("1")),
-            &["U0556", "no such signal"],
-        );
+        has(force("left-io", nothing, json!("1")), &["U0556", "no such signal"]);
         has(force("left", speed(), json!("1")), &["U0556"]);
     }
 }

@@ -70,9 +70,7 @@ pub(super) async fn compare(
         )));
     }
     let Ok(_turn) = app.reader.try_acquire() else {
-        return Err(Problem::too_many(
-            "another comparison is in progress: try again later",
-        ));
+        return Err(Problem::too_many("another comparison is in progress: try again later"));
     };
     tokio::task::block_in_place(|| read_and_compare(&app, &with)).map(Json)
 }
@@ -80,13 +78,9 @@ pub(super) async fn compare(
 fn read_and_compare(app: &App, with: &str) -> Answered<Compared> {
     let unread = |error: &dyn std::fmt::Display| Problem::unrecorded(format!("{with}: {error}"));
     let here = fs::canonicalize(&app.run).map_err(|error| unread(&error))?;
-    let runs = here
-        .parent()
-        .ok_or_else(|| unread(&"it has no parent directory"))?;
+    let runs = here.parent().ok_or_else(|| unread(&"it has no parent directory"))?;
     let other = Run::open(&runs.join(with)).map_err(|error| unread(&error))?;
-    let other = other
-        .read(Bounds::default())
-        .map_err(|error| unread(&error))?;
+    let other = other.read(Bounds::default()).map_err(|error| unread(&error))?;
     let found = {
         let model = app.model();
         diff(&known(&model)?.run, &other)
@@ -106,10 +100,7 @@ fn read_and_compare(app: &App, with: &str) -> Answered<Compared> {
                 };
                 Line {
                     cycle: difference.cycle,
-                    what: format!(
-                        "{} of {}, {} times",
-                        what, difference.name, difference.count
-                    ),
+                    what: format!("{} of {}, {} times", what, difference.name, difference.count),
                     here: difference.left.clone(),
                     there: difference.right.clone(),
                 }

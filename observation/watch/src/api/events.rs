@@ -83,10 +83,7 @@ impl Wanted {
         Ok(EventFilter {
             find: self.find,
             until: self.until,
-            levels: list(&self.levels)
-                .into_iter()
-                .map(level)
-                .collect::<Answered<_>>()?,
+            levels: list(&self.levels).into_iter().map(level).collect::<Answered<_>>()?,
             kinds: list(&self.kinds),
             members: list(&self.members),
             of_host: self.host,
@@ -109,23 +106,15 @@ pub(super) async fn events(
     Ok(Json(Events {
         rows: list.rows.len(),
         hidden_of_host: list.hidden_of_host,
-        levels: levels
-            .map(|(level, &count)| (level.word(), count))
-            .collect(),
-        members: members
-            .map(|(&name, &count)| (name.to_owned(), count))
-            .collect(),
+        levels: levels.map(|(level, &count)| (level.word(), count)).collect(),
+        members: members.map(|(&name, &count)| (name.to_owned(), count)).collect(),
         events: list.rows.iter().take(limit).map(shown).collect(),
         kinds: list.kinds,
     }))
 }
 
 fn shown(row: &EventRow<'_>) -> ShownEvent {
-    let EventRow {
-        event,
-        first,
-        count,
-    } = *row;
+    let EventRow { event, first, count } = *row;
     ShownEvent {
         id: first.number,
         cycle: event.cycle,

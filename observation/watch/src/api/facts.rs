@@ -122,16 +122,10 @@ pub(super) async fn run(
     let stations = run.station_ids().map(|station| StationFacts {
         rank: station.index(),
         name: run.members().name(Member::Station(station)).to_owned(),
-        role: if schedule.is_understudy(station) {
-            "understudy"
-        } else {
-            "controller"
-        },
+        role: if schedule.is_understudy(station) { "understudy" } else { "controller" },
         program: (!schedule.is_understudy(station)).then_some(station.index()),
     });
-    let programs = run
-        .program_ids()
-        .map(|program| program_facts(known, program, person.role));
+    let programs = run.program_ids().map(|program| program_facts(known, program, person.role));
     Ok(Json(RunFacts {
         title: format!("{} · {}", cluster.name(), model.name()),
         cluster: cluster.name().to_owned(),
@@ -160,9 +154,8 @@ fn program_facts(known: &Known, program: ProgramId, role: Role) -> ProgramFacts 
     for source in remote_io.iter().flat_map(|remote_io| &remote_io.inputs) {
         let input = inputs.iter_mut().find(|input| input.name == source.name);
         if let Some(input) = input {
-            input.operator = source
-                .operator()
-                .and_then(|declared| operator_facts(&source.name, declared, role));
+            input.operator =
+                source.operator().and_then(|declared| operator_facts(&source.name, declared, role));
             input.from = source.signal().map(|signal| FromFacts {
                 program: signal.input.from.index(),
                 output: signal.output.clone(),
@@ -181,12 +174,7 @@ fn program_facts(known: &Known, program: ProgramId, role: Role) -> ProgramFacts 
 
 /// Nothing for an input that the gateway of another group writes.
 fn operator_facts(name: &str, declared: &OperatorDeclaration, role: Role) -> Option<OperatorFacts> {
-    let OperatorInput {
-        place,
-        kind,
-        role: required,
-        ..
-    } = declared.input;
+    let OperatorInput { place, kind, role: required, .. } = declared.input;
     let (kind, limits) = match kind {
         OperatorInputKind::Level => ("level", None),
         OperatorInputKind::Pulse(_) => ("pulse", None),
@@ -272,10 +260,8 @@ pub(super) fn at_cycle<T>(
     let older = {
         let model = app.model();
         let known = known(&model)?;
-        let newest = known
-            .run
-            .newest()
-            .ok_or_else(|| Problem::unrecorded("the run has no cycle yet"))?;
+        let newest =
+            known.run.newest().ok_or_else(|| Problem::unrecorded("the run has no cycle yet"))?;
         let cycle = cycle.unwrap_or(newest);
         if cycle > newest {
             return Err(Problem::unrecorded(format!(
@@ -315,14 +301,8 @@ mod tests {
     fn an_input_says_why_a_person_may_not_write_it() {
         let declared = OperatorDeclaration {
             input: OperatorInput {
-                place: PointPlace {
-                    bit: 0,
-                    of: Elementary::Int,
-                },
-                kind: OperatorInputKind::Setpoint {
-                    low: (-5i16) as u16 as u64,
-                    high: 7,
-                },
+                place: PointPlace { bit: 0, of: Elementary::Int },
+                kind: OperatorInputKind::Setpoint { low: (-5i16) as u16 as u64, high: 7 },
                 initial: 0,
                 role: Role::Engineer,
             },
@@ -337,10 +317,7 @@ mod tests {
         };
         let operator = facts(Role::Operator);
         assert_eq!(operator["title"], "gap");
-        assert_eq!(
-            (&operator["low"], &operator["high"]),
-            (&(-5).into(), &7.into())
-        );
+        assert_eq!((&operator["low"], &operator["high"]), (&(-5).into(), &7.into()));
         assert_eq!(operator["why"], "it requires the role engineer");
         assert_eq!(facts(Role::Engineer)["why"], Value::Null);
     }

@@ -96,10 +96,7 @@ fn page<'r>(found: &'r [usize], count: usize, wanted: &Wanted) -> (Rungs, &'r [u
         pages,
         count,
         found: found.len(),
-        shown: own
-            .first()
-            .zip(own.last())
-            .map(|(first, last)| (first + 1, last + 1)),
+        shown: own.first().zip(own.last()).map(|(first, last)| (first + 1, last + 1)),
     };
     (rungs, own)
 }
@@ -111,10 +108,8 @@ pub(super) async fn picture(
 ) -> Answered<Json<Picture>> {
     let Path(program) = program?;
     let Query(wanted) = wanted?;
-    at_cycle(&app, wanted.cycle, |known, cycle| {
-        draw(known, ProgramId(program), cycle, &wanted)
-    })
-    .map(Json)
+    at_cycle(&app, wanted.cycle, |known, cycle| draw(known, ProgramId(program), cycle, &wanted))
+        .map(Json)
 }
 
 fn controller_of(known: &Known, program: ProgramId) -> Answered<&Controller> {
@@ -145,10 +140,7 @@ fn draw(known: &Known, program: ProgramId, cycle: i64, wanted: &Wanted) -> Answe
         Names::Symbols => draw_svg_rungs(ladder, shown, flow),
         Names::Addresses => draw_svg_rungs(&by_address(ladder), shown, flow),
     };
-    let mut words = format!(
-        "{}, cycle {cycle}",
-        shown::program_name(&known.run, program)
-    );
+    let mut words = format!("{}, cycle {cycle}", shown::program_name(&known.run, program));
     let step = known.run.history(program).and_then(|steps| steps.at(cycle));
     match (&evaluation, step.and_then(|step| step.sampled.as_ref())) {
         (Ok(_), Some(sampled)) => {
@@ -160,13 +152,7 @@ fn draw(known: &Known, program: ProgramId, cycle: i64, wanted: &Wanted) -> Answe
     if rungs.found < rungs.count {
         words += &format!("; {} of {} rungs", rungs.found, rungs.count);
     }
-    Ok(Picture {
-        cycle,
-        words,
-        svg: without_style(&svg),
-        rungs: Some(rungs),
-        lines: None,
-    })
+    Ok(Picture { cycle, words, svg: without_style(&svg), rungs: Some(rungs), lines: None })
 }
 
 /// A program with numbers as its text, with the values after the scan of a cycle; of a search the lines that have the words.
@@ -179,13 +165,7 @@ fn text(known: &Known, program: ProgramId, cycle: i64, find: &str) -> Picture {
     if lines.len() < count {
         words += &format!("; {} of {count} lines", lines.len());
     }
-    Picture {
-        cycle,
-        words,
-        svg: String::new(),
-        rungs: None,
-        lines: Some(lines),
-    }
+    Picture { cycle, words, svg: String::new(), rungs: None, lines: Some(lines) }
 }
 
 /// A program with numbers as function blocks or as a chart, with the values of a scan.
@@ -309,10 +289,7 @@ pub(super) async fn cross_reference(
             name,
         }
     });
-    Ok(Json(CrossReference {
-        place: "rung",
-        signals: lines.collect(),
-    }))
+    Ok(Json(CrossReference { place: "rung", signals: lines.collect() }))
 }
 
 /// The variables of a program with numbers, by lines of its text.
@@ -326,10 +303,7 @@ fn uses(known: &Known, program: ProgramId) -> CrossReference {
         written: places(own.written),
         read: places(own.read),
     });
-    CrossReference {
-        place: "line",
-        signals: signals.collect(),
-    }
+    CrossReference { place: "line", signals: signals.collect() }
 }
 
 fn note(rungs: &mut BTreeMap<String, Vec<usize>>, names: Vec<String>, place: usize) {

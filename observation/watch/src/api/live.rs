@@ -68,11 +68,7 @@ pub(super) async fn live(
     let mut newest = app.newest.clone();
     // The first one is shown at once.
     newest.mark_changed();
-    let viewer = Viewer {
-        newest,
-        shown: None,
-        _place: place,
-    };
+    let viewer = Viewer { newest, shown: None, _place: place };
     let events = unfold(viewer, |mut viewer| async move {
         let event = viewer.next().await?;
         Some((Ok(event), viewer))

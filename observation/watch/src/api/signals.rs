@@ -54,9 +54,7 @@ impl Signals {
             "state" => {
                 let of_program = self.0.entry(program.0).or_insert_with(|| {
                     let signals = known.run.state_signals(program).into_iter();
-                    signals
-                        .map(|signal| (identified(&signal.name), signal))
-                        .collect()
+                    signals.map(|signal| (identified(&signal.name), signal)).collect()
                 });
                 Signal::State(of_program.get(name)?.clone())
             }

@@ -89,10 +89,7 @@ pub(super) async fn trends(
     let names = identifiers(&signals, MAXIMUM_SIGNALS)?;
     let model = app.model();
     let known = known(&model)?;
-    let sources = known
-        .run
-        .program_ids()
-        .map(|program| band(known, program, from, to));
+    let sources = known.run.program_ids().map(|program| band(known, program, from, to));
     let faults = known.run.events().filter(|event| {
         let done = matches!(event.event, "fault" | "ended" | "forced" | "unforced");
         done && (from..=to).contains(&event.cycle)
@@ -104,10 +101,7 @@ pub(super) async fn trends(
         sources: sources.collect(),
         faults: faults
             .take(MAXIMUM_FAULTS)
-            .map(|event| Fault {
-                cycle: event.cycle,
-                words: event.text.clone(),
-            })
+            .map(|event| Fault { cycle: event.cycle, words: event.text.clone() })
             .collect(),
     }))
 }
@@ -143,9 +137,7 @@ fn trends_of(known: &Known, names: &[&str], from: i64, to: i64) -> Answered<Vec<
     }
     for (program, (places, own)) in of_states {
         let program = ProgramId(program);
-        let scans = known
-            .run
-            .state_trend(program, (from, to), &own, MAXIMUM_SCANS);
+        let scans = known.run.state_trend(program, (from, to), &own, MAXIMUM_SCANS);
         for (number, place) in places.into_iter().enumerate() {
             let values = scans.iter().map(|(cycle, values)| {
                 let drawn = match &values[number] {
@@ -215,13 +207,9 @@ fn runs(
 
 fn band(known: &Known, program: ProgramId, from: i64, to: i64) -> Band {
     let sources = known.run.series().sources(program);
-    let spans = sources
-        .into_iter()
-        .flat_map(|sources| sources.spans(from, to + 1));
+    let spans = sources.into_iter().flat_map(|sources| sources.spans(from, to + 1));
     Band {
         name: shown::program_name(&known.run, program),
-        runs: spans
-            .map(|span| (span.from, span.to - 1, source_word(*span.value)))
-            .collect(),
+        runs: spans.map(|span| (span.from, span.to - 1, source_word(*span.value))).collect(),
     }
 }

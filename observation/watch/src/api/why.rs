@@ -34,9 +34,7 @@ pub(super) async fn why(
             }
         });
         let (controller, signal) = signal.ok_or_else(|| {
-            Problem::unknown(format!(
-                "the cluster has no output {output:.60} of program {program}"
-            ))
+            Problem::unknown(format!("the cluster has no output {output:.60} of program {program}"))
         })?;
         let name = format!("{}.{signal}", controller.name);
         let why = known.run.why(&name, Some(cycle));

@@ -40,11 +40,7 @@ fn station(snapshot: &Snapshot, station: &StationSnapshot) -> ShownMember {
     let excluded = (!excluded.is_empty()).then(|| format!("excluded for {}", excluded.join(", ")));
     ShownMember {
         name: station.name.clone(),
-        kind: if station.understudy {
-            "understudy"
-        } else {
-            "controller"
-        },
+        kind: if station.understudy { "understudy" } else { "controller" },
         state: station.state.word(),
         down: matches!(station.state, StationState::Killed | StationState::Ended),
         is_cycle_master: snapshot.cycle_master.as_ref() == Some(&station.name),
@@ -62,10 +58,7 @@ fn remote_io(snapshot: &Snapshot, program: usize, remote_io: &RemoteIoSnapshot) 
         name: remote_io.name.clone(),
         kind: "remote-io",
         state: remote_io.state.word(),
-        down: matches!(
-            remote_io.state,
-            RemoteIoState::Killed | RemoteIoState::Ended
-        ),
+        down: matches!(remote_io.state, RemoteIoState::Killed | RemoteIoState::Ended),
         is_cycle_master: false,
         cut: remote_io.link.isolated,
         note: note([

@@ -66,12 +66,8 @@ pub fn lay_out(network: &Network, top: i64) -> BlockPlan {
     let mut layout = Layout::new(network);
     let lines = i64::try_from(network.comments.len()).unwrap_or(0);
     let widest = network.comments.iter().map(|line| width(line)).max();
-    let comments = Place {
-        x: MARGIN,
-        y: top,
-        width: widest.unwrap_or(0) + CHARACTER,
-        height: lines * LINE,
-    };
+    let comments =
+        Place { x: MARGIN, y: top, width: widest.unwrap_or(0) + CHARACTER, height: lines * LINE };
     let mut bottom = comments.bottom();
     if lines > 0 {
         bottom += LINE / 2;
@@ -86,13 +82,7 @@ pub fn lay_out(network: &Network, top: i64) -> BlockPlan {
     let wires = layout.wires();
     let places = layout.objects.iter().map(|placed| placed.place.right());
     let right = places.chain([comments.right()]).max();
-    BlockPlan {
-        wires,
-        right: right.unwrap_or(MARGIN),
-        comments,
-        objects: layout.objects,
-        bottom,
-    }
+    BlockPlan { wires, right: right.unwrap_or(MARGIN), comments, objects: layout.objects, bottom }
 }
 
 /// The size of a block or of contacts, and where its pins are.
@@ -206,18 +196,10 @@ impl<'n> Layout<'n> {
         if self.is_block(object) {
             return self.block(object, top);
         }
-        let place = Place {
-            x: MARGIN,
-            y: top,
-            width: self.text(object),
-            height: HEIGHT,
-        };
+        let place = Place { x: MARGIN, y: top, width: self.text(object), height: HEIGHT };
         self.simple(object, place);
         let right = self.place_targets(object);
-        Reached {
-            right,
-            bottom: top + ROW,
-        }
+        Reached { right, bottom: top + ROW }
     }
 
     /// A value or a target at its place.
@@ -231,14 +213,7 @@ impl<'n> Layout<'n> {
     fn block(&mut self, object: usize, top: i64) -> Reached {
         let network = self.network;
         let shown = &network.objects[object];
-        let Shape {
-            head,
-            above,
-            inputs: pins,
-            outputs,
-            width,
-            height,
-        } = Shape::of(shown);
+        let Shape { head, above, inputs: pins, outputs, width, height } = Shape::of(shown);
         let offset = |input: usize| pins[input] - head;
         let sources: Vec<Option<(usize, usize)>> =
             shown.inputs.iter().map(|input| input.from).collect();
@@ -293,12 +268,7 @@ impl<'n> Layout<'n> {
             (Kind::Contacts(_), 0) => MARGIN,
             (_, count) => lane(count) + CHANNEL,
         };
-        let place = Place {
-            x,
-            y: first - head,
-            width,
-            height,
-        };
+        let place = Place { x, y: first - head, width, height };
         let placed = &mut self.objects[object];
         placed.place = place;
         placed.inputs = pins;
@@ -308,21 +278,13 @@ impl<'n> Layout<'n> {
                 && !self.is_block(*source)
             {
                 let width = self.text(*source);
-                let value = Place {
-                    x: right - width,
-                    y: row - HEIGHT / 2,
-                    width,
-                    height: HEIGHT,
-                };
+                let value = Place { x: right - width, y: row - HEIGHT / 2, width, height: HEIGHT };
                 self.simple(*source, value);
             }
         }
         let right = self.place_targets(object);
         let last = last.map_or(top, |last| last + ROW / 2);
-        Reached {
-            right,
-            bottom: free.max(last).max(place.bottom()),
-        }
+        Reached { right, bottom: free.max(last).max(place.bottom()) }
     }
 
     /// Moves an object, what feeds it and its targets down.
@@ -348,10 +310,7 @@ impl<'n> Layout<'n> {
         let shown = &self.network.objects[object];
         match &shown.kind {
             Kind::Value(text) => {
-                let value = shown
-                    .outputs
-                    .first()
-                    .and_then(|output| output.value.as_ref());
+                let value = shown.outputs.first().and_then(|output| output.value.as_ref());
                 let value = value.map_or(0, |value| width(value) + CHARACTER);
                 width(text) + value + CHARACTER
             }
@@ -372,9 +331,7 @@ impl<'n> Layout<'n> {
     fn place_targets(&mut self, object: usize) -> i64 {
         let own = self.objects[object].place.right();
         let targets = self.targets[object].clone();
-        let labels = targets
-            .iter()
-            .map(|(_, output)| self.label(object, *output));
+        let labels = targets.iter().map(|(_, output)| self.label(object, *output));
         let is_block = self.is_block(object);
         let label = labels.max().filter(|_| is_block).unwrap_or(0);
         let x = own + label + 2 * CHANNEL;
@@ -399,10 +356,7 @@ impl<'n> Layout<'n> {
                 let Some(from) = input.from else { continue };
                 let (source, own) = (&self.objects[from.0], &self.objects[place]);
                 let y = own.place.y + own.inputs[number];
-                let begin = Point {
-                    x: source.place.right(),
-                    y: self.row(from),
-                };
+                let begin = Point { x: source.place.right(), y: self.row(from) };
                 let mut points = vec![begin];
                 if begin.y != y {
                     let bends = self.bends[place].get(number);
@@ -411,11 +365,7 @@ impl<'n> Layout<'n> {
                     points.push(Point { x, y });
                 }
                 points.push(Point { x: own.place.x, y });
-                wires.push(Wire {
-                    from,
-                    to: (place, number),
-                    points,
-                });
+                wires.push(Wire { from, to: (place, number), points });
             }
         }
         wires

@@ -101,11 +101,7 @@ pub fn lay_out(chart: &Chart, top: i64) -> ChartPlan {
         }
     }
     let last = layout.merge(vec![waiting]);
-    ChartPlan {
-        objects: layout.objects,
-        right: last.right,
-        bottom: last.bottom,
-    }
+    ChartPlan { objects: layout.objects, right: last.right, bottom: last.bottom }
 }
 
 /// A line that leads down from a part and does not end yet.
@@ -141,12 +137,7 @@ struct Band {
 
 impl Band {
     fn at(left: i64, bottom: i64) -> Self {
-        Self {
-            left,
-            right: left,
-            bottom,
-            ends: Vec::new(),
-        }
+        Self { left, right: left, bottom, ends: Vec::new() }
     }
 }
 
@@ -217,32 +208,16 @@ impl<'c> Layout<'c> {
                 points.push(Point { x, y });
             }
             points.push(end);
-            Link {
-                from: open.object,
-                output: open.output,
-                points,
-            }
+            Link { from: open.object, output: open.output, points }
         });
         let inputs = links.collect();
-        self.objects.push(ChartObject {
-            part,
-            place,
-            inputs,
-            outputs,
-        });
+        self.objects.push(ChartObject { part, place, inputs, outputs });
         self.objects.len() - 1
     }
 
     fn below(&self, object: usize) -> Open {
         let place = self.objects[object].place;
-        Open {
-            object,
-            output: 0,
-            at: Point {
-                x: place.middle(),
-                y: place.bottom(),
-            },
-        }
+        Open { object, output: 0, at: Point { x: place.middle(), y: place.bottom() } }
     }
 
     /// Places a step and what is behind it, as far as it leads on.
@@ -285,12 +260,7 @@ impl<'c> Layout<'c> {
     /// A step with its actions.
     fn step(&mut self, open: Option<Open>, step: usize, band: &mut Band, y: i64) -> usize {
         self.placed.insert(step);
-        let place = Place {
-            x: band.left,
-            y,
-            width: self.step,
-            height: STEP,
-        };
+        let place = Place { x: band.left, y, width: self.step, height: STEP };
         let open: Vec<Open> = open.into_iter().collect();
         let object = self.add(Part::Step(step), place, &open, 1);
         band.right = band.right.max(place.right());
@@ -307,22 +277,12 @@ impl<'c> Layout<'c> {
                 width,
                 height: ACTION * i64::try_from(actions.len()).unwrap_or(1),
             };
-            let at = Point {
-                x: place.right(),
-                y: y + STEP / 2,
-            };
-            let end = Point {
-                x: aside.x,
-                y: at.y,
-            };
+            let at = Point { x: place.right(), y: y + STEP / 2 };
+            let end = Point { x: aside.x, y: at.y };
             self.objects.push(ChartObject {
                 part: Part::Actions(step),
                 place: aside,
-                inputs: vec![Link {
-                    from: object,
-                    output: 1,
-                    points: vec![at, end],
-                }],
+                inputs: vec![Link { from: object, output: 1, points: vec![at, end] }],
                 outputs: 0,
             });
             band.right = band.right.max(aside.right());
@@ -356,12 +316,7 @@ impl<'c> Layout<'c> {
         y: i64,
     ) -> Option<(Open, usize)> {
         let axis = self.axis(band.left);
-        let place = Place {
-            x: axis - BAR / 2,
-            y,
-            width: BAR,
-            height: 4,
-        };
+        let place = Place { x: axis - BAR / 2, y, width: BAR, height: 4 };
         let object = self.add(Part::Transition(transition), place, from, 1);
         let shown = &self.chart.transitions[transition];
         let label = place.right() + ASIDE + width(&shown.condition);
@@ -408,12 +363,7 @@ impl<'c> Layout<'c> {
 
     fn jump(&mut self, open: Open, step: usize, band: &mut Band, y: i64) {
         let width = width(&self.chart.steps[step].name) + 2 * CHARACTER;
-        let place = Place {
-            x: open.at.x - width / 2,
-            y,
-            width,
-            height: 20,
-        };
+        let place = Place { x: open.at.x - width / 2, y, width, height: 20 };
         self.add(Part::Jump(step), place, &[open], 0);
         band.right = band.right.max(place.right());
         band.bottom = band.bottom.max(place.bottom());
@@ -429,17 +379,8 @@ impl<'c> Layout<'c> {
         branch: impl Fn(&mut Self, Open, i64, i64, usize) -> Band,
     ) -> Vec<Band> {
         let count = firsts.len();
-        let height = if part == Part::SelectionDivergence {
-            2
-        } else {
-            6
-        };
-        let place = Place {
-            x: self.axis(left) - BEYOND,
-            y,
-            width: 2 * BEYOND,
-            height,
-        };
+        let height = if part == Part::SelectionDivergence { 2 } else { 6 };
+        let place = Place { x: self.axis(left) - BEYOND, y, width: 2 * BEYOND, height };
         let object = self.add(part, place, &[from], count);
         let bar = &mut self.objects[object];
         // It is entered at its left end, where the column is.
@@ -453,10 +394,7 @@ impl<'c> Layout<'c> {
             if let Some(around) = self.around.last_mut() {
                 around.later = firsts[output + 1..].concat();
             }
-            let at = Point {
-                x: self.axis(left),
-                y: place.bottom(),
-            };
+            let at = Point { x: self.axis(left), y: place.bottom() };
             let open = Open { object, output, at };
             let band = branch(self, open, left, place.bottom() + GAP, output);
             self.objects[object].place.width = at.x + BEYOND - place.x;

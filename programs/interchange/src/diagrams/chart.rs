@@ -37,9 +37,8 @@ pub(crate) fn chart(of: &syntax::Chart) -> Result<(Chart, Vec<usize>), String> {
         }
     });
     let places = of.steps.iter().enumerate();
-    let places: HashMap<String, usize> = places
-        .map(|(place, step)| (step.name.key(), place))
-        .collect();
+    let places: HashMap<String, usize> =
+        places.map(|(place, step)| (step.name.key(), place)).collect();
     let found = |names: &[Name]| -> Vec<usize> {
         let mut found = Vec::new();
         for place in names.iter().filter_map(|name| places.get(&name.key())) {
@@ -59,9 +58,6 @@ pub(crate) fn chart(of: &syntax::Chart) -> Result<(Chart, Vec<usize>), String> {
             to: found(&transition.to),
         }
     });
-    let chart = Chart {
-        steps: steps.collect(),
-        transitions: transitions.collect(),
-    };
+    let chart = Chart { steps: steps.collect(), transitions: transitions.collect() };
     Ok((chart, order))
 }

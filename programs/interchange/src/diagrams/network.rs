@@ -89,10 +89,7 @@ impl Maker<'_> {
         if matches!(statement.kind, StatementKind::Nothing) {
             return Ok(());
         }
-        let mut network = Network {
-            comments: statement.comments.clone(),
-            ..Network::default()
-        };
+        let mut network = Network { comments: statement.comments.clone(), ..Network::default() };
         self.join(statement, &mut network);
         self.taken.borrow_mut().clear();
         let first = network.objects.len();
@@ -119,11 +116,7 @@ impl Maker<'_> {
         }
         if let Some((object, instance)) = instance {
             self.open.retain(|open| open.instance != instance);
-            self.open.push(Open {
-                network: self.networks.len(),
-                object,
-                instance,
-            });
+            self.open.push(Open { network: self.networks.len(), object, instance });
         }
         self.networks.push(network);
         Ok(())
@@ -220,14 +213,9 @@ impl Maker<'_> {
                 let value = self.source(value, network);
                 let from = match enable {
                     Some(enable) => enabled(value, enable, network),
-                    None if value.negated => function(
-                        "NOT",
-                        &[Value {
-                            negated: false,
-                            ..value
-                        }],
-                        network,
-                    ),
+                    None if value.negated => {
+                        function("NOT", &[Value { negated: false, ..value }], network)
+                    }
                     None => value.from,
                 };
                 network.target(print_path(path), from);
@@ -262,14 +250,10 @@ impl Maker<'_> {
         };
         let name = print_path(path);
         let Some(called) = called.filter(|called| called.kind == UnitKind::FunctionBlock) else {
-            return Err(format!(
-                "the call `{name}`, which is not of a function block"
-            ));
+            return Err(format!("the call `{name}`, which is not of a function block"));
         };
         let pins = self.pins(called, arguments, &name)?;
-        let takes = arguments
-            .iter()
-            .any(|it| matches!(it, Argument::Taken { .. }));
+        let takes = arguments.iter().any(|it| matches!(it, Argument::Taken { .. }));
         if takes && enable.is_some() {
             return Err("a block with `=>` under a condition".to_owned());
         }
@@ -279,10 +263,7 @@ impl Maker<'_> {
             let value = self.source(value, network);
             inputs.push(pin(name, value));
         }
-        let kind = Kind::Block {
-            of: called.name.to_string(),
-            instance: Some(name.clone()),
-        };
+        let kind = Kind::Block { of: called.name.to_string(), instance: Some(name.clone()) };
         let mut outputs = Vec::new();
         outputs.extend(enable.map(|_| output("ENO")));
         outputs.extend(
@@ -296,16 +277,8 @@ impl Maker<'_> {
                 let Some(place) = place.filter(|place| is_free(network, (object, *place))) else {
                     return Err(format!("the output `{from}` of `{name}`"));
                 };
-                let value = Value {
-                    from: (object, place),
-                    negated: false,
-                    is_function: false,
-                };
-                let from = if *negated {
-                    function("NOT", &[value], network)
-                } else {
-                    value.from
-                };
+                let value = Value { from: (object, place), negated: false, is_function: false };
+                let from = if *negated { function("NOT", &[value], network) } else { value.from };
                 network.target(print_path(to), from);
             }
         }
@@ -315,11 +288,7 @@ impl Maker<'_> {
 
     /// The type of a value, where something in it has one.
     fn type_of(&self, value: &Expression) -> Option<TypeKind> {
-        let values = Values {
-            file: self.file,
-            declarations: &self.unit.declarations,
-            made: &[],
-        };
+        let values = Values { file: self.file, declarations: &self.unit.declarations, made: &[] };
         values.strong(value).map(|of| of.kind)
     }
 
@@ -391,9 +360,7 @@ fn feeds_a_block(network: &Network, object: usize) -> bool {
 /// Whether nothing is connected to an output.
 fn is_free(network: &Network, output: Source) -> bool {
     let inputs = network.objects.iter().flat_map(|object| &object.inputs);
-    inputs
-        .filter_map(|input| input.from)
-        .all(|from| from != output)
+    inputs.filter_map(|input| input.from).all(|from| from != output)
 }
 
 /// Whether an expression calls a function that may do more than answer.
@@ -417,32 +384,19 @@ fn does_more(file: &File, value: &Expression) -> bool {
 }
 
 fn pin(name: &str, value: Value) -> Input {
-    Input {
-        name: name.to_owned(),
-        negated: value.negated,
-        from: Some(value.from),
-    }
+    Input { name: name.to_owned(), negated: value.negated, from: Some(value.from) }
 }
 
 fn output(name: &str) -> Output {
-    Output {
-        name: name.to_owned(),
-        value: None,
-    }
+    Output { name: name.to_owned(), value: None }
 }
 
 /// A standard function whose inputs are known by their places.
 fn function(name: &str, values: &[Value], network: &mut Network) -> Source {
     let names = understudy_structured_text::input_names(name, values.len());
-    let inputs = names
-        .iter()
-        .zip(values)
-        .map(|(name, value)| pin(name, *value));
+    let inputs = names.iter().zip(values).map(|(name, value)| pin(name, *value));
     let inputs = inputs.collect();
-    let kind = Kind::Block {
-        of: name.to_owned(),
-        instance: None,
-    };
+    let kind = Kind::Block { of: name.to_owned(), instance: None };
     (network.add(kind, inputs, vec![output("OUT")]), 0)
 }
 
@@ -450,14 +404,7 @@ fn function(name: &str, values: &[Value], network: &mut Network) -> Source {
 fn enabled(value: Value, enable: Value, network: &mut Network) -> Source {
     let (object, output_of) = match (value.is_function, value.negated) {
         (true, false) => value.from,
-        (_, true) => function(
-            "NOT",
-            &[Value {
-                negated: false,
-                ..value
-            }],
-            network,
-        ),
+        (_, true) => function("NOT", &[Value { negated: false, ..value }], network),
         (false, false) => function("MOVE", &[value], network),
     };
     let shown = &mut network.objects[object];

@@ -87,10 +87,7 @@ pub fn draw_typed(
         let wanted = wanted.program;
         !unit.is_program || wanted.is_none_or(|name| unit.name.eq_ignore_ascii_case(name))
     };
-    for unit in units(name, text, &file, bodies)
-        .iter()
-        .filter(|it| is_wanted(it))
-    {
+    for unit in units(name, text, &file, bodies).iter().filter(|it| is_wanted(it)) {
         unit.paint(&mut picture);
         if let DrawnBody::Text(_, Some(reason)) = &unit.body {
             let message = format!("`{}` is listed and not drawn: it has {reason}", unit.name);
@@ -136,11 +133,7 @@ fn drawn_unit(file: &File, unit: &Unit, style: Option<Style>) -> DrawnUnit {
         UnitKind::Function => "FUNCTION",
         UnitKind::Method => "METHOD",
     };
-    let mut notes: String = unit
-        .comments
-        .iter()
-        .map(|line| format!("{line}\n"))
-        .collect();
+    let mut notes: String = unit.comments.iter().map(|line| format!("{line}\n")).collect();
     notes += &print::declarations(&unit.declarations);
     let mut parts = Vec::new();
     let body = match &unit.body {
@@ -149,10 +142,7 @@ fn drawn_unit(file: &File, unit: &Unit, style: Option<Style>) -> DrawnUnit {
         Body::Chart(of) => {
             let actions = of.actions.iter();
             let action = |action: &understudy_structured_text::syntax::Action| {
-                (
-                    format!("ACTION {}", action.name),
-                    print::statements(&action.body),
-                )
+                (format!("ACTION {}", action.name), print::statements(&action.body))
             };
             parts.extend(actions.map(action));
             match chart(of) {

@@ -61,10 +61,7 @@ pub fn draw_svg(program: &Program) -> String {
 /// Makes room for the longest words along an edge.
 fn stretch(graphs: &mut [Digraph]) {
     let edges = graphs.iter().flat_map(|graph| &graph.edges);
-    let longest = edges
-        .map(|edge| words(&edge.label).0.chars().count())
-        .max()
-        .unwrap_or(0);
+    let longest = edges.map(|edge| words(&edge.label).0.chars().count()).max().unwrap_or(0);
     let factor = ((longest as f64 * 7.3 + 3.0 * RADIUS) / STEP_X).max(1.0);
     for vertex in graphs.iter_mut().flat_map(|graph| &mut graph.vertices) {
         vertex.x = LEFT + (vertex.x - LEFT) * factor;
@@ -83,15 +80,7 @@ fn draw_graph(body: &mut String, graph: &Digraph, below: f64) {
     let places: HashMap<usize, Vertex> = graph
         .vertices
         .iter()
-        .map(|vertex| {
-            (
-                vertex.number,
-                Vertex {
-                    y: vertex.y + below,
-                    ..*vertex
-                },
-            )
-        })
+        .map(|vertex| (vertex.number, Vertex { y: vertex.y + below, ..*vertex }))
         .collect();
     if let Some(rail) = places.get(&0) {
         let _ = writeln!(
@@ -108,11 +97,7 @@ fn draw_graph(body: &mut String, graph: &Digraph, below: f64) {
         }
     }
     for vertex in &graph.vertices {
-        let class = if vertex.number == 0 {
-            "vertex rail"
-        } else {
-            "vertex"
-        };
+        let class = if vertex.number == 0 { "vertex rail" } else { "vertex" };
         let y = vertex.y + below;
         let _ = writeln!(
             body,
@@ -135,26 +120,11 @@ fn draw_edge(body: &mut String, edge: &Edge, from: Vertex, to: Vertex, below: f6
     let path = if (from.y, to.y) == (row, row) {
         format!("M{left:.1} {row:.1}L{right:.1} {row:.1}")
     } else {
-        let start = if from.y == row {
-            left
-        } else {
-            from.x + RADIUS * 0.7
-        };
-        let start_y = if from.y == row {
-            row
-        } else {
-            from.y + RADIUS * 0.7 * (row - from.y).signum()
-        };
-        let end = if to.y == row {
-            right
-        } else {
-            to.x - RADIUS * 0.7
-        };
-        let end_y = if to.y == row {
-            row
-        } else {
-            to.y + RADIUS * 0.7 * (row - to.y).signum()
-        };
+        let start = if from.y == row { left } else { from.x + RADIUS * 0.7 };
+        let start_y =
+            if from.y == row { row } else { from.y + RADIUS * 0.7 * (row - from.y).signum() };
+        let end = if to.y == row { right } else { to.x - RADIUS * 0.7 };
+        let end_y = if to.y == row { row } else { to.y + RADIUS * 0.7 * (row - to.y).signum() };
         format!(
             "M{start:.1} {start_y:.1}Q{:.1} {row:.1} {near:.1} {row:.1}L{far:.1} {row:.1}Q{:.1} {row:.1} {end:.1} {end_y:.1}",
             from.x + 14.0,
@@ -165,11 +135,8 @@ fn draw_edge(body: &mut String, edge: &Edge, from: Vertex, to: Vertex, below: f6
     let (text, bar) = words(&edge.label);
     let (middle, above) = ((from.x + to.x) / 2.0, row - 9.0);
     let class = if is_output { " class=\"written\"" } else { "" };
-    let _ = writeln!(
-        body,
-        r#"<text{class} x="{middle:.1}" y="{above:.1}">{}</text>"#,
-        escaped(&text)
-    );
+    let _ =
+        writeln!(body, r#"<text{class} x="{middle:.1}" y="{above:.1}">{}</text>"#, escaped(&text));
     if bar {
         let half = text.chars().count() as f64 * 3.6;
         let _ = writeln!(
@@ -194,9 +161,7 @@ fn words(label: &Label) -> (String, bool) {
         Label::Block(name, kind) => {
             let time = kind.preset_time().map(duration::text);
             let preset = time.or(kind.preset_value().map(|value| value.to_string()));
-            let preset = preset
-                .map(|preset| format!(" {preset}"))
-                .unwrap_or_default();
+            let preset = preset.map(|preset| format!(" {preset}")).unwrap_or_default();
             (format!("{} {name}{preset}", kind.word()), false)
         }
         Label::Coil(kind, name) => {

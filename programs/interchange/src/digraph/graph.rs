@@ -69,11 +69,7 @@ pub enum Label {
 
 /// All graphs of a program, those that feed a block before the rung with the block.
 pub fn digraphs(program: &Program) -> Vec<Digraph> {
-    let mut drawing = Drawing {
-        next_vertex: 1,
-        top: TOP,
-        graphs: Vec::new(),
-    };
+    let mut drawing = Drawing { next_vertex: 1, top: TOP, graphs: Vec::new() };
     for rung in &program.rungs {
         let mut blocks = Vec::new();
         visit(&rung.network, &mut |element| {
@@ -102,11 +98,7 @@ impl Drawing {
             feeds,
             title: None,
             comments: Vec::new(),
-            vertices: vec![Vertex {
-                number: 0,
-                x: LEFT,
-                y: self.top,
-            }],
+            vertices: vec![Vertex { number: 0, x: LEFT, y: self.top }],
             edges: Vec::new(),
         }
     }
@@ -172,13 +164,7 @@ impl Drawing {
             if let Element::Branches(branches) = element {
                 let mut below = row;
                 for branch in branches {
-                    self.series(
-                        graph,
-                        branch,
-                        from,
-                        Some((next, next_column)),
-                        (column, below),
-                    );
+                    self.series(graph, branch, from, Some((next, next_column)), (column, below));
                     below += height(branch);
                 }
             } else {
@@ -255,26 +241,17 @@ fn word_of<T: PartialEq>(table: &[(&'static str, T)], wanted: T) -> &'static str
 }
 
 pub(super) fn contact_kind(word: &str) -> Option<ContactKind> {
-    CONTACTS
-        .iter()
-        .find(|(known, _)| *known == word)
-        .map(|(_, kind)| *kind)
+    CONTACTS.iter().find(|(known, _)| *known == word).map(|(_, kind)| *kind)
 }
 
 pub(super) fn coil_kind(word: &str) -> Option<CoilKind> {
-    COILS
-        .iter()
-        .find(|(known, _)| *known == word)
-        .map(|(_, kind)| *kind)
+    COILS.iter().find(|(known, _)| *known == word).map(|(_, kind)| *kind)
 }
 
 /// All edge types, for help.
 pub(super) fn edge_types() -> String {
     let contacts = CONTACTS.iter().map(|(word, _)| *word);
     let coils = COILS.iter().map(|(word, _)| *word);
-    let words: Vec<&str> = contacts
-        .chain(["ComparisonEdge", "BlockEdge"])
-        .chain(coils)
-        .collect();
+    let words: Vec<&str> = contacts.chain(["ComparisonEdge", "BlockEdge"]).chain(coils).collect();
     words.join(", ")
 }

@@ -57,21 +57,13 @@ fn legal(name: &str) -> String {
 
 /// Declares what is used: what an output writes is an output, what is only read is an input.
 pub(super) fn signals(used: &[Use], program: &mut Program, diagnostics: &mut Vec<Diagnostic>) {
-    let written = used
-        .iter()
-        .filter(|used| used.is_written)
-        .filter_map(|used| used.name.as_ref());
+    let written = used.iter().filter(|used| used.is_written).filter_map(|used| used.name.as_ref());
     let written: HashSet<&str> = written.map(Name::as_str).collect();
-    let blocks: HashSet<&str> = used
-        .iter()
-        .filter_map(|used| used.block.as_deref())
-        .collect();
+    let blocks: HashSet<&str> = used.iter().filter_map(|used| used.block.as_deref()).collect();
     let mut declared = HashSet::new();
     for used in used {
         let Some(name) = &used.name else { continue };
-        let of_block = name
-            .rsplit_once('.')
-            .is_some_and(|(block, _)| blocks.contains(block));
+        let of_block = name.rsplit_once('.').is_some_and(|(block, _)| blocks.contains(block));
         if of_block || !declared.insert(name.to_string()) {
             continue;
         }
@@ -102,14 +94,9 @@ pub(super) fn signals(used: &[Use], program: &mut Program, diagnostics: &mut Vec
 
 /// Says where the address of an edge is not the one that its symbol is declared with.
 pub(super) fn contradictions(used: &[Use], program: &Program, diagnostics: &mut Vec<Diagnostic>) {
-    let signals = program
-        .inputs
-        .iter()
-        .chain(&program.outputs)
-        .chain(&program.memory);
-    let declared: HashMap<&str, Option<&Address>> = signals
-        .map(|signal| (signal.name.as_str(), signal.address.as_ref()))
-        .collect();
+    let signals = program.inputs.iter().chain(&program.outputs).chain(&program.memory);
+    let declared: HashMap<&str, Option<&Address>> =
+        signals.map(|signal| (signal.name.as_str(), signal.address.as_ref())).collect();
     for used in used {
         let (Some(name), Some(text)) = (&used.name, &used.address) else {
             continue;
@@ -135,8 +122,5 @@ fn address(text: &str, area: Area) -> Option<Address> {
         return parse_address(text);
     }
     let (word, bit) = text.split_once('.')?;
-    Some(Address {
-        area,
-        path: vec![word.parse().ok()?, bit.parse().ok()?],
-    })
+    Some(Address { area, path: vec![word.parse().ok()?, bit.parse().ok()?] })
 }

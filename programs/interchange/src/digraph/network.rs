@@ -45,11 +45,7 @@ pub(super) fn network(
     place: &Range<usize>,
 ) -> Result<Network, Vec<Diagnostic>> {
     if edges.is_empty() {
-        return Err(vec![Diagnostic::error(
-            "U1062",
-            "the graph has no edge",
-            place.clone(),
-        )]);
+        return Err(vec![Diagnostic::error("U1062", "the graph has no edge", place.clone())]);
     }
     let shape = Shape::of(&edges, place)?;
     let mut elements = Vec::new();
@@ -109,18 +105,13 @@ impl Shape {
         let mut found = Vec::new();
         for edge in edges {
             if behind_outputs.contains(&edge.from) {
-                let message = format!(
-                    "vertex {} follows an output, where the power ends",
-                    edge.from
-                );
+                let message =
+                    format!("vertex {} follows an output, where the power ends", edge.from);
                 found.push(Diagnostic::error("U1063", message, edge.span.clone()));
             }
         }
-        let sources: Vec<usize> = incoming
-            .iter()
-            .filter(|(_, count)| **count == 0)
-            .map(|(vertex, _)| *vertex)
-            .collect();
+        let sources: Vec<usize> =
+            incoming.iter().filter(|(_, count)| **count == 0).map(|(vertex, _)| *vertex).collect();
         let source = match sources.as_slice() {
             [source] => *source,
             [] => {
@@ -161,25 +152,14 @@ impl Shape {
         }
         let is_sink = |vertex: &usize| !outgoing.contains_key(vertex);
         let sinks: Vec<usize> = order.iter().copied().filter(is_sink).collect();
-        let lost: Vec<usize> = sinks
-            .iter()
-            .copied()
-            .filter(|sink| !outputs_at.contains(sink))
-            .collect();
+        let lost: Vec<usize> =
+            sinks.iter().copied().filter(|sink| !outputs_at.contains(sink)).collect();
         // A graph without outputs ends in a block, at its one end.
         if !outputs_at.is_empty() && !lost.is_empty() || lost.len() > 1 {
             let message = format!("power that comes to vertex {} leads nowhere", lost[0]);
             found.push(Diagnostic::error("U1063", message, place.clone()));
         }
-        if found.is_empty() {
-            Ok(Self {
-                source,
-                sinks,
-                order,
-            })
-        } else {
-            Err(found)
-        }
+        if found.is_empty() { Ok(Self { source, sinks, order }) } else { Err(found) }
     }
 }
 
@@ -205,9 +185,7 @@ impl Part {
             Tree::Series(series) => series,
             Tree::Parallel(mut branches) => {
                 branches.sort_by_key(|(first, _)| *first);
-                vec![Element::Branches(
-                    branches.into_iter().map(|(_, branch)| branch).collect(),
-                )]
+                vec![Element::Branches(branches.into_iter().map(|(_, branch)| branch).collect())]
             }
         }
     }
@@ -243,13 +221,7 @@ fn reduced(shape: &Shape, elements: &[(usize, usize, Element)], target: usize) -
         let (first, depth) = (left.first.min(right.first), left.depth.max(right.depth));
         let mut series = left.into_series();
         series.extend(right.into_series());
-        let is_joined = reduction.add(Part {
-            from,
-            to,
-            first,
-            depth,
-            tree: Tree::Series(series),
-        });
+        let is_joined = reduction.add(Part { from, to, first, depth, tree: Tree::Series(series) });
         if reduction.deepest > MAXIMUM_DEPTH {
             return None;
         }
@@ -329,11 +301,7 @@ fn by_vertices(
 ) -> Network {
     let bit = |vertex: usize| format!("graph_{number}.vertex_{vertex}");
     let power = |vertex: usize| -> Series {
-        if vertex == shape.source {
-            Vec::new()
-        } else {
-            vec![contact(&bit(vertex))]
-        }
+        if vertex == shape.source { Vec::new() } else { vec![contact(&bit(vertex))] }
     };
     let mut into: HashMap<usize, Vec<Series>> = HashMap::new();
     for (from, to, element) in elements {
@@ -350,10 +318,7 @@ fn by_vertices(
         };
         network.before.push(Rung {
             network: series,
-            coils: vec![Coil {
-                kind: CoilKind::Plain,
-                target: Name::from(bit(vertex)),
-            }],
+            coils: vec![Coil { kind: CoilKind::Plain, target: Name::from(bit(vertex)) }],
             ..Rung::default()
         });
         network.bits.push(bit(vertex));
@@ -372,27 +337,14 @@ fn by_vertices(
             network.series = power(from);
             network.coils = coils;
         }
-        None => {
-            network.series = shape
-                .sinks
-                .first()
-                .map(|sink| power(*sink))
-                .unwrap_or_default()
-        }
+        None => network.series = shape.sinks.first().map(|sink| power(*sink)).unwrap_or_default(),
     }
     network.after = rungs
-        .map(|(from, coils)| Rung {
-            network: power(from),
-            coils,
-            ..Rung::default()
-        })
+        .map(|(from, coils)| Rung { network: power(from), coils, ..Rung::default() })
         .collect();
     network
 }
 
 fn contact(operand: &str) -> Element {
-    Element::Contact(Contact {
-        kind: ContactKind::NormallyOpen,
-        operand: Name::from(operand),
-    })
+    Element::Contact(Contact { kind: ContactKind::NormallyOpen, operand: Name::from(operand) })
 }

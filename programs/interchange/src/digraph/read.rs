@@ -35,10 +35,7 @@ pub(super) fn read(text: &str) -> Reading {
     }
     let mut diagnostics = reader.diagnostics;
     diagnostics.sort_by_key(|found| found.span.start);
-    Reading {
-        program: (!has_errors(&diagnostics)).then_some(program),
-        diagnostics,
-    }
+    Reading { program: (!has_errors(&diagnostics)).then_some(program), diagnostics }
 }
 
 #[derive(Default)]
@@ -50,8 +47,7 @@ struct Reader {
 
 impl Reader {
     fn error(&mut self, code: &'static str, message: impl Into<String>, span: Range<usize>) {
-        self.diagnostics
-            .push(Diagnostic::error(code, message, span));
+        self.diagnostics.push(Diagnostic::error(code, message, span));
     }
 
     /// Reports the children and attributes of `node` that are not read.
@@ -69,32 +65,21 @@ impl Reader {
         for attribute in node.attributes() {
             let name = attribute.name();
             if attribute.namespace().is_none() && !attributes.contains(&name) {
-                found.push((
-                    format!("the attribute `{name}` is not read here"),
-                    attribute.range(),
-                ));
+                found.push((format!("the attribute `{name}` is not read here"), attribute.range()));
             }
         }
         for (message, span) in found {
-            self.diagnostics
-                .push(Diagnostic::warning("U1066", message, span));
+            self.diagnostics.push(Diagnostic::warning("U1066", message, span));
         }
     }
 
     fn diagram(&mut self, root: Node<'_, '_>) -> Program {
         if root.tag_name().name() != "LadderDiagram" {
-            let message = format!(
-                "expected a LadderDiagram, found `{}`",
-                root.tag_name().name()
-            );
+            let message = format!("expected a LadderDiagram, found `{}`", root.tag_name().name());
             self.error("U1060", message, xml::start_tag(root));
             return Program::default();
         }
-        self.only(
-            root,
-            &["Comment", "Signals", "Graph", "Footer"],
-            &["name", "description"],
-        );
+        self.only(root, &["Comment", "Signals", "Graph", "Footer"], &["name", "description"]);
         let name = xml::attribute(root, "name").unwrap_or_else(|| Name::from("ladder"));
         let mut program = Program {
             name: self.names.legal(&name, &mut self.diagnostics),
@@ -240,13 +225,7 @@ impl Reader {
 
     /// Adds the rungs of a graph, with what feeds its blocks.
     fn rung(&mut self, node: Node<'_, '_>, found: Network, program: &mut Program) {
-        let Network {
-            before,
-            bits,
-            series,
-            coils,
-            after,
-        } = found;
+        let Network { before, bits, series, coils, after } = found;
         program.memory.extend(bits.into_iter().map(Signal::new));
         let mut own = Rung {
             title: node.attribute("title").map(str::to_owned),
@@ -295,10 +274,7 @@ impl Reader {
                         }
                         bits.extend(found.bits);
                         self.feed(&mut found.series, first, bits);
-                        block.pins.push(Feed {
-                            pin: Name::at(*pin, span),
-                            network: found.series,
-                        });
+                        block.pins.push(Feed { pin: Name::at(*pin, span), network: found.series });
                     }
                 }
                 Element::Contact(_) | Element::Comparison(_) => {}
@@ -309,20 +285,12 @@ impl Reader {
 
 fn has_block(element: &Element) -> bool {
     let mut found = false;
-    visit(&vec![element.clone()], &mut |element| {
-        found |= matches!(element, Element::Block(_))
-    });
+    visit(&vec![element.clone()], &mut |element| found |= matches!(element, Element::Block(_)));
     found
 }
 
 fn comments(node: Node<'_, '_>, name: &str) -> Vec<String> {
     xml::children(node, name)
-        .map(|comment| {
-            xml::text(comment)
-                .as_str()
-                .split_whitespace()
-                .collect::<Vec<_>>()
-                .join(" ")
-        })
+        .map(|comment| xml::text(comment).as_str().split_whitespace().collect::<Vec<_>>().join(" "))
         .collect()
 }

@@ -18,11 +18,9 @@ pub fn write(program: &Program) -> String {
     lines(&mut text, 1, "Comment", &program.comments);
     text.push_str("  <Signals>\n");
     let mut addresses = HashMap::new();
-    for (role, signals) in [
-        ("input", &program.inputs),
-        ("output", &program.outputs),
-        ("memory", &program.memory),
-    ] {
+    for (role, signals) in
+        [("input", &program.inputs), ("output", &program.outputs), ("memory", &program.memory)]
+    {
         for signal in signals {
             declaration(&mut text, role, signal);
             if let Some(address) = &signal.address {
@@ -47,27 +45,15 @@ fn attribute(text: &mut String, name: &str, value: Option<&str>) {
 
 fn lines(text: &mut String, depth: usize, element: &str, lines: &[String]) {
     for line in lines {
-        let _ = writeln!(
-            text,
-            "{:1$}<{element}>{2}</{element}>",
-            "",
-            2 * depth,
-            escaped(line)
-        );
+        let _ = writeln!(text, "{:1$}<{element}>{2}</{element}>", "", 2 * depth, escaped(line));
     }
 }
 
 fn declaration(text: &mut String, role: &str, signal: &Signal) {
-    let _ = write!(
-        text,
-        "    <Signal role=\"{role}\" name=\"{}\"",
-        escaped(&signal.name)
-    );
+    let _ = write!(text, "    <Signal role=\"{role}\" name=\"{}\"", escaped(&signal.name));
     let address = signal.address.as_ref().map(Address::to_string);
     attribute(text, "address", address.as_deref());
-    let initial = signal
-        .initial
-        .map(|initial| if initial { "1" } else { "0" });
+    let initial = signal.initial.map(|initial| if initial { "1" } else { "0" });
     attribute(text, "initial", initial);
     attribute(text, "description", signal.description.as_deref());
     if signal.comments.is_empty() {
@@ -90,12 +76,7 @@ fn address_text(address: &Address) -> String {
 fn write_graph(text: &mut String, graph: &Digraph, addresses: &HashMap<&str, String>) {
     let _ = write!(text, "  <Graph graphNumber=\"{}\"", graph.number);
     if let Some((block, pin)) = &graph.feeds {
-        let _ = write!(
-            text,
-            " block=\"{}\" pin=\"{}\"",
-            escaped(block),
-            escaped(pin)
-        );
+        let _ = write!(text, " block=\"{}\" pin=\"{}\"", escaped(block), escaped(pin));
     }
     attribute(text, "title", graph.title.as_deref());
     text.push_str(">\n");
@@ -125,14 +106,8 @@ fn write_edge(text: &mut String, edge: &Edge, addresses: &HashMap<&str, String>)
         }
         Label::Block(name, kind) => {
             let mut more = vec![("block", kind.word().to_owned())];
-            more.extend(
-                kind.preset_time()
-                    .map(|time| ("preset", duration::text(time))),
-            );
-            more.extend(
-                kind.preset_value()
-                    .map(|value| ("preset", value.to_string())),
-            );
+            more.extend(kind.preset_time().map(|time| ("preset", duration::text(time))));
+            more.extend(kind.preset_value().map(|value| ("preset", value.to_string())));
             (name.to_string(), more)
         }
     };
@@ -142,10 +117,7 @@ fn write_edge(text: &mut String, edge: &Edge, addresses: &HashMap<&str, String>)
     };
     element("from", &edge.from.to_string());
     element("to", &edge.to.to_string());
-    element(
-        "address",
-        addresses.get(symbol.as_str()).map_or("", String::as_str),
-    );
+    element("address", addresses.get(symbol.as_str()).map_or("", String::as_str));
     element("symbol", &symbol);
     for (name, content) in more {
         element(name, &content);

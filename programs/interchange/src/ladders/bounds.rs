@@ -56,17 +56,11 @@ impl Interval {
             join(self.high, other.low),
             join(self.high, other.high),
         ];
-        all.into_iter()
-            .map(|value| Self::new(value, value))
-            .reduce(Self::hull)
-            .unwrap_or(self)
+        all.into_iter().map(|value| Self::new(value, value)).reduce(Self::hull).unwrap_or(self)
     }
 
     pub(super) fn plus(self, other: Self) -> Self {
-        Self::new(
-            self.low.saturating_add(other.low),
-            self.high.saturating_add(other.high),
-        )
+        Self::new(self.low.saturating_add(other.low), self.high.saturating_add(other.high))
     }
 
     pub(super) fn negated(self) -> Self {
@@ -78,9 +72,7 @@ impl Interval {
     }
 
     pub(super) fn quotient(self, by: i64) -> Self {
-        self.corners(Self::just(by), |number, by| {
-            number.checked_div(by).unwrap_or(0)
-        })
+        self.corners(Self::just(by), |number, by| number.checked_div(by).unwrap_or(0))
     }
 
     pub(super) fn remainder(self, by: i64) -> Self {
@@ -107,11 +99,7 @@ impl Interval {
     pub(super) fn of_bits(self) -> Self {
         let (width, signed) = self.width();
         let all = 1_i128 << width.min(120);
-        if signed {
-            Self::new(-all / 2, all / 2 - 1)
-        } else {
-            Self::new(0, all - 1)
-        }
+        if signed { Self::new(-all / 2, all / 2 - 1) } else { Self::new(0, all - 1) }
     }
 }
 
@@ -188,15 +176,12 @@ struct Analysis<'a> {
 
 impl<'a> Analysis<'a> {
     fn new(program: &'a Resolved) -> Self {
-        let seen = program
-            .cells
-            .iter()
-            .map(|cell| match (cell.kind, cell.role) {
-                (Kind::Truth, _) => Interval::just(0),
-                // What comes from outside is whatever its bits say.
-                (Kind::Number { declared, .. }, Role::Input) => Interval::of(declared).of_bits(),
-                (Kind::Number { .. }, _) => Interval::just(cell.initial),
-            });
+        let seen = program.cells.iter().map(|cell| match (cell.kind, cell.role) {
+            (Kind::Truth, _) => Interval::just(0),
+            // What comes from outside is whatever its bits say.
+            (Kind::Number { declared, .. }, Role::Input) => Interval::of(declared).of_bits(),
+            (Kind::Number { .. }, _) => Interval::just(cell.initial),
+        });
         let mut named = BTreeSet::new();
         let mut choices = 0;
         walk(&program.steps, &mut |step| match &step.action {
@@ -204,9 +189,7 @@ impl<'a> Analysis<'a> {
             Action::SetNumber(_, number) => constants(number, &mut named),
             Action::If(branches, _) => {
                 choices += branches.len();
-                branches
-                    .iter()
-                    .for_each(|(truth, _)| constants_of_truth(truth, &mut named));
+                branches.iter().for_each(|(truth, _)| constants_of_truth(truth, &mut named));
             }
             Action::Block { .. } | Action::Timer { .. } => {}
         });
@@ -228,16 +211,12 @@ impl<'a> Analysis<'a> {
     }
 
     fn whole(&self) -> Vec<Interval> {
-        (0..self.seen.len())
-            .map(|cell| self.type_of(cell).hull(self.seen[cell]))
-            .collect()
+        (0..self.seen.len()).map(|cell| self.type_of(cell).hull(self.seen[cell])).collect()
     }
 
     fn numbers(&self) -> impl Iterator<Item = usize> {
         let cells = self.program.cells.iter().enumerate();
-        cells
-            .filter(|(_, cell)| matches!(cell.kind, Kind::Number { .. }))
-            .map(|(place, _)| place)
+        cells.filter(|(_, cell)| matches!(cell.kind, Kind::Number { .. })).map(|(place, _)| place)
     }
 
     fn whole_of(&self, start: &Present) -> Present {
@@ -256,19 +235,11 @@ impl<'a> Analysis<'a> {
             let next = &mut widened[cell];
             if new.high > old.high {
                 let above = self.thresholds.iter().find(|value| **value >= new.high);
-                next.high = above
-                    .map_or(all.high, |value| (*value).min(all.high))
-                    .max(new.high);
+                next.high = above.map_or(all.high, |value| (*value).min(all.high)).max(new.high);
             }
             if new.low < old.low {
-                let below = self
-                    .thresholds
-                    .iter()
-                    .rev()
-                    .find(|value| **value <= new.low);
-                next.low = below
-                    .map_or(all.low, |value| (*value).max(all.low))
-                    .min(new.low);
+                let below = self.thresholds.iter().rev().find(|value| **value <= new.low);
+                next.low = below.map_or(all.low, |value| (*value).max(all.low)).min(new.low);
             }
         }
         widened
@@ -341,15 +312,13 @@ fn evaluate(number: &Number, present: &Present) -> Interval {
     match number {
         Number::Constant(value) => Interval::just(*value),
         Number::Cell(cell) => present[*cell],
-        Number::Sum(parts) => parts
-            .iter()
-            .fold(Interval::just(0), |sum, (negative, part)| {
-                let part = evaluate(part, present);
-                sum.plus(if *negative { part.negated() } else { part })
-            }),
-        Number::Product(factors) => factors.iter().fold(Interval::just(1), |product, factor| {
-            product.times(evaluate(factor, present))
+        Number::Sum(parts) => parts.iter().fold(Interval::just(0), |sum, (negative, part)| {
+            let part = evaluate(part, present);
+            sum.plus(if *negative { part.negated() } else { part })
         }),
+        Number::Product(factors) => factors
+            .iter()
+            .fold(Interval::just(1), |product, factor| product.times(evaluate(factor, present))),
         Number::Quotient(number, by) => evaluate(number, present).quotient(*by),
         Number::Remainder(number, by) => evaluate(number, present).remainder(*by),
         Number::Wrapped(number, range) => {
@@ -392,11 +361,7 @@ fn refine(truth: &Truth, holds: bool, present: &mut Present) {
             }
         }
         (Truth::Compare(relation, left, right), _) => {
-            let relation = if holds {
-                *relation
-            } else {
-                relation.opposite()
-            };
+            let relation = if holds { *relation } else { relation.opposite() };
             if let Number::Cell(cell) = **left {
                 let bound = evaluate(right, present);
                 narrow(&mut present[cell], relation, bound);
@@ -436,11 +401,7 @@ fn narrow(interval: &mut Interval, relation: Relation, bound: Interval) {
 fn constants(number: &Number, named: &mut BTreeSet<i128>) {
     match number {
         Number::Constant(value) => {
-            named.extend([
-                i128::from(*value) - 1,
-                i128::from(*value),
-                i128::from(*value) + 1,
-            ]);
+            named.extend([i128::from(*value) - 1, i128::from(*value), i128::from(*value) + 1]);
         }
         Number::Cell(_) => {}
         Number::Sum(parts) => parts.iter().for_each(|(_, part)| constants(part, named)),
@@ -460,9 +421,7 @@ fn constants_of_truth(truth: &Truth, named: &mut BTreeSet<i128>) {
     match truth {
         Truth::Not(inner) => constants_of_truth(inner, named),
         Truth::All(parts) | Truth::Any(parts) | Truth::Odd(parts) => {
-            parts
-                .iter()
-                .for_each(|part| constants_of_truth(part, named));
+            parts.iter().for_each(|part| constants_of_truth(part, named));
         }
         Truth::Compare(_, left, right) => {
             constants(left, named);

@@ -52,9 +52,8 @@ impl BlockFacts {
 }
 
 /// The standard blocks of the ladder.
-pub(super) const STANDARD: [&str; 10] = [
-    "TON", "TOF", "TP", "CTU", "CTD", "CTUD", "SR", "RS", "R_TRIG", "F_TRIG",
-];
+pub(super) const STANDARD: [&str; 10] =
+    ["TON", "TOF", "TP", "CTU", "CTD", "CTUD", "SR", "RS", "R_TRIG", "F_TRIG"];
 
 /// Boolean inputs of a standard block, the wire's first.
 pub(super) fn inputs(word: &str) -> &'static [&'static str] {

@@ -15,8 +15,7 @@ pub(super) fn lost(text: &str, file: &File, program: &Program) -> Vec<Diagnostic
     let declared = |name: &str| {
         let units = file.units.iter().flat_map(|unit| &unit.declarations);
         let mut all = units.chain(&file.globals);
-        all.find(|found| found.name.is(name))
-            .map_or(0..0, |found| found.name.span())
+        all.find(|found| found.name.is(name)).map_or(0..0, |found| found.name.span())
     };
     let warning = |message: String, span| Diagnostic::warning("U1055", message, span);
     let mut found = Vec::new();
@@ -63,11 +62,7 @@ pub(super) fn lost(text: &str, file: &File, program: &Program) -> Vec<Diagnostic
         }
     }
     // The parts of a document are reported by their counts.
-    if !text
-        .trim_start_matches('\u{feff}')
-        .trim_start()
-        .starts_with('<')
-    {
+    if !text.trim_start_matches('\u{feff}').trim_start().starts_with('<') {
         found.extend(unused(text, file));
     }
     found
@@ -92,15 +87,9 @@ fn has_others(program: &Program, of: &Type) -> bool {
 fn unused(text: &str, file: &File) -> Option<Diagnostic> {
     let belongs = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
     let mut places: HashMap<String, Vec<usize>> = HashMap::new();
-    for word in text
-        .split(|letter| !belongs(letter))
-        .filter(|word| !word.is_empty())
-    {
+    for word in text.split(|letter| !belongs(letter)).filter(|word| !word.is_empty()) {
         let place = word.as_ptr() as usize - text.as_ptr() as usize;
-        places
-            .entry(word.to_ascii_uppercase())
-            .or_default()
-            .push(place);
+        places.entry(word.to_ascii_uppercase()).or_default().push(place);
     }
     let is_named = |name: &Name, own: &Range<usize>| {
         let found = places.get(&name.key());
@@ -117,10 +106,7 @@ fn unused(text: &str, file: &File) -> Option<Diagnostic> {
             TypeKind::Enumeration(values, _) => values.as_slice(),
             _ => &[],
         };
-        let mut names = values
-            .iter()
-            .map(|(name, _)| name)
-            .chain([&definition.name]);
+        let mut names = values.iter().map(|(name, _)| name).chain([&definition.name]);
         if !names.any(|name| is_named(name, &name.span())) {
             unused.push(&definition.name);
         }

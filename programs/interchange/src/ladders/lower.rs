@@ -73,9 +73,7 @@ pub(super) fn signals(cell: &Cell, interval: Interval) -> Vec<String> {
         Kind::Truth => vec![cell.name.clone()],
         Kind::Number { .. } => {
             let (width, _) = interval.width();
-            (0..width)
-                .map(|place| format!("{}.{place}", cell.name))
-                .collect()
+            (0..width).map(|place| format!("{}.{place}", cell.name)).collect()
         }
     }
 }
@@ -131,22 +129,13 @@ impl Lowering<'_> {
             }
             return;
         }
-        if let Action::Block {
-            name,
-            kind,
-            wire,
-            feeds,
-        } = &step.action
-        {
+        if let Action::Block { name, kind, wire, feeds } = &step.action {
             self.place = step.span.clone();
             let wire = self.truth(wire);
-            let fed: Vec<(&'static str, Expression)> = feeds
-                .iter()
-                .map(|(pin, truth)| (*pin, self.truth(truth)))
-                .collect();
+            let fed: Vec<(&'static str, Expression)> =
+                feeds.iter().map(|(pin, truth)| (*pin, self.truth(truth))).collect();
             self.rungs.comment(&step.comments);
-            self.rungs
-                .block(&self.graph, &self.leaves, name, *kind, wire, &fed);
+            self.rungs.block(&self.graph, &self.leaves, name, *kind, wire, &fed);
         } else {
             self.step(step);
             walk(std::slice::from_ref(step), &mut |step| {
@@ -241,26 +230,18 @@ impl Lowering<'_> {
     }
 
     fn choice(&mut self, branches: &[(Truth, Vec<Step>)], otherwise: &[Step]) {
-        let conditions: Vec<Expression> = branches
-            .iter()
-            .map(|(condition, _)| self.truth(condition))
-            .collect();
+        let conditions: Vec<Expression> =
+            branches.iter().map(|(condition, _)| self.truth(condition)).collect();
         let mut results = Vec::new();
-        for steps in branches
-            .iter()
-            .map(|(_, branch)| branch.as_slice())
-            .chain([otherwise])
-        {
+        for steps in branches.iter().map(|(_, branch)| branch.as_slice()).chain([otherwise]) {
             self.overlays.push(HashMap::new());
             for step in steps {
                 self.step(step);
             }
             results.push(self.overlays.pop().unwrap_or_default());
         }
-        let written: BTreeSet<usize> = results
-            .iter()
-            .flat_map(|result| result.keys().copied())
-            .collect();
+        let written: BTreeSet<usize> =
+            results.iter().flat_map(|result| result.keys().copied()).collect();
         for cell in written {
             let base = if self.cells[cell].role == Role::Passing {
                 Value::Truth(self.graph.constant(false))
@@ -302,21 +283,12 @@ impl Lowering<'_> {
 
     /// What the cell holds here.
     fn present(&mut self, cell: usize) -> Value {
-        if let Some(value) = self
-            .overlays
-            .iter()
-            .rev()
-            .find_map(|overlay| overlay.get(&cell))
-        {
+        if let Some(value) = self.overlays.iter().rev().find_map(|overlay| overlay.get(&cell)) {
             return value.clone();
         }
         let content = &self.cells[cell];
         let fixed = !self.written[cell] && content.role != Role::Input;
-        let known = self
-            .known
-            .get(&cell)
-            .copied()
-            .or(fixed.then_some(content.initial));
+        let known = self.known.get(&cell).copied().or(fixed.then_some(content.initial));
         let interval = self.intervals[cell];
         match (content.kind, known) {
             (Kind::Truth, Some(value)) => Value::Truth(self.graph.constant(value == 1)),
@@ -329,13 +301,8 @@ impl Lowering<'_> {
             ),
             (Kind::Number { .. }, None) => {
                 let names = signals(content, interval);
-                let bits = names
-                    .into_iter()
-                    .map(|name| self.variable(Leaf::Signal(name)));
-                Value::Number(Bits {
-                    bits: bits.collect(),
-                    interval,
-                })
+                let bits = names.into_iter().map(|name| self.variable(Leaf::Signal(name)));
+                Value::Number(Bits { bits: bits.collect(), interval })
             }
         }
     }

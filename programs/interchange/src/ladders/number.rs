@@ -19,10 +19,7 @@ impl Bits {
         let interval = Interval::just(value);
         let (width, _) = interval.width();
         let bits = (0..width).map(|place| graph.constant(value >> place.min(63) & 1 == 1));
-        Self {
-            bits: bits.collect(),
-            interval,
-        }
+        Self { bits: bits.collect(), interval }
     }
 
     /// Its value where all bits are constant.
@@ -58,10 +55,7 @@ impl Bits {
     /// Stored in a place for `interval`; what does not fit wraps around.
     pub(super) fn stored(&self, graph: &mut Graph, interval: Interval) -> Self {
         let (width, _) = interval.width();
-        Self {
-            bits: self.extended(graph, width),
-            interval,
-        }
+        Self { bits: self.extended(graph, width), interval }
     }
 
     pub(super) fn plus(&self, graph: &mut Graph, other: &Self) -> Self {
@@ -101,10 +95,7 @@ impl Bits {
             interval: other.interval,
         };
         let carry = graph.constant(true);
-        let left = Self {
-            bits: self.extended(graph, width),
-            interval: self.interval,
-        };
+        let left = Self { bits: self.extended(graph, width), interval: self.interval };
         left.added(graph, &inverted, carry, interval)
     }
 
@@ -115,10 +106,7 @@ impl Bits {
         let right = other.extended(graph, width);
         // Of no more bits than the result, whatever the signs are: two's complement is arithmetic modulo 2^width.
         let zero = graph.constant(false);
-        let mut sum = Self {
-            bits: vec![zero; width],
-            interval,
-        };
+        let mut sum = Self { bits: vec![zero; width], interval };
         for (place, factor) in right.into_iter().enumerate() {
             let mut bits = vec![zero; place];
             for bit in &left[..width - place] {
@@ -152,9 +140,7 @@ impl Bits {
         let other = other.extended(graph, width);
         let bits = own.into_iter().zip(other);
         Self {
-            bits: bits
-                .map(|(own, other)| choose(graph, condition, other, own))
-                .collect(),
+            bits: bits.map(|(own, other)| choose(graph, condition, other, own)).collect(),
             interval,
         }
     }
@@ -178,23 +164,15 @@ impl Bits {
             let (width, _) = Interval::new(0, 2 * divisor - 1).width();
             let zero = graph.constant(false);
             shifted.resize(width, zero);
-            let shifted = Self {
-                bits: shifted,
-                interval: Interval::new(0, 2 * divisor - 1),
-            };
+            let shifted = Self { bits: shifted, interval: Interval::new(0, 2 * divisor - 1) };
             let divisor_bits = Self::constant(graph, i64::try_from(divisor).unwrap_or(i64::MAX));
             let fits = shifted.compare(graph, Relation::GreaterOrEqual, &divisor_bits);
             let less = shifted.minus(graph, &divisor_bits);
-            rest = shifted
-                .chosen(graph, fits, &less)
-                .stored(graph, Interval::new(0, divisor - 1));
+            rest = shifted.chosen(graph, fits, &less).stored(graph, Interval::new(0, divisor - 1));
             bits.push(fits);
         }
         bits.reverse();
-        let quotient = Self {
-            bits,
-            interval: positive.interval,
-        };
+        let quotient = Self { bits, interval: positive.interval };
         let quotient = quotient.stored(graph, Interval::new(0, most / divisor));
         let negative_divisor = graph.constant(by < 0);
         let quotient_sign = graph.xor(sign, negative_divisor);
@@ -219,11 +197,7 @@ impl Bits {
                     let equal = graph.not(differs);
                     same = graph.and(same, equal);
                 }
-                if relation == Relation::Equal {
-                    same
-                } else {
-                    graph.not(same)
-                }
+                if relation == Relation::Equal { same } else { graph.not(same) }
             }
             Relation::Less => self.less(graph, other),
             Relation::Greater => other.less(graph, self),
@@ -251,11 +225,8 @@ impl Bits {
         let mut less = graph.constant(false);
         let width = left.len();
         for (place, (left, right)) in left.into_iter().zip(right).enumerate() {
-            let (low, high) = if signed && place + 1 == width {
-                (right, left)
-            } else {
-                (left, right)
-            };
+            let (low, high) =
+                if signed && place + 1 == width { (right, left) } else { (left, right) };
             less = smaller(graph, low, high, less);
         }
         less
@@ -308,10 +279,7 @@ mod tests {
             let place = u32::try_from(place).expect("a small width");
             graph.variable(Variable::Input(first + place))
         });
-        Bits {
-            bits: bits.collect(),
-            interval,
-        }
+        Bits { bits: bits.collect(), interval }
     }
 
     fn value(graph: &Graph, number: &Bits, assignment: u64) -> i128 {
@@ -324,11 +292,7 @@ mod tests {
         };
         (0..width).fold(0, |sum, place| {
             let weight = 1_i128 << place;
-            let weight = if signed && place + 1 == width {
-                -weight
-            } else {
-                weight
-            };
+            let weight = if signed && place + 1 == width { -weight } else { weight };
             sum + if bit(place) { weight } else { 0 }
         })
     }
@@ -336,17 +300,8 @@ mod tests {
     /// All pairs of numbers of all signs and of up to four bits.
     #[test]
     fn calculates_as_whole_numbers_do() {
-        let intervals = [
-            (0, 0),
-            (0, 1),
-            (0, 5),
-            (0, 7),
-            (-1, 0),
-            (-4, 3),
-            (-3, 7),
-            (-8, -2),
-            (2, 6),
-        ];
+        let intervals =
+            [(0, 0), (0, 1), (0, 5), (0, 7), (-1, 0), (-4, 3), (-3, 7), (-8, -2), (2, 6)];
         for (low, high) in intervals {
             for (other_low, other_high) in intervals {
                 let left_interval = Interval::new(low, high);
@@ -359,9 +314,8 @@ mod tests {
                 let product = left.times(&mut graph, &right);
                 let less = left.compare(&mut graph, Relation::Less, &right);
                 let equal = left.compare(&mut graph, Relation::Equal, &right);
-                let divided: Vec<_> = [1, 2, 3, -2, 5, 9]
-                    .map(|by| (by, left.divided(&mut graph, by)))
-                    .into();
+                let divided: Vec<_> =
+                    [1, 2, 3, -2, 5, 9].map(|by| (by, left.divided(&mut graph, by))).into();
                 for a in low..=high {
                     for b in other_low..=other_high {
                         let bits = |value: i128| u64::try_from(value & 31).expect("5 bits");

@@ -89,15 +89,11 @@ impl Number {
             Self::Constant(value) => Some(*value),
             Self::Sum(parts) => parts.iter().try_fold(0_i64, |sum, (negative, part)| {
                 let value = part.constant()?;
-                if *negative {
-                    sum.checked_sub(value)
-                } else {
-                    sum.checked_add(value)
-                }
+                if *negative { sum.checked_sub(value) } else { sum.checked_add(value) }
             }),
-            Self::Product(factors) => factors.iter().try_fold(1_i64, |product, factor| {
-                product.checked_mul(factor.constant()?)
-            }),
+            Self::Product(factors) => factors
+                .iter()
+                .try_fold(1_i64, |product, factor| product.checked_mul(factor.constant()?)),
             Self::Quotient(number, by) => number.constant()?.checked_div(*by),
             Self::Remainder(number, by) => number.constant()?.checked_rem(*by),
             Self::Cell(_) | Self::Choice(..) | Self::Wrapped(..) => None,

@@ -115,9 +115,7 @@ fn is_stop(word: &str, wire: &Truth) -> bool {
 
 fn has_timers(steps: &[Step]) -> bool {
     let mut found = false;
-    walk(steps, &mut |step| {
-        found |= matches!(step.action, Action::Timer { .. })
-    });
+    walk(steps, &mut |step| found |= matches!(step.action, Action::Timer { .. }));
     found
 }
 
@@ -132,11 +130,7 @@ impl Placing {
         let mut sum = Counted::new();
         for step in steps {
             let found = match &step.action {
-                Action::Timer {
-                    timer,
-                    wire,
-                    preset,
-                } => {
+                Action::Timer { timer, wire, preset } => {
                     let stops = is_stop(timers[*timer].word, wire);
                     let calls = Calls {
                         running: usize::from(!stops),
@@ -209,13 +203,7 @@ impl Placing {
             let blocks = blocks.collect();
             clocks.push(Clock { preset, blocks });
         }
-        let plan = Plan {
-            word,
-            started: timer.started,
-            output: timer.output,
-            clocks,
-            second,
-        };
+        let plan = Plan { word, started: timer.started, output: timer.output, clocks, second };
         self.plans.insert(number, plan);
     }
 
@@ -248,11 +236,9 @@ impl Placing {
         let mut pieces = Vec::new();
         for step in steps {
             match step.action {
-                Action::Timer {
-                    timer,
-                    wire,
-                    preset,
-                } => self.call(timer, wire, preset, &step.span, step.comments, &mut pieces),
+                Action::Timer { timer, wire, preset } => {
+                    self.call(timer, wire, preset, &step.span, step.comments, &mut pieces)
+                }
                 Action::If(branches, otherwise)
                     if has_timers(&otherwise)
                         || branches.iter().any(|(_, branch)| has_timers(branch)) =>
@@ -300,10 +286,7 @@ impl Placing {
             pieces.push(set(plan.output, Truth::Constant(false)));
             return;
         }
-        let chosen = plan
-            .clocks
-            .iter()
-            .find(|clock| Some(clock.preset) == preset);
+        let chosen = plan.clocks.iter().find(|clock| Some(clock.preset) == preset);
         let chosen = chosen.or(plan.clocks.first());
         let over = chosen.map_or(&[][..], |clock| &clock.blocks).iter();
         let over = Truth::Any(over.map(|(_, pin)| Truth::Cell(*pin)).collect());
@@ -347,12 +330,7 @@ impl Placing {
             for condition in &mut held {
                 let cell = self.bit("held", Role::Passing);
                 let mut parts = vec![condition.clone()];
-                parts.extend(
-                    before
-                        .iter()
-                        .cloned()
-                        .map(|held| Truth::Not(Box::new(held))),
-                );
+                parts.extend(before.iter().cloned().map(|held| Truth::Not(Box::new(held))));
                 pieces.push(step(Action::SetTruth(cell, Truth::All(parts))));
                 *condition = Truth::Cell(cell);
                 before.push(Truth::Cell(cell));
@@ -385,18 +363,12 @@ impl Placing {
                 return;
             };
             let place = place.clone();
-            let next = fronts
-                .into_iter()
-                .find(|(timer, (count, _))| waiting.get(timer) == Some(count));
+            let next =
+                fronts.into_iter().find(|(timer, (count, _))| waiting.get(timer) == Some(count));
             let Some((next, (_, span))) = next else {
                 let message =
                     "the timers of these branches are called in different orders".to_owned();
-                self.error(
-                    "U1050",
-                    message,
-                    place,
-                    "call them in the same order in every branch",
-                );
+                self.error("U1050", message, place, "call them in the same order in every branch");
                 return;
             };
             for body in &mut bodies {
@@ -421,11 +393,7 @@ impl Placing {
             return;
         };
         let mut push = |action| {
-            steps.push(Step {
-                action,
-                span: span.clone(),
-                comments: Vec::new(),
-            });
+            steps.push(Step { action, span: span.clone(), comments: Vec::new() });
         };
         let started = || Truth::Cell(plan.started);
         for clock in &plan.clocks {
@@ -442,12 +410,7 @@ impl Placing {
                     }
                     Some(second) => Truth::All(vec![started(), second]),
                 };
-                push(Action::Block {
-                    name: name.clone(),
-                    kind,
-                    wire,
-                    feeds: Vec::new(),
-                });
+                push(Action::Block { name: name.clone(), kind, wire, feeds: Vec::new() });
             }
             if let ("TP", [(_, pin)]) = (plan.word, clock.blocks.as_slice()) {
                 let runs = Truth::Any(vec![started(), Truth::Cell(*pin)]);

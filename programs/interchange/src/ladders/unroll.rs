@@ -139,9 +139,7 @@ impl<'a> Unrolling<'a> {
             resolved: Resolved::default(),
             cells: HashMap::new(),
             shown: HashSet::new(),
-            inputs: points
-                .map(|point| (64 * u64::from(point.slot), point.of))
-                .collect(),
+            inputs: points.map(|point| (64 * u64::from(point.slot), point.of)).collect(),
             blocks: HashMap::new(),
             timers: HashMap::new(),
             known: vec![HashMap::new()],
@@ -164,10 +162,7 @@ impl<'a> Unrolling<'a> {
                 return Err(self.refuse("it runs in some scans only"));
             }
             self.begin(task.routine, &[])?;
-            let context = Context {
-                routine: task.routine,
-                own: u64::from(task.own),
-            };
+            let context = Context { routine: task.routine, own: u64::from(task.own) };
             self.body(context)?;
         }
         self.resolved.steps = std::mem::take(&mut self.steps);
@@ -193,11 +188,7 @@ impl<'a> Unrolling<'a> {
     }
 
     fn refuse(&self, what: impl Into<String>) -> Refusal {
-        Refusal {
-            what: what.into(),
-            line: self.line,
-            code: "U1056",
-        }
+        Refusal { what: what.into(), line: self.line, code: "U1056" }
     }
 
     /// Cells of the variables that people see, in their order.
@@ -230,11 +221,7 @@ impl<'a> Unrolling<'a> {
             line => self.comments.remove(&line).unwrap_or_default(),
         };
         let line = self.line as usize;
-        self.steps.push(Step {
-            action,
-            span: line..line,
-            comments,
-        });
+        self.steps.push(Step { action, span: line..line, comments });
         Ok(())
     }
 
@@ -336,11 +323,8 @@ impl<'a> Unrolling<'a> {
             return (shape(&part.name), part.of);
         }
         let names = self.around.names;
-        let (list, slot) = if slot < state {
-            (&names.hidden, slot)
-        } else {
-            (&names.frames, slot - state)
-        };
+        let (list, slot) =
+            if slot < state { (&names.hidden, slot) } else { (&names.frames, slot - state) };
         let part = Program {
             variables: list.clone(),
             structures: self.program.structures.clone(),
@@ -432,10 +416,7 @@ fn drop_unread(steps: &mut Vec<Step>, kept: &HashSet<usize>) {
 fn kind_of(of: Elementary) -> Option<Kind> {
     match of {
         Elementary::Bool => Some(Kind::Truth),
-        _ => range_of(of).map(|wide| Kind::Number {
-            declared: wide,
-            wide,
-        }),
+        _ => range_of(of).map(|wide| Kind::Number { declared: wide, wide }),
     }
 }
 

@@ -10,9 +10,7 @@ use super::parse::{Counter, Element, Kind, Timer};
 pub(super) fn limits(rungs: &[Vec<Element>]) -> HashMap<String, Option<(i64, i64)>> {
     let mut limits = HashMap::new();
     let mut directions: HashMap<String, Counter> = HashMap::new();
-    rungs
-        .iter()
-        .for_each(|rung| find_limits(rung, &mut limits, &mut directions));
+    rungs.iter().for_each(|rung| find_limits(rung, &mut limits, &mut directions));
     limits
 }
 
@@ -35,9 +33,9 @@ fn find_limits(
                 see(limits, left, right.parse().ok());
                 see(limits, right, left.parse().ok());
             }
-            Kind::Calculate(_, to, left, right) => [to, left, right]
-                .into_iter()
-                .for_each(|name| see(limits, name, None)),
+            Kind::Calculate(_, to, left, right) => {
+                [to, left, right].into_iter().for_each(|name| see(limits, name, None))
+            }
             Kind::Timer(Timer::Retentive, name, _) => see(limits, name, None),
             Kind::Parallel(branches) => {
                 for branch in branches {

@@ -98,40 +98,22 @@ const REFUSED: [&str; 14] = [
 ];
 
 /// Comparisons and their signs.
-const COMPARISONS: [(&str, &str); 6] = [
-    ("EQU", "="),
-    ("NEQ", "<>"),
-    ("GRT", ">"),
-    ("GEQ", ">="),
-    ("LES", "<"),
-    ("LEQ", "<="),
-];
+const COMPARISONS: [(&str, &str); 6] =
+    [("EQU", "="), ("NEQ", "<>"), ("GRT", ">"), ("GEQ", ">="), ("LES", "<"), ("LEQ", "<=")];
 
 /// Lines above the program that say how LDmicro compiles it.
-const SETTINGS: [&str; 7] = [
-    "CRYSTAL", "BAUD", "COMPILED", "MICRO", "VERSION", "RATE", "CONFIG",
-];
+const SETTINGS: [&str; 7] = ["CRYSTAL", "BAUD", "COMPILED", "MICRO", "VERSION", "RATE", "CONFIG"];
 
 const CALCULATIONS: [(&str, char); 4] = [("ADD", '+'), ("SUB", '-'), ("MUL", '*'), ("DIV", '/')];
 
 /// Everything that can be read, and everything that is wrong.
 pub(super) fn parse(text: &str) -> (File, Vec<Diagnostic>) {
-    let mut parser = Parser {
-        lines: Vec::new(),
-        place: 0,
-        depth: 0,
-        elements: 0,
-        diagnostics: Vec::new(),
-    };
+    let mut parser =
+        Parser { lines: Vec::new(), place: 0, depth: 0, elements: 0, diagnostics: Vec::new() };
     if text.len() > MAXIMUM_BYTES {
-        let message = format!(
-            "the file has {} bytes; at most {MAXIMUM_BYTES} are read",
-            text.len()
-        );
-        return (
-            File::default(),
-            vec![Diagnostic::error("U1070", message, 0..0)],
-        );
+        let message =
+            format!("the file has {} bytes; at most {MAXIMUM_BYTES} are read", text.len());
+        return (File::default(), vec![Diagnostic::error("U1070", message, 0..0)]);
     }
     let mut start = 0;
     for line in text.split_inclusive('\n') {
@@ -157,8 +139,7 @@ struct Parser<'a> {
 
 impl<'a> Parser<'a> {
     fn error(&mut self, code: &'static str, message: impl Into<String>, span: Range<usize>) {
-        self.diagnostics
-            .push(Diagnostic::error(code, message, span));
+        self.diagnostics.push(Diagnostic::error(code, message, span));
     }
 
     fn next(&mut self) -> Option<(&'a str, Range<usize>)> {
@@ -174,20 +155,10 @@ impl<'a> Parser<'a> {
 
     fn file(&mut self) -> File {
         let mut file = File::default();
-        let is_known = self
-            .lines
-            .first()
-            .is_some_and(|(_, line)| line.starts_with("LDmicro"));
+        let is_known = self.lines.first().is_some_and(|(_, line)| line.starts_with("LDmicro"));
         if !is_known {
-            let span = self
-                .lines
-                .first()
-                .map_or(0..0, |(start, line)| *start..start + line.len());
-            self.error(
-                "U1070",
-                "a file of LDmicro begins with `LDmicro0.1` or the like",
-                span,
-            );
+            let span = self.lines.first().map_or(0..0, |(start, line)| *start..start + line.len());
+            self.error("U1070", "a file of LDmicro begins with `LDmicro0.1` or the like", span);
             return file;
         }
         self.place = 1;
@@ -200,9 +171,7 @@ impl<'a> Parser<'a> {
                 break;
             } else if let Some(cycle) = line.strip_prefix("CYCLE=") {
                 file.period = self.cycle(cycle, span);
-            } else if line
-                .split_once('=')
-                .is_some_and(|(name, _)| SETTINGS.contains(&name.trim()))
+            } else if line.split_once('=').is_some_and(|(name, _)| SETTINGS.contains(&name.trim()))
             {
                 // For the compiler of the microcontroller.
             } else {
@@ -233,19 +202,14 @@ impl<'a> Parser<'a> {
 
     /// In microseconds, with whatever follows the number.
     fn cycle(&mut self, text: &str, span: Range<usize>) -> Option<Duration> {
-        let digits = text
-            .trim_start()
-            .find(|letter: char| !letter.is_ascii_digit());
+        let digits = text.trim_start().find(|letter: char| !letter.is_ascii_digit());
         let digits = &text.trim_start()[..digits.unwrap_or(text.trim_start().len())];
         let period = digits.parse().ok().map(Duration::from_micros);
         let period = period.filter(|period| understudy_ladder::PERIODS.contains(period));
         if period.is_none() {
             self.error(
                 "U1072",
-                format!(
-                    "invalid cycle time `{}`: expected microseconds",
-                    shortened(text, 60)
-                ),
+                format!("invalid cycle time `{}`: expected microseconds", shortened(text, 60)),
                 span,
             );
         }
@@ -269,10 +233,7 @@ impl<'a> Parser<'a> {
                 }
                 None => self.error(
                     "U1071",
-                    format!(
-                        "invalid pin `{}`: expected a name and its pin",
-                        shortened(line, 60)
-                    ),
+                    format!("invalid pin `{}`: expected a name and its pin", shortened(line, 60)),
                     span,
                 ),
             }
@@ -361,28 +322,20 @@ impl<'a> Parser<'a> {
         };
         let found = match words[0] {
             "COMMENT" => {
-                let text = line["COMMENT".len()..]
-                    .replace("\\r", " ")
-                    .replace("\\n", " ");
-                Some(Kind::Comment(
-                    text.split_whitespace().collect::<Vec<_>>().join(" "),
-                ))
+                let text = line["COMMENT".len()..].replace("\\r", " ").replace("\\n", " ");
+                Some(Kind::Comment(text.split_whitespace().collect::<Vec<_>>().join(" ")))
             }
-            "CONTACTS" => own(1)
-                .zip(flag(2))
-                .map(|(name, negated)| Kind::Contacts(name, negated)),
-            "COIL" => own(1)
-                .zip(flag(2).zip(flag(3).zip(flag(4))))
-                .and_then(|(name, flags)| {
-                    let coil = match flags {
-                        (true, (false, false)) => Coil::Negated,
-                        (false, (true, false)) => Coil::Set,
-                        (false, (false, true)) => Coil::Reset,
-                        (false, (false, false)) => Coil::Plain,
-                        _ => return None,
-                    };
-                    Some(Kind::Coil(name, coil))
-                }),
+            "CONTACTS" => own(1).zip(flag(2)).map(|(name, negated)| Kind::Contacts(name, negated)),
+            "COIL" => own(1).zip(flag(2).zip(flag(3).zip(flag(4)))).and_then(|(name, flags)| {
+                let coil = match flags {
+                    (true, (false, false)) => Coil::Negated,
+                    (false, (true, false)) => Coil::Set,
+                    (false, (false, true)) => Coil::Reset,
+                    (false, (false, false)) => Coil::Plain,
+                    _ => return None,
+                };
+                Some(Kind::Coil(name, coil))
+            }),
             "SHORT" => Some(Kind::Wire(true)),
             "OPEN" => Some(Kind::Wire(false)),
             "OSR" => Some(Kind::Edge(Edge::Rising)),
@@ -402,15 +355,12 @@ impl<'a> Parser<'a> {
                     "PERSIST of `{}` is not kept: the state of a circuit is kept by its copies",
                     shortened(what, 60)
                 );
-                self.diagnostics
-                    .push(Diagnostic::warning("U1075", message, span.clone()));
+                self.diagnostics.push(Diagnostic::warning("U1075", message, span.clone()));
                 return None;
             }
             word => {
                 if let Some((_, sign)) = COMPARISONS.iter().find(|(known, _)| *known == word) {
-                    own(1)
-                        .zip(own(2))
-                        .map(|(left, right)| Kind::Compare(sign, left, right))
+                    own(1).zip(own(2)).map(|(left, right)| Kind::Compare(sign, left, right))
                 } else if let Some((_, sign)) =
                     CALCULATIONS.iter().find(|(known, _)| *known == word)
                 {
@@ -473,9 +423,6 @@ impl<'a> Parser<'a> {
 }
 
 fn counter(counter: Counter, name: Option<String>, value: Option<String>) -> Option<Kind> {
-    let value = value?
-        .parse()
-        .ok()
-        .filter(|value| (-0x8000..0x8000).contains(value))?;
+    let value = value?.parse().ok().filter(|value| (-0x8000..0x8000).contains(value))?;
     Some(Kind::Counter(counter, name?, value))
 }

@@ -25,8 +25,7 @@ impl Written {
     /// The line behind a place of the text.
     pub(super) fn place_of(&self, offset: usize) -> Range<usize> {
         let next = self.places.partition_point(|(start, _)| *start <= offset);
-        next.checked_sub(1)
-            .map_or(0..0, |place| self.places[place].1.clone())
+        next.checked_sub(1).map_or(0..0, |place| self.places[place].1.clone())
     }
 }
 
@@ -62,11 +61,7 @@ pub(super) fn statements(file: &File) -> (Written, Vec<Diagnostic>) {
         writer.line("rungs_run := TRUE;", &(0..0));
     }
     for rung in &file.rungs {
-        let rail = if writer.has_master {
-            "rungs_run"
-        } else {
-            "TRUE"
-        };
+        let rail = if writer.has_master { "rungs_run" } else { "TRUE" };
         writer.series(rung, rail.to_owned(), true);
     }
     writer.finish(file)
@@ -122,11 +117,7 @@ impl Writer {
     fn unique(&mut self, wanted: &str) -> String {
         let mut name = String::new();
         for letter in wanted.chars().take(100) {
-            let letter = if letter.is_ascii_alphanumeric() {
-                letter
-            } else {
-                '_'
-            };
+            let letter = if letter.is_ascii_alphanumeric() { letter } else { '_' };
             if !(letter == '_' && name.ends_with('_')) {
                 name.push(letter);
             }
@@ -135,11 +126,7 @@ impl Writer {
         let starts = name.starts_with(|first: char| first.is_ascii_alphabetic());
         // The words of the language, which LDmicro does not know, are no names.
         let is_word = understudy_structured_text::parser::is_keyword(name);
-        let base = if starts && !is_word {
-            name.to_owned()
-        } else {
-            format!("v_{name}")
-        };
+        let base = if starts && !is_word { name.to_owned() } else { format!("v_{name}") };
         let mut unique = base.clone();
         let mut count = 2;
         while !self.taken.insert(unique.to_ascii_uppercase()) {
@@ -166,13 +153,9 @@ impl Writer {
                 Use::Number => "a number",
                 Use::Timer => "a timer",
             };
-            let message = format!(
-                "`{name}` is {} elsewhere, and {} here",
-                words(found),
-                words(wanted)
-            );
-            self.diagnostics
-                .push(Diagnostic::error("U1074", message, span.clone()));
+            let message =
+                format!("`{name}` is {} elsewhere, and {} here", words(found), words(wanted));
+            self.diagnostics.push(Diagnostic::error("U1074", message, span.clone()));
         }
         known
     }
@@ -192,8 +175,7 @@ impl Writer {
             Ok(value) if (-0x8000..0x8000).contains(&value) => value.to_string(),
             Ok(value) => {
                 let message = format!("the number {value} needs more than 16 bits");
-                self.diagnostics
-                    .push(Diagnostic::error("U1072", message, span.clone()));
+                self.diagnostics.push(Diagnostic::error("U1072", message, span.clone()));
                 "0".into()
             }
             Err(_) => self.name(text, Use::Number, span),
@@ -234,14 +216,7 @@ impl Writer {
             }
             Kind::Contacts(name, negated) => {
                 let name = self.name(name, Use::Bit, span);
-                both(
-                    power,
-                    &if *negated {
-                        format!("NOT {name}")
-                    } else {
-                        name
-                    },
-                )
+                both(power, &if *negated { format!("NOT {name}") } else { name })
             }
             Kind::Wire(true) => power,
             Kind::Wire(false) => "FALSE".into(),
@@ -253,18 +228,13 @@ impl Writer {
                 self.acting(branches, power, is_last, span)
             }
             Kind::Parallel(branches) => {
-                let branches = branches
-                    .iter()
-                    .map(|branch| self.series(branch, "TRUE".into(), false));
+                let branches =
+                    branches.iter().map(|branch| self.series(branch, "TRUE".into(), false));
                 let branches: Vec<String> = branches.collect();
                 either(power, branches)
             }
             Kind::Coil(name, coil) => {
-                let power = if is_last {
-                    power
-                } else {
-                    self.held(power, span)
-                };
+                let power = if is_last { power } else { self.held(power, span) };
                 let name = self.name(name, Use::Bit, span);
                 let line = match coil {
                     Coil::Plain => format!("{name} := {power};"),
@@ -292,17 +262,9 @@ impl Writer {
         for branch in branches {
             let passed = self.series(branch, power.clone(), is_last);
             // What comes next may write what this branch has read.
-            behind.push(if is_last {
-                passed
-            } else {
-                self.held(passed, span)
-            });
+            behind.push(if is_last { passed } else { self.held(passed, span) });
         }
-        if is_last {
-            power
-        } else {
-            either("TRUE".into(), behind)
-        }
+        if is_last { power } else { either("TRUE".into(), behind) }
     }
 
     fn finish(mut self, file: &File) -> (Written, Vec<Diagnostic>) {
@@ -311,24 +273,14 @@ impl Writer {
         }
         let mut diagnostics = self.diagnostics;
         let mut head = String::from("PROGRAM ldmicro\n");
-        let pins: HashMap<&str, &str> = file
-            .pins
-            .iter()
-            .map(|(name, pin)| (name.as_str(), pin.as_str()))
-            .collect();
+        let pins: HashMap<&str, &str> =
+            file.pins.iter().map(|(name, pin)| (name.as_str(), pin.as_str())).collect();
         // Inputs and outputs that the list names come first, in its order.
         let mut names: Vec<(&String, &String)> = self.names.iter().collect();
-        let order: HashMap<&str, usize> = file
-            .pins
-            .iter()
-            .enumerate()
-            .map(|(place, (name, _))| (name.as_str(), place))
-            .collect();
+        let order: HashMap<&str, usize> =
+            file.pins.iter().enumerate().map(|(place, (name, _))| (name.as_str(), place)).collect();
         names.sort_by_key(|(name, _)| {
-            (
-                order.get(name.as_str()).copied().unwrap_or(usize::MAX),
-                (*name).clone(),
-            )
+            (order.get(name.as_str()).copied().unwrap_or(usize::MAX), (*name).clone())
         });
         for (section, first) in [("VAR_INPUT", "X"), ("VAR_OUTPUT", "Y"), ("VAR", "")] {
             let _ = writeln!(head, "  {section}");
@@ -366,14 +318,9 @@ impl Writer {
             diagnostics.push(Diagnostic::warning("U1075", message, place.clone()));
         }
         let shift = head.len();
-        let places = self
-            .places
-            .into_iter()
-            .map(|(start, span)| (start + shift, span));
-        let written = Written {
-            places: places.collect(),
-            text: format!("{head}{}END_PROGRAM\n", self.body),
-        };
+        let places = self.places.into_iter().map(|(start, span)| (start + shift, span));
+        let written =
+            Written { places: places.collect(), text: format!("{head}{}END_PROGRAM\n", self.body) };
         (written, diagnostics)
     }
 }
@@ -390,34 +337,24 @@ fn either(power: String, branches: Vec<String>) -> String {
     if branches.iter().any(|branch| branch == "TRUE") {
         return power;
     }
-    let branches: Vec<String> = branches
-        .into_iter()
-        .filter(|branch| branch != "FALSE")
-        .collect();
+    let branches: Vec<String> = branches.into_iter().filter(|branch| branch != "FALSE").collect();
     match branches.as_slice() {
         [] => "FALSE".into(),
         [one] => both(power, one),
         more => {
             let more: Vec<String> = more.iter().map(|branch| bracketed(branch)).collect();
             let joined = format!("({})", more.join(" OR "));
-            if power == "TRUE" {
-                joined
-            } else {
-                both(power, &joined)
-            }
+            if power == "TRUE" { joined } else { both(power, &joined) }
         }
     }
 }
 
 /// In brackets, where it is more than a name.
 fn bracketed(expression: &str) -> String {
-    let is_plain = expression
-        .bytes()
-        .all(|byte| byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'.'));
+    let is_plain =
+        expression.bytes().all(|byte| byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'.'));
     let is_closed = expression.starts_with("NOT ")
-        && expression[4..]
-            .bytes()
-            .all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
+        && expression[4..].bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
     let is_whole =
         expression.starts_with('(') && expression.ends_with(')') && !expression[1..].contains('(');
     if is_plain || is_closed || is_whole {

@@ -38,9 +38,7 @@ pub struct Note {
 
 impl Fidelity {
     pub(super) fn plan(&mut self, notes: Vec<(String, Range<usize>)>) {
-        let notes = notes
-            .into_iter()
-            .map(|(message, span)| Note { message, span });
+        let notes = notes.into_iter().map(|(message, span)| Note { message, span });
         self.notes.extend(notes);
     }
 
@@ -68,36 +66,22 @@ impl Fidelity {
         let in_file = |is: &dyn Fn(&Kind) -> bool| objects.iter().filter(|kind| is(kind)).count();
         let coils = program.rungs.iter().map(|rung| rung.coils.len()).sum();
         let signals = program.inputs.len() + program.outputs.len() + program.memory.len();
-        let comments: usize = program
-            .rungs
-            .iter()
-            .map(|rung| usize::from(!rung.comments.is_empty()))
-            .sum();
+        let comments: usize =
+            program.rungs.iter().map(|rung| usize::from(!rung.comments.is_empty())).sum();
         let mut contacts = 0;
         for rung in &program.rungs {
             visit(&rung.network, &mut |element| {
                 contacts += usize::from(matches!(element, Element::Contact(_)));
             });
         }
-        let count = |what, in_file, in_program| Count {
-            what,
-            in_file,
-            in_program,
-        };
+        let count = |what, in_file, in_program| Count { what, in_file, in_program };
         self.counts = vec![
             count(
                 "BOOL variables",
-                pou.variables
-                    .iter()
-                    .filter(|variable| variable.kind.is_bool())
-                    .count(),
+                pou.variables.iter().filter(|variable| variable.kind.is_bool()).count(),
                 signals,
             ),
-            count(
-                "contacts",
-                in_file(&|kind| matches!(kind, Kind::Contact(..))),
-                contacts,
-            ),
+            count("contacts", in_file(&|kind| matches!(kind, Kind::Contact(..))), contacts),
             count(
                 "coils and written variables",
                 in_file(&|kind| matches!(kind, Kind::Coil(..) | Kind::OutVariable(..))),
@@ -118,10 +102,7 @@ impl Fidelity {
         for other in &project.pous {
             if !used.iter().any(|known| known.name == other.name) {
                 let message = format!("the unit `{}` is not used by `{}`", other.name, pou.name);
-                self.notes.push(Note {
-                    message,
-                    span: other.name.span(),
-                });
+                self.notes.push(Note { message, span: other.name.span() });
             }
         }
         for global in &project.globals {
@@ -134,10 +115,7 @@ impl Fidelity {
                     "the global variable `{}`, which `{}` does not declare as external, is not kept",
                     global.name, pou.name
                 );
-                self.notes.push(Note {
-                    message,
-                    span: global.name.span(),
-                });
+                self.notes.push(Note { message, span: global.name.span() });
             }
         }
         self.notes.sort_by_key(|note| note.span.start);

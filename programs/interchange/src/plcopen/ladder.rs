@@ -64,22 +64,14 @@ pub(crate) fn draw(project: &Project, pou: &Pou, plan: &Plan, period: Duration) 
         drawing.flush_before(&step.action);
         drawing.comments.extend(step.comments.iter().cloned());
         match &step.action {
-            Action::Write {
-                targets,
-                power,
-                guard,
-            } => {
+            Action::Write { targets, power, guard } => {
                 if guard.is_some() {
                     drawing.general("a function with EN", step.span.clone());
                 }
                 drawing.write(targets, power, &step.span);
             }
             Action::Call(call) => drawing.call(call, &step.span),
-            Action::Keep {
-                object,
-                power,
-                guard,
-            } => {
+            Action::Keep { object, power, guard } => {
                 if guard.is_some() {
                     drawing.general("a function with EN", step.span.clone());
                 }
@@ -122,15 +114,11 @@ struct Drawing<'a> {
 
 impl Drawing<'_> {
     fn general(&mut self, what: impl Into<String>, span: Range<usize>) {
-        self.general.push(Ignored {
-            what: what.into(),
-            span,
-        });
+        self.general.push(Ignored { what: what.into(), span });
     }
 
     fn error(&mut self, code: &'static str, message: String, span: Range<usize>) {
-        self.diagnostics
-            .push(Diagnostic::error(code, message, span));
+        self.diagnostics.push(Diagnostic::error(code, message, span));
     }
 
     fn rung(&mut self, network: Series, coils: Vec<Coil>) {
@@ -169,10 +157,7 @@ impl Drawing<'_> {
             return name.clone();
         }
         let name = Name::from(self.scope.fresh(if value { "always" } else { "never" }));
-        self.program.memory.push(Signal {
-            initial: Some(value),
-            ..Signal::new(name.clone())
-        });
+        self.program.memory.push(Signal { initial: Some(value), ..Signal::new(name.clone()) });
         if value {
             self.always = Some(name.clone());
         } else {
@@ -182,10 +167,7 @@ impl Drawing<'_> {
     }
 
     fn constant_contact(&mut self, value: bool) -> Element {
-        Element::Contact(Contact {
-            kind: ContactKind::NormallyOpen,
-            operand: self.constant(value),
-        })
+        Element::Contact(Contact { kind: ContactKind::NormallyOpen, operand: self.constant(value) })
     }
 
     fn write(&mut self, targets: &[(Name, Modifier)], power: &Power, span: &Range<usize>) {
@@ -207,10 +189,7 @@ impl Drawing<'_> {
                     let what = format!(
                         "`{target}`, which shows a number or time of a block and which nothing reads,"
                     );
-                    self.ignored.push(Ignored {
-                        what,
-                        span: target.span(),
-                    });
+                    self.ignored.push(Ignored { what, span: target.span() });
                 }
                 Some(Binding::Instance(_)) => {
                     let message = format!("`{target}` is a block and cannot be written");

@@ -16,9 +16,7 @@ pub(crate) fn boolean(text: &str) -> Option<bool> {
 
 /// A whole number: `5`, `INT#5`, `16#1F`, `2#1010`, `1_000`.
 pub(crate) fn integer(text: &str) -> Option<i64> {
-    const TYPES: [&str; 8] = [
-        "SINT", "INT", "DINT", "LINT", "USINT", "UINT", "UDINT", "ULINT",
-    ];
+    const TYPES: [&str; 8] = ["SINT", "INT", "DINT", "LINT", "USINT", "UINT", "UDINT", "ULINT"];
     let text = text.trim();
     let bare = match text.split_once('#') {
         Some((name, rest)) if TYPES.contains(&name.to_ascii_uppercase().as_str()) => rest,
@@ -104,11 +102,7 @@ mod tests {
             ("T#1 s", None),
         ];
         for (text, microseconds) in times {
-            assert_eq!(
-                time(text),
-                microseconds.map(Duration::from_micros),
-                "{text}"
-            );
+            assert_eq!(time(text), microseconds.map(Duration::from_micros), "{text}");
         }
         let integers = [
             ("5", Some(5)),

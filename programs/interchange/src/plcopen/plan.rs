@@ -202,9 +202,7 @@ fn stale(graph: &Graph, links: &Links, plan: &Plan, trace: &Trace) -> HashSet<us
             Kind::InOutVariable(text, ..) => text.to_uppercase(),
             _ => continue,
         };
-        let instance = text
-            .split_once('.')
-            .map(|(instance, _)| format!("{instance}."));
+        let instance = text.split_once('.').map(|(instance, _)| format!("{instance}."));
         let asked = (trace.first[place], last[place]);
         if changed(&text, asked.0, asked.1)
             || instance.is_some_and(|instance| changed(&instance, asked.0, asked.1))
@@ -249,11 +247,8 @@ fn comments(graph: &Graph, plan: &mut Plan) {
         })
         .collect();
     comments.sort_by_key(|(place, _)| *place);
-    let places: HashMap<usize, (i64, i64)> = graph
-        .objects
-        .iter()
-        .map(|object| (object.span.start, object.position))
-        .collect();
+    let places: HashMap<usize, (i64, i64)> =
+        graph.objects.iter().map(|object| (object.span.start, object.position)).collect();
     let by_distance = comments.len().saturating_mul(plan.steps.len()) <= MAXIMUM_DISTANCES;
     for ((y, x), text) in comments {
         let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
@@ -261,17 +256,10 @@ fn comments(graph: &Graph, plan: &mut Plan) {
         let distance = |step: &Step| {
             let place = places.get(&step.span.start)?;
             let (right, down) = (place.0.saturating_sub(x), place.1.saturating_sub(y));
-            let sideways = if right < 0 {
-                right.saturating_mul(-8)
-            } else {
-                right
-            };
+            let sideways = if right < 0 { right.saturating_mul(-8) } else { right };
             (down >= 0).then(|| down.saturating_mul(2).saturating_add(sideways))
         };
-        let below = plan
-            .steps
-            .iter_mut()
-            .filter(|step| by_distance && distance(step).is_some());
+        let below = plan.steps.iter_mut().filter(|step| by_distance && distance(step).is_some());
         let below = below.min_by_key(|step| distance(step));
         match below {
             Some(step) => step.comments.extend(lines),

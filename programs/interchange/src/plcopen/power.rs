@@ -71,11 +71,7 @@ impl Power {
             Self::All(others) => parts.extend(others),
             one => parts.push(one),
         }
-        if parts.len() == 1 {
-            parts.remove(0)
-        } else {
-            Self::All(parts)
-        }
+        if parts.len() == 1 { parts.remove(0) } else { Self::All(parts) }
     }
 
     /// Parallel branches, of which those that begin alike share their beginning. None at all is no power.
@@ -147,11 +143,7 @@ fn join(series: Vec<Vec<Power>>) -> Power {
                 // A wire beside the rest: power passes anyway.
                 return head;
             }
-            let tail = if tails.len() == 1 {
-                series_of(tails.remove(0))
-            } else {
-                join(tails)
-            };
+            let tail = if tails.len() == 1 { series_of(tails.remove(0)) } else { join(tails) };
             head.and(tail)
         })
         .collect();

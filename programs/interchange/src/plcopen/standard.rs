@@ -11,64 +11,26 @@ pub(crate) struct StandardBlock {
 }
 
 const BLOCKS: [StandardBlock; 10] = [
-    StandardBlock {
-        word: "TON",
-        inputs: &["IN", "PT"],
-        outputs: &["Q", "ET"],
-    },
-    StandardBlock {
-        word: "TOF",
-        inputs: &["IN", "PT"],
-        outputs: &["Q", "ET"],
-    },
-    StandardBlock {
-        word: "TP",
-        inputs: &["IN", "PT"],
-        outputs: &["Q", "ET"],
-    },
-    StandardBlock {
-        word: "CTU",
-        inputs: &["CU", "R", "PV"],
-        outputs: &["Q", "CV"],
-    },
-    StandardBlock {
-        word: "CTD",
-        inputs: &["CD", "LD", "PV"],
-        outputs: &["Q", "CV"],
-    },
+    StandardBlock { word: "TON", inputs: &["IN", "PT"], outputs: &["Q", "ET"] },
+    StandardBlock { word: "TOF", inputs: &["IN", "PT"], outputs: &["Q", "ET"] },
+    StandardBlock { word: "TP", inputs: &["IN", "PT"], outputs: &["Q", "ET"] },
+    StandardBlock { word: "CTU", inputs: &["CU", "R", "PV"], outputs: &["Q", "CV"] },
+    StandardBlock { word: "CTD", inputs: &["CD", "LD", "PV"], outputs: &["Q", "CV"] },
     StandardBlock {
         word: "CTUD",
         inputs: &["CU", "CD", "R", "LD", "PV"],
         outputs: &["QU", "QD", "CV"],
     },
-    StandardBlock {
-        word: "SR",
-        inputs: &["S1", "R"],
-        outputs: &["Q1"],
-    },
-    StandardBlock {
-        word: "RS",
-        inputs: &["S", "R1"],
-        outputs: &["Q1"],
-    },
-    StandardBlock {
-        word: "R_TRIG",
-        inputs: &["CLK"],
-        outputs: &["Q"],
-    },
-    StandardBlock {
-        word: "F_TRIG",
-        inputs: &["CLK"],
-        outputs: &["Q"],
-    },
+    StandardBlock { word: "SR", inputs: &["S1", "R"], outputs: &["Q1"] },
+    StandardBlock { word: "RS", inputs: &["S", "R1"], outputs: &["Q1"] },
+    StandardBlock { word: "R_TRIG", inputs: &["CLK"], outputs: &["Q"] },
+    StandardBlock { word: "F_TRIG", inputs: &["CLK"], outputs: &["Q"] },
 ];
 
 impl StandardBlock {
     /// The block of that name, whatever its case.
     pub(crate) fn of(type_name: &str) -> Option<Self> {
-        BLOCKS
-            .into_iter()
-            .find(|block| block.word.eq_ignore_ascii_case(type_name))
+        BLOCKS.into_iter().find(|block| block.word.eq_ignore_ascii_case(type_name))
     }
 
     pub(crate) fn wire_input(self) -> &'static str {
@@ -90,17 +52,11 @@ impl StandardBlock {
             ("CTU" | "CTUD", "RESET") => "R",
             _ => pin,
         };
-        self.inputs
-            .iter()
-            .copied()
-            .find(|known| known.eq_ignore_ascii_case(other))
+        self.inputs.iter().copied().find(|known| known.eq_ignore_ascii_case(other))
     }
 
     pub(crate) fn output(self, pin: &str) -> Option<&'static str> {
-        self.outputs
-            .iter()
-            .copied()
-            .find(|known| known.eq_ignore_ascii_case(pin))
+        self.outputs.iter().copied().find(|known| known.eq_ignore_ascii_case(pin))
     }
 
     pub(crate) fn has_output(self, pin: &str) -> bool {

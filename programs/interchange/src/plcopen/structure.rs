@@ -30,12 +30,8 @@ pub(in crate::plcopen) fn wired(object: &Object) -> String {
 const MAXIMUM_WAY: usize = 10_000;
 
 pub(in crate::plcopen) fn structure(graph: &Graph, diagnostics: &mut Vec<Diagnostic>) -> Structure {
-    let places: HashMap<u64, usize> = graph
-        .objects
-        .iter()
-        .enumerate()
-        .map(|(place, object)| (object.id, place))
-        .collect();
+    let places: HashMap<u64, usize> =
+        graph.objects.iter().enumerate().map(|(place, object)| (object.id, place)).collect();
     let mut found = Structure::default();
     let mut named: HashMap<String, usize> = HashMap::new();
     for (place, object) in graph.objects.iter().enumerate() {
@@ -98,11 +94,8 @@ fn back(graph: &Graph, places: &HashMap<u64, usize>, from: usize, transitions: b
     let mut seen = Vec::new();
     let mut waiting = vec![from];
     while let Some(place) = waiting.pop() {
-        for wire in graph.objects[place]
-            .inputs
-            .iter()
-            .filter(|pin| is_flow(pin))
-            .flat_map(|pin| &pin.wires)
+        for wire in
+            graph.objects[place].inputs.iter().filter(|pin| is_flow(pin)).flat_map(|pin| &pin.wires)
         {
             let Some(&behind) = places.get(&wire.from) else {
                 continue;

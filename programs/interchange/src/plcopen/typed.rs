@@ -59,16 +59,10 @@ pub(super) fn read_typed_of(
             root.tag_name().name()
         );
         let error = Diagnostic::error("U1001", message, xml::start_tag(root));
-        let help = format!(
-            "it should be `project` in the namespace {:?}",
-            NAMESPACES[0]
-        );
+        let help = format!("it should be `project` in the namespace {:?}", NAMESPACES[0]);
         return (File::default(), vec![error.with_help(help)]);
     }
-    let mut typed = Typed {
-        file: File::default(),
-        diagnostics: Vec::new(),
-    };
+    let mut typed = Typed { file: File::default(), diagnostics: Vec::new() };
     account::check(root, &mut typed.diagnostics);
     typed.project(root, units);
     let mut diagnostics = typed.diagnostics;
@@ -105,8 +99,7 @@ pub fn drawn_units(text: &str) -> HashMap<String, Style> {
 
 impl Typed {
     fn error(&mut self, code: &'static str, message: String, span: Range<usize>) {
-        self.diagnostics
-            .push(Diagnostic::error(code, message, span));
+        self.diagnostics.push(Diagnostic::error(code, message, span));
     }
 
     fn error_with(&mut self, code: &'static str, message: String, span: Range<usize>, help: &str) {
@@ -143,10 +136,7 @@ impl Typed {
             }
         }
         let mut nodes: HashMap<String, Node<'_, '_>> = HashMap::new();
-        for node in root
-            .descendants()
-            .filter(|node| node.tag_name().name() == "pou")
-        {
+        for node in root.descendants().filter(|node| node.tag_name().name() == "pou") {
             if let Some(name) = attribute(node, "name") {
                 nodes.entry(name.to_uppercase()).or_insert(node);
             }

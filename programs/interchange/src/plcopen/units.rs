@@ -26,11 +26,7 @@ fn mentions(pou: &Pou, name: &str) -> bool {
     let typed = pou.variables.iter().any(|variable| {
         matches!(&variable.kind, VariableType::Derived(kind) if kind.eq_ignore_ascii_case(name))
     });
-    let parts = pou
-        .actions
-        .iter()
-        .chain(&pou.transitions)
-        .filter_map(|part| part.body.as_ref());
+    let parts = pou.actions.iter().chain(&pou.transitions).filter_map(|part| part.body.as_ref());
     typed || pou.body.iter().chain(parts).any(|body| match body {
         Body::Graph(graph) => graph.objects.iter().any(|object| {
             matches!(&object.kind, super::document::Kind::Block(block) if block.type_name.eq_ignore_ascii_case(name))
@@ -61,14 +57,9 @@ pub(crate) fn undeclared(project: &Project, instance: &Name, kind: &str) -> Diag
         let message = format!("{message}; it is read as a separate {kind}");
         (Diagnostic::warning("U1012", message, instance.span()), "")
     } else {
-        (
-            Diagnostic::error("U1012", message, instance.span()),
-            ", or leave the name out",
-        )
+        (Diagnostic::error("U1012", message, instance.span()), ", or leave the name out")
     };
-    found.with_help(format!(
-        "declare the variable `{instance}` of type {kind}{help}"
-    ))
+    found.with_help(format!("declare the variable `{instance}` of type {kind}{help}"))
 }
 
 /// What of a unit and of those that it uses a ladder does not keep.

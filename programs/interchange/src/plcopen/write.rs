@@ -41,12 +41,8 @@ pub fn write(program: &Program, period: Duration) -> String {
     sheet.write(&mut tree);
     tree.close("LD");
     tree.close("body");
-    let about: Vec<&str> = program
-        .comments
-        .iter()
-        .chain(&program.description)
-        .map(String::as_str)
-        .collect();
+    let about: Vec<&str> =
+        program.comments.iter().chain(&program.description).map(String::as_str).collect();
     if !about.is_empty() {
         tree.formatted("documentation", &about.join("\n"));
     }
@@ -101,11 +97,7 @@ fn interface(tree: &mut Tree, program: &Program, names: &StandardNames, added: &
     let outputs = program.outputs.iter().map(|signal| ("outputVars", signal));
     let memory = program.memory.iter().map(|signal| ("localVars", signal));
     for (section, signal) in inputs.chain(outputs).chain(memory) {
-        let section = if signal.address.is_some() {
-            "localVars"
-        } else {
-            section
-        };
+        let section = if signal.address.is_some() { "localVars" } else { section };
         enter(tree, &mut list, section);
         variable(tree, signal, names.signal(&signal.name));
     }
@@ -149,18 +141,11 @@ fn variable(tree: &mut Tree, signal: &Signal, name: &str) {
     tree.close("type");
     if let Some(initial) = signal.initial {
         tree.open("initialValue", &[]);
-        tree.empty(
-            "simpleValue",
-            &[("value", if initial { "TRUE" } else { "FALSE" })],
-        );
+        tree.empty("simpleValue", &[("value", if initial { "TRUE" } else { "FALSE" })]);
         tree.close("initialValue");
     }
-    let about: Vec<&str> = signal
-        .comments
-        .iter()
-        .chain(&signal.description)
-        .map(String::as_str)
-        .collect();
+    let about: Vec<&str> =
+        signal.comments.iter().chain(&signal.description).map(String::as_str).collect();
     if !about.is_empty() {
         tree.formatted("documentation", &about.join("\n"));
     }
@@ -176,14 +161,8 @@ fn instances(tree: &mut Tree, names: &mut StandardNames, period: Duration) {
     tree.open("configurations", &[]);
     tree.open("configuration", &[("name", &configuration)]);
     tree.open("resource", &[("name", &resource)]);
-    tree.open(
-        "task",
-        &[("name", &task), ("interval", &interval), ("priority", "0")],
-    );
-    tree.empty(
-        "pouInstance",
-        &[("name", &instance), ("typeName", names.program())],
-    );
+    tree.open("task", &[("name", &task), ("interval", &interval), ("priority", "0")]);
+    tree.empty("pouInstance", &[("name", &instance), ("typeName", names.program())]);
     tree.close("task");
     tree.close("resource");
     tree.close("configuration");
@@ -201,29 +180,17 @@ fn prepared(program: &Program, names: &mut StandardNames) -> (Vec<Rung>, Vec<Str
             let target = names.add(&format!("{wanted}_out"));
             added.push(target.clone());
             rungs.push(Rung {
-                coils: vec![Coil {
-                    kind: CoilKind::Plain,
-                    target: target.into(),
-                }],
+                coils: vec![Coil { kind: CoilKind::Plain, target: target.into() }],
                 ..rung.clone()
             });
         } else if changes_itself(rung) {
             let power = names.add("power");
             added.push(power.clone());
-            let keep = Coil {
-                kind: CoilKind::Plain,
-                target: power.as_str().into(),
-            };
-            rungs.push(Rung {
-                coils: vec![keep],
-                ..rung.clone()
-            });
+            let keep = Coil { kind: CoilKind::Plain, target: power.as_str().into() };
+            rungs.push(Rung { coils: vec![keep], ..rung.clone() });
             for coil in &rung.coils {
                 let operand = power.as_str().into();
-                let contact = Contact {
-                    kind: ContactKind::NormallyOpen,
-                    operand,
-                };
+                let contact = Contact { kind: ContactKind::NormallyOpen, operand };
                 rungs.push(Rung {
                     network: vec![Element::Contact(contact)],
                     coils: vec![coil.clone()],

@@ -23,16 +23,10 @@ pub const MAXIMUM_DEPTH: usize = 64;
 #[expect(clippy::result_large_err, reason = "once for a file")]
 pub(crate) fn parse(text: &str) -> Result<Document<'_>, Diagnostic> {
     if text.len() > MAXIMUM_BYTES {
-        let message = format!(
-            "the file has {} bytes, more than {MAXIMUM_BYTES}",
-            text.len()
-        );
+        let message = format!("the file has {} bytes, more than {MAXIMUM_BYTES}", text.len());
         return Err(Diagnostic::error("U1001", message, 0..0));
     }
-    let options = ParsingOptions {
-        nodes_limit: MAXIMUM_NODES,
-        ..ParsingOptions::default()
-    };
+    let options = ParsingOptions { nodes_limit: MAXIMUM_NODES, ..ParsingOptions::default() };
     let document = Document::parse_with_options(text, options).map_err(|error| {
         let place = error.pos();
         let offset = offset(text, place.row as usize, place.col as usize);
@@ -93,12 +87,8 @@ pub(crate) fn start_tag(node: Node<'_, '_>) -> Range<usize> {
     let end = node
         .attributes()
         .next_back()
-        .map_or(range.start + 1 + node.tag_name().name().len(), |last| {
-            last.range().end
-        });
-    let length = text[end.min(range.end) - range.start..]
-        .find('>')
-        .map_or(0, |place| place + 1);
+        .map_or(range.start + 1 + node.tag_name().name().len(), |last| last.range().end);
+    let length = text[end.min(range.end) - range.start..].find('>').map_or(0, |place| place + 1);
     range.start..(end + length).min(range.end)
 }
 

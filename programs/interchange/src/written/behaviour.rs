@@ -58,16 +58,12 @@ impl Pair<'_> {
     pub(super) fn is_proved(&self, written: impl Fn(&str) -> Option<String>) -> bool {
         let places = self.registers(written);
         let (before, after) = (self.before.registers(), self.after.registers());
-        if places
-            .iter()
-            .any(|&(place, other)| before[place].initial != after[other].initial)
-        {
+        if places.iter().any(|&(place, other)| before[place].initial != after[other].initial) {
             return false;
         }
         // What no output depends on stays what it is, apart from the registers of the other circuit.
-        let mut back: Vec<Variable> = (before.len()..before.len() + after.len())
-            .map(register)
-            .collect();
+        let mut back: Vec<Variable> =
+            (before.len()..before.len() + after.len()).map(register).collect();
         for &(place, other) in &places {
             back[other] = register(place);
         }
@@ -90,19 +86,13 @@ impl Pair<'_> {
             })
         });
         // What is the same function in another form is decided by its diagram, where no counter is above its preset.
-        let other_form: HashSet<(Expression, Expression)> = left
-            .iter()
-            .copied()
-            .zip(right)
-            .filter(|(left, right)| left != right)
-            .collect();
+        let other_form: HashSet<(Expression, Expression)> =
+            left.iter().copied().zip(right).filter(|(left, right)| left != right).collect();
         if other_form.is_empty() {
             return true;
         }
-        let now: Vec<Expression> = places
-            .iter()
-            .map(|&(place, _)| graph.variable(register(place)))
-            .collect();
+        let now: Vec<Expression> =
+            places.iter().map(|&(place, _)| graph.variable(register(place))).collect();
         let bounded = self.bounded(&mut graph, &places, &now);
         let stays = self.bounded(&mut graph, &places, &left);
         let mut equal: Vec<(Expression, Expression)> = other_form
@@ -110,10 +100,8 @@ impl Pair<'_> {
             .map(|(left, right)| (graph.and(left, bounded), graph.and(right, bounded)))
             .collect();
         equal.push((graph.and(stays, bounded), bounded));
-        let roots: Vec<Expression> = equal
-            .iter()
-            .flat_map(|&(left, right)| [left, right])
-            .collect();
+        let roots: Vec<Expression> =
+            equal.iter().flat_map(|&(left, right)| [left, right]).collect();
         let diagrams = Diagrams::for_roots(&graph, &roots, MAXIMUM_NODES);
         equal.into_iter().all(|(left, right)| {
             let diagram = |root| diagrams.of(&graph, root).ok();
@@ -192,9 +180,7 @@ fn register(place: usize) -> Variable {
 /// For each register, whether one of `outputs` depends on it, now or in a later step.
 fn used(circuit: &Circuit, outputs: Vec<usize>) -> Vec<bool> {
     let outputs = outputs.into_iter();
-    let mut roots: Vec<Expression> = outputs
-        .map(|place| circuit.outputs()[place].value)
-        .collect();
+    let mut roots: Vec<Expression> = outputs.map(|place| circuit.outputs()[place].value).collect();
     let mut used = vec![false; circuit.registers().len()];
     while !roots.is_empty() {
         let reached = circuit.graph().reached(&roots);

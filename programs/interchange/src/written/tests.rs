@@ -3,9 +3,8 @@ use super::*;
 const EVERY_ELEMENT: &str = include_str!("../../../ladder/tests/ladder/every-element.ladder");
 
 fn program() -> Program {
-    let (program, _) = understudy_ladder::parse(EVERY_ELEMENT)
-        .into_result()
-        .expect("a sound program");
+    let (program, _) =
+        understudy_ladder::parse(EVERY_ELEMENT).into_result().expect("a sound program");
     program
 }
 
@@ -45,13 +44,7 @@ fn no_line_of_a_ladder_goes_unnoticed() {
 fn no_line_of_structured_text_goes_unnoticed() {
     no_line_goes_unnoticed(Format::StructuredText, &|line| {
         let line = line.trim();
-        let is_frame = [
-            "VAR",
-            "END_VAR",
-            "RESOURCE",
-            "END_RESOURCE",
-            "PROGRAM instance0",
-        ];
+        let is_frame = ["VAR", "END_VAR", "RESOURCE", "END_RESOURCE", "PROGRAM instance0"];
         line.is_empty() || is_frame.iter().any(|word| line.starts_with(word))
     });
 }
@@ -61,10 +54,7 @@ fn what_a_form_cannot_hold_is_a_warning() {
     let written = write(Format::Ladder, &program(), Some(Duration::from_millis(20)));
     let losses = written.expect("it can be written").losses;
     let messages: Vec<&str> = losses.iter().map(|found| found.message.as_str()).collect();
-    assert_eq!(
-        messages,
-        ["the ladder format does not keep the interval of the task: 20ms"]
-    );
+    assert_eq!(messages, ["the ladder format does not keep the interval of the task: 20ms"]);
 }
 
 #[test]

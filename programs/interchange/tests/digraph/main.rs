@@ -49,11 +49,7 @@ fn a_graph_that_is_neither_series_nor_parallel() {
     let bridge = program(include_str!("bridge.xml"));
     insta::assert_snapshot!(print(&bridge));
     let mut scans = Interpreter::new(&bridge, PERIOD).expect("a sound program");
-    let names: Vec<&str> = bridge
-        .inputs
-        .iter()
-        .map(|input| input.name.as_str())
-        .collect();
+    let names: Vec<&str> = bridge.inputs.iter().map(|input| input.name.as_str()).collect();
     assert_eq!(names, ["a", "b", "c", "d", "e"]);
     let (mut last_e, mut z) = (false, false);
     let mut dice = Dice::new(1);
@@ -74,10 +70,7 @@ fn check_round_trip(ladder: &Program, seed: u64) {
     let again = program(&xml);
     // Branches that hold nothing but branches are one with them; otherwise nothing changes.
     assert_eq!(write(&again), xml);
-    let (one, other) = (
-        ladder.lower(PERIOD).expect("sound"),
-        again.lower(PERIOD).expect("sound"),
-    );
+    let (one, other) = (ladder.lower(PERIOD).expect("sound"), again.lower(PERIOD).expect("sound"));
     let (mut one_runs, mut other_runs) = (Running::new(&one), Running::new(&other));
     let mut dice = Dice::new(seed);
     for scan in 0..16 {
@@ -126,10 +119,7 @@ fn elements_are_edges() {
         let graphs = digraphs(&ladder);
         let edges: usize = graphs.iter().map(|graph| graph.edges.len()).sum();
         let coils: usize = ladder.rungs.iter().map(|rung| rung.coils.len()).sum();
-        assert_eq!(
-            edges,
-            ladder.contact_count() + ladder.blocks().len() + coils
-        );
+        assert_eq!(edges, ladder.contact_count() + ladder.blocks().len() + coils);
         assert!(graphs.iter().all(|graph| graph.vertices[0].number == 0));
     }
 }
@@ -160,10 +150,7 @@ fn large_graphs_end() {
     program(&graph((0..size).map(|k| (k, k + 1)), size));
     program(&graph((0..size).map(|_| (0, 1)), 1));
     // Branches in branches: each vertex is also reached from the rail.
-    program(&graph(
-        (0..size).flat_map(|k| [(k, k + 1), (0, k + 1)]),
-        size,
-    ));
+    program(&graph((0..size).flat_map(|k| [(k, k + 1), (0, k + 1)]), size));
     // A ladder of bridges, which is nowhere series or parallel.
     let bridges = (0..size / 2).flat_map(|k| [(k, k + 1), (k, k + 2), (k + 1, k + 2)]);
     program(&graph(bridges, size / 2 + 1));

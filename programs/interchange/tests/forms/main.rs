@@ -18,9 +18,7 @@ fn words(text: &str) -> Vec<Range<usize>> {
     let mut start = 0;
     while let Some(first) = text[start..].chars().next() {
         let length = if belongs(first) {
-            text[start..]
-                .find(|letter| !belongs(letter))
-                .unwrap_or(text.len() - start)
+            text[start..].find(|letter| !belongs(letter)).unwrap_or(text.len() - start)
         } else {
             first.len_utf8()
         };
@@ -85,9 +83,7 @@ fn every_word_of_structured_text_counts() {
         "{text}    TASK t(INTERVAL := T#20ms); TASK u(INTERVAL := T#50ms); END_RESOURCE END_CONFIGURATION"
     );
     let configuration = text.find("  RESOURCE").expect("a resource");
-    let words = words(&text)
-        .into_iter()
-        .filter(|word| word.end < configuration);
+    let words = words(&text).into_iter().filter(|word| word.end < configuration);
     check(Format::StructuredText, &text, words, &allowed);
 }
 
@@ -98,12 +94,7 @@ fn every_word_of_ldmicro_counts() {
     let lines = lines(text).filter(|line| !line.is_empty());
     // Settings of the compiler for the microcontroller.
     let allowed = ["CRYSTAL=", "4000000"];
-    check(
-        Format::LdMicro,
-        text,
-        words.into_iter().chain(lines),
-        &allowed,
-    );
+    check(Format::LdMicro, text, words.into_iter().chain(lines), &allowed);
 }
 
 #[test]
@@ -123,18 +114,14 @@ fn every_element_of_a_digraph_counts() {
         let document = roxmltree::Document::parse(&text).expect("XML");
         let is_drawn = |node: &roxmltree::Node<'_, '_>| {
             let drawing = ["Vertices", "startX", "startY"];
-            node.ancestors()
-                .any(|node| drawing.contains(&node.tag_name().name()))
+            node.ancestors().any(|node| drawing.contains(&node.tag_name().name()))
         };
-        let nodes = document
-            .descendants()
-            .filter(|node| node.is_element() && !is_drawn(node));
+        let nodes = document.descendants().filter(|node| node.is_element() && !is_drawn(node));
         let mut places = Vec::new();
         for node in nodes {
             places.push(node.range());
-            let attributes = node
-                .attributes()
-                .filter(|attribute| attribute.name() != "graphNumber");
+            let attributes =
+                node.attributes().filter(|attribute| attribute.name() != "graphNumber");
             places.extend(attributes.map(|attribute| attribute.range()));
         }
         // Addresses are declared; another one at an edge is a finding.
@@ -152,10 +139,7 @@ fn an_empty_program_is_not_taken_without_a_word() {
         (Format::Digraph, "<LadderDiagram name=\"p\"/>"),
     ] {
         let found = read(format, "file", text, None).diagnostics;
-        assert!(
-            found.iter().any(|found| found.code == "U1023"),
-            "{format:?}: {found:?}"
-        );
+        assert!(found.iter().any(|found| found.code == "U1023"), "{format:?}: {found:?}");
     }
 }
 
@@ -166,16 +150,9 @@ fn an_address_of_an_edge_that_is_not_the_declared_one_is_said() {
     let text = digraph::write(&program);
     let changed = text.replacen("<address>000.01</address>", "<address>000.02</address>", 1);
     assert_ne!(text, changed);
-    assert!(
-        read(Format::Digraph, "file", &text, None)
-            .diagnostics
-            .is_empty()
-    );
+    assert!(read(Format::Digraph, "file", &text, None).diagnostics.is_empty());
     let found = read(Format::Digraph, "file", &changed, None).diagnostics;
-    assert_eq!(
-        found.iter().map(|found| found.code).collect::<Vec<_>>(),
-        ["U1068"]
-    );
+    assert_eq!(found.iter().map(|found| found.code).collect::<Vec<_>>(), ["U1068"]);
 }
 
 #[test]
@@ -183,15 +160,10 @@ fn names_that_differ_by_case_alone_are_named_both() {
     let text = "PROGRAM p VAR_INPUT a : BOOL; A : BOOL; END_VAR VAR_OUTPUT y : BOOL; END_VAR y := a; END_PROGRAM";
     let found = read(Format::StructuredText, "file", text, None);
     assert!(found.program.is_none());
-    let messages: Vec<&str> = found
-        .diagnostics
-        .iter()
-        .map(|found| found.message.as_str())
-        .collect();
+    let messages: Vec<&str> =
+        found.diagnostics.iter().map(|found| found.message.as_str()).collect();
     assert!(
-        messages
-            .iter()
-            .any(|message| message.contains("`a`") && message.contains("`A`")),
+        messages.iter().any(|message| message.contains("`a`") && message.contains("`A`")),
         "{messages:?}"
     );
 }
@@ -216,16 +188,11 @@ fn the_interval_of_a_task_is_a_time_within_the_bounds() {
 /// Many warnings before an error do not hide it: nothing is taken that was not understood.
 #[test]
 fn an_error_behind_many_warnings_is_an_error() {
-    let words: String = (0..300)
-        .map(|place| format!("w{place} AT %QW{place} : INT (0..1);\n"))
-        .collect();
+    let words: String =
+        (0..300).map(|place| format!("w{place} AT %QW{place} : INT (0..1);\n")).collect();
     let text =
         format!("PROGRAM p VAR {words} y AT %QX0.0 : BOOL; END_VAR y := unknown; END_PROGRAM");
-    assert!(
-        read(Format::StructuredText, "file", &text, None)
-            .program
-            .is_none()
-    );
+    assert!(read(Format::StructuredText, "file", &text, None).program.is_none());
     let persist = "RUNG\n    CONTACTS Xa 0\n    PERSIST Xa\n    COIL Yb 0 0 0\nEND\n".repeat(300);
     let text = format!("LDmicro0.1\nPROGRAM\n{persist}RUNG\n    WARP Xa\n    COIL Yc 0 0 0\nEND\n");
     assert!(read(Format::LdMicro, "file", &text, None).program.is_none());

@@ -49,15 +49,9 @@ fn a_retentive_timer_keeps_its_time() {
 
 #[test]
 fn hostile_files_end() {
-    let deep = format!(
-        "LDmicro0.1\nPROGRAM\nRUNG\n{}",
-        "PARALLEL\nSERIES\n".repeat(50_000)
-    );
+    let deep = format!("LDmicro0.1\nPROGRAM\nRUNG\n{}", "PARALLEL\nSERIES\n".repeat(50_000));
     assert!(read("deep", &deep).program.is_none());
-    let many = format!(
-        "LDmicro0.1\nPROGRAM\nRUNG\n{}END\n",
-        "CONTACTS Xa 0\n".repeat(100_000)
-    );
+    let many = format!("LDmicro0.1\nPROGRAM\nRUNG\n{}END\n", "CONTACTS Xa 0\n".repeat(100_000));
     assert!(read("many", &many).program.is_none());
     let long = format!(
         "LDmicro0.1\nPROGRAM\nRUNG\n{}COIL Ya 0 0 0\nEND\n",

@@ -51,10 +51,9 @@ impl Maker {
             8 => Element::Shot(dice.below(2) == 1, count),
             9 => Element::Timer(dice.below(2) == 1, count, 1 + dice.below(3) as u64),
             10 => Element::Counter(self.counters[dice.below(self.counters.len())], count, value),
-            11 => Element::Compare(
-                ["EQU", "NEQ", "GRT", "GEQ", "LES", "LEQ"][dice.below(6)],
-                value,
-            ),
+            11 => {
+                Element::Compare(["EQU", "NEQ", "GRT", "GEQ", "LES", "LEQ"][dice.below(6)], value)
+            }
             12 if dice.below(3) == 0 => Element::Master,
             12 => Element::Reset,
             13 => Element::Move(value),
@@ -70,17 +69,12 @@ fn write(series: &[Element], text: &mut String) {
     for element in series {
         let line = match element {
             Element::Contacts(name, negated) => format!("CONTACTS {name} {}", u8::from(*negated)),
-            Element::Coil(name, kind) => format!(
-                "COIL {name} {}",
-                ["0 0 0", "1 0 0", "0 1 0", "0 0 1"][*kind]
-            ),
+            Element::Coil(name, kind) => {
+                format!("COIL {name} {}", ["0 0 0", "1 0 0", "0 1 0", "0 0 1"][*kind])
+            }
             Element::Shot(rising, _) => if *rising { "OSR" } else { "OSF" }.to_owned(),
             Element::Timer(on, number, cycles) => {
-                format!(
-                    "{} Tt{number} {}",
-                    if *on { "TON" } else { "TOF" },
-                    cycles * 10_000
-                )
+                format!("{} Tt{number} {}", if *on { "TON" } else { "TOF" }, cycles * 10_000)
             }
             Element::Counter(word, _, value) => format!("{word} Cn {value}"),
             Element::Reset => "RES Cn".to_owned(),
@@ -137,11 +131,7 @@ impl Execution {
             }
             Element::Shot(rising, number) => {
                 let before = self.before.insert(*number, power).unwrap_or(false);
-                if *rising {
-                    power && !before
-                } else {
-                    !power && before
-                }
+                if *rising { power && !before } else { !power && before }
             }
             Element::Timer(true, number, most) => {
                 let cycles = self.cycles.entry(*number).or_default();
@@ -164,11 +154,7 @@ impl Execution {
                         self.number = 0;
                     }
                 }
-                if *word == "CTC" {
-                    power
-                } else {
-                    self.number >= *value
-                }
+                if *word == "CTC" { power } else { self.number >= *value }
             }
             Element::Reset => {
                 if power {
@@ -216,9 +202,8 @@ fn check(seed: u64) {
         counters: [&["CTU"][..], &["CTD"], &["CTC"], &["CTU", "CTD", "CTC"]]
             [usize::try_from(seed % 4).expect("small")],
     };
-    let rungs: Vec<Vec<Element>> = (0..1 + maker.dice.below(5))
-        .map(|_| maker.series(2, 1))
-        .collect();
+    let rungs: Vec<Vec<Element>> =
+        (0..1 + maker.dice.below(5)).map(|_| maker.series(2, 1)).collect();
     let mut text =
         "LDmicro0.1\nCYCLE=10000\nIO LIST\nXa at 1\nXb at 2\nYc at 3\nYd at 4\nEND\nPROGRAM\n"
             .to_owned();
@@ -228,9 +213,7 @@ fn check(seed: u64) {
         text.push_str("END\n");
     }
     let reading = read("random", &text);
-    let program = reading
-        .program
-        .unwrap_or_else(|| panic!("{:#?}\n{text}", reading.diagnostics));
+    let program = reading.program.unwrap_or_else(|| panic!("{:#?}\n{text}", reading.diagnostics));
     let period = Duration::from_millis(10);
     let mut scans = Interpreter::new(&program, period).expect("a sound program");
     let mut circuit = Running::new(&program.lower(period).expect("a sound program"));
@@ -243,24 +226,14 @@ fn check(seed: u64) {
             let rail = execution.runs;
             execution.series(rung, rail);
         }
-        let inputs: Vec<bool> = program
-            .inputs
-            .iter()
-            .map(|input| execution.bits[input.name.as_str()])
-            .collect();
+        let inputs: Vec<bool> =
+            program.inputs.iter().map(|input| execution.bits[input.name.as_str()]).collect();
         let found = scans.scan(&inputs);
         assert_eq!(circuit.step(&inputs), found);
-        let outputs = program
-            .outputs
-            .iter()
-            .map(|output| execution.bits.get(output.name.as_str()).copied());
+        let outputs =
+            program.outputs.iter().map(|output| execution.bits.get(output.name.as_str()).copied());
         let expected: Vec<bool> = outputs.map(Option::unwrap_or_default).collect();
-        assert_eq!(
-            found,
-            expected,
-            "cycle {scan}\n{text}\n{}",
-            understudy_ladder::print(&program)
-        );
+        assert_eq!(found, expected, "cycle {scan}\n{text}\n{}", understudy_ladder::print(&program));
     }
 }
 

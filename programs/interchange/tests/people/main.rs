@@ -11,9 +11,7 @@ use understudy_interchange::{Source, Wanted, read_source};
 use understudy_text::{Diagnostic, Lines, MAXIMUM_FINDINGS, Severity, decode};
 
 /// Ends of the names of files with programs.
-const FORMS: [&str; 9] = [
-    "st", "il", "xml", "iecst", "scl", "tcpou", "tcgvl", "tcdut", "exp",
-];
+const FORMS: [&str; 9] = ["st", "il", "xml", "iecst", "scl", "tcpou", "tcgvl", "tcdut", "exp"];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
@@ -32,17 +30,11 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
 fn outcome(path: &Path) -> (String, Vec<String>) {
     let bytes = fs::read(path).expect("a readable file");
     let Ok(text) = decode(bytes) else {
-        return (
-            "refused".to_owned(),
-            vec!["it is not a text in UTF-8".to_owned()],
-        );
+        return ("refused".to_owned(), vec!["it is not a text in UTF-8".to_owned()]);
     };
     let name = path.to_string_lossy();
     let read = |program| {
-        let wanted = Wanted {
-            program,
-            period: None,
-        };
+        let wanted = Wanted { program, period: None };
         read_source(&name, &text, wanted)
     };
     let mut files = vec![read(None)];
@@ -50,11 +42,7 @@ fn outcome(path: &Path) -> (String, Vec<String>) {
     let is_choice =
         |found: &&Diagnostic| found.code == "U1013" && found.message.contains("no CONFIGURATION");
     if let Some(choice) = files[0].diagnostics.iter().find(is_choice)
-        && let Some((_, names)) = choice
-            .help
-            .as_deref()
-            .unwrap_or_default()
-            .rsplit_once(" of ")
+        && let Some((_, names)) = choice.help.as_deref().unwrap_or_default().rsplit_once(" of ")
     {
         files = names.split(", ").map(|name| read(Some(name))).collect();
     }
@@ -126,16 +114,10 @@ fn files_of_other_people_are_taken_or_refused_with_a_reason() {
         let found = names.iter().flat_map(|name| survey(&programs.join(name)));
         found.collect::<Vec<String>>()
     };
-    let editors = [
-        "beremiz+beremiz",
-        "gracesrm+OpenPLC_Sample_Programs",
-        "virajdesai0309+OpenPLC_Tutorials",
-    ];
+    let editors =
+        ["beremiz+beremiz", "gracesrm+OpenPLC_Sample_Programs", "virajdesai0309+OpenPLC_Tutorials"];
     expect(&refused(&editors), &EDITORS);
-    expect(
-        &refused(&["iec-checker+iec-checker", "ironplc+ironplc"]),
-        &COMPILERS,
-    );
+    expect(&refused(&["iec-checker+iec-checker", "ironplc+ironplc"]), &COMPILERS);
     let objects = refused(&["tcunit+TcUnit"]);
     assert!(objects.len() <= OBJECTS, "{objects:?}");
 }
@@ -144,10 +126,7 @@ fn files_of_other_people_are_taken_or_refused_with_a_reason() {
 fn expect(refused: &[String], expected: &[(&str, &str)]) {
     let is_expected = |name: &&String| expected.iter().any(|(known, _)| name.starts_with(known));
     let others: Vec<&String> = refused.iter().filter(|name| !is_expected(name)).collect();
-    assert!(
-        others.is_empty(),
-        "refused without a known reason: {others:?}"
-    );
+    assert!(others.is_empty(), "refused without a known reason: {others:?}");
     assert!(
         refused.len() == expected.len(),
         "{refused:?} are refused, and {} are expected",
@@ -159,43 +138,28 @@ fn expect(refused: &[String], expected: &[(&str, &str)]) {
 const EDITORS: [(&str, &str); 6] = [
     ("plc-0838c4", "a structure with texts at %I"),
     ("plc-6ca127", "files of the controller (CSV)"),
-    (
-        "plc-981f90",
-        "answers of Python, and C code that writes variables",
-    ),
+    ("plc-981f90", "answers of Python, and C code that writes variables"),
     ("pous-0c3725", "Python, and C code that writes variables"),
     ("Additional_Function_Blocks-aa71a4", "the clock RTC"),
-    (
-        "pous-c48922",
-        "C code that writes variables: blocks that execute Python",
-    ),
+    ("pous-c48922", "C code that writes variables: blocks that execute Python"),
 ];
 
 /// Of the 69 files of iec-checker and ironplc those that are refused: almost all are not legal by themselves, on purpose.
 const COMPILERS: [(&str, &str); 33] = [
     ("array-use", "`gvl` is not declared"),
     ("comments-86b512", "undeclared variables"),
-    (
-        "control-statements",
-        "undeclared variables, and a condition that is a number",
-    ),
+    ("control-statements", "undeclared variables, and a condition that is a number"),
     ("function-declaration", "one variable is declared twice"),
     ("generic-types", "variables of type ANY"),
     ("literals-e23d9e", "names that differ in capitals only"),
-    (
-        "multiple-variables",
-        "variables are declared twice, and VAR_EXTERNAL without a VAR_GLOBAL",
-    ),
+    ("multiple-variables", "variables are declared twice, and VAR_EXTERNAL without a VAR_GLOBAL"),
     ("plcopen-cp1-", "`%B0` is not an address"),
     ("plcopen-cp16", "a configuration runs a function block"),
     ("plcopen-cp25", "a REAL goes to an INT"),
     ("plcopen-cp3-", "`%B0` is not an address"),
     ("plcopen-cp4", "addresses that overlap"),
     ("references-", "references to what is none"),
-    (
-        "struct-declaration",
-        "a text goes to a WORD within a structure",
-    ),
+    ("struct-declaration", "a text goes to a WORD within a structure"),
     ("user1-", "`func1` is not declared"),
     ("F_DegreesToRadians", "`PI` of another library"),
     ("a_types", "a TYPE without a type"),
@@ -206,18 +170,12 @@ const COMPILERS: [(&str, &str); 33] = [
     ("conditional-", "undeclared variables"),
     ("configuration-", "`plc_prg` is not declared"),
     ("expressions-", "undeclared variables"),
-    (
-        "first_steps_function_block_logger",
-        "a type of another file",
-    ),
+    ("first_steps_function_block_logger", "a type of another file"),
     ("first_steps_program", "blocks of other files"),
     ("if-cec224", "undeclared variables"),
     ("inout_var_decl", "undeclared variables"),
     ("input_var_decl", "undeclared variables"),
-    (
-        "pointer_to",
-        "pointers without a purpose, which the standard does not have",
-    ),
+    ("pointer_to", "pointers without a purpose, which the standard does not have"),
     ("strings-", "a character that is none"),
     ("textual-", "undeclared variables"),
     ("type_decl", "undeclared types"),

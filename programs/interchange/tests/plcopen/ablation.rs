@@ -82,11 +82,8 @@ fn unread(text: &str) -> Vec<String> {
         }
         let without = format!("{}{}", &text[..place.start], &text[place.end..]);
         if Document::parse(&without).is_ok() && reading(Format::PlcOpen, &without) == whole {
-            let around: Vec<&str> = node
-                .ancestors()
-                .skip(1)
-                .map(|node| node.tag_name().name())
-                .collect();
+            let around: Vec<&str> =
+                node.ancestors().skip(1).map(|node| node.tag_name().name()).collect();
             unread.push(format!("{what} in {}", around.join(" in ")));
         }
     };
@@ -114,10 +111,8 @@ fn unread(text: &str) -> Vec<String> {
             continue;
         }
         let name = node.tag_name().name();
-        let says = node
-            .descendants()
-            .filter_map(|node| node.text())
-            .any(|text| !text.trim().is_empty());
+        let says =
+            node.descendants().filter_map(|node| node.text()).any(|text| !text.trim().is_empty());
         let is_empty = matches!(name, "documentation" | "comment") && !says;
         // A rail that nothing is connected to.
         let is_rail = name == "leftPowerRail"
@@ -154,10 +149,7 @@ fn every_element_of_a_written_program_counts() {
 #[test]
 fn every_element_of_the_examples_counts() {
     for name in ["pump", "probes"] {
-        let path = format!(
-            "{}/../../examples/plcopen/{name}.xml",
-            env!("CARGO_MANIFEST_DIR")
-        );
+        let path = format!("{}/../../examples/plcopen/{name}.xml", env!("CARGO_MANIFEST_DIR"));
         let text = std::fs::read_to_string(path).expect("an example");
         assert_eq!(unread(&text), Vec::<String>::new(), "{name}");
     }
@@ -186,14 +178,8 @@ const BODIES: [(&str, &str); 6] = [
         "rungs",
         r#"<LD><rung localId="1"><contact variable="a" negated="true"/><coil variable="y" storage="set"/></rung><rung localId="2"><block typeName="TON" instanceName="t"><variable formalParameter="IN">b</variable><variable formalParameter="PT">T#1s</variable><variable formalParameter="Q">y</variable></block></rung></LD>"#,
     ),
-    (
-        "text",
-        "<ST><xhtml:p><![CDATA[t(IN := a, PT := T#1s); y := t.Q;]]></xhtml:p></ST>",
-    ),
-    (
-        "a list",
-        "<IL><xhtml:p><![CDATA[LD a\nAND b\nST y]]></xhtml:p></IL>",
-    ),
+    ("text", "<ST><xhtml:p><![CDATA[t(IN := a, PT := T#1s); y := t.Q;]]></xhtml:p></ST>"),
+    ("a list", "<IL><xhtml:p><![CDATA[LD a\nAND b\nST y]]></xhtml:p></IL>"),
     (
         "functions",
         r#"<FBD><inVariable localId="1"><position x="0" y="0"/><connectionPointOut/><expression>a</expression></inVariable>
@@ -217,11 +203,7 @@ fn file(body: &str) -> String {
 fn every_element_of_each_language_counts() {
     for (name, body) in BODIES {
         let text = file(body);
-        assert!(
-            read(&text, None).program.is_some(),
-            "{name}\n{}",
-            reading(Format::PlcOpen, &text)
-        );
+        assert!(read(&text, None).program.is_some(), "{name}\n{}", reading(Format::PlcOpen, &text));
         assert_eq!(
             unread(&text),
             Vec::<String>::new(),
@@ -233,10 +215,7 @@ fn every_element_of_each_language_counts() {
 
 fn codes(text: &str) -> Vec<&'static str> {
     let reading = read(text, None);
-    let errors = reading
-        .diagnostics
-        .iter()
-        .filter(|found| found.severity == Severity::Error);
+    let errors = reading.diagnostics.iter().filter(|found| found.severity == Severity::Error);
     let codes: Vec<&str> = errors.map(|found| found.code).collect();
     assert_eq!(codes.is_empty(), reading.program.is_some());
     codes
@@ -262,10 +241,7 @@ fn what_has_no_meaning_here_is_refused_and_not_dropped() {
             r#"<LD><step localId="1" name="s" initialStep="true"><position x="0" y="0"/></step></LD>"#,
             "U1010",
         ),
-        (
-            "<ST><xhtml:p>y := a;</xhtml:p></ST><IL><xhtml:p>LD b</xhtml:p></IL>",
-            "U1010",
-        ),
+        ("<ST><xhtml:p>y := a;</xhtml:p></ST><IL><xhtml:p>LD b</xhtml:p></IL>", "U1010"),
         (
             r#"<FBD><inVariable localId="1"><position x="0" y="0"/><connectionPointOut><expression>b</expression></connectionPointOut><expression>a</expression></inVariable><outVariable localId="2"><position x="9" y="0"/><connectionPointIn><connection refLocalId="1"/></connectionPointIn><expression>y</expression></outVariable></FBD>"#,
             "U1010",
@@ -302,9 +278,8 @@ fn names_that_differ_by_case_alone_are_named_both() {
 #[test]
 fn the_interval_of_a_task_is_a_time_within_the_bounds() {
     let text = file("<ST><xhtml:p>y := a;</xhtml:p></ST>");
-    let old = text
-        .replace("T#20ms", "00:00:00.020")
-        .replace("name=\"i\" typeName", "name=\"i\" type");
+    let old =
+        text.replace("T#20ms", "00:00:00.020").replace("name=\"i\" typeName", "name=\"i\" type");
     assert_eq!(codes(&old), codes(&text), "as 1.0 writes it");
     for interval in ["T#-10ms", "T#0s", "T#2h", "soon", "10"] {
         let text = file("<ST><xhtml:p>y := a;</xhtml:p></ST>").replace("T#20ms", interval);
@@ -324,10 +299,7 @@ fn places_in_bodies_are_exact() {
             "<ST>\n        <xhtml:p><![CDATA[\n  IF a &  b THEN\r\n    y := missing;\n  END_IF;]]></xhtml:p></ST>",
             "missing",
         ),
-        (
-            "<ST>\n   <xhtml:p>IF a &amp; b THEN y := missing; END_IF;</xhtml:p>\n</ST>",
-            "missing",
-        ),
+        ("<ST>\n   <xhtml:p>IF a &amp; b THEN y := missing; END_IF;</xhtml:p>\n</ST>", "missing"),
         (
             "<IL>\n        <xhtml:p><![CDATA[\n  LD a\r\n  AND b\n  ST missing]]></xhtml:p></IL>",
             "missing",
@@ -335,10 +307,7 @@ fn places_in_bodies_are_exact() {
     ] {
         let text = file(body);
         let reading = read(&text, None);
-        let found = reading
-            .diagnostics
-            .iter()
-            .find(|found| found.severity == Severity::Error);
+        let found = reading.diagnostics.iter().find(|found| found.severity == Severity::Error);
         let found = found.expect("an error");
         assert_eq!(&text[found.span.clone()], wrong, "{found:?} {body}");
     }

@@ -17,11 +17,7 @@ fn errors(text: &str) -> Vec<String> {
     let reading = read(text, None);
     let mut found = findings(text, &reading);
     found.retain(|line| line.contains(" error "));
-    assert_eq!(
-        reading.program.is_some(),
-        found.is_empty(),
-        "errors, and a program"
-    );
+    assert_eq!(reading.program.is_some(), found.is_empty(), "errors, and a program");
     found
 }
 
@@ -38,10 +34,8 @@ fn coil(id: u64, variable: &str, x: i32, from: &[u64]) -> String {
 }
 
 fn element(name: &str, id: u64, variable: &str, x: i32, from: &[u64]) -> String {
-    let wires: String = from
-        .iter()
-        .map(|from| format!("<connection refLocalId=\"{from}\"/>"))
-        .collect();
+    let wires: String =
+        from.iter().map(|from| format!("<connection refLocalId=\"{from}\"/>")).collect();
     format!(
         "<{name} localId=\"{id}\"><position x=\"{x}\" y=\"0\"/><connectionPointIn>{wires}</connectionPointIn><variable>{variable}</variable></{name}>\n"
     )
@@ -76,14 +70,8 @@ fn files_that_are_none() {
     let cases = [
         ("", "nothing"),
         ("\u{feff}<project/>", "no namespace"),
-        (
-            "<project xmlns=\"http://www.plcopen.org/xml/tc6.xsd\"/>",
-            "another version",
-        ),
-        (
-            "<project xmlns=\"http://www.plcopen.org/xml/tc6_0201\"/>",
-            "no program",
-        ),
+        ("<project xmlns=\"http://www.plcopen.org/xml/tc6.xsd\"/>", "another version"),
+        ("<project xmlns=\"http://www.plcopen.org/xml/tc6_0201\"/>", "no program"),
         ("<a><b></a>", "crossed tags"),
         ("<a", "cut"),
         ("\0\0", "no text"),
@@ -103,9 +91,7 @@ fn files_that_are_none() {
 
 #[test]
 fn a_long_chain_and_a_full_mesh_end() {
-    let mut chain: String = (2..20_000)
-        .map(|id| contact(id, "a", id as i32, &[id - 1]))
-        .collect();
+    let mut chain: String = (2..20_000).map(|id| contact(id, "a", id as i32, &[id - 1])).collect();
     chain += &coil(20_000, "y", 20_000, &[19_999]);
     assert_eq!(objects(&chain), Vec::<String>::new());
     let mut mesh = String::new();
@@ -143,26 +129,17 @@ fn cut_and_changed_files_never_panic() {
         let pair = dice.below(quotes.len() / 2) * 2;
         let other = dice.below(quotes.len() / 2) * 2;
         let value = &text[quotes[other]..quotes[other + 1]];
-        let changed = format!(
-            "{}{value}{}",
-            &text[..quotes[pair]],
-            &text[quotes[pair + 1]..]
-        );
+        let changed = format!("{}{value}{}", &text[..quotes[pair]], &text[quotes[pair + 1]..]);
         let _ = errors(&changed);
     }
 }
 
 #[test]
 fn changed_examples_are_read_or_refused_and_what_is_read_can_be_written() {
-    let tries = std::env::var("FUZZ_TRIES")
-        .ok()
-        .and_then(|tries| tries.parse().ok());
+    let tries = std::env::var("FUZZ_TRIES").ok().and_then(|tries| tries.parse().ok());
     let mut dice = Dice::new(9);
     for name in ["pump", "probes"] {
-        let path = format!(
-            "{}/../../examples/plcopen/{name}.xml",
-            env!("CARGO_MANIFEST_DIR")
-        );
+        let path = format!("{}/../../examples/plcopen/{name}.xml", env!("CARGO_MANIFEST_DIR"));
         let text = std::fs::read_to_string(path).expect("an example");
         let quotes: Vec<usize> = text.match_indices('"').map(|(place, _)| place).collect();
         let words: Vec<&str> = text.split(['<', '>']).skip(1).collect();
@@ -180,19 +157,12 @@ fn changed_examples_are_read_or_refused_and_what_is_read_can_be_written() {
             }
             let reading = read(&changed, None);
             let Some(program) = reading.program else {
-                assert!(
-                    !reading.diagnostics.is_empty(),
-                    "no program and no reason\n{changed}"
-                );
+                assert!(!reading.diagnostics.is_empty(), "no program and no reason\n{changed}");
                 continue;
             };
             assert!(program.lower(PERIOD).is_ok(), "{changed}");
             let again = read(&write(&program, PERIOD), None);
-            assert!(
-                again.program.is_some(),
-                "{:?}\n{changed}",
-                again.diagnostics
-            );
+            assert!(again.program.is_some(), "{:?}\n{changed}", again.diagnostics);
         }
     }
 }

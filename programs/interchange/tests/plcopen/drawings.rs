@@ -53,11 +53,7 @@ END_PROGRAM
 #[test]
 fn statements_are_function_blocks() {
     let found = document("level", "level.st", LEVEL, Bodies::Blocks);
-    assert!(
-        found.text.contains("<FBD>") && !found.text.contains("<ST>"),
-        "{}",
-        found.text
-    );
+    assert!(found.text.contains("<FBD>") && !found.text.contains("<ST>"), "{}", found.text);
     assert_eq!(found.losses, []);
     // A block is connected to what reads its output, and stays so.
     let again = written("again.xml", &found.text, Bodies::AsRead).expect("a document");
@@ -66,12 +62,7 @@ fn statements_are_function_blocks() {
         assert!(text.contains(r#"formalParameter="R" negated="true""#));
         assert!(text.contains("scale to percent"));
     }
-    assert!(
-        written("level.st", LEVEL, Bodies::AsRead)
-            .expect("a document")
-            .text
-            .contains("<ST>")
-    );
+    assert!(written("level.st", LEVEL, Bodies::AsRead).expect("a document").text.contains("<ST>"));
 }
 
 /// An output is connected once: what reads it again in one statement names it.
@@ -85,16 +76,8 @@ fn an_output_is_connected_once() {
   y := t.ET + (t.ET + t.PT) - t.ET;
 END_PROGRAM";
     let found = document("once", "once.st", text, Bodies::Blocks);
-    assert_eq!(
-        found.text.matches(r#"formalParameter="ET">"#).count(),
-        2,
-        "{}",
-        found.text
-    );
-    assert_eq!(
-        found.text.matches("<expression>t.ET</expression>").count(),
-        2
-    );
+    assert_eq!(found.text.matches(r#"formalParameter="ET">"#).count(), 2, "{}", found.text);
+    assert_eq!(found.text.matches("<expression>t.ET</expression>").count(), 2);
 }
 
 #[test]
@@ -170,31 +153,16 @@ fn random_chart(dice: &mut Dice) -> String {
             let timed = dice.pick(&["L", "D", "SD", "DS", "SL"]);
             let plain = dice.pick(&["N", "R", "S", "P", "P0", "P1"]);
             let _ = match dice.below(3) {
-                0 => write!(
-                    text,
-                    "{action}({timed}, T#{}ms); ",
-                    10 * (1 + dice.below(5))
-                ),
+                0 => write!(text, "{action}({timed}, T#{}ms); ", 10 * (1 + dice.below(5))),
                 _ => write!(text, "{action}({plain}); "),
             };
         }
         text += "END_STEP\n";
     }
-    let condition = [
-        "a",
-        "NOT b",
-        "a AND b",
-        "n > 0",
-        "S0.T > T#30ms",
-        "S1.X OR a",
-    ];
+    let condition = ["a", "NOT b", "a AND b", "n > 0", "S0.T > T#30ms", "S1.X OR a"];
     for _ in 0..2 + dice.below(10) {
         let mut some = || {
-            let several = if dice.below(4) == 0 {
-                1 + dice.below(3)
-            } else {
-                1
-            };
+            let several = if dice.below(4) == 0 { 1 + dice.below(3) } else { 1 };
             let mut all: Vec<usize> = (0..several).map(|_| dice.below(count)).collect();
             all.sort_unstable();
             all.dedup();
@@ -241,8 +209,7 @@ fn a_ladder_with_boxes_is_a_ladder() {
     let negated = |what: &str| {
         let tags = found.text.split(what).skip(1);
         let tags = tags.filter_map(|text| text.split_once('>'));
-        tags.filter(|(tag, _)| tag.contains(r#"negated="true""#))
-            .count()
+        tags.filter(|(tag, _)| tag.contains(r#"negated="true""#)).count()
     };
     assert_eq!((negated("<contact "), negated("<coil ")), (2, 1));
 
@@ -260,19 +227,12 @@ fn random_power(dice: &mut Dice, depth: usize) -> String {
     match dice.below(if depth == 0 { 4 } else { 9 }) {
         0 => dice.pick(&["a", "b", "y", "z"]).to_owned(),
         1 => format!("NOT {}", dice.pick(&["a", "b", "y"])),
-        2 => dice
-            .pick(&["n > 3", "m <= n", "t.Q", "t.ET > T#20ms"])
-            .to_owned(),
+        2 => dice.pick(&["n > 3", "m <= n", "t.Q", "t.ET > T#20ms"]).to_owned(),
         3 => dice.pick(&["TRUE", "FALSE", "a", "t.Q"]).to_owned(),
         4 | 5 => format!("({} AND {})", inner(dice), inner(dice)),
         6 => format!("({} OR {})", inner(dice), inner(dice)),
         7 => format!("({} XOR {})", inner(dice), inner(dice)),
-        _ => format!(
-            "NOT ({} OR {} AND {})",
-            inner(dice),
-            inner(dice),
-            inner(dice)
-        ),
+        _ => format!("NOT ({} OR {} AND {})", inner(dice), inner(dice), inner(dice)),
     }
 }
 
@@ -298,12 +258,7 @@ fn random_ladders_with_numbers_are_executed_as_they_were() {
         text += "END_PROGRAM\n";
         let blocks = document(&format!("blocks-{seed}"), "main.st", &text, Bodies::Blocks);
         let ladder = blocks.text.replace("FBD>", "LD>");
-        let found = document(
-            &format!("ladder-{seed}"),
-            "main.xml",
-            &ladder,
-            Bodies::AsRead,
-        );
+        let found = document(&format!("ladder-{seed}"), "main.xml", &ladder, Bodies::AsRead);
         assert!(found.text.contains("<LD>"), "{text}");
     }
 }
@@ -313,14 +268,7 @@ fn pictures_show_every_name() {
     let (svg, found) = draw_typed("level.st", LEVEL, Wanted::default(), Bodies::Blocks);
     let svg = svg.expect("a picture");
     assert!(found.is_empty(), "{found:#?}");
-    for word in [
-        "PROGRAM level",
-        ">TON<",
-        ">latch<",
-        ">27648.0<",
-        ">valve<",
-        "scale to percent",
-    ] {
+    for word in ["PROGRAM level", ">TON<", ">latch<", ">27648.0<", ">valve<", "scale to percent"] {
         assert!(svg.contains(word), "{word}");
     }
     let (svg, _) = draw_typed("batch.st", BATCH, Wanted::default(), Bodies::AsRead);
@@ -330,10 +278,7 @@ fn pictures_show_every_name() {
     }
     // Text is its own picture.
     let (svg, _) = draw_typed("level.st", LEVEL, Wanted::default(), Bodies::AsRead);
-    assert!(
-        svg.expect("a picture")
-            .contains("error := setpoint - scaled;")
-    );
+    assert!(svg.expect("a picture").contains("error := setpoint - scaled;"));
     let (text, _) = listing("level.st", LEVEL, Wanted::default());
     assert!(text.expect("a text").contains("END_PROGRAM"));
 }

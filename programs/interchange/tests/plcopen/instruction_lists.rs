@@ -76,9 +76,7 @@ fn lines(dice: &mut Dice) -> Vec<Line> {
             _ => None,
         });
         let placed = |label: &usize| {
-            lines
-                .iter()
-                .any(|line| matches!(line, Line::Label(known) if known == label))
+            lines.iter().any(|line| matches!(line, Line::Label(known) if known == label))
         };
         let missing: Vec<usize> = wanted.filter(|label| !placed(label)).collect();
         if !missing.is_empty() && dice.rarely(2) {
@@ -86,10 +84,7 @@ fn lines(dice: &mut Dice) -> Vec<Line> {
         }
     }
     for label in 0..labels {
-        if !lines
-            .iter()
-            .any(|line| matches!(line, Line::Label(known) if *known == label))
-        {
+        if !lines.iter().any(|line| matches!(line, Line::Label(known) if *known == label)) {
             lines.push(Line::Label(label));
         }
     }
@@ -207,11 +202,7 @@ fn declared() -> String {
     for (section, names) in [("input", INPUTS), ("output", OUTPUTS)] {
         declared += &variables(&names.map(|name| (section, name, "<BOOL/>")));
     }
-    declared
-        + &variables(&[
-            ("local", "t", "<derived name=\"TON\"/>"),
-            ("local", "n", "<INT/>"),
-        ])
+    declared + &variables(&[("local", "t", "<derived name=\"TON\"/>"), ("local", "n", "<INT/>")])
 }
 
 #[test]
@@ -225,9 +216,7 @@ fn lists_do_what_a_machine_of_one_result_does() {
         let mut naive = Naive::default();
         for scan in 0..24 {
             let inputs = dice.bits(INPUTS.len());
-            naive
-                .values
-                .extend(INPUTS.into_iter().zip(inputs.iter().copied()));
+            naive.values.extend(INPUTS.into_iter().zip(inputs.iter().copied()));
             naive.scan(&lines);
             assert_eq!(
                 run.step(&inputs),

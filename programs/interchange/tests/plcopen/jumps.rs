@@ -215,9 +215,7 @@ fn what_is_skipped_and_what_is_not_called_stays_as_it_is() {
         let mut naive = Naive::default();
         for scan in 0..30 {
             let inputs = dice.bits(INPUTS.len());
-            naive
-                .values
-                .extend(INPUTS.into_iter().zip(inputs.iter().copied()));
+            naive.values.extend(INPUTS.into_iter().zip(inputs.iter().copied()));
             naive.scan(&rungs);
             assert_eq!(
                 run.step(&inputs),
@@ -282,10 +280,7 @@ fn comments_stay_above_what_they_stand_above() {
     ];
     let text = file(&declared, &objects.concat());
     let program = program(&text);
-    let commented = program
-        .rungs
-        .iter()
-        .filter(|rung| !rung.comments.is_empty());
+    let commented = program.rungs.iter().filter(|rung| !rung.comments.is_empty());
     let comments: Vec<_> = commented.flat_map(|rung| &rung.comments).collect();
     assert_eq!(comments, ["What (*is*) skipped"]);
 }

@@ -65,8 +65,7 @@ impl Naive<'_> {
         for &id in order {
             let power = self.power(id);
             let cell = &self.cells[id - 1];
-            self.values
-                .insert(cell.variable.clone(), power != cell.negated);
+            self.values.insert(cell.variable.clone(), power != cell.negated);
         }
     }
 }
@@ -97,10 +96,7 @@ pub(crate) fn variables(list: &[(&str, &str, &str)]) -> String {
 }
 
 fn wires(sources: &[usize]) -> String {
-    sources
-        .iter()
-        .map(|source| format!("<connection refLocalId=\"{source}\"/>"))
-        .collect()
+    sources.iter().map(|source| format!("<connection refLocalId=\"{source}\"/>")).collect()
 }
 
 pub(crate) fn element(cell: &Cell) -> String {
@@ -166,11 +162,8 @@ fn random_graphs_mean_what_a_naive_walk_finds() {
         let program = program(&file(&declared, &format!("{RAIL}{objects}")));
         let circuit = program.lower(PERIOD).expect("it was checked");
         let mut run = Running::new(&circuit);
-        let mut order: Vec<usize> = cells
-            .iter()
-            .filter(|cell| cell.is_coil)
-            .map(|cell| cell.id)
-            .collect();
+        let mut order: Vec<usize> =
+            cells.iter().filter(|cell| cell.is_coil).map(|cell| cell.id).collect();
         order.sort_by_key(|id| (cells[id - 1].place.1, cells[id - 1].place.0));
         let mut naive = Naive {
             cells: &cells,
@@ -186,10 +179,8 @@ fn random_graphs_mean_what_a_naive_walk_finds() {
                 naive.values.insert((*name).to_owned(), *value);
             }
             naive.scan(&order);
-            let expected: Vec<bool> = ["q0", "q1", "m0"]
-                .iter()
-                .map(|name| naive.values[*name])
-                .collect();
+            let expected: Vec<bool> =
+                ["q0", "q1", "m0"].iter().map(|name| naive.values[*name]).collect();
             assert_eq!(
                 run.step(&inputs),
                 expected,
@@ -202,10 +193,9 @@ fn random_graphs_mean_what_a_naive_walk_finds() {
 
 #[test]
 fn dancing_lights_do_what_another_compiler_s_code_does() {
-    let (Some(file), Some(vectors)) = (
-        data("ladder/dancinglights/plc.xml"),
-        data("ladder/vectors/dancinglights.json"),
-    ) else {
+    let (Some(file), Some(vectors)) =
+        (data("ladder/dancinglights/plc.xml"), data("ladder/vectors/dancinglights.json"))
+    else {
         return;
     };
     let text = std::fs::read_to_string(file).expect("a file that exists");
@@ -215,16 +205,11 @@ fn dancing_lights_do_what_another_compiler_s_code_does() {
     let mut run = Running::new(&circuit);
     let scans = vectors["scans"].as_array().expect("scans");
     for (number, scan) in scans.iter().enumerate() {
-        let (inputs, outputs) = scan
-            .as_str()
-            .and_then(|line| line.split_once(' '))
-            .expect("two words");
+        let (inputs, outputs) =
+            scan.as_str().and_then(|line| line.split_once(' ')).expect("two words");
         let inputs: Vec<bool> = inputs.chars().map(|bit| bit == '1').collect();
-        let shown: String = run
-            .step(&inputs)
-            .iter()
-            .map(|on| if *on { '1' } else { '0' })
-            .collect();
+        let shown: String =
+            run.step(&inputs).iter().map(|on| if *on { '1' } else { '0' }).collect();
         assert_eq!(shown, outputs, "scan {number}");
     }
     assert!(scans.len() >= 600);
@@ -236,16 +221,9 @@ fn shown(variables: &str, objects: &str) -> String {
     let reading = read(&text, None);
     let mut lines = findings(&text, &reading);
     lines.retain(|line| !line.contains("U0151"));
-    let notes = reading
-        .fidelity
-        .notes
-        .iter()
-        .map(|note| format!("note: {}", note.message));
+    let notes = reading.fidelity.notes.iter().map(|note| format!("note: {}", note.message));
     lines.extend(notes);
-    let program = reading
-        .program
-        .map(|program| print(&program))
-        .unwrap_or_default();
+    let program = reading.program.map(|program| print(&program)).unwrap_or_default();
     format!("{}\n{program}", lines.join("\n"))
 }
 
@@ -277,11 +255,8 @@ pub(crate) fn block(id: usize, kind: &str, instance: &str, inputs: &[(&str, usiz
         .iter()
         .map(|(pin, source)| format!("<variable formalParameter=\"{pin}\"><connectionPointIn>{}</connectionPointIn></variable>", wires(&[*source])))
         .collect();
-    let instance = if instance.is_empty() {
-        String::new()
-    } else {
-        format!(" instanceName=\"{instance}\"")
-    };
+    let instance =
+        if instance.is_empty() { String::new() } else { format!(" instanceName=\"{instance}\"") };
     format!(
         "<block localId=\"{id}\" typeName=\"{kind}\"{instance}><position x=\"{x}\" y=\"{x}\"/><inputVariables>{inputs}</inputVariables><inOutVariables/><outputVariables/></block>\n",
         x = id * 10
@@ -340,10 +315,7 @@ fn what_a_rung_changes_is_not_read_again_for_its_next_coil() {
     let objects = [
         RAIL.to_owned(),
         contact(1, "a", &[0]),
-        element(&Cell {
-            negated: true,
-            ..cell(2, "y", &[1])
-        }),
+        element(&Cell { negated: true, ..cell(2, "y", &[1]) }),
         coil(3, "y", &[2]),
         contact(4, "b", &[2]),
         coil(5, "z", &[4]),
@@ -398,12 +370,7 @@ fn a_sequence_steps_as_its_chart_says() {
         ("output", "y", "<BOOL/>"),
         ("output", "z", "<BOOL/>"),
     ]);
-    let coils = [
-        RAIL.to_owned(),
-        contact(1, "a", &[0]),
-        coil(2, "begin", &[1]),
-    ]
-    .concat();
+    let coils = [RAIL.to_owned(), contact(1, "a", &[0]), coil(2, "begin", &[1])].concat();
     let actions = format!(
         "<actions><action name=\"work\"><body><LD>{RAIL}{}{}</LD></body></action></actions>",
         contact(1, "b", &[0]),
@@ -434,21 +401,15 @@ fn a_sequence_steps_as_its_chart_says() {
     ];
     for (number, (inputs, outputs)) in scans.iter().enumerate() {
         let inputs: Vec<bool> = inputs.chars().map(|bit| bit == '1').collect();
-        let shown: String = run
-            .step(&inputs)
-            .iter()
-            .map(|on| if *on { '1' } else { '0' })
-            .collect();
+        let shown: String =
+            run.step(&inputs).iter().map(|on| if *on { '1' } else { '0' }).collect();
         assert_eq!(shown, *outputs, "scan {number}\n{}", print(&program));
     }
 }
 
 #[test]
 fn units_of_the_file_stand_in_place_of_their_calls() {
-    let path = format!(
-        "{}/../../examples/plcopen/probes.xml",
-        env!("CARGO_MANIFEST_DIR")
-    );
+    let path = format!("{}/../../examples/plcopen/probes.xml", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(path).expect("an example");
     let program = program(&text);
     let circuit = program.lower(PERIOD).expect("it was checked");
@@ -457,29 +418,17 @@ fn units_of_the_file_stand_in_place_of_their_calls() {
     let mut doubts = 0;
     for scan in 0..200 {
         let [a, b, c] = [dice.rarely(6), dice.rarely(6), false];
-        doubts = if a != b || a != c {
-            (doubts + 1).min(9)
-        } else {
-            0
-        };
+        doubts = if a != b || a != c { (doubts + 1).min(9) } else { 0 };
         let agreed = u8::from(a) + u8::from(b) + u8::from(c) >= 2;
         let expected = vec![agreed, doubts >= 5];
-        assert_eq!(
-            run.step(&[a, b, c]),
-            expected,
-            "scan {scan}\n{}",
-            print(&program)
-        );
+        assert_eq!(run.step(&[a, b, c]), expected, "scan {scan}\n{}", print(&program));
     }
 }
 
 #[test]
 fn a_number_that_comes_from_outside_is_no_preset() {
     let mut declared = variables(&BITS);
-    declared += &variables(&[
-        ("input", "n", "<INT/>"),
-        ("local", "C", "<derived name=\"CTU\"/>"),
-    ]);
+    declared += &variables(&[("input", "n", "<INT/>"), ("local", "C", "<derived name=\"CTU\"/>")]);
     let objects = [
         RAIL.to_owned(),
         contact(1, "a", &[0]),
@@ -492,9 +441,5 @@ fn a_number_that_comes_from_outside_is_no_preset() {
     let reading = read(&text, None);
     let program = reading.program.as_ref();
     let inputs = program.map(|program| program.inputs.len());
-    assert!(
-        inputs.is_none_or(|inputs| inputs > 2),
-        "{:?}",
-        findings(&text, &reading)
-    );
+    assert!(inputs.is_none_or(|inputs| inputs > 2), "{:?}", findings(&text, &reading));
 }

@@ -15,11 +15,7 @@ use crate::support::{PERIOD, data};
 /// The program of a document, or its errors.
 fn typed(text: &str, period: Duration) -> Result<Program, Vec<Diagnostic>> {
     let (file, mut found) = read_typed(text);
-    let options = Options {
-        text,
-        program: None,
-        period: i64::try_from(period.as_nanos()).ok(),
-    };
+    let options = Options { text, program: None, period: i64::try_from(period.as_nanos()).ok() };
     let lowered = lower(&file, &options);
     found.extend(lowered.diagnostics);
     found.retain(|found| found.severity == Severity::Error);
@@ -40,12 +36,7 @@ impl Scans {
     fn new(program: Program) -> Self {
         program.validate().expect("a sound program");
         let machine = Machine::new(&program);
-        Self {
-            state: machine.initial().to_vec(),
-            scratch: Scratch::default(),
-            machine,
-            program,
-        }
+        Self { state: machine.initial().to_vec(), scratch: Scratch::default(), machine, program }
     }
 
     fn scan(&mut self, values: &[u64]) -> Vec<u64> {
@@ -55,8 +46,7 @@ impl Scans {
         for (point, value) in points.zip(values) {
             point.set(&mut inputs, *value);
         }
-        self.machine
-            .step(&mut self.scratch, &mut self.state, &inputs, &mut outputs);
+        self.machine.step(&mut self.scratch, &mut self.state, &inputs, &mut outputs);
         let points = self.program.outputs.iter().filter(|point| point.slot != 0);
         points.map(|point| point.get(&outputs)).collect()
     }
@@ -95,10 +85,7 @@ fn taken(id: u32, source: u32, expression: &str) -> String {
 fn function(id: u32, of: &str, sources: &[u32]) -> String {
     let inputs = sources.iter().enumerate().map(|(at, source)| {
         let source = from(*source);
-        format!(
-            r#"<variable formalParameter="IN{}">{source}</variable>"#,
-            at + 1
-        )
+        format!(r#"<variable formalParameter="IN{}">{source}</variable>"#, at + 1)
     });
     let inputs: String = inputs.collect();
     format!(
@@ -125,11 +112,7 @@ fn a_sum_that_feeds_itself_is_what_it_was_in_the_last_scan() {
 fn a_jump_back_repeats_and_a_jump_on_skips() {
     let variables = variable("n", "%IW0", "INT") + &variable("y", "%QW0", "INT");
     let order = |text: String, order: u32| {
-        text.replacen(
-            " localId",
-            &format!(" executionOrderId=\"{order}\" localId"),
-            1,
-        )
+        text.replacen(" localId", &format!(" executionOrderId=\"{order}\" localId"), 1)
     };
     let label = r#"<label localId="1" executionOrderId="1" label="again"/>"#;
     let jump = r#"<jump localId="9" executionOrderId="5" label="again">"#;
@@ -230,10 +213,7 @@ fn with_macro_step(inner: &str) -> String {
 fn a_macro_step_ends_with_the_last_step_of_its_chart() {
     let variables = variable("go", "%IX0.0", "BOOL") + &variable("n", "%QW0", "INT");
     for inner in ["flat", "nested"] {
-        let text = document(
-            &variables,
-            &format!("<SFC>{}</SFC>", with_macro_step(inner)),
-        );
+        let text = document(&variables, &format!("<SFC>{}</SFC>", with_macro_step(inner)));
         // Idle; First; not left while `go` is off, and not the macro step either; Last; Idle; First.
         let shown = run(&text, &[&[0], &[1], &[0], &[0], &[1], &[0], &[1]]);
         let counts: Vec<u64> = shown.iter().map(|outputs| outputs[0]).collect();
@@ -247,10 +227,7 @@ fn what_is_not_understood_is_refused_by_its_name() {
     for (body, word) in [
         (r#"<ST>a := a;</ST><Extra/>"#, "Extra"),
         (r#"<FBD><comment localId="1" magic="yes"/></FBD>"#, "magic"),
-        (
-            r#"<SFC><macroStep localId="1" name="m"/></SFC>"#,
-            "the macro step `m` has no body",
-        ),
+        (r#"<SFC><macroStep localId="1" name="m"/></SFC>"#, "the macro step `m` has no body"),
         (
             r#"<SFC><macroStep localId="1" name="m"><body><ST>a := a;</ST></body></macroStep></SFC>"#,
             "is not a sequential function chart",
@@ -261,19 +238,15 @@ fn what_is_not_understood_is_refused_by_its_name() {
         ),
     ] {
         let found = typed(&document(&variables, body), PERIOD).expect_err("a refusal");
-        assert!(
-            found.iter().any(|found| found.message.contains(word)),
-            "{word}: {found:#?}"
-        );
+        assert!(found.iter().any(|found| found.message.contains(word)), "{word}: {found:#?}");
     }
 }
 
 #[test]
 fn dancing_lights_as_a_typed_program_do_what_another_compiler_s_code_does() {
-    let (Some(file), Some(vectors)) = (
-        data("ladder/dancinglights/plc.xml"),
-        data("ladder/vectors/dancinglights.json"),
-    ) else {
+    let (Some(file), Some(vectors)) =
+        (data("ladder/dancinglights/plc.xml"), data("ladder/vectors/dancinglights.json"))
+    else {
         return;
     };
     let text = std::fs::read_to_string(file).expect("a file that exists");
@@ -296,11 +269,7 @@ fn dancing_lights_as_a_typed_program_do_what_another_compiler_s_code_does() {
 fn documents() -> Vec<std::path::PathBuf> {
     let examples = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
     let mut folders = vec![examples];
-    folders.extend(
-        ["ladder", "programs"]
-            .iter()
-            .filter_map(|folder| data(folder)),
-    );
+    folders.extend(["ladder", "programs"].iter().filter_map(|folder| data(folder)));
     let mut found = Vec::new();
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(folder).expect("a folder") {
@@ -341,12 +310,7 @@ fn both_readers_agree_scan_by_scan() {
         let named = |points: &understudy_typed::Points| -> Option<Vec<String>> {
             let mut points = points.iter().filter(|point| point.slot != 0);
             let is_bit = points.clone().all(|point| point.of == Elementary::Bool);
-            is_bit.then(|| {
-                points
-                    .by_ref()
-                    .map(|point| point.name.to_uppercase())
-                    .collect()
-            })
+            is_bit.then(|| points.by_ref().map(|point| point.name.to_uppercase()).collect())
         };
         let same = |names: Option<Vec<String>>, bits: usize| {
             names.is_some_and(|names| names.len() == bits)
@@ -381,16 +345,8 @@ fn all_programs_of_the_tasks_run() {
         )
     };
     let bool = |name, address| variable(name, address, "BOOL");
-    let first = unit(
-        "first",
-        &(bool("a", "%IX0.0") + &bool("y", "%QX0.0")),
-        "y := a;",
-    );
-    let second = unit(
-        "second",
-        &(bool("b", "%IX0.1") + &bool("z", "%QX0.1")),
-        "z := NOT b;",
-    );
+    let first = unit("first", &(bool("a", "%IX0.0") + &bool("y", "%QX0.0")), "y := a;");
+    let second = unit("second", &(bool("b", "%IX0.1") + &bool("z", "%QX0.1")), "z := NOT b;");
     let text = format!(
         r#"<project xmlns="http://www.plcopen.org/xml/tc6_0201"><types><dataTypes/><pous>{first}{second}</pous></types>
 <instances><configurations><configuration name="c"><resource name="r"><task name="t" priority="0" interval="T#20ms">
@@ -404,10 +360,7 @@ fn all_programs_of_the_tasks_run() {
     let mut scans = Scans::new((*program).clone());
     assert_eq!(scans.scan(&[1, 0]), [1, 1]);
     assert_eq!(scans.scan(&[0, 1]), [0, 0]);
-    let wanted = understudy_interchange::Wanted {
-        program: Some("second"),
-        period: None,
-    };
+    let wanted = understudy_interchange::Wanted { program: Some("second"), period: None };
     let read = understudy_interchange::read_source("two.xml", &text, wanted);
     assert!(matches!(
         read.source,
@@ -426,8 +379,5 @@ fn python_whose_answer_nothing_reads_has_no_effect() {
     assert_eq!(run(&text, &[&[], &[]]), [[1], [2]]);
     let answered = document(&variables, &body("IF poll.ACK THEN n := 0; END_IF;"));
     let found = typed(&answered, PERIOD).expect_err("an answer that nothing gives");
-    assert!(
-        found.iter().any(|found| found.message.contains("ACK")),
-        "{found:#?}"
-    );
+    assert!(found.iter().any(|found| found.message.contains("ACK")), "{found:#?}");
 }

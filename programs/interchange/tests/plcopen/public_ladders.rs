@@ -23,21 +23,13 @@ fn each_is_read_or_what_is_not_taken_is_listed() {
         };
         let text = std::fs::read_to_string(path).expect("a file that exists");
         let mut reading = read(&text, None);
-        if reading
-            .diagnostics
-            .iter()
-            .any(|found| found.code == "U1013")
-        {
+        if reading.diagnostics.iter().any(|found| found.code == "U1013") {
             // A library: each of its units is read for itself.
             for unit in units(&text) {
                 let found = read(&text, Some(&unit));
                 lines.push(format!(
                     "{file} {unit}: {}",
-                    if found.program.is_some() {
-                        "taken"
-                    } else {
-                        "not taken"
-                    }
+                    if found.program.is_some() { "taken" } else { "not taken" }
                 ));
                 reading = found;
             }
@@ -52,15 +44,9 @@ fn each_is_read_or_what_is_not_taken_is_listed() {
             }
             *codes.entry(found.code).or_default() += 1;
         }
-        let codes: Vec<String> = codes
-            .iter()
-            .map(|(code, count)| format!("{code} {count}"))
-            .collect();
-        let codes = if codes.is_empty() {
-            "nothing".to_owned()
-        } else {
-            codes.join(", ")
-        };
+        let codes: Vec<String> =
+            codes.iter().map(|(code, count)| format!("{code} {count}")).collect();
+        let codes = if codes.is_empty() { "nothing".to_owned() } else { codes.join(", ") };
         let size = match &reading.program {
             None => "not taken".to_owned(),
             Some(program) => {
@@ -76,10 +62,8 @@ fn each_is_read_or_what_is_not_taken_is_listed() {
                 )
             }
         };
-        lines.push(format!(
-            "{file}: {size}; {} notes; found {codes}",
-            reading.fidelity.notes.len()
-        ));
+        lines
+            .push(format!("{file}: {size}; {} notes; found {codes}", reading.fidelity.notes.len()));
     }
     insta::assert_snapshot!(lines.join("\n"));
 }
@@ -87,7 +71,5 @@ fn each_is_read_or_what_is_not_taken_is_listed() {
 /// The names of the units of a file.
 fn units(text: &str) -> Vec<String> {
     let parts = text.split("<pou name=\"").skip(1);
-    parts
-        .filter_map(|part| Some(part.split_once('"')?.0.to_owned()))
-        .collect()
+    parts.filter_map(|part| Some(part.split_once('"')?.0.to_owned())).collect()
 }

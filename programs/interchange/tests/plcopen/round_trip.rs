@@ -18,16 +18,12 @@ fn check(original: &Program, seed: u64) {
     let off: Vec<&String> = found.iter().filter(|line| line.contains("U10")).collect();
     assert!(off.is_empty(), "seed {seed}: {off:#?}");
     assert_eq!(reading.period, Some(PERIOD), "seed {seed}");
-    let again = reading
-        .program
-        .unwrap_or_else(|| panic!("seed {seed}: {found:#?}"));
+    let again = reading.program.unwrap_or_else(|| panic!("seed {seed}: {found:#?}"));
     let names = |program: &Program| (program.inputs.len(), program.outputs.len());
     assert_eq!(names(original), names(&again), "seed {seed}");
     let addresses = |program: &Program| -> Vec<String> {
         let signals = program.inputs.iter().chain(program.writable());
-        signals
-            .filter_map(|signal| signal.address.as_ref().map(ToString::to_string))
-            .collect()
+        signals.filter_map(|signal| signal.address.as_ref().map(ToString::to_string)).collect()
     };
     assert_eq!(addresses(original), addresses(&again), "seed {seed}");
     let before = original.lower(PERIOD).expect("a sound program");
@@ -35,10 +31,7 @@ fn check(original: &Program, seed: u64) {
     for run in 0..4 {
         let expected = outputs(&before, seed ^ run, 60);
         let actual = outputs(&after, seed ^ run, 60);
-        let scan = expected
-            .iter()
-            .zip(&actual)
-            .position(|(left, right)| left != right);
+        let scan = expected.iter().zip(&actual).position(|(left, right)| left != right);
         assert_eq!(scan, None, "seed {seed}, run {run}: a scan differs");
     }
     // What was read is written as it was: nothing grows from file to file.
@@ -62,16 +55,8 @@ fn random_programs_come_back() {
 
 #[test]
 fn the_examples_come_back() {
-    for name in [
-        "press-cell/robot",
-        "press-cell/press",
-        "boiler/main",
-        "filling-line/plant",
-    ] {
-        let path = format!(
-            "{}/../../examples/{name}.ladder",
-            env!("CARGO_MANIFEST_DIR")
-        );
+    for name in ["press-cell/robot", "press-cell/press", "boiler/main", "filling-line/plant"] {
+        let path = format!("{}/../../examples/{name}.ladder", env!("CARGO_MANIFEST_DIR"));
         let text = std::fs::read_to_string(&path).expect("an example");
         let program = parse(&text).into_result().expect("an example is right").0;
         check(&program, 7);
@@ -104,11 +89,7 @@ output 1st_
     original.inputs[0].description = Some("]]> & <a>".into());
     let text = write(&original, PERIOD);
     let again = program(&text);
-    let names: Vec<&str> = again
-        .inputs
-        .iter()
-        .map(|signal| signal.name.as_str())
-        .collect();
+    let names: Vec<&str> = again.inputs.iter().map(|signal| signal.name.as_str()).collect();
     assert_eq!(names, ["robot_holding", "a_b", "A_B_2"]);
     assert_eq!(again.inputs[0].description.as_deref(), Some("]]> & <a>"));
     assert_eq!(again.outputs[0].name.as_str(), "true_2");

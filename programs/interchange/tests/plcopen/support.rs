@@ -27,11 +27,7 @@ pub(crate) fn data(path: &str) -> Option<PathBuf> {
 
 /// Every finding of a reading as a line.
 pub(crate) fn findings(text: &str, reading: &Reading) -> Vec<String> {
-    let report = Report {
-        name: String::new(),
-        text: text.to_owned(),
-        diagnostics: Vec::new(),
-    };
+    let report = Report { name: String::new(), text: text.to_owned(), diagnostics: Vec::new() };
     let line = |found: &understudy_text::Diagnostic| {
         let severity = match found.severity {
             Severity::Error => "error",
@@ -47,9 +43,7 @@ pub(crate) fn findings(text: &str, reading: &Reading) -> Vec<String> {
 pub(crate) fn program(text: &str) -> Program {
     let reading = read(text, None);
     let found = findings(text, &reading);
-    reading
-        .program
-        .unwrap_or_else(|| panic!("no program: {found:#?}"))
+    reading.program.unwrap_or_else(|| panic!("no program: {found:#?}"))
 }
 
 /// Outputs of `scans` scans under random inputs that change now and then.

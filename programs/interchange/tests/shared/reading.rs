@@ -10,13 +10,7 @@ pub(crate) fn reading(format: Format, text: &str) -> String {
     let found = reading.diagnostics.iter();
     let mut said: Vec<String> = found
         .map(|found| format!("{:?} {} {}", found.severity, found.code, found.message))
-        .chain(
-            reading
-                .fidelity
-                .notes
-                .iter()
-                .map(|note| note.message.clone()),
-        )
+        .chain(reading.fidelity.notes.iter().map(|note| note.message.clone()))
         .collect();
     said.sort();
     format!("{program}\n{:?}\n{}", reading.period, said.join("\n"))

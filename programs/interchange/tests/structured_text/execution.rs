@@ -24,11 +24,7 @@ fn places(names: &[&str], points: &understudy_typed::Points) -> Vec<usize> {
 
 /// The typed program of a file.
 pub(crate) fn typed(text: &str, file: &File) -> Option<Program> {
-    let options = Options {
-        text,
-        program: None,
-        period: i64::try_from(PERIOD.as_nanos()).ok(),
-    };
+    let options = Options { text, program: None, period: i64::try_from(PERIOD.as_nanos()).ok() };
     lower(file, &options).program
 }
 
@@ -41,10 +37,7 @@ pub(crate) fn check(what: &str, ladder: &Ladder, typed: &Program, seed: u64) {
         Err(error) => panic!("{what}: {error:?}\n{}", understudy_ladder::print(ladder)),
     };
     let mut running = Running::new(&circuit);
-    let (into, from) = (
-        places(&inputs, &typed.inputs),
-        places(&outputs, &typed.outputs),
-    );
+    let (into, from) = (places(&inputs, &typed.inputs), places(&outputs, &typed.outputs));
     let interpreter = Interpreter::new(typed);
     let mut state = interpreter.initial().to_vec();
     let mut dice = Dice::new(seed);
@@ -92,10 +85,7 @@ fn ladders_of_public_texts_do_what_their_typed_programs_do() {
     let mut found = Vec::new();
     let own = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples");
     files(Path::new(own), &mut found);
-    files(
-        Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests")),
-        &mut found,
-    );
+    files(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests")), &mut found);
     // Those of the project alone are few.
     let mut least = 5;
     if let Some(folder) = std::env::var_os("UNDERSTUDY_DATA") {

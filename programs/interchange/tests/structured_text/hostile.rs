@@ -6,10 +6,7 @@ use crate::support::read;
 fn codes(text: &str) -> Vec<&'static str> {
     let reading = read(text);
     let mut codes: Vec<_> = reading.diagnostics.iter().map(|found| found.code).collect();
-    assert_eq!(
-        understudy_text::has_errors(&reading.diagnostics),
-        reading.program.is_none()
-    );
+    assert_eq!(understudy_text::has_errors(&reading.diagnostics), reading.program.is_none());
     codes.dedup();
     codes
 }
@@ -27,13 +24,7 @@ fn depth_is_bounded() {
         let text = program("", &format!("y := {}a;", open.repeat(deep)));
         assert!(codes(&text).contains(&"U1035"), "{open}");
     }
-    for open in [
-        "IF a THEN ",
-        "CASE n OF 1: ",
-        "FOR n := 1 TO 2 DO ",
-        "WHILE a DO ",
-        "REPEAT ",
-    ] {
+    for open in ["IF a THEN ", "CASE n OF 1: ", "FOR n := 1 TO 2 DO ", "WHILE a DO ", "REPEAT "] {
         let text = program("", &open.repeat(deep));
         assert!(codes(&text).contains(&"U1035"), "{open}");
     }
@@ -45,10 +36,7 @@ fn depth_is_bounded() {
 fn length_is_no_depth() {
     let long = 5_000;
     let chain = |operator: &str| {
-        program(
-            "",
-            &format!("y := a{};", format!(" {operator} NOT y").repeat(long)),
-        )
+        program("", &format!("y := a{};", format!(" {operator} NOT y").repeat(long)))
     };
     for operator in ["AND", "OR", "XOR"] {
         assert!(codes(&chain(operator)).is_empty(), "{operator}");
@@ -59,10 +47,8 @@ fn length_is_no_depth() {
     }
     let sum = program("", &format!("y := n{} > 3;", " - 1".repeat(long)));
     assert!(codes(&sum).len() <= 1);
-    let branches = format!(
-        "IF a THEN y := TRUE; {} END_IF;",
-        "ELSIF NOT a THEN y := FALSE; ".repeat(long)
-    );
+    let branches =
+        format!("IF a THEN y := TRUE; {} END_IF;", "ELSIF NOT a THEN y := FALSE; ".repeat(long));
     assert!(codes(&program("", &branches)).is_empty());
     assert!(codes(&program("", &"y := a; ".repeat(long))).is_empty());
 }
@@ -94,26 +80,15 @@ fn size_is_bounded() {
     );
     assert_eq!(codes(&functions), ["U1048"]);
     let nested = "FOR i := 1 TO 30000 DO ".repeat(10);
-    let loops = program(
-        "VAR i : DINT; END_VAR",
-        &format!("{nested} y := a; {}", "END_FOR; ".repeat(10)),
-    );
+    let loops =
+        program("VAR i : DINT; END_VAR", &format!("{nested} y := a; {}", "END_FOR; ".repeat(10)));
     assert_eq!(codes(&loops), ["U1048"]);
-    let empty = program(
-        "VAR i : DINT; END_VAR",
-        "FOR i := 1 TO 2000000000 DO END_FOR;",
-    );
+    let empty = program("VAR i : DINT; END_VAR", "FOR i := 1 TO 2000000000 DO END_FOR;");
     assert_eq!(codes(&empty), ["U1048"]);
     let products = program("", &format!("y := n{} > 0;", " * n".repeat(40)));
     assert_eq!(codes(&products), ["U1048"]);
     let many: String = (0..60_000).map(|place| format!("v{place}, ")).collect();
-    assert_eq!(
-        codes(&program(
-            &format!("VAR {many} last : BOOL; END_VAR"),
-            "y := a;"
-        )),
-        ["U1048"]
-    );
+    assert_eq!(codes(&program(&format!("VAR {many} last : BOOL; END_VAR"), "y := a;")), ["U1048"]);
 }
 
 /// The bound is that of the whole text, however many units it has.
@@ -127,15 +102,9 @@ fn many_units_are_bounded() {
         })
         .collect();
     // They are looked at, and said not to be used.
-    assert_eq!(
-        codes(&format!("{units}{}", program("", "y := a;"))),
-        ["U1055"]
-    );
+    assert_eq!(codes(&format!("{units}{}", program("", "y := a;"))), ["U1055"]);
     let many = "FUNCTION_BLOCK f END_FUNCTION_BLOCK\n".repeat(5_000);
-    assert_eq!(
-        codes(&format!("{many}{}", program("", "y := a;"))),
-        ["U1042"]
-    );
+    assert_eq!(codes(&format!("{many}{}", program("", "y := a;"))), ["U1042"]);
 }
 
 #[test]

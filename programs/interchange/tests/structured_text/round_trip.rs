@@ -23,10 +23,7 @@ fn random_circuit(seed: u64) -> Circuit {
         values.push(value);
     }
     for _ in 0..dice.below(40) {
-        let (left, right) = (
-            values[dice.below(values.len())],
-            values[dice.below(values.len())],
-        );
+        let (left, right) = (values[dice.below(values.len())], values[dice.below(values.len())]);
         let graph = builder.graph();
         values.push(match dice.below(9) {
             0 => graph.constant(left < right),
@@ -50,28 +47,17 @@ fn random_circuit(seed: u64) -> Circuit {
 fn check(circuit: &Circuit, seed: u64) {
     let text = circuit_as_structured_text(circuit, PERIOD);
     let again = program(&text);
-    let names: Vec<&str> = again
-        .inputs
-        .iter()
-        .map(|signal| signal.name.as_str())
-        .collect();
+    let names: Vec<&str> = again.inputs.iter().map(|signal| signal.name.as_str()).collect();
     assert_eq!(names, circuit.inputs());
     let lowered = again.lower(PERIOD).expect("a sound program");
     // What is read back remembers no more than what was written.
-    assert!(
-        lowered.registers().len() <= circuit.registers().len(),
-        "{text}"
-    );
+    assert!(lowered.registers().len() <= circuit.registers().len(), "{text}");
     let mut original = Running::new(circuit);
     let mut copy = Running::new(&lowered);
     let mut dice = Dice::new(seed);
     for scan in 0..32 {
         let inputs = dice.bits(circuit.inputs().len());
-        assert_eq!(
-            copy.step(&inputs),
-            original.step(&inputs),
-            "scan {scan}\n{text}"
-        );
+        assert_eq!(copy.step(&inputs), original.step(&inputs), "scan {scan}\n{text}");
     }
 }
 
@@ -99,9 +85,7 @@ fn the_ladders_of_the_examples_come_back() {
         include_str!("../../../../examples/filling-line/filling-line.ladder"),
     ];
     for ladder in ladders {
-        let (ladder, _) = understudy_ladder::parse(ladder)
-            .into_result()
-            .expect("a sound program");
+        let (ladder, _) = understudy_ladder::parse(ladder).into_result().expect("a sound program");
         check(&ladder.lower(PERIOD).expect("a sound program"), 5);
     }
 }

@@ -30,22 +30,11 @@ pub(crate) fn program(text: &str) -> Program {
 
 /// What is found in a text, each with its line and column.
 pub(crate) fn findings(text: &str, diagnostics: Vec<Diagnostic>) -> String {
-    let report = understudy_text::Report {
-        name: "text".into(),
-        text: text.into(),
-        diagnostics,
-    };
+    let report = understudy_text::Report { name: "text".into(), text: text.into(), diagnostics };
     let lines = report.diagnostics.iter().map(|found| {
         let place = report.line_and_column(found.span.start);
-        let help = found
-            .help
-            .as_ref()
-            .map(|help| format!("\n      {help}"))
-            .unwrap_or_default();
-        format!(
-            "{place}: {} {:?}: {}{help}\n",
-            found.code, found.severity, found.message
-        )
+        let help = found.help.as_ref().map(|help| format!("\n      {help}")).unwrap_or_default();
+        format!("{place}: {} {:?}: {}{help}\n", found.code, found.severity, found.message)
     });
     lines.collect()
 }

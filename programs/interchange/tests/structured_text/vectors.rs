@@ -15,10 +15,9 @@ fn bits(text: &str) -> Vec<bool> {
 #[test]
 fn the_text_of_all_blocks_does_what_matiec_makes_of_it() {
     let text = include_str!("texts/blocks.st");
-    let recorded: serde_json::Value = serde_json::from_str(include_str!(
-        "../../../ladder/tests/ladder/vectors/blocks.json"
-    ))
-    .expect("a JSON document");
+    let recorded: serde_json::Value =
+        serde_json::from_str(include_str!("../../../ladder/tests/ladder/vectors/blocks.json"))
+            .expect("a JSON document");
     let program = program(text);
     let period = Duration::from_millis(recorded["period_ms"].as_u64().expect("a period"));
     assert_eq!(read(text).period, Some(period));
@@ -34,9 +33,8 @@ fn the_text_of_all_blocks_does_what_matiec_makes_of_it() {
             signal[key].as_str().expect("a word").to_owned()
         };
         let expected = recorded[kind].as_array().expect("a list of signals").iter();
-        let expected: Vec<_> = expected
-            .map(|signal| (word(signal, "name"), word(signal, "address")))
-            .collect();
+        let expected: Vec<_> =
+            expected.map(|signal| (word(signal, "name"), word(signal, "address"))).collect();
         assert_eq!(found, expected);
     }
     let mut interpreter = Interpreter::new(&program, period).expect("a sound program");
@@ -47,16 +45,8 @@ fn the_text_of_all_blocks_does_what_matiec_makes_of_it() {
         let scan = scan.as_str().and_then(|scan| scan.split_once(' '));
         let (inputs, outputs) = scan.expect("inputs, a blank, outputs");
         let inputs = bits(inputs);
-        assert_eq!(
-            interpreter.scan(&inputs),
-            bits(outputs),
-            "interpreter, scan {number}"
-        );
-        assert_eq!(
-            circuit.step(&inputs),
-            bits(outputs),
-            "circuit, scan {number}"
-        );
+        assert_eq!(interpreter.scan(&inputs), bits(outputs), "interpreter, scan {number}");
+        assert_eq!(circuit.step(&inputs), bits(outputs), "circuit, scan {number}");
     }
 }
 
@@ -66,44 +56,30 @@ fn the_standard_blocks_do_what_the_standard_says() {
     let text = include_str!("../../../ladder/tests/ladder/vectors/semantics.txt");
     let lines: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).collect();
     let mut count = 0;
-    for case in lines
-        .split(|line| line.is_empty())
-        .filter(|case| !case.is_empty())
-    {
-        let (block, _) = case[0]
-            .split_once(':')
-            .expect("a block and what is to be seen");
+    for case in lines.split(|line| line.is_empty()).filter(|case| !case.is_empty()) {
+        let (block, _) = case[0].split_once(':').expect("a block and what is to be seen");
         let (kind, preset) = block.split_once(' ').unwrap_or((block, ""));
-        let rows = case[1..]
-            .iter()
-            .map(|line| line.split_once(' ').expect("a name and its values"));
-        let rows: Vec<(&str, Vec<bool>)> = rows
-            .map(|(name, values)| (name, bits(values.trim())))
-            .collect();
-        let (outputs, inputs): (Vec<_>, Vec<_>) = rows
-            .into_iter()
-            .partition(|(name, _)| name.starts_with('Q'));
+        let rows =
+            case[1..].iter().map(|line| line.split_once(' ').expect("a name and its values"));
+        let rows: Vec<(&str, Vec<bool>)> =
+            rows.map(|(name, values)| (name, bits(values.trim()))).collect();
+        let (outputs, inputs): (Vec<_>, Vec<_>) =
+            rows.into_iter().partition(|(name, _)| name.starts_with('Q'));
         let names = |rows: &[(&str, Vec<bool>)], prefix: &str| -> String {
-            let names: Vec<String> = rows
-                .iter()
-                .map(|(name, _)| format!("{prefix}{name}"))
-                .collect();
+            let names: Vec<String> =
+                rows.iter().map(|(name, _)| format!("{prefix}{name}")).collect();
             names.join(", ")
         };
-        let given: Vec<String> = inputs
-            .iter()
-            .map(|(name, _)| format!("{name} := in_{name}"))
-            .collect();
+        let given: Vec<String> =
+            inputs.iter().map(|(name, _)| format!("{name} := in_{name}")).collect();
         let preset = match preset {
             "" => String::new(),
             time if time.ends_with("ms") => format!(", PT := T#{time}"),
             number => format!(", PV := {number}"),
         };
         let call = format!("block({}{preset});", given.join(", "));
-        let shown: String = outputs
-            .iter()
-            .map(|(name, _)| format!("out_{name} := block.{name}; "))
-            .collect();
+        let shown: String =
+            outputs.iter().map(|(name, _)| format!("out_{name} := block.{name}; ")).collect();
         let calls = [call.clone(), format!("IF always THEN {call} END_IF;")];
         for call in calls {
             let source = format!(

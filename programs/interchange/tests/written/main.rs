@@ -12,12 +12,8 @@ use understudy_testing::random::{Dice, random_program};
 
 const PERIOD: Duration = Duration::from_millis(100);
 
-const WRITTEN: [Format; 4] = [
-    Format::Ladder,
-    Format::PlcOpen,
-    Format::StructuredText,
-    Format::Digraph,
-];
+const WRITTEN: [Format; 4] =
+    [Format::Ladder, Format::PlcOpen, Format::StructuredText, Format::Digraph];
 
 /// What is read of the program as it is written.
 fn read_again(format: Format, program: &Program) -> Reading {
@@ -97,11 +93,9 @@ fn random_programs_come_back_from_every_form() {
 /// a branch twice, with its edge contacts.
 #[test]
 fn most_random_programs_are_proved_equal_in_every_scan() {
-    for (format, least) in [
-        (Format::Ladder, 60),
-        (Format::StructuredText, 50),
-        (Format::PlcOpen, 20),
-    ] {
+    for (format, least) in
+        [(Format::Ladder, 60), (Format::StructuredText, 50), (Format::PlcOpen, 20)]
+    {
         let is_proved = |seed: &u64| {
             let program = random_program(*seed, 8);
             let written = write(format, &program, Some(PERIOD)).expect("it can be written");
@@ -148,12 +142,7 @@ fn nothing_of_an_example_is_lost_but_what_is_said() {
             assert!(compared.proved && compared.scans > 0, "{}", path.display());
             for found in &written.losses {
                 let is_name = found.message.contains("otherwise: ");
-                assert!(
-                    is_name,
-                    "{} as {format:?}: {}",
-                    path.display(),
-                    found.message
-                );
+                assert!(is_name, "{} as {format:?}: {}", path.display(), found.message);
             }
         }
     }

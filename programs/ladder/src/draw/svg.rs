@@ -77,9 +77,7 @@ impl Picture {
         let meanings = signals.map(|signal| (signal.name.to_string(), meaning(signal)));
         Self {
             body: String::new(),
-            meanings: meanings
-                .filter(|(_, meaning)| !meaning.is_empty())
-                .collect(),
+            meanings: meanings.filter(|(_, meaning)| !meaning.is_empty()).collect(),
             top: MARGIN,
             width: 0.0,
             flows: false,
@@ -185,10 +183,8 @@ impl Picture {
         if (x1, y1) == (x2, y2) {
             return;
         }
-        let _ = writeln!(
-            self.body,
-            r#"<path class="{class}" d="M{x1:.1} {y1:.1}L{x2:.1} {y2:.1}"/>"#
-        );
+        let _ =
+            writeln!(self.body, r#"<path class="{class}" d="M{x1:.1} {y1:.1}L{x2:.1} {y2:.1}"/>"#);
     }
 
     /// The inside of a contact or coil whose wire is at `y`.
@@ -211,47 +207,21 @@ impl Picture {
 
     fn paint(&mut self, shape: &Shape) {
         match shape {
-            Shape::Wire {
-                left,
-                right,
-                row,
-                live,
-            } => {
+            Shape::Wire { left, right, row, live } => {
                 let y = self.down(*row);
-                self.line(
-                    wire_class(*live),
-                    [Self::across(*left), y, Self::across(*right), y],
-                );
+                self.line(wire_class(*live), [Self::across(*left), y, Self::across(*right), y]);
             }
-            Shape::Riser {
-                column,
-                top,
-                bottom,
-                live,
-            } => {
+            Shape::Riser { column, top, bottom, live } => {
                 let x = Self::across(*column);
-                self.line(
-                    wire_class(*live),
-                    [x, self.down(*top), x, self.down(*bottom)],
-                );
+                self.line(wire_class(*live), [x, self.down(*top), x, self.down(*bottom)]);
             }
-            Shape::Rail {
-                column,
-                top,
-                bottom,
-            } => {
+            Shape::Rail { column, top, bottom } => {
                 let x = Self::across(*column);
                 let half = CELL_HEIGHT / 2.0;
                 let ends = [x, self.down(*top) - half, x, self.down(*bottom) + half];
                 self.line("rail", ends);
             }
-            Shape::Contact {
-                left,
-                right,
-                row,
-                sign,
-                closed,
-            } => {
+            Shape::Contact { left, right, row, sign, closed } => {
                 let (x1, x2, y) = (Self::across(*left), Self::across(*right), self.down(*row));
                 if *closed {
                     self.filled(x1, y, x2 - x1);
@@ -264,12 +234,7 @@ impl Picture {
                     _ => self.centred((x1 + x2) / 2.0, *row, sign),
                 }
             }
-            Shape::Coil {
-                left,
-                row,
-                sign,
-                on,
-            } => {
+            Shape::Coil { left, row, sign, on } => {
                 let (x1, x2, y) = (Self::across(*left), Self::across(left + 2), self.down(*row));
                 if *on {
                     self.filled(x1 + 1.0, y, x2 - x1 - 2.0);
@@ -285,12 +250,7 @@ impl Picture {
                 );
                 self.centred((x1 + x2) / 2.0, *row, sign.trim());
             }
-            Shape::Outline {
-                left,
-                right,
-                top,
-                bottom,
-            } => {
+            Shape::Outline { left, right, top, bottom } => {
                 let (x, y) = (Self::across(*left), self.down(*top));
                 let _ = writeln!(
                     self.body,
@@ -300,13 +260,7 @@ impl Picture {
                 );
             }
             Shape::Label { text, .. } if text.is_empty() => {}
-            Shape::Label {
-                column,
-                row,
-                text,
-                value,
-                signal,
-            } => {
+            Shape::Label { column, row, text, value, signal } => {
                 let x = MARGIN + CELL_WIDTH * f64::from(*column);
                 let baseline = self.down(*row) + 4.5;
                 let class = if *signal { "name" } else { "pin" };
@@ -350,9 +304,7 @@ fn wire_class(live: bool) -> &'static str {
 /// Address, initial value and comment of a signal on one line.
 fn meaning(signal: &Signal) -> String {
     let address = signal.address.as_ref().map(ToString::to_string);
-    let initial = signal
-        .initial
-        .map(|initial| format!("= {}", u8::from(initial)));
+    let initial = signal.initial.map(|initial| format!("= {}", u8::from(initial)));
     let parts = [address, initial, signal.description.clone()];
     parts.into_iter().flatten().collect::<Vec<_>>().join("  ")
 }

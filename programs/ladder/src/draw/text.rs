@@ -67,9 +67,7 @@ fn signals(text: &mut String, heading: &str, signals: &[Signal]) {
             "   {:name_width$}  {:address_width$}  {}  {}",
             signal.name.as_str(),
             address(signal),
-            signal
-                .initial
-                .map_or("   ", |initial| if initial { "= 1" } else { "= 0" }),
+            signal.initial.map_or("   ", |initial| if initial { "= 1" } else { "= 0" }),
             signal.description.as_deref().unwrap_or(""),
         );
         let _ = writeln!(text, "{}", line.trim_end());
@@ -77,11 +75,7 @@ fn signals(text: &mut String, heading: &str, signals: &[Signal]) {
 }
 
 fn address(signal: &Signal) -> String {
-    signal
-        .address
-        .as_ref()
-        .map(ToString::to_string)
-        .unwrap_or_default()
+    signal.address.as_ref().map(ToString::to_string).unwrap_or_default()
 }
 
 /// Directions in which a wire leaves a cell, each the value of a digit of base 3.
@@ -112,12 +106,7 @@ impl Canvas {
     fn new(width: i32, above: i32, below: i32) -> Self {
         let width = usize::try_from(width).unwrap_or(0);
         let cells = width * usize::try_from(above + below + 1).unwrap_or(0);
-        Self {
-            width,
-            above,
-            weights: vec![0; cells],
-            characters: vec![None; cells],
-        }
+        Self { width, above, weights: vec![0; cells], characters: vec![None; cells] }
     }
 
     fn cell(&self, column: i32, row: i32) -> usize {
@@ -156,63 +145,28 @@ impl Canvas {
 
     fn paint(&mut self, shape: &Shape) {
         match shape {
-            Shape::Wire {
-                left,
-                right,
-                row,
-                live,
-            } => self.across(*left, *right, *row, *live),
-            Shape::Riser {
-                column,
-                top,
-                bottom,
-                live,
-            } => self.along(*column, *top, *bottom, *live),
-            Shape::Rail {
-                column,
-                top,
-                bottom,
-            } => {
+            Shape::Wire { left, right, row, live } => self.across(*left, *right, *row, *live),
+            Shape::Riser { column, top, bottom, live } => self.along(*column, *top, *bottom, *live),
+            Shape::Rail { column, top, bottom } => {
                 for row in *top..=*bottom {
                     self.connect(*column, row, UP, false);
                     self.connect(*column, row, DOWN, false);
                 }
             }
-            Shape::Contact {
-                left,
-                row,
-                sign,
-                closed,
-                ..
-            } => {
-                let (before, behind) = if *closed {
-                    ('┫', '┣')
-                } else {
-                    ('┤', '├')
-                };
+            Shape::Contact { left, row, sign, closed, .. } => {
+                let (before, behind) = if *closed { ('┫', '┣') } else { ('┤', '├') };
                 self.write_at(*left, *row, &format!("{before}{sign}{behind}"));
             }
-            Shape::Coil {
-                left, row, sign, ..
-            } => self.write_at(*left, *row, &format!("({sign})")),
-            Shape::Outline {
-                left,
-                right,
-                top,
-                bottom,
-            } => {
+            Shape::Coil { left, row, sign, .. } => self.write_at(*left, *row, &format!("({sign})")),
+            Shape::Outline { left, right, top, bottom } => {
                 self.across(*left, *right, *top, false);
                 self.across(*left, *right, *bottom, false);
                 self.along(*left, *top, *bottom, false);
                 self.along(*right, *top, *bottom, false);
             }
-            Shape::Label {
-                column,
-                row,
-                text,
-                value,
-                ..
-            } => self.write_at(*column, *row, &format!("{text}{value}")),
+            Shape::Label { column, row, text, value, .. } => {
+                self.write_at(*column, *row, &format!("{text}{value}"))
+            }
         }
     }
 
@@ -221,10 +175,7 @@ impl Canvas {
             return;
         }
         let wires: Vec<char> = WIRES.chars().collect();
-        let rows = self
-            .weights
-            .chunks(self.width)
-            .zip(self.characters.chunks(self.width));
+        let rows = self.weights.chunks(self.width).zip(self.characters.chunks(self.width));
         for (weights, characters) in rows {
             let line: String = weights
                 .iter()

@@ -27,12 +27,7 @@ pub(super) fn block_piece<'e>(
             .preset_time()
             .map(|time| (format!("PT {}", duration::text(time)), String::new())),
     );
-    rows.extend(
-        block
-            .kind
-            .preset_value()
-            .map(|value| (format!("PV {value}"), String::new())),
-    );
+    rows.extend(block.kind.preset_value().map(|value| (format!("PV {value}"), String::new())));
     for feed in &block.pins {
         let before = flows.clone().next().is_some();
         let (_, power) = series(&feed.network, flows);
@@ -47,11 +42,7 @@ pub(super) fn block_piece<'e>(
     let head = length(input) + length(word) + length(outputs[0]) + 2;
     let second = outputs.get(1).copied().unwrap_or("");
     let widths = rows.iter().enumerate().map(|(place, (row, value))| {
-        let beside = if place == 0 && !second.is_empty() {
-            length(second) + 1
-        } else {
-            0
-        };
+        let beside = if place == 0 && !second.is_empty() { length(second) + 1 } else { 0 };
         length(row) + length(value) + beside
     });
     let inner = widths.max().unwrap_or(0).max(head).max(length(&block.name));
@@ -68,19 +59,10 @@ pub(super) fn block_piece<'e>(
     };
     let plain = |column, row, text| label(column, row, text, String::new());
     let mut shapes = vec![
-        Shape::Outline {
-            left,
-            right,
-            top: -1,
-            bottom,
-        },
+        Shape::Outline { left, right, top: -1, bottom },
         wire(0, left, 0, flow.is_some_and(|flow| flow.enters)),
         wire(right, right + 2, 0, flow.is_some_and(|flow| flow.leaves)),
-        plain(
-            left + 1 + (inner - length(&block.name)) / 2,
-            -2,
-            &block.name,
-        ),
+        plain(left + 1 + (inner - length(&block.name)) / 2, -2, &block.name),
         plain(left + 1, 0, input),
         plain(left + 1 + word_column, 0, word),
         plain(right - length(outputs[0]), 0, outputs[0]),
@@ -91,12 +73,7 @@ pub(super) fn block_piece<'e>(
         row += 1;
         shapes.push(label(left + 1, row, &text, value));
     }
-    let piece = Piece {
-        width: right + 2,
-        above: 2,
-        below: bottom,
-        shapes,
-    };
+    let piece = Piece { width: right + 2, above: 2, below: bottom, shapes };
     (piece, flow)
 }
 

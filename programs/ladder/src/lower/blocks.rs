@@ -181,7 +181,6 @@ impl<'a> Lowering<'a> {
             [up, down, full, empty].map(|value| self.graph.not(value));
         let more = self.graph.all([up, not_down, not_full]);
         let less = self.graph.all([down, not_up, not_empty]);
-        old.increment(&mut self.graph, more)
-            .decrement(&mut self.graph, less)
+        old.increment(&mut self.graph, more).decrement(&mut self.graph, less)
     }
 }

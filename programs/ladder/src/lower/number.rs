@@ -34,11 +34,8 @@ impl Number {
         }
         let mut holds = graph.constant(true);
         for (place, &bit) in self.0.iter().enumerate() {
-            holds = if value >> place & 1 == 1 {
-                graph.and(bit, holds)
-            } else {
-                graph.or(bit, holds)
-            };
+            holds =
+                if value >> place & 1 == 1 { graph.and(bit, holds) } else { graph.or(bit, holds) };
         }
         holds
     }
@@ -96,11 +93,7 @@ impl Number {
     pub(super) fn loaded(&self, graph: &mut Graph, load: Expression, value: u64) -> Self {
         let keep = graph.not(load);
         let bits = self.0.iter().enumerate().map(|(place, &bit)| {
-            if value >> place & 1 == 1 {
-                graph.or(load, bit)
-            } else {
-                graph.and(keep, bit)
-            }
+            if value >> place & 1 == 1 { graph.or(load, bit) } else { graph.and(keep, bit) }
         });
         Self(bits.collect())
     }

@@ -62,9 +62,7 @@ impl<'a> Lowering<'a> {
     }
 
     fn tapped_elements(&self) -> usize {
-        self.tapped
-            .as_ref()
-            .map_or(0, |tapped| tapped.elements.len())
+        self.tapped.as_ref().map_or(0, |tapped| tapped.elements.len())
     }
 
     pub(super) fn before_block(&mut self, block: &'a Block) -> BlockTap {
@@ -187,27 +185,13 @@ impl Observer {
             let flows = of_rung.map(|wires| {
                 let flow = take(3);
                 let reading = self.reading(*wires, &mut take);
-                ElementFlow {
-                    enters: flow[0],
-                    passes: flow[1],
-                    leaves: flow[2],
-                    reading,
-                }
+                ElementFlow { enters: flow[0], passes: flow[1], leaves: flow[2], reading }
             });
             let flows = flows.collect();
             let power = take(1)[0];
-            rungs.push(RungFlow {
-                elements: flows,
-                power,
-                coils: take(shape.coils),
-            });
+            rungs.push(RungFlow { elements: flows, power, coils: take(shape.coils) });
         }
-        Evaluation {
-            inputs: unpack(inputs, self.inputs),
-            outputs,
-            memory,
-            rungs,
-        }
+        Evaluation { inputs: unpack(inputs, self.inputs), outputs, memory, rungs }
     }
 
     fn reading(&self, wires: Wires, take: &mut impl FnMut(usize) -> Vec<bool>) -> Reading {

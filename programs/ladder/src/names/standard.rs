@@ -17,16 +17,8 @@ impl StandardNames {
     /// Names for the program, its signals and its blocks.
     pub fn of(program: &Program) -> Self {
         let mut namer = Namer::new(Language::StructuredText);
-        let mut names = Self {
-            program: namer.name(&program.name),
-            known: HashMap::new(),
-            namer,
-        };
-        let signals = program
-            .inputs
-            .iter()
-            .chain(&program.outputs)
-            .chain(&program.memory);
+        let mut names = Self { program: namer.name(&program.name), known: HashMap::new(), namer };
+        let signals = program.inputs.iter().chain(&program.outputs).chain(&program.memory);
         let blocks = program.blocks();
         let blocks = blocks.iter().map(|block| &block.name);
         for name in signals.map(|signal| &signal.name).chain(blocks) {
@@ -43,9 +35,7 @@ impl StandardNames {
 
     /// The name of a signal or block.
     pub fn signal<'a>(&'a self, name: &'a Name) -> &'a str {
-        self.known
-            .get(name.as_str())
-            .map_or(name.as_str(), String::as_str)
+        self.known.get(name.as_str()).map_or(name.as_str(), String::as_str)
     }
 
     /// The name of what a contact reads: a signal, or block and output.

@@ -14,9 +14,8 @@ use crate::program::{
 };
 
 /// The words of the function blocks.
-const BLOCK_WORDS: [&str; 10] = [
-    "TON", "TOF", "TP", "CTU", "CTD", "CTUD", "SR", "RS", "R_TRIG", "F_TRIG",
-];
+const BLOCK_WORDS: [&str; 10] =
+    ["TON", "TOF", "TP", "CTU", "CTD", "CTUD", "SR", "RS", "R_TRIG", "F_TRIG"];
 
 /// The largest counter preset, that of IEC 61131-3's INT.
 pub const MAXIMUM_PRESET_VALUE: u16 = 32_767;
@@ -83,11 +82,7 @@ impl Parser {
                 self.advance();
             }
             Lexeme::Sign("|") => {
-                self.error(
-                    "U0102",
-                    "`|` outside of brackets".into(),
-                    "expected an element",
-                );
+                self.error("U0102", "`|` outside of brackets".into(), "expected an element");
                 self.advance();
             }
             Lexeme::Faulty => self.advance(),
@@ -160,9 +155,7 @@ impl Parser {
     }
 
     fn counter_value(&mut self, number: u64) -> Option<u16> {
-        let value = u16::try_from(number)
-            .ok()
-            .filter(|value| *value <= MAXIMUM_PRESET_VALUE);
+        let value = u16::try_from(number).ok().filter(|value| *value <= MAXIMUM_PRESET_VALUE);
         if value.is_none() {
             let message = format!("{number} is more than a counter can hold");
             self.error("U0110", message, format!("at most {MAXIMUM_PRESET_VALUE}"));
@@ -232,9 +225,7 @@ impl Parser {
                 return None;
             }
         };
-        let known = BLOCK_WORDS
-            .into_iter()
-            .find(|known| known.eq_ignore_ascii_case(&word));
+        let known = BLOCK_WORDS.into_iter().find(|known| known.eq_ignore_ascii_case(&word));
         let Some(known) = known else {
             let span = self.span();
             let diagnostic =

@@ -36,14 +36,7 @@ impl Named {
                 held.push(index);
             }
         }
-        Self {
-            inputs,
-            outputs,
-            registers,
-            shared,
-            next,
-            held,
-        }
+        Self { inputs, outputs, registers, shared, next, held }
     }
 
     /// What an assignment writes.

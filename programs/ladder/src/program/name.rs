@@ -16,10 +16,7 @@ pub struct Name {
 impl Name {
     /// A name that stood at `span` (bytes) of its source.
     pub fn at(text: impl Into<String>, span: Range<usize>) -> Self {
-        Self {
-            text: text.into(),
-            span,
-        }
+        Self { text: text.into(), span }
     }
 
     /// Its letters.

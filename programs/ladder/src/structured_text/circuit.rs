@@ -22,9 +22,8 @@ pub fn circuit_as_structured_text(circuit: &Circuit, period: Duration) -> String
 
     let mut text = format!("PROGRAM {program}\n");
     let inputs = circuit.inputs().iter().zip(&names.inputs);
-    let inputs: Vec<String> = inputs
-        .map(|(wanted, name)| format!("{name} : BOOL;{}", origin(wanted, name)))
-        .collect();
+    let inputs: Vec<String> =
+        inputs.map(|(wanted, name)| format!("{name} : BOOL;{}", origin(wanted, name))).collect();
     section(&mut text, "VAR_INPUT", &inputs);
     let outputs = circuit.outputs().iter().zip(&names.outputs);
     let outputs: Vec<String> = outputs
@@ -37,10 +36,7 @@ pub fn circuit_as_structured_text(circuit: &Circuit, period: Duration) -> String
         .zip(&names.registers)
         .map(|(register, name)| {
             let initial = if register.initial { "TRUE" } else { "FALSE" };
-            format!(
-                "{name} : BOOL := {initial};{}",
-                origin(&register.name, name)
-            )
+            format!("{name} : BOOL := {initial};{}", origin(&register.name, name))
         })
         .collect();
     section(&mut text, "VAR", &state);
@@ -48,10 +44,7 @@ pub fn circuit_as_structured_text(circuit: &Circuit, period: Duration) -> String
     let helpers: Vec<String> = helpers.map(|name| format!("{name} : BOOL;")).collect();
     section(&mut text, "VAR", &helpers);
 
-    let writer = Writer {
-        plan: &plan,
-        names: &names,
-    };
+    let writer = Writer { plan: &plan, names: &names };
     let mut section = "";
     for assignment in &plan.assignments {
         let heading = assignment.target.heading();

@@ -176,9 +176,8 @@ impl<'a> Writer<'a> {
         if !is_single && (!power.is_word() || self.changes(rung, &power)) {
             power = self.hold("power", power);
         }
-        for coils in rung
-            .coils
-            .chunk_by(|left, right| left.kind.is_latch() && right.kind.is_latch())
+        for coils in
+            rung.coils.chunk_by(|left, right| left.kind.is_latch() && right.kind.is_latch())
         {
             match coils {
                 [coil] => self.coil(coil, &power),
@@ -215,11 +214,7 @@ impl<'a> Writer<'a> {
 
     /// Calls an instance of its own that sees the edges of `power`, and gives its output; `of` is what the contact or coil is drawn with.
     fn edge(&mut self, kind: &'static str, of: &str, power: &Power) -> Power {
-        let direction = if kind == "R_TRIG" {
-            "rising"
-        } else {
-            "falling"
-        };
+        let direction = if kind == "R_TRIG" { "rising" } else { "falling" };
         let name = self.names.add(&format!("{of}_{direction}"));
         let mut words = vec![format!("{name}("), "CLK".into(), ":=".into()];
         power.words(0, &mut words);
@@ -232,11 +227,7 @@ impl<'a> Writer<'a> {
     /// Set and reset coils with the same power, which is read once.
     fn latches(&mut self, coils: &[Coil], power: &Power) {
         let latched = |coil: &Coil| {
-            let value = if coil.kind == CoilKind::Set {
-                "TRUE"
-            } else {
-                "FALSE"
-            };
+            let value = if coil.kind == CoilKind::Set { "TRUE" } else { "FALSE" };
             format!("{} := {value}", self.names.operand(&coil.target))
         };
         let latched: Vec<String> = coils.iter().map(latched).collect();
@@ -322,18 +313,12 @@ impl<'a> Writer<'a> {
         let calls = |branch: &Series| visit_any(branch, |inner| matches!(inner, Element::Block(_)));
         let has_block = branches.iter().any(calls);
         // The power before the branches is common to them, and a block in one of them needs it there.
-        let power = if has_block && !power.is_word() {
-            self.hold("power", power)
-        } else {
-            power
-        };
+        let power = if has_block && !power.is_word() { self.hold("power", power) } else { power };
         let start = if has_block { power.clone() } else { Power::On };
         self.depth += 1;
         let depth = self.depth;
-        let parts: Vec<Power> = branches
-            .iter()
-            .map(|branch| self.series(branch, start.clone()))
-            .collect();
+        let parts: Vec<Power> =
+            branches.iter().map(|branch| self.series(branch, start.clone())).collect();
         self.depth -= 1;
         let mut any = Power::Any(parts);
         if depth.is_multiple_of(MAXIMUM_DEPTH) {
@@ -419,10 +404,7 @@ impl<'a> Writer<'a> {
             let about = remark(&block.name, name, &Signal::default());
             format!("{name} : {};{about}", block.kind.word())
         });
-        let edges = self
-            .edges
-            .iter()
-            .map(|(name, word)| format!("{name} : {word};"));
+        let edges = self.edges.iter().map(|(name, word)| format!("{name} : {word};"));
         let held = self.held.iter().map(|name| format!("{name} : BOOL;"));
         let lines: Vec<String> = blocks.chain(edges).chain(held).collect();
         section(text, "VAR", &lines);
@@ -453,15 +435,8 @@ fn direct_blocks(series: &Series) -> impl Iterator<Item = &str> {
 fn remark(wanted: &str, name: &str, signal: &Signal) -> String {
     let changed = (wanted != name).then_some(wanted);
     let about = signal.comments.iter().chain(&signal.description);
-    let parts: Vec<&str> = changed
-        .into_iter()
-        .chain(about.map(String::as_str))
-        .collect();
-    if parts.is_empty() {
-        String::new()
-    } else {
-        format!("  {}", comment(&parts.join("  ")))
-    }
+    let parts: Vec<&str> = changed.into_iter().chain(about.map(String::as_str)).collect();
+    if parts.is_empty() { String::new() } else { format!("  {}", comment(&parts.join("  "))) }
 }
 
 /// The relation as it is also right where a counter counts on past its preset, as the third edition of the standard has it.

@@ -12,10 +12,7 @@ fn evaluate(circuit: &Circuit, state: &[bool], inputs: &[bool]) -> (Vec<bool>, V
             Variable::Register(index) => state[index as usize],
         })
     };
-    let next = circuit
-        .registers()
-        .iter()
-        .map(|register| value(register.next));
+    let next = circuit.registers().iter().map(|register| value(register.next));
     let outputs = circuit.outputs().iter().map(|output| value(output.value));
     (next.collect(), outputs.collect())
 }
@@ -31,11 +28,7 @@ fn check(text: &str, equations: impl Fn(&[bool], &[bool]) -> (Vec<bool>, Vec<boo
     for number in 0..1 << (registers + inputs) {
         let x = bits(number, registers);
         let u = bits(number >> registers, inputs);
-        assert_eq!(
-            evaluate(&circuit, &x, &u),
-            equations(&x, &u),
-            "x {x:?}, u {u:?}"
-        );
+        assert_eq!(evaluate(&circuit, &x, &u), equations(&x, &u), "x {x:?}, u {u:?}");
     }
     assert!(circuit.registers().iter().all(|register| !register.initial));
     circuit
@@ -43,12 +36,8 @@ fn check(text: &str, equations: impl Fn(&[bool], &[bool]) -> (Vec<bool>, Vec<boo
 
 /// (24) with `holding` and `empty` in the set terms of rows 1 to 6, and (25).
 fn robot(x: &[bool], u: &[bool], holding: bool, empty: [bool; 3]) -> (Vec<bool>, Vec<bool>) {
-    let &[u10, u11, u12, u13, u14, u15] = u else {
-        panic!("six inputs")
-    };
-    let &[x11, x12, x13, x14, x15, x16, x17] = x else {
-        panic!("seven state bits")
-    };
+    let &[u10, u11, u12, u13, u14, u15] = u else { panic!("six inputs") };
+    let &[x11, x12, x13, x14, x15, x16, x17] = x else { panic!("seven state bits") };
     let f = vec![
         (u13 && u11 && holding || x11 && !u12) && u13 && !u15,
         (u13 && u12 && empty[0] || x12 && !u11) && u13 && !u15,
@@ -69,30 +58,19 @@ fn robot(x: &[bool], u: &[bool], holding: bool, empty: [bool; 3]) -> (Vec<bool>,
 }
 
 fn press(x: &[bool], u: &[bool]) -> (Vec<bool>, Vec<bool>) {
-    let &[u20, u21, u22, u23] = u else {
-        panic!("four inputs")
-    };
-    let &[x21, x22] = x else {
-        panic!("two state bits")
-    };
-    let f = vec![
-        (u20 && u21 || x21 && !u22) && !u23,
-        (u22 || x22 && !u21) && !u23,
-    ];
+    let &[u20, u21, u22, u23] = u else { panic!("four inputs") };
+    let &[x21, x22] = x else { panic!("two state bits") };
+    let f = vec![(u20 && u21 || x21 && !u22) && !u23, (u22 || x22 && !u21) && !u23];
     (f, vec![x21 && !u23, x22 && !u23])
 }
 
 #[test]
 fn the_robot_is_the_working_reading_of_24_and_25() {
-    let circuit = check(
-        include_str!("../../../../examples/press-cell/robot.ladder"),
-        |x, u| robot(x, u, x[6], [!x[6]; 3]),
-    );
-    let names: Vec<&str> = circuit
-        .registers()
-        .iter()
-        .map(|register| register.name.as_str())
-        .collect();
+    let circuit = check(include_str!("../../../../examples/press-cell/robot.ladder"), |x, u| {
+        robot(x, u, x[6], [!x[6]; 3])
+    });
+    let names: Vec<&str> =
+        circuit.registers().iter().map(|register| register.name.as_str()).collect();
     assert_eq!(
         names,
         [
@@ -109,22 +87,15 @@ fn the_robot_is_the_working_reading_of_24_and_25() {
 
 #[test]
 fn the_robot_as_printed_is_24_and_25() {
-    check(
-        include_str!("../../../../parity/tests/fixtures/robot-as-printed.ladder"),
-        |x, u| robot(x, u, u[5], [!u[5]; 3]),
-    );
+    check(include_str!("../../../../parity/tests/fixtures/robot-as-printed.ladder"), |x, u| {
+        robot(x, u, u[5], [!u[5]; 3])
+    });
 }
 
 #[test]
 fn the_press_is_28_and_29() {
-    check(
-        include_str!("../../../../examples/press-cell/press.ladder"),
-        press,
-    );
-    check(
-        include_str!("../../../../parity/tests/fixtures/press-as-printed.ladder"),
-        press,
-    );
+    check(include_str!("../../../../examples/press-cell/press.ladder"), press);
+    check(include_str!("../../../../parity/tests/fixtures/press-as-printed.ladder"), press);
 }
 
 #[test]

@@ -23,11 +23,7 @@ fn report(text: &str) -> String {
             Severity::Warning => "warning",
         };
         let place = report.line_and_column(found.span.start);
-        let _ = write!(
-            lines,
-            "{place} {severity} {}: {}",
-            found.code, found.message
-        );
+        let _ = write!(lines, "{place} {severity} {}: {}", found.code, found.message);
         if let Some(label) = &found.label {
             let _ = write!(lines, " [{label}]");
         }
@@ -149,13 +145,8 @@ fn every_bound_is_an_error() {
         let errors = diagnostics.filter(|found| found.severity == Severity::Error);
         errors.map(|found| found.code).collect()
     };
-    let nested = |depth: usize| {
-        format!(
-            "{HEAD}rung {}a{} (y)",
-            "[ b | ".repeat(depth),
-            " ]".repeat(depth)
-        )
-    };
+    let nested =
+        |depth: usize| format!("{HEAD}rung {}a{} (y)", "[ b | ".repeat(depth), " ]".repeat(depth));
     assert_eq!(codes(&nested(MAXIMUM_NESTING)), [""; 0]);
     assert_eq!(codes(&nested(MAXIMUM_NESTING + 1)), ["U0113", "U0118"]);
     assert_eq!(codes(&nested(100_000)), ["U0113", "U0118"]);

@@ -13,10 +13,7 @@ fn check(name: &str, text: &str) {
 
 #[test]
 fn robot() {
-    check(
-        "robot",
-        include_str!("../../../../examples/press-cell/robot.ladder"),
-    );
+    check("robot", include_str!("../../../../examples/press-cell/robot.ladder"));
 }
 
 #[test]
@@ -58,11 +55,7 @@ rung
 #[test]
 fn power_is_heavy() {
     let program = program(FLOWING);
-    let scans: [&[bool]; 3] = [
-        &[true, false, true],
-        &[false, false, false],
-        &[false, false, true],
-    ];
+    let scans: [&[bool]; 3] = [&[true, false, true], &[false, false, false], &[false, false, true]];
     let evaluation = last_scan(&program, &scans);
     let rungs = [0, 1, 2];
     let text = draw_text_rungs(&program, &rungs, Some(&evaluation));

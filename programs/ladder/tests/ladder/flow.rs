@@ -49,10 +49,7 @@ fn follow(series: &Series, power: bool, flows: &mut std::slice::Iter<'_, Element
                 let Reading::Number(number) = flow.reading else {
                     panic!("a comparison reads a number, not {:?}", flow.reading);
                 };
-                assert_eq!(
-                    flow.passes,
-                    comparison.relation.holds(number, comparison.value)
-                );
+                assert_eq!(flow.passes, comparison.relation.holds(number, comparison.value));
                 assert_eq!(flow.leaves, power && flow.passes);
             }
             Element::Branches(_) => assert_eq!(flow.leaves, any),
@@ -130,10 +127,8 @@ fn check_observer(program: &Program, seed: u64) {
         let mut expected = naive.scan_observed(&inputs);
         let mut found = observer.evaluate(&mut scratch, &state, &packed);
         // Before its first pulse an off-delay has no time yet; its state does not tell that from one that is over.
-        for (rung, (expected, found)) in program
-            .rungs
-            .iter()
-            .zip(expected.rungs.iter_mut().zip(&mut found.rungs))
+        for (rung, (expected, found)) in
+            program.rungs.iter().zip(expected.rungs.iter_mut().zip(&mut found.rungs))
         {
             let mut place = 0;
             visit(&rung.network, &mut |element| {

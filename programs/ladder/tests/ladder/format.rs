@@ -37,11 +37,7 @@ fn the_document_names_the_inputs_and_outputs_of_every_block() {
         let cells: Vec<&str> = row.split('|').map(str::trim).collect();
         assert_eq!(cells[2], kind.wire_input());
         for (pin, required) in kind.side_inputs() {
-            let cell = if *required {
-                format!("{pin} (required)")
-            } else {
-                (*pin).to_owned()
-            };
+            let cell = if *required { format!("{pin} (required)") } else { (*pin).to_owned() };
             assert!(cells[3].split(", ").any(|known| known == cell), "{row}");
         }
         for output in kind.outputs() {

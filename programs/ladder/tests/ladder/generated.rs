@@ -47,11 +47,7 @@ fn check(circuit: &Circuit, seed: u64) {
     let ladder = from_circuit(circuit);
     let text = print(&ladder);
     let parsed = parse(&text);
-    assert!(
-        !understudy_text::has_errors(&parsed.diagnostics),
-        "{:#?}\n{text}",
-        parsed.diagnostics
-    );
+    assert!(!understudy_text::has_errors(&parsed.diagnostics), "{:#?}\n{text}", parsed.diagnostics);
     assert_eq!(parsed.program, ladder, "{text}");
     let lowered = ladder.lower(PERIOD).expect("a sound program");
     let source = circuit_as_structured_text(circuit, PERIOD);
@@ -63,11 +59,7 @@ fn check(circuit: &Circuit, seed: u64) {
         let inputs = dice.bits(circuit.inputs().len());
         let expected = original.step(&inputs);
         assert_eq!(again.step(&inputs), expected, "scan {scan}\n{text}");
-        assert_eq!(
-            assignments.execute(&inputs),
-            expected,
-            "execution {scan}\n{source}"
-        );
+        assert_eq!(assignments.execute(&inputs), expected, "execution {scan}\n{source}");
     }
 }
 

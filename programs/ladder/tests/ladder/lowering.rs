@@ -94,47 +94,28 @@ fn small(rungs: Vec<Rung>) -> Program {
 }
 
 fn rung(network: Series, kind: CoilKind, target: &str) -> Rung {
-    Rung {
-        network,
-        coils: vec![Coil {
-            kind,
-            target: target.into(),
-        }],
-        ..Rung::default()
-    }
+    Rung { network, coils: vec![Coil { kind, target: target.into() }], ..Rung::default() }
 }
 
 fn contacts() -> Vec<Element> {
     let kinds = ContactKind::ALL.into_iter();
     kinds
         .flat_map(|kind| {
-            ["a", "m", "y"].map(|operand| {
-                Element::Contact(Contact {
-                    kind,
-                    operand: operand.into(),
-                })
-            })
+            ["a", "m", "y"]
+                .map(|operand| Element::Contact(Contact { kind, operand: operand.into() }))
         })
         .collect()
 }
 
 fn check_on_one_input(program: &Program) {
     let sequence = every_word(2, 3);
-    check(
-        program,
-        PERIOD,
-        sequence.into_iter().map(|bit| vec![bit == 1]),
-    );
+    check(program, PERIOD, sequence.into_iter().map(|bit| vec![bit == 1]));
 }
 
 #[test]
 fn all_programs_of_two_rungs_of_one_contact() {
     let mut rungs = Vec::new();
-    for network in contacts()
-        .into_iter()
-        .map(|contact| vec![contact])
-        .chain([Vec::new()])
-    {
+    for network in contacts().into_iter().map(|contact| vec![contact]).chain([Vec::new()]) {
         for kind in CoilKind::ALL {
             for target in ["m", "y"] {
                 rungs.push(rung(network.clone(), kind, target));
@@ -182,44 +163,24 @@ fn all_networks_of_three_contacts() {
 #[test]
 fn every_block_on_every_short_history_of_its_inputs() {
     let contact = |operand: &str| {
-        Element::Contact(Contact {
-            kind: ContactKind::NormallyOpen,
-            operand: operand.into(),
-        })
+        Element::Contact(Contact { kind: ContactKind::NormallyOpen, operand: operand.into() })
     };
-    let mut kinds = vec![
-        BlockKind::Sr,
-        BlockKind::Rs,
-        BlockKind::RTrig,
-        BlockKind::FTrig,
-    ];
+    let mut kinds = vec![BlockKind::Sr, BlockKind::Rs, BlockKind::RTrig, BlockKind::FTrig];
     for preset in 0..5 {
         let time = PERIOD * u32::from(preset);
-        kinds.extend([
-            BlockKind::Ton(time),
-            BlockKind::Tof(time),
-            BlockKind::Tp(time),
-        ]);
-        kinds.extend([
-            BlockKind::Ctu(preset),
-            BlockKind::Ctd(preset),
-            BlockKind::Ctud(preset),
-        ]);
+        kinds.extend([BlockKind::Ton(time), BlockKind::Tof(time), BlockKind::Tp(time)]);
+        kinds.extend([BlockKind::Ctu(preset), BlockKind::Ctd(preset), BlockKind::Ctud(preset)]);
     }
     for kind in kinds {
         let inputs = ["wire", "R", "LD", "CD", "R1"];
-        let pins = kind.side_inputs().iter().map(|(pin, _)| Feed {
-            pin: (*pin).into(),
-            network: vec![contact(pin)],
-        });
+        let pins = kind
+            .side_inputs()
+            .iter()
+            .map(|(pin, _)| Feed { pin: (*pin).into(), network: vec![contact(pin)] });
         let used = inputs.into_iter().filter(|input| {
             *input == "wire" || kind.side_inputs().iter().any(|(pin, _)| pin == input)
         });
-        let block = Block {
-            name: "block".into(),
-            kind,
-            pins: pins.collect(),
-        };
+        let block = Block { name: "block".into(), kind, pins: pins.collect() };
         // Both below the block and above it, where a contact sees the last scan's output.
         let program = Program {
             name: "one".into(),
@@ -231,16 +192,9 @@ fn every_block_on_every_short_history_of_its_inputs() {
                     CoilKind::Plain,
                     "above",
                 ),
+                rung(vec![contact("wire"), Element::Block(block)], CoilKind::Plain, "below"),
                 rung(
-                    vec![contact("wire"), Element::Block(block)],
-                    CoilKind::Plain,
-                    "below",
-                ),
-                rung(
-                    vec![contact(&format!(
-                        "block.{}",
-                        kind.outputs().last().expect("an output")
-                    ))],
+                    vec![contact(&format!("block.{}", kind.outputs().last().expect("an output")))],
                     CoilKind::Plain,
                     "second",
                 ),
@@ -269,16 +223,10 @@ fn only_what_outlives_a_scan_is_a_register() {
     check(&format!("{declared}rung m (y)\nrung a (m)"), &["m"]);
     check(&format!("{declared}rung [ a | m ] (m)\nrung m (y)"), &["m"]);
     check(&format!("{declared}rung a (S m)\nrung m (y)"), &["m"]);
-    check(
-        &format!("{declared}rung a (m)\nrung a (S m)\nrung m (y)"),
-        &[],
-    );
+    check(&format!("{declared}rung a (m)\nrung a (S m)\nrung m (y)"), &[]);
     check(&format!("{declared}rung [ a | y ] (y)"), &["y"]);
     check(&format!("{declared}rung m (y)"), &[]);
-    check(
-        &format!("{declared}rung n (y)\nrung m (n)\nrung a (m)"),
-        &["m", "n"],
-    );
+    check(&format!("{declared}rung n (y)\nrung m (n)\nrung a (m)"), &["m", "n"]);
     check(
         &format!("{declared}rung +a {{TON t 300ms}} (y)"),
         &["t.scans.0", "t.scans.1", "a.rising"],
@@ -287,24 +235,15 @@ fn only_what_outlives_a_scan_is_a_register() {
         &format!("{declared}rung a {{TON t 300ms}} (m)\nrung m (y)"),
         &["t.scans.0", "t.scans.1"],
     );
-    check(
-        &format!("{declared}rung a /t.Q {{TON t 100ms}} (y)"),
-        &["t.scans.0", "t.Q"],
-    );
-    check(
-        &format!("{declared}rung a {{CTU c 5}} (y)"),
-        &["c.CV.0", "c.CV.1", "c.CV.2", "c.CU"],
-    );
+    check(&format!("{declared}rung a /t.Q {{TON t 100ms}} (y)"), &["t.scans.0", "t.Q"]);
+    check(&format!("{declared}rung a {{CTU c 5}} (y)"), &["c.CV.0", "c.CV.1", "c.CV.2", "c.CU"]);
 }
 
 #[test]
 fn periods_that_make_no_sense_are_refused() {
     let program = program("program p\ninput a\noutput y\nrung a (y)");
     for period in [Duration::ZERO, Duration::from_secs(3601)] {
-        assert_eq!(
-            program.lower(period).map(|_| ()),
-            Err(LowerError::Period { period })
-        );
+        assert_eq!(program.lower(period).map(|_| ()), Err(LowerError::Period { period }));
         assert!(Interpreter::new(&program, period).is_err());
     }
 }
@@ -312,11 +251,7 @@ fn periods_that_make_no_sense_are_refused() {
 #[test]
 fn a_program_with_errors_is_refused_with_all_of_them() {
     let parsed = understudy_ladder::parse("program p\ninput a\noutput y\nrung b (a)\nrung c (y)");
-    let error = parsed
-        .program
-        .lower(PERIOD)
-        .map(|_| ())
-        .expect_err("three errors");
+    let error = parsed.program.lower(PERIOD).map(|_| ()).expect_err("three errors");
     insta::assert_snapshot!(error, @"the program `p` has errors: the input `a` cannot be written; nothing is called `b`; nothing is called `c`");
 }
 
@@ -325,10 +260,7 @@ fn presets_are_rounded_up_to_the_period_with_a_warning() {
     let program = program("program p\ninput a\noutput y\nrung a {TON t 250ms} (y)");
     let messages = |milliseconds| -> Vec<String> {
         let warnings = program.preset_warnings(Duration::from_millis(milliseconds));
-        warnings
-            .into_iter()
-            .map(|warning| warning.message)
-            .collect()
+        warnings.into_iter().map(|warning| warning.message).collect()
     };
     assert_eq!(messages(50), [""; 0]);
     assert_eq!(

@@ -85,14 +85,8 @@ fn words(source: &str) -> Vec<String> {
         rest = after.split_once("*)").expect("a comment ends").1;
     }
     text.push_str(rest);
-    let text = text
-        .replace(":=", " \u{1} ")
-        .replace(':', " : ")
-        .replace('\u{1}', ":=");
-    let text = text
-        .replace(';', " ; ")
-        .replace('(', " ( ")
-        .replace(')', " ) ");
+    let text = text.replace(":=", " \u{1} ").replace(':', " : ").replace('\u{1}', ":=");
+    let text = text.replace(';', " ; ").replace('(', " ( ").replace(')', " ) ");
     text.split_whitespace().map(str::to_owned).collect()
 }
 

@@ -20,10 +20,8 @@ fn all_blocks_do_what_matiec_does() {
     for (kind, signals) in [("inputs", &program.inputs), ("outputs", &program.outputs)] {
         let names: Vec<&str> = signals.iter().map(|signal| signal.name.as_str()).collect();
         let expected = recorded[kind].as_array().expect("a list of signals");
-        let expected: Vec<&str> = expected
-            .iter()
-            .map(|signal| signal["name"].as_str().expect("a name"))
-            .collect();
+        let expected: Vec<&str> =
+            expected.iter().map(|signal| signal["name"].as_str().expect("a name")).collect();
         assert_eq!(names, expected);
     }
     let mut interpreter = Interpreter::new(&program, period).expect("a sound program");
@@ -31,20 +29,10 @@ fn all_blocks_do_what_matiec_does() {
     let scans = recorded["scans"].as_array().expect("a list of scans");
     assert_eq!(scans.len(), 2_000);
     for (number, scan) in scans.iter().enumerate() {
-        let (inputs, outputs) = scan
-            .as_str()
-            .and_then(|scan| scan.split_once(' '))
-            .expect("inputs, a blank, outputs");
+        let (inputs, outputs) =
+            scan.as_str().and_then(|scan| scan.split_once(' ')).expect("inputs, a blank, outputs");
         let inputs = bits(inputs);
-        assert_eq!(
-            interpreter.scan(&inputs),
-            bits(outputs),
-            "interpreter, scan {number}"
-        );
-        assert_eq!(
-            circuit.step(&inputs),
-            bits(outputs),
-            "circuit, scan {number}"
-        );
+        assert_eq!(interpreter.scan(&inputs), bits(outputs), "interpreter, scan {number}");
+        assert_eq!(circuit.step(&inputs), bits(outputs), "circuit, scan {number}");
     }
 }

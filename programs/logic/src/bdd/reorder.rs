@@ -30,11 +30,7 @@ impl Need {
     pub(super) fn new(limit: usize) -> Self {
         // A good order is left alone as long as there is room.
         let first = limit / 4 * 3;
-        Self {
-            limit,
-            count_at: AtomicUsize::new(first),
-            change_at: AtomicUsize::new(first),
-        }
+        Self { limit, count_at: AtomicUsize::new(first), change_at: AtomicUsize::new(first) }
     }
 
     /// Nodes that there are in all: swaps need room.
@@ -55,13 +51,11 @@ impl Need {
         } else {
             self.change(manager);
             let left = alive_now(manager);
-            self.change_at
-                .store(change_at.max(2 * left), Ordering::Relaxed);
+            self.change_at.store(change_at.max(2 * left), Ordering::Relaxed);
             left
         };
         let change_at = self.change_at.load(Ordering::Relaxed);
-        self.count_at
-            .store(alive.max(change_at / 2) + change_at / 2, Ordering::Relaxed);
+        self.count_at.store(alive.max(change_at / 2) + change_at / 2, Ordering::Relaxed);
         alive <= self.limit
     }
 
@@ -116,24 +110,13 @@ where
         let order = levels.clone().map(|level| manager.level_to_var(level));
         let order = order.collect();
         let sizes: Vec<usize> = levels.map(|level| manager.level(level).len()).collect();
-        Self {
-            total: sizes.iter().sum(),
-            manager,
-            order,
-            sizes,
-            room,
-            moves: 0,
-        }
+        Self { total: sizes.iter().sum(), manager, order, sizes, room, moves: 0 }
     }
 
     fn run(mut self) {
         self.moves = MOVES * self.total;
-        let mut largest: Vec<(usize, VarNo)> = self
-            .sizes
-            .iter()
-            .copied()
-            .zip(self.order.iter().copied())
-            .collect();
+        let mut largest: Vec<(usize, VarNo)> =
+            self.sizes.iter().copied().zip(self.order.iter().copied()).collect();
         largest.sort_unstable_by_key(|&(size, variable)| (std::cmp::Reverse(size), variable));
         for (_, variable) in largest.into_iter().take(VARIABLES) {
             if self.moves == 0 {

@@ -34,11 +34,7 @@ pub struct Sparse {
 impl Sparse {
     /// The runs of `scan`.
     pub fn new(scan: Scan) -> Self {
-        Self {
-            found: Vec::new(),
-            wide: Vec::new(),
-            scan,
-        }
+        Self { found: Vec::new(), wide: Vec::new(), scan }
     }
 
     /// The compiled circuit.

@@ -9,11 +9,7 @@ use understudy_logic::{Circuit, CircuitBuilder, Expression, Graph, Variable};
 pub(crate) type Step = (u8, Index, Index);
 
 pub(crate) fn configuration(cases: u32) -> ProptestConfig {
-    ProptestConfig {
-        cases,
-        failure_persistence: None,
-        ..ProptestConfig::default()
-    }
+    ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() }
 }
 
 pub(crate) fn steps(most: usize) -> impl Strategy<Value = Vec<Step>> {
@@ -48,9 +44,7 @@ pub(crate) fn grown(inputs: u32, registers: u32, steps: &[Step]) -> (Graph, Expr
 
 pub(crate) fn variables(inputs: u32, registers: u32) -> Vec<Variable> {
     let inputs = (0..inputs).map(Variable::Input);
-    inputs
-        .chain((0..registers).map(Variable::Register))
-        .collect()
+    inputs.chain((0..registers).map(Variable::Register)).collect()
 }
 
 /// Every assignment of `variables`, as a function.

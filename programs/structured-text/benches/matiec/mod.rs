@@ -49,9 +49,7 @@ impl Peer {
 
     /// Nanoseconds of a scan, the best of all rounds.
     pub(crate) fn nanoseconds(&self) -> f64 {
-        let output = Command::new(self.folder.join("peer"))
-            .output()
-            .expect("the peer runs");
+        let output = Command::new(self.folder.join("peer")).output().expect("the peer runs");
         let text = String::from_utf8(output.stdout).expect("a text");
         text.trim().parse().expect("a number")
     }
@@ -66,32 +64,19 @@ impl Drop for Peer {
 /// What runs the scans of a case.
 fn c(case: &Case) -> String {
     let declared = |points: &understudy_typed::Points| -> Vec<Point> {
-        points
-            .iter()
-            .filter(|point| point.slot != 0)
-            .cloned()
-            .collect()
+        points.iter().filter(|point| point.slot != 0).cloned().collect()
     };
-    let (inputs, outputs) = (
-        declared(&case.program.inputs),
-        declared(&case.program.outputs),
-    );
+    let (inputs, outputs) = (declared(&case.program.inputs), declared(&case.program.outputs));
     let fields = |points: &[Point]| -> String {
         let field = |point: &Point| format!("{} {};", point.of.name(), point.name.to_uppercase());
         points.iter().map(field).collect()
     };
     let each = |points: &[Point], form: &str| -> String {
-        points
-            .iter()
-            .map(|point| form.replace('X', &point.name.to_uppercase()))
-            .collect()
+        points.iter().map(|point| form.replace('X', &point.name.to_uppercase())).collect()
     };
     let mut rows = String::new();
     for scan in &case.scans {
-        let values = inputs
-            .iter()
-            .zip(scan)
-            .map(|(point, &value)| literal(point.of, value));
+        let values = inputs.iter().zip(scan).map(|(point, &value)| literal(point.of, value));
         let _ = writeln!(rows, "{{{}}},", values.collect::<Vec<_>>().join(", "));
     }
     format!(
@@ -184,9 +169,7 @@ fn words(text: &str) -> impl Iterator<Item = &str> {
     let mut rest = text;
     std::iter::from_fn(move || {
         let first = rest.chars().next()?;
-        let end = rest
-            .find(|character| is_word(character) != is_word(first))
-            .unwrap_or(rest.len());
+        let end = rest.find(|character| is_word(character) != is_word(first)).unwrap_or(rest.len());
         let (word, behind) = rest.split_at(end);
         rest = behind;
         Some(word)

@@ -19,9 +19,7 @@ fn type_of(word: &str) -> Option<Elementary> {
         ("LW", Elementary::Lword),
         ("L", Elementary::Dint),
     ];
-    let short = short
-        .iter()
-        .find(|(name, _)| word.eq_ignore_ascii_case(name));
+    let short = short.iter().find(|(name, _)| word.eq_ignore_ascii_case(name));
     let named = || {
         let all = Elementary::ALL.into_iter();
         let mut plain = all.filter(|of| !of.is_time());
@@ -84,20 +82,11 @@ impl<'a> Lexer<'a> {
         self.place += usize::from(signed);
         let text = match self.decimal() {
             Some(text) => text,
-            None => self
-                .take_while(|next| next.is_ascii_digit() || next == '_')
-                .replace('_', ""),
+            None => self.take_while(|next| next.is_ascii_digit() || next == '_').replace('_', ""),
         };
         self.no_tail(start).unwrap_or_else(|| {
-            let sign = if self.text[value..].starts_with('-') {
-                "-"
-            } else {
-                ""
-            };
-            literal(Literal::Real {
-                text: format!("{sign}{text}"),
-                of: Some(of),
-            })
+            let sign = if self.text[value..].starts_with('-') { "-" } else { "" };
+            literal(Literal::Real { text: format!("{sign}{text}"), of: Some(of) })
         })
     }
 
@@ -128,10 +117,7 @@ impl<'a> Lexer<'a> {
             let message = format!("`{text}` is not in the range of {of}: {least} to {most}");
             return self.error("U1032", message, start);
         }
-        literal(Literal::Integer {
-            value,
-            of: Some(of),
-        })
+        literal(Literal::Integer { value, of: Some(of) })
     }
 
     /// A number without a type.
@@ -232,10 +218,7 @@ impl<'a> Lexer<'a> {
         self.take_while(|next| next.is_alphanumeric() || next == '_');
         let text = self.since(value);
         match moment::nanoseconds(kind, text) {
-            Ok(nanoseconds) => literal(Literal::Time {
-                nanoseconds,
-                of: kind.elementary(),
-            }),
+            Ok(nanoseconds) => literal(Literal::Time { nanoseconds, of: kind.elementary() }),
             Err(expected) => {
                 let what = kind.elementary().name();
                 let message = format!("invalid {what} `{text}`: expected {expected}");
@@ -273,11 +256,7 @@ impl<'a> Lexer<'a> {
             return literal(Literal::Text { bytes, wide });
         };
         let end = std::mem::replace(&mut self.place, place);
-        let shown: String = self
-            .rest()
-            .chars()
-            .take(if is_escape { 3 } else { 1 })
-            .collect();
+        let shown: String = self.rest().chars().take(if is_escape { 3 } else { 1 }).collect();
         self.place += shown.len().min(end - place);
         let faulty = if is_escape {
             let message = format!(

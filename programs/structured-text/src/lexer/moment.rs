@@ -65,10 +65,7 @@ pub(super) fn length(kind: Moment, text: &str) -> usize {
             (Moment::Duration, next) if next.is_ascii_alphabetic() => true,
             // Some dialects have spaces between the parts.
             (Moment::Duration, b' ') => {
-                let spaces = bytes[place..]
-                    .iter()
-                    .take_while(|next| **next == b' ')
-                    .count();
+                let spaces = bytes[place..].iter().take_while(|next| **next == b' ').count();
                 let next = place + spaces;
                 if place > 0 && bytes[place - 1].is_ascii_alphabetic() && is_digit(next) {
                     place = next;
@@ -194,11 +191,7 @@ pub(crate) fn calendar(days: i64) -> (i64, i64, i64) {
     let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
     let shifted = (5 * day_of_year + 2) / 153;
     let day = day_of_year - (153 * shifted + 2) / 5 + 1;
-    let month = if shifted < 10 {
-        shifted + 3
-    } else {
-        shifted - 9
-    };
+    let month = if shifted < 10 { shifted + 3 } else { shifted - 9 };
     let year = year_of_era + era * 400 + i64::from(month <= 2);
     (year, month, day)
 }

@@ -28,9 +28,8 @@ const PRAGMAS: [&str; 17] = [
 ];
 
 /// Pragmas that choose which statements are compiled, by their first word.
-const CONDITIONS: [&str; 8] = [
-    "if", "elsif", "else", "end_if", "define", "undefine", "#if", "#ifdef",
-];
+const CONDITIONS: [&str; 8] =
+    ["if", "elsif", "else", "end_if", "define", "undefine", "#if", "#ifdef"];
 
 /// Whether a pragma is C code, which matiec copies into its own.
 pub(super) fn is_foreign_code(content: &str) -> bool {

@@ -4,11 +4,7 @@ use super::*;
 
 fn literal(text: &str) -> Literal {
     let lexemes = lex(text);
-    assert!(
-        lexemes.diagnostics.is_empty(),
-        "{text}: {:?}",
-        lexemes.diagnostics
-    );
+    assert!(lexemes.diagnostics.is_empty(), "{text}: {:?}", lexemes.diagnostics);
     assert_eq!(lexemes.placed.len(), 2, "{text}");
     match &lexemes.placed[0].lexeme {
         Lexeme::Literal(literal) => (**literal).clone(),
@@ -25,15 +21,9 @@ fn lexemes_and_comments() {
     let text = "(* above (* nested *) *) a := 16#fF; // behind\n{attribute 'x'} B >= 1..2 /* c */";
     let lexemes = lex(text);
     assert!(lexemes.diagnostics.is_empty(), "{:?}", lexemes.diagnostics);
-    let written: Vec<&str> = lexemes
-        .placed
-        .iter()
-        .map(|placed| &text[placed.span.clone()])
-        .collect();
-    assert_eq!(
-        written,
-        ["a", ":=", "16#fF", ";", "B", ">=", "1", "..", "2", ""]
-    );
+    let written: Vec<&str> =
+        lexemes.placed.iter().map(|placed| &text[placed.span.clone()]).collect();
+    assert_eq!(written, ["a", ":=", "16#fF", ";", "B", ">=", "1", "..", "2", ""]);
     let comments = |index: usize| lexemes.placed[index].comments.clone().unwrap_or_default();
     assert_eq!(comments(0).above, ["above (* nested *)"]);
     assert_eq!(comments(3).behind.as_deref(), Some("behind"));
@@ -51,10 +41,7 @@ fn a_comment_that_does_not_nest_ends_at_the_first_end() {
 #[test]
 fn whole_numbers() {
     let check = |text, expected, kind| {
-        let expected = Literal::Integer {
-            value: expected,
-            of: kind,
-        };
+        let expected = Literal::Integer { value: expected, of: kind };
         assert_eq!(literal(text), expected, "{text}");
     };
     check("1_000", 1000, None);
@@ -66,16 +53,9 @@ fn whole_numbers() {
     check("WORD#16#FF_FF", 0xFFFF, Some(Elementary::Word));
     check("W#16#12", 0x12, Some(Elementary::Word));
     check("USINT#255", 255, Some(Elementary::Usint));
-    for text in [
-        "18446744073709551616",
-        "3#1",
-        "2#2",
-        "5abc",
-        "SINT#128",
-        "UINT#-1",
-        "BOOL#2",
-        "16#",
-    ] {
+    for text in
+        ["18446744073709551616", "3#1", "2#2", "5abc", "SINT#128", "UINT#-1", "BOOL#2", "16#"]
+    {
         assert_eq!(code(text), "U1032", "{text}");
     }
 }
@@ -99,10 +79,7 @@ fn real_numbers_are_kept_as_written() {
 #[test]
 fn times_are_nanoseconds() {
     let check = |text, expected, of| {
-        let expected = Literal::Time {
-            nanoseconds: expected,
-            of,
-        };
+        let expected = Literal::Time { nanoseconds: expected, of };
         assert_eq!(literal(text), expected, "{text}");
     };
     check("T#1m30s", 90_000_000_000, Elementary::Time);
@@ -114,11 +91,7 @@ fn times_are_nanoseconds() {
     check("D#1970-01-02", 86_400_000_000_000, Elementary::Date);
     check("DATE#1969-12-31", -86_400_000_000_000, Elementary::Date);
     check("TOD#14:30:20.5", 52_220_500_000_000, Elementary::TimeOfDay);
-    check(
-        "DT#2000-03-01-00:00:01",
-        951_868_801_000_000_000,
-        Elementary::DateAndTime,
-    );
+    check("DT#2000-03-01-00:00:01", 951_868_801_000_000_000, Elementary::DateAndTime);
     let invalid = [
         "T#1s1h",
         "T#5",

@@ -88,10 +88,8 @@ impl Lowering<'_> {
                 && first.of != resolved.of
             {
                 let (own, other) = (self.describe(&resolved.of), self.describe(&first.of));
-                let message = format!(
-                    "`{name}` is {own} at {address}, where `{}` is {other}",
-                    first.name
-                );
+                let message =
+                    format!("`{name}` is {own} at {address}, where `{}` is {other}", first.name);
                 let found = understudy_text::Diagnostic::error("U1083", message, address.span());
                 let found = found.with_related(first.span.clone(), "declared here");
                 self.report(found.with_help("give both one type, or two addresses"));
@@ -99,19 +97,13 @@ impl Lowering<'_> {
             }
             return known;
         }
-        let symbol = self
-            .at_address(name, address, resolved)
-            .unwrap_or(Symbol::Faulty);
+        let symbol = self.at_address(name, address, resolved).unwrap_or(Symbol::Faulty);
         self.addresses.insert(key, symbol.clone());
         symbol
     }
 
     fn at_address(&mut self, name: &Name, address: &Name, resolved: &Resolved) -> Option<Symbol> {
-        let kind = address
-            .as_str()
-            .chars()
-            .nth(1)
-            .map(|kind| kind.to_ascii_uppercase());
+        let kind = address.as_str().chars().nth(1).map(|kind| kind.to_ascii_uppercase());
         let is_input = kind == Some('I');
         let is_point = is_input || kind == Some('Q');
         if !is_point && kind != Some('M') {
@@ -143,10 +135,7 @@ impl Lowering<'_> {
                 true => &mut self.program.inputs,
                 false => &mut self.program.outputs,
             };
-            if known
-                .iter()
-                .any(|point| point.name.eq_ignore_ascii_case(&shown))
-            {
+            if known.iter().any(|point| point.name.eq_ignore_ascii_case(&shown)) {
                 shown = format!("{shown} {address}");
             }
             known.push(shown, of, slot + offset);
@@ -261,9 +250,7 @@ impl Lowering<'_> {
             _ => Elementary::Bool,
         };
         let resolved: Resolved = Type::Elementary(of).into();
-        let symbol = self
-            .at_address(address, address, &resolved)
-            .unwrap_or(Symbol::Faulty);
+        let symbol = self.at_address(address, address, &resolved).unwrap_or(Symbol::Faulty);
         self.addresses.insert(key, symbol.clone());
         symbol
     }
@@ -272,11 +259,7 @@ impl Lowering<'_> {
 /// An address in capitals, with the X that may be left out.
 fn normal(address: &str) -> String {
     let mut key = address.to_ascii_uppercase();
-    if key
-        .chars()
-        .nth(2)
-        .is_some_and(|digit| digit.is_ascii_digit())
-    {
+    if key.chars().nth(2).is_some_and(|digit| digit.is_ascii_digit()) {
         key.insert(2, 'X');
     }
     key

@@ -39,18 +39,11 @@ impl Lowering<'_> {
         if declarations.iter().any(is_unknown) && self.follows_an_error() {
             return None;
         }
-        let mut bound = Bound {
-            given: Vec::new(),
-            taken: Vec::new(),
-            enable: None,
-            enabled: None,
-        };
+        let mut bound = Bound { given: Vec::new(), taken: Vec::new(), enable: None, enabled: None };
         let inputs = |class: Class| matches!(class, Class::Input | Class::InOut);
         let indices = 0..parameters.len();
-        let mut order: Vec<usize> = indices
-            .clone()
-            .filter(|at| inputs(parameters[*at].class))
-            .collect();
+        let mut order: Vec<usize> =
+            indices.clone().filter(|at| inputs(parameters[*at].class)).collect();
         let places = order.len();
         order.extend(indices.filter(|at| !inputs(parameters[*at].class)));
         let find = |name: &Name| parameters.iter().position(|found| name.is(&found.name));
@@ -197,20 +190,16 @@ impl Lowering<'_> {
         let target = self.target(path)?;
         self.writable(&target, path)?;
         if target.bits.is_some() {
-            let message = format!(
-                "`{}` is a VAR_IN_OUT, and a bit of a word is no variable",
-                parameter.name
-            );
+            let message =
+                format!("`{}` is a VAR_IN_OUT, and a bit of a word is no variable", parameter.name);
             self.error("U1049", message, value.span.clone());
             return None;
         }
         if target.place.of != parameter.of {
             let found = self.describe(&target.place.of);
             let wanted = self.describe(&parameter.of);
-            let message = format!(
-                "`{}` is a VAR_IN_OUT of {wanted}, and is given {found}",
-                parameter.name
-            );
+            let message =
+                format!("`{}` is a VAR_IN_OUT of {wanted}, and is given {found}", parameter.name);
             let help = "give a variable of exactly that type";
             self.error_with("U1043", message, value.span.clone(), help);
             return None;
@@ -246,10 +235,7 @@ impl Lowering<'_> {
         let parameters = self.deeper(span, |own| {
             let mut parameters = Vec::new();
             for declaration in &unit.declarations {
-                if !matches!(
-                    declaration.class,
-                    Class::Input | Class::Output | Class::InOut
-                ) {
+                if !matches!(declaration.class, Class::Input | Class::Output | Class::InOut) {
                     continue;
                 }
                 let (resolved, _) = own.reference_type(&declaration.of)?;

@@ -90,8 +90,7 @@ impl Layout {
         let slot = self.slots.min(u64::from(u32::MAX)) as u32;
         self.slots += if is_reference { 1 } else { resolved.of.slots() };
         if !is_reference && self.slots <= u64::from(MAXIMUM_SLOTS) {
-            self.image
-                .put(u64::from(slot) * 64, &resolved.of, &resolved.image);
+            self.image.put(u64::from(slot) * 64, &resolved.of, &resolved.image);
         }
         self.fields.push(Field {
             name: name.to_owned(),
@@ -188,20 +187,10 @@ impl<'a> Lowering<'a> {
         let fields = layout.fields.iter().enumerate();
         let fields = fields.map(|(at, field)| (field.name.to_ascii_uppercase(), at));
         let image = layout.image.done();
-        let info = StructureInfo {
-            fields: fields.collect(),
-            unit: Some(unit),
-        };
-        let structure = Structure {
-            name: found.name.as_str().to_owned(),
-            fields: layout.fields,
-        };
+        let info = StructureInfo { fields: fields.collect(), unit: Some(unit) };
+        let structure = Structure { name: found.name.as_str().to_owned(), fields: layout.fields };
         let id = self.add_structure(structure, info);
-        Some(Block {
-            of: Type::Structure(id, layout.slots as u32),
-            image,
-            ..layout.block
-        })
+        Some(Block { of: Type::Structure(id, layout.slots as u32), image, ..layout.block })
     }
 
     fn member(&mut self, unit: usize, declaration: &'a Declaration, layout: &mut Layout) {
@@ -212,10 +201,7 @@ impl<'a> Lowering<'a> {
             let other = others.find(|other| other.name == *name);
             let message = match other.filter(|other| other.name.as_str() != name.as_str()) {
                 Some(other) => {
-                    format!(
-                        "`{}` and `{name}` are one name, and both are declared",
-                        other.name
-                    )
+                    format!("`{}` and `{name}` are one name, and both are declared", other.name)
                 }
                 None => format!("`{name}` is declared twice"),
             };
@@ -228,10 +214,7 @@ impl<'a> Lowering<'a> {
             class: declaration.class,
             is_retained: declaration.retained,
             description: declaration.description.clone(),
-            address: declaration
-                .address
-                .as_ref()
-                .map(|found| found.as_str().to_owned()),
+            address: declaration.address.as_ref().map(|found| found.as_str().to_owned()),
             symbol,
         };
         layout.block.members.insert(key.clone(), member);
@@ -278,11 +261,7 @@ impl<'a> Lowering<'a> {
         }
         let name = declaration.name.as_str();
         let slot = layout.add(name, &resolved, is_reference);
-        let mut root = if is_reference {
-            Root::OwnReference(slot)
-        } else {
-            Root::Own(slot)
-        };
+        let mut root = if is_reference { Root::OwnReference(slot) } else { Root::Own(slot) };
         if let Some(is_rising) = declaration.edge {
             let hidden: Resolved = Type::Elementary(understudy_typed::Elementary::Bool).into();
             if resolved.of != hidden.of {
@@ -293,12 +272,7 @@ impl<'a> Lowering<'a> {
             let seen = layout.add(&format!("{name}.edge"), &hidden, false);
             let last = layout.add(&format!("{name}.last"), &hidden, false);
             root = Root::Own(seen);
-            layout.block.edges.push(Edge {
-                input: slot,
-                seen,
-                last,
-                is_rising,
-            });
+            layout.block.edges.push(Edge { input: slot, seen, last, is_rising });
         }
         let is_parameter = match declaration.class {
             Class::Input | Class::Output => true,
@@ -330,10 +304,7 @@ impl<'a> Lowering<'a> {
         match &of.kind {
             TypeKind::OpenArray(dimensions, element) => {
                 let element = self.resolve(element)?.of;
-                let array = Array {
-                    ranges: vec![(0, 0); (*dimensions).clamp(1, 16)],
-                    element,
-                };
+                let array = Array { ranges: vec![(0, 0); (*dimensions).clamp(1, 16)], element };
                 Some((Type::Array(Arc::new(array)).into(), true))
             }
             TypeKind::Text { .. } => Some((self.resolve(of)?, true)),
@@ -345,9 +316,7 @@ impl<'a> Lowering<'a> {
     fn assumed(&mut self, declaration: &Declaration) -> Symbol {
         let name = &declaration.name;
         let found = self.resolve(&declaration.of);
-        let slot = found
-            .as_ref()
-            .and_then(|found| self.state(found.of.slots(), &name.span()));
+        let slot = found.as_ref().and_then(|found| self.state(found.of.slots(), &name.span()));
         let symbol = match (found, slot) {
             (Some(found), Some(slot)) => Symbol::Variable(Rc::new(Variable {
                 name: name.as_str().to_owned(),

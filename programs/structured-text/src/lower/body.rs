@@ -66,10 +66,7 @@ fn edges(block: &Block, line: u32, body: &mut Vec<Statement>) {
             bool.clone(),
         );
         for (slot, value) in [(edge.seen, seen), (edge.last, now(edge.is_rising))] {
-            body.push(Statement {
-                line,
-                kind: StatementKind::Assign(variable(slot), value),
-            });
+            body.push(Statement { line, kind: StatementKind::Assign(variable(slot), value) });
         }
     }
 }

@@ -177,10 +177,7 @@ impl Lowering<'_> {
         for _ in 0..=self.units.len() {
             let methods = &self.units[unit].unit.methods;
             if let Some(at) = methods.iter().position(|method| method.name.is(key)) {
-                return Some(Owner {
-                    unit,
-                    method: Some(at),
-                });
+                return Some(Owner { unit, method: Some(at) });
             }
             unit = self.base_of(unit)?;
         }

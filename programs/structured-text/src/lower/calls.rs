@@ -47,18 +47,16 @@ impl Lowering<'_> {
                 }
                 None
             }
-            callee => self
-                .routine_call(callee, arguments, span)
-                .map(|(call, enable, enabled)| {
-                    let of = Type::Elementary(Elementary::Bool);
-                    let of = call.result.as_ref().map_or(of, |result| result.of.clone());
-                    let kind = ExpressionKind::Call(Box::new(call));
-                    statements.push(Statement {
-                        line,
-                        kind: StatementKind::Evaluate(Expression { of, kind }),
-                    });
-                    (enable, enabled)
-                }),
+            callee => self.routine_call(callee, arguments, span).map(|(call, enable, enabled)| {
+                let of = Type::Elementary(Elementary::Bool);
+                let of = call.result.as_ref().map_or(of, |result| result.of.clone());
+                let kind = ExpressionKind::Call(Box::new(call));
+                statements.push(Statement {
+                    line,
+                    kind: StatementKind::Evaluate(Expression { of, kind }),
+                });
+                (enable, enabled)
+            }),
         };
         match control {
             Some(control) => self.enabled(control, statements, line, body),
@@ -89,13 +87,7 @@ impl Lowering<'_> {
         }
         body.push(Statement {
             line,
-            kind: StatementKind::If(
-                vec![Branch {
-                    condition,
-                    body: statements,
-                }],
-                Vec::new(),
-            ),
+            kind: StatementKind::If(vec![Branch { condition, body: statements }], Vec::new()),
         });
     }
 
@@ -144,22 +136,16 @@ impl Lowering<'_> {
             Some(class) if self.is_part_of(class, unit) => class,
             _ => unit,
         };
-        let key = Key {
-            owner,
-            class: Some(class),
-            open,
-        };
+        let key = Key { owner, class: Some(class), open };
         let routine = self.routine(key, span)?;
         self.called(&routine, span);
         for (at, value) in &bound.given {
             let parameter = &routine.parameters[*at];
             let to = instance.part(parameter.slot, &parameter.of);
             let kind = if parameter.class == Class::InOut {
-                self.referenced(value, parameter)
-                    .map(|from| StatementKind::Bind(to, from))
+                self.referenced(value, parameter).map(|from| StatementKind::Bind(to, from))
             } else {
-                self.expression(value, &parameter.of)
-                    .map(|value| StatementKind::Assign(to, value))
+                self.expression(value, &parameter.of).map(|value| StatementKind::Assign(to, value))
             };
             body.extend(kind.map(|kind| Statement { line, kind }));
         }
@@ -233,20 +219,11 @@ impl Lowering<'_> {
             }
             Callee::Block(..) | Callee::Standard(_) => return None,
         };
-        let plain = Key {
-            owner,
-            class,
-            open: Vec::new(),
-        };
+        let plain = Key { owner, class, open: Vec::new() };
         let called = self.unit_of(owner);
         let parameters = self.declared_parameters(&plain, span)?;
-        let bound = self.bind(
-            called.name.as_str(),
-            &called.declarations,
-            &parameters,
-            arguments,
-            span,
-        )?;
+        let bound =
+            self.bind(called.name.as_str(), &called.declarations, &parameters, arguments, span)?;
         let open = self.open_types(&parameters, &bound)?;
         let routine = self.routine(Key { open, ..plain }, span)?;
         self.called(&routine, span);
@@ -272,10 +249,8 @@ impl Lowering<'_> {
             let parameter = &routine.parameters[*at];
             let target = self.target(path)?;
             self.writable(&target, path)?;
-            let are_texts = matches!(
-                (&target.place.of, &parameter.of),
-                (Type::Text(_), Type::Text(_))
-            );
+            let are_texts =
+                matches!((&target.place.of, &parameter.of), (Type::Text(_), Type::Text(_)));
             if *negated || target.bits.is_some() || target.place.of != parameter.of && !are_texts {
                 let wanted = self.describe(&parameter.of);
                 let message = format!(
@@ -316,10 +291,8 @@ impl Lowering<'_> {
         }
         if let Callee::Block(..) = callee {
             let message = format!("`{}` is a block: it has no value of its own", shown(path));
-            let help = format!(
-                "call it as a statement, and read an output, such as `{}.Q`",
-                shown(path)
-            );
+            let help =
+                format!("call it as a statement, and read an output, such as `{}.Q`", shown(path));
             self.error_with("U1049", message, span.clone(), help);
             return Operand::Faulty;
         }
@@ -340,10 +313,7 @@ impl Lowering<'_> {
             return Operand::Faulty;
         }
         let of = result.of.clone();
-        let value = Expression {
-            of: of.clone(),
-            kind: ExpressionKind::Call(Box::new(call)),
-        };
+        let value = Expression { of: of.clone(), kind: ExpressionKind::Call(Box::new(call)) };
         self.permitted(value, enable)
     }
 
@@ -385,11 +355,7 @@ impl Lowering<'_> {
             return Operand::Faulty;
         };
         if value.of.elementary().is_none() {
-            self.error(
-                "U1040",
-                "EN is for results without parts",
-                enable.span.clone(),
-            );
+            self.error("U1040", "EN is for results without parts", enable.span.clone());
             return Operand::Faulty;
         }
         let zero = number(value.of.clone(), 0);
@@ -442,11 +408,6 @@ impl Lowering<'_> {
         };
         let assigned = self.assign(path, &value);
         let statements = assigned.map(|kind| Statement { line, kind });
-        self.enabled(
-            (enable, enabled),
-            statements.into_iter().collect(),
-            line,
-            body,
-        );
+        self.enabled((enable, enabled), statements.into_iter().collect(), line, body);
     }
 }

@@ -51,9 +51,7 @@ impl Lowering<'_> {
         rest: &[(Operator, syntax::Expression)],
         hint: Option<&Type>,
     ) -> Operand {
-        let compares = rest
-            .iter()
-            .any(|(operator, _)| matches!(operator, Operator::Compare(_)));
+        let compares = rest.iter().any(|(operator, _)| matches!(operator, Operator::Compare(_)));
         let outer = hint.filter(|_| !compares);
         let mut whole = first.span.clone();
         let mut left = self.operand(first, outer);
@@ -79,9 +77,8 @@ impl Lowering<'_> {
     ) -> Operand {
         let operator = rest[0].0;
         let parts = std::iter::once(first).chain(rest.iter().map(|(_, part)| part));
-        let mut parts: Vec<(Operand, Span)> = parts
-            .map(|part| (self.operand(part, hint), part.span.clone()))
-            .collect();
+        let mut parts: Vec<(Operand, Span)> =
+            parts.map(|part| (self.operand(part, hint), part.span.clone())).collect();
         while parts.len() > 1 {
             let mut halved = Vec::with_capacity(parts.len().div_ceil(2));
             let mut pending = parts.into_iter();
@@ -172,10 +169,8 @@ impl Lowering<'_> {
             let ordering = match (left, right) {
                 (Number::Integer(left), Number::Integer(right)) => Some(left.cmp(&right)),
                 _ => {
-                    let (left, right) = (
-                        left.in_real(Elementary::Lreal),
-                        right.in_real(Elementary::Lreal),
-                    );
+                    let (left, right) =
+                        (left.in_real(Elementary::Lreal), right.in_real(Elementary::Lreal));
                     let of = Type::Elementary(Elementary::Bool);
                     let operation = Operation::Compare(comparison, Elementary::Lreal);
                     return Operand::Typed(apply(operation, vec![left, right], of));
@@ -218,11 +213,7 @@ impl Lowering<'_> {
             Number::Real(..) if of.is_real() => of,
             Number::Real(..) if is_whole(of) => {
                 let hinted = hint.and_then(Type::elementary).filter(|of| of.is_real());
-                let single = if of.bits() == 64 {
-                    Elementary::Lreal
-                } else {
-                    Elementary::Real
-                };
+                let single = if of.bits() == 64 { Elementary::Lreal } else { Elementary::Real };
                 hinted.unwrap_or(single)
             }
             Number::Integer(_) if of.is_real() => of,
@@ -256,16 +247,10 @@ impl Lowering<'_> {
     ) -> Option<Expression> {
         let of = Type::Elementary(Elementary::Bool);
         if let (Type::Text(_), Type::Text(_)) = (&left.of, &right.of) {
-            return Some(text(
-                TextOperation::Compare(comparison),
-                vec![left, right],
-                of,
-            ));
+            return Some(text(TextOperation::Compare(comparison), vec![left, right], of));
         }
-        let are_enumerations = matches!(
-            (&left.of, &right.of),
-            (Type::Enumeration(..), Type::Enumeration(..))
-        );
+        let are_enumerations =
+            matches!((&left.of, &right.of), (Type::Enumeration(..), Type::Enumeration(..)));
         let kinds = left.of.elementary().zip(right.of.elementary());
         let common = match kinds {
             Some(_) if are_enumerations && left.of != right.of => None,

@@ -32,13 +32,8 @@ impl<'a> Lowering<'a> {
         self.scope.routine = id.0;
         let whole = place(Root::Own(0), block.of.clone());
         let name = instance.name.as_str();
-        let bound = self.bind(
-            name,
-            &[],
-            &routine.parameters,
-            instance.connections,
-            &instance.name.span(),
-        );
+        let bound =
+            self.bind(name, &[], &routine.parameters, instance.connections, &instance.name.span());
         let mut body = Vec::new();
         let line = self.line(&instance.name.span());
         if let Some(bound) = bound {
@@ -106,13 +101,7 @@ impl<'a> Lowering<'a> {
         let kinds = [
             StatementKind::Assign(variable(slot), begins),
             StatementKind::Assign(variable(slot + 1), condition),
-            StatementKind::If(
-                vec![Branch {
-                    condition: load(variable(slot)),
-                    body,
-                }],
-                Vec::new(),
-            ),
+            StatementKind::If(vec![Branch { condition: load(variable(slot)), body }], Vec::new()),
         ];
         kinds.map(|kind| Statement { line, kind }).into()
     }

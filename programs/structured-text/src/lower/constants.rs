@@ -38,13 +38,10 @@ impl Lowering<'_> {
         let outside = self.leave_unit();
         self.scope.unit = owner.map(|owner| owner.unit);
         self.scope.method = owner.and_then(|owner| owner.method);
-        let found = self.deeper(&declaration.name.span(), |own| {
-            own.constant_value(declaration)
-        });
+        let found = self.deeper(&declaration.name.span(), |own| own.constant_value(declaration));
         self.scope = outside;
         let symbol = found.map_or(Symbol::Faulty, Symbol::Constant);
-        self.constants
-            .insert(key, ConstantState::Done(symbol.clone()));
+        self.constants.insert(key, ConstantState::Done(symbol.clone()));
         symbol
     }
 

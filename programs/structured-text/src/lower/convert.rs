@@ -56,11 +56,7 @@ fn fit(from: Elementary, to: Elementary) -> Fit {
     }
     if is_whole(from) && to.is_real() {
         let exact = if to == Elementary::Real { 16 } else { 32 };
-        return if from.bits() <= exact {
-            Fit::Whole
-        } else {
-            Fit::Rounded
-        };
+        return if from.bits() <= exact { Fit::Whole } else { Fit::Rounded };
     }
     if (from, to) == (Elementary::Real, Elementary::Lreal) {
         return Fit::Whole;
@@ -108,11 +104,7 @@ pub(super) fn common(left: Elementary, right: Elementary) -> Option<Elementary> 
         });
     }
     if left.is_bit_string() && right.is_bit_string() {
-        return Some(if left.bits() >= right.bits() {
-            left
-        } else {
-            right
-        });
+        return Some(if left.bits() >= right.bits() { left } else { right });
     }
     let (left, right) = (as_integer(left), as_integer(right));
     Some(match left.bits().cmp(&right.bits()) {
@@ -158,11 +150,7 @@ impl Lowering<'_> {
                 return Some(number(to.clone(), value as u64 & of.mask()));
             }
             let message = format!("{} has no value {value}", self.describe(to));
-            let shown: Vec<&str> = values
-                .iter()
-                .map(|(name, _)| name.as_str())
-                .take(20)
-                .collect();
+            let shown: Vec<&str> = values.iter().map(|(name, _)| name.as_str()).take(20).collect();
             let help = format!("write one of its names: {}", shown.join(", "));
             self.error_with("U1043", message, span.clone(), help);
             return None;
@@ -288,11 +276,7 @@ impl Lowering<'_> {
         let is_elementary = |name: &str| Elementary::ALL.iter().any(|of| of.name() == name);
         let help = match to {
             Type::Elementary(_) | Type::Text(_) if is_elementary(found) => {
-                let wanted = if matches!(to, Type::Text(_)) {
-                    "STRING"
-                } else {
-                    &wanted
-                };
+                let wanted = if matches!(to, Type::Text(_)) { "STRING" } else { &wanted };
                 match wanted {
                     "BOOL" => {
                         format!("compare it, such as `… > 0`, or write {found}_TO_BOOL(…)")

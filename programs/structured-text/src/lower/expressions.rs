@@ -78,10 +78,7 @@ impl Lowering<'_> {
             Literal::Integer { value, of: None } => {
                 return Operand::Number(Number::Integer(*value));
             }
-            Literal::Integer {
-                value,
-                of: Some(of),
-            } => {
+            Literal::Integer { value, of: Some(of) } => {
                 let value = Operand::Number(Number::Integer(*value));
                 match self.coerce(value, &Type::Elementary(*of), span) {
                     Some(value) => value,
@@ -151,11 +148,7 @@ impl Lowering<'_> {
                 Some(of) if is_number(of) || of == Elementary::Time => {
                     let of = as_integer(of);
                     let value = reinterpret(value, of);
-                    Operand::Typed(apply(
-                        Operation::Negate(of),
-                        vec![value],
-                        Type::Elementary(of),
-                    ))
+                    Operand::Typed(apply(Operation::Negate(of), vec![value], Type::Elementary(of)))
                 }
                 _ => {
                     let found = self.describe(&value.of);

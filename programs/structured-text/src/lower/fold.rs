@@ -23,10 +23,7 @@ pub(super) fn apply(operation: Operation, operands: Vec<Expression>, of: Type) -
     {
         return number(of, value);
     }
-    Expression {
-        of,
-        kind: ExpressionKind::Apply(operation, operands),
-    }
+    Expression { of, kind: ExpressionKind::Apply(operation, operands) }
 }
 
 /// An operation on texts.
@@ -43,42 +40,29 @@ pub(super) fn text(operation: TextOperation, operands: Vec<Expression>, of: Type
         let mut result = Vec::new();
         let value = operation.apply(&constants, &mut result);
         return match &of {
-            Type::Text(_) => Expression {
-                of,
-                kind: ExpressionKind::Text(Arc::from(result)),
-            },
+            Type::Text(_) => Expression { of, kind: ExpressionKind::Text(Arc::from(result)) },
             _ => number(of, value),
         };
     }
-    Expression {
-        of,
-        kind: ExpressionKind::Apply(Operation::Text(operation), operands),
-    }
+    Expression { of, kind: ExpressionKind::Apply(Operation::Text(operation), operands) }
 }
 
 /// The same value as another elementary type.
 pub(super) fn convert(value: Expression, to: Elementary) -> Expression {
     match value.of.elementary() {
-        Some(from) if from != to => apply(
-            Operation::Convert(from, to),
-            vec![value],
-            Type::Elementary(to),
-        ),
-        _ => Expression {
-            of: Type::Elementary(to),
-            kind: value.kind,
-        },
+        Some(from) if from != to => {
+            apply(Operation::Convert(from, to), vec![value], Type::Elementary(to))
+        }
+        _ => Expression { of: Type::Elementary(to), kind: value.kind },
     }
 }
 
 /// The same bits as another elementary type of the same width.
 pub(super) fn reinterpret(value: Expression, to: Elementary) -> Expression {
     match value.of.elementary() {
-        Some(from) if from != to => apply(
-            Operation::Reinterpret(from, to),
-            vec![value],
-            Type::Elementary(to),
-        ),
+        Some(from) if from != to => {
+            apply(Operation::Reinterpret(from, to), vec![value], Type::Elementary(to))
+        }
         _ => value,
     }
 }

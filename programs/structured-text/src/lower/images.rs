@@ -22,9 +22,7 @@ pub(super) struct Builder {
 impl Builder {
     /// Begins with an image.
     pub(super) fn of(image: &Image) -> Self {
-        Self {
-            slots: image.iter().copied().collect(),
-        }
+        Self { slots: image.iter().copied().collect() }
     }
 
     /// Writes bits that do not cross a slot.
@@ -54,11 +52,7 @@ impl Builder {
             return;
         };
         let end = start.saturating_add(u32::try_from(of.slots()).unwrap_or(u32::MAX));
-        let old: Vec<u32> = self
-            .slots
-            .range(start..end)
-            .map(|(slot, _)| *slot)
-            .collect();
+        let old: Vec<u32> = self.slots.range(start..end).map(|(slot, _)| *slot).collect();
         for slot in old {
             self.slots.remove(&slot);
         }
@@ -82,8 +76,5 @@ impl Builder {
 
 /// An image at a place of the program's memory.
 pub(super) fn initial(image: &Image, start: u32) -> impl Iterator<Item = Initial> + '_ {
-    image.iter().map(move |(slot, value)| Initial {
-        slot: start + slot,
-        value: *value,
-    })
+    image.iter().map(move |(slot, value)| Initial { slot: start + slot, value: *value })
 }

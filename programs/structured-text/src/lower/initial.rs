@@ -160,10 +160,8 @@ impl Lowering<'_> {
             return self.entries(entries, array, bit, at, image, span);
         }
         if *at >= array.length() {
-            let message = format!(
-                "more initial values than the array has elements: {}",
-                array.length()
-            );
+            let message =
+                format!("more initial values than the array has elements: {}", array.length());
             self.error("U1036", message, span.clone());
             return None;
         }

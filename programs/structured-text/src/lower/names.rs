@@ -66,14 +66,12 @@ pub(super) enum Constant {
 impl Constant {
     pub(super) fn expression(&self) -> Expression {
         match self {
-            Self::Number(of, value) => Expression {
-                of: of.clone(),
-                kind: ExpressionKind::Constant(*value),
-            },
-            Self::Text(capacity, bytes) => Expression {
-                of: Type::Text(*capacity),
-                kind: ExpressionKind::Text(bytes.clone()),
-            },
+            Self::Number(of, value) => {
+                Expression { of: of.clone(), kind: ExpressionKind::Constant(*value) }
+            }
+            Self::Text(capacity, bytes) => {
+                Expression { of: Type::Text(*capacity), kind: ExpressionKind::Text(bytes.clone()) }
+            }
         }
     }
 }
@@ -129,10 +127,7 @@ impl<'a> Lowering<'a> {
             let base = self.base_of(at.unit).filter(|_| most > 0);
             most = most.saturating_sub(1);
             owner = match at.method {
-                Some(_) => Some(Owner {
-                    unit: at.unit,
-                    method: None,
-                }),
+                Some(_) => Some(Owner { unit: at.unit, method: None }),
                 None => base.map(|unit| Owner { unit, method: None }),
             };
         }
@@ -167,10 +162,7 @@ impl<'a> Lowering<'a> {
             let help = format!("write the type in front, such as `{}#{name}`", types[0]);
             self.error_with("U1041", message, name.span(), help);
         }
-        Some(number(
-            Type::Enumeration(id, elementary),
-            value as u64 & elementary.mask(),
-        ))
+        Some(number(Type::Enumeration(id, elementary), value as u64 & elementary.mask()))
     }
 
     fn enumeration_name(&self, id: EnumerationId) -> String {
@@ -256,8 +248,5 @@ impl<'a> Lowering<'a> {
 
 /// A value of a type.
 pub(super) fn number(of: Type, value: u64) -> Expression {
-    Expression {
-        of,
-        kind: ExpressionKind::Constant(value),
-    }
+    Expression { of, kind: ExpressionKind::Constant(value) }
 }

@@ -64,12 +64,8 @@ impl Number {
         match self {
             Self::Real(..) => Elementary::Lreal,
             Self::Integer(value) => {
-                let types = [
-                    Elementary::Int,
-                    Elementary::Dint,
-                    Elementary::Lint,
-                    Elementary::Ulint,
-                ];
+                let types =
+                    [Elementary::Int, Elementary::Dint, Elementary::Lint, Elementary::Ulint];
                 let fits = |of: &Elementary| {
                     let (least, most) = limits(*of);
                     least <= value && value <= most
@@ -115,10 +111,7 @@ impl Number {
                 let double = [left.1, right.1].map(f64::to_bits);
                 let single = of(Elementary::Real)?.apply(&single).ok()?;
                 let double = of(Elementary::Lreal)?.apply(&double).ok()?;
-                Some(Self::Real(
-                    f32::from_bits(single as u32),
-                    f64::from_bits(double),
-                ))
+                Some(Self::Real(f32::from_bits(single as u32), f64::from_bits(double)))
             }
         }
     }

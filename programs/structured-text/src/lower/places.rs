@@ -44,10 +44,7 @@ impl Target {
 
 /// What is stored at a place.
 pub(super) fn load(place: Place) -> Expression {
-    Expression {
-        of: place.of.clone(),
-        kind: ExpressionKind::Load(Box::new(place)),
-    }
+    Expression { of: place.of.clone(), kind: ExpressionKind::Load(Box::new(place)) }
 }
 
 pub(super) fn place(root: Root, of: Type) -> Place {
@@ -60,16 +57,7 @@ impl Lowering<'_> {
         let symbol = self.root_symbol(&path.root);
         match (&symbol, path.steps.as_slice()) {
             (Some(Symbol::Constant(constant)), []) => return Some(constant.expression()),
-            (
-                Some(Symbol::Constant(constant)),
-                [
-                    Step::Bits {
-                        width,
-                        number,
-                        span,
-                    },
-                ],
-            ) => {
+            (Some(Symbol::Constant(constant)), [Step::Bits { width, number, span }]) => {
                 let value = constant.expression();
                 let (part, at) = self.bits(&value.of, *width, *number, span)?;
                 return Some(extract(value, part, at));
@@ -192,11 +180,9 @@ impl Lowering<'_> {
             at += 1;
             match step {
                 Step::Field(name) => self.field(&mut target, name)?,
-                Step::Bits {
-                    width,
-                    number,
-                    span,
-                } => target.bits = Some(self.bits(&target.place.of, *width, *number, span)?),
+                Step::Bits { width, number, span } => {
+                    target.bits = Some(self.bits(&target.place.of, *width, *number, span)?)
+                }
                 Step::Index(first) => {
                     let mut indices: Vec<&syntax::Expression> = first.iter().collect();
                     while let Some(Step::Index(more)) = steps.get(at) {
@@ -264,10 +250,8 @@ impl Lowering<'_> {
         };
         let count = whole.bits() / part.bits();
         if number >= count || part.bits() == whole.bits() && number > 0 {
-            let message = format!(
-                "part {number} of {whole}, which has parts 0 to {}",
-                count.max(1) - 1
-            );
+            let message =
+                format!("part {number} of {whole}, which has parts 0 to {}", count.max(1) - 1);
             self.error("U1036", message, span.clone());
             return None;
         }
@@ -295,10 +279,8 @@ impl Lowering<'_> {
             let array: Arc<Array> = array.clone();
             let dimensions = array.ranges.len();
             if rest.len() < dimensions {
-                let message = format!(
-                    "the array has {dimensions} dimensions, and {} are given",
-                    rest.len()
-                );
+                let message =
+                    format!("the array has {dimensions} dimensions, and {} are given", rest.len());
                 self.error("U1043", message, span.clone());
                 return None;
             }
@@ -374,10 +356,8 @@ impl Lowering<'_> {
                 self.warn("U1081", message, path.span.clone(), help);
             }
             Some(Class::Output) => {
-                let message = format!(
-                    "`{}` is an output, which the block writes itself",
-                    shown(path)
-                );
+                let message =
+                    format!("`{}` is an output, which the block writes itself", shown(path));
                 let help = "use a VAR_INPUT of the block";
                 self.warn("U1081", message, path.span.clone(), help);
             }
@@ -420,11 +400,7 @@ pub(super) fn insert(old: Expression, value: Expression, part: Elementary, at: u
         return reinterpret(value, whole);
     }
     let operands = vec![reinterpret(old, of), value];
-    let value = apply(
-        Operation::Insert { of, part, at },
-        operands,
-        Type::Elementary(of),
-    );
+    let value = apply(Operation::Insert { of, part, at }, operands, Type::Elementary(of));
     reinterpret(value, whole)
 }
 

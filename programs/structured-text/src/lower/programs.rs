@@ -101,10 +101,7 @@ impl<'a> Lowering<'a> {
                 name: name.to_owned(),
                 of: variable.of.clone(),
                 slot,
-                address: declaration
-                    .address
-                    .as_ref()
-                    .map(|found| found.as_str().to_owned()),
+                address: declaration.address.as_ref().map(|found| found.as_str().to_owned()),
                 description: declaration.description.clone(),
                 is_retained: declaration.retained,
             });
@@ -121,12 +118,7 @@ impl<'a> Lowering<'a> {
                 file.units.is_empty() && file.types.is_empty() && file.globals.is_empty();
             if options.program.is_some() || is_empty {
                 let message = "the file has no PROGRAM";
-                self.error_with(
-                    "U1051",
-                    message,
-                    0..0,
-                    "add a PROGRAM that calls its blocks",
-                );
+                self.error_with("U1051", message, 0..0, "add a PROGRAM that calls its blocks");
             }
             return self.library(file);
         }
@@ -134,10 +126,7 @@ impl<'a> Lowering<'a> {
         if instances.is_empty() {
             return Vec::new();
         }
-        let base = instances
-            .iter()
-            .filter_map(|instance| instance.interval)
-            .min();
+        let base = instances.iter().filter_map(|instance| instance.interval).min();
         self.program.period = options.period.or(base).unwrap_or(DEFAULT_PERIOD);
         let name = instances[0].name;
         self.program.name = match instances.len() {
@@ -274,10 +263,7 @@ impl<'a> Lowering<'a> {
             return;
         };
         let key = Key {
-            owner: Owner {
-                unit: instance.unit,
-                method: None,
-            },
+            owner: Owner { unit: instance.unit, method: None },
             class: Some(instance.unit),
             open: Vec::new(),
         };
@@ -286,11 +272,7 @@ impl<'a> Lowering<'a> {
         };
         self.program.initial.extend(initial(&block.image, own));
         let connected = self.connected(instance, &routine, &block);
-        self.program.tasks.push(Task {
-            routine: connected.unwrap_or(routine.id),
-            own,
-            every,
-        });
+        self.program.tasks.push(Task { routine: connected.unwrap_or(routine.id), own, every });
         let prefix = match are_several {
             true => format!("{}.", instance.name),
             false => String::new(),
@@ -319,10 +301,7 @@ impl<'a> Lowering<'a> {
                 }
                 continue;
             }
-            let parameter = block
-                .parameters
-                .iter()
-                .find(|found| found.name == variable.name);
+            let parameter = block.parameters.iter().find(|found| found.name == variable.name);
             let slot = match (variable.root, parameter) {
                 (_, Some(parameter)) => own + parameter.slot,
                 (Root::Own(slot), None) => own + slot,
@@ -399,10 +378,7 @@ impl<'a> Lowering<'a> {
     }
 
     fn check(&mut self, index: usize, method: Option<usize>, class: Option<usize>, unit: &'a Unit) {
-        let owner = Owner {
-            unit: index,
-            method,
-        };
+        let owner = Owner { unit: index, method };
         let mut open = Vec::new();
         let outside = self.leave_unit();
         self.scope.unit = Some(index);

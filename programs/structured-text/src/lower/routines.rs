@@ -106,9 +106,7 @@ impl<'a> Lowering<'a> {
                 self.names.frames.push(found);
             }
         }
-        self.names
-            .library
-            .push(self.units[key.owner.unit].is_library);
+        self.names.library.push(self.units[key.owner.unit].is_library);
         let id = RoutineId(self.program.routines.len() as u32);
         let name = match key.owner.method {
             Some(_) => format!("{}.{}", self.units[key.owner.unit].unit.name, unit.name),
@@ -126,12 +124,7 @@ impl<'a> Lowering<'a> {
             body: Vec::new(),
         });
         self.calls.push(Vec::new());
-        Some(Routine {
-            id,
-            parameters: frame.parameters,
-            result,
-            symbols: Rc::new(frame.symbols),
-        })
+        Some(Routine { id, parameters: frame.parameters, result, symbols: Rc::new(frame.symbols) })
     }
 
     /// Takes slots of a frame for a variable.
@@ -156,9 +149,7 @@ impl<'a> Lowering<'a> {
             return;
         }
         let symbol = self.frame_symbol(key, declaration, frame);
-        frame
-            .symbols
-            .insert(name.key(), symbol.unwrap_or(Symbol::Faulty));
+        frame.symbols.insert(name.key(), symbol.unwrap_or(Symbol::Faulty));
     }
 
     fn frame_symbol(

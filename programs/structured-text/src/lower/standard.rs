@@ -235,11 +235,9 @@ impl Lowering<'_> {
                 "SEL" | "MAX" | "MIN" | "LIMIT" | "MUX" => self.selection(key, values, hint, span),
                 "ATAN2" => self.arc_tangent_of_two(values, hint, span),
                 "FLOOR" | "CEIL" | "ROUND" | "FRAC" => self.rounded(key, values[0], hint),
-                "TIME" | "LTIME" => Some(apply(
-                    Operation::Elapsed,
-                    Vec::new(),
-                    Type::Elementary(Elementary::Time),
-                )),
+                "TIME" | "LTIME" => {
+                    Some(apply(Operation::Elapsed, Vec::new(), Type::Elementary(Elementary::Time)))
+                }
                 "CONCAT_DATE_TOD" | "CONCAT_DATE_LTOD" => self.date_and_time(values),
                 "SIZEOF" => return self.size_of(values[0]),
                 "UPPER_BOUND" | "LOWER_BOUND" => return self.array_bound(key, values),
@@ -291,12 +289,7 @@ impl Lowering<'_> {
             };
             let right = self.operand(pair[1], hint.as_ref());
             let operator = Operator::Compare(comparison);
-            let one = self.binary(
-                operator,
-                (left, &pair[0].span),
-                (right, &pair[1].span),
-                None,
-            );
+            let one = self.binary(operator, (left, &pair[0].span), (right, &pair[1].span), None);
             let one = self.settle(one, None)?;
             all = Some(match all {
                 Some(before) => choose(before, one, boolean(false)),
@@ -330,10 +323,7 @@ impl Lowering<'_> {
         let found = self.typed(values[0], hint);
         let by = self.long(values[1]);
         let (found, by) = (found?, by?);
-        let Some(of) = found
-            .of
-            .elementary()
-            .filter(|of| is_whole(*of) || *of == Elementary::Bool)
+        let Some(of) = found.of.elementary().filter(|of| is_whole(*of) || *of == Elementary::Bool)
         else {
             let shown = self.describe(&found.of);
             let message = format!("{key} needs a bit string, and this is {shown}");
@@ -349,10 +339,7 @@ impl Lowering<'_> {
             _ => Operation::RotateRight(bits),
         };
         let operands = vec![reinterpret(found, bits), by];
-        Some(reinterpret(
-            apply(operation, operands, Type::Elementary(bits)),
-            of,
-        ))
+        Some(reinterpret(apply(operation, operands, Type::Elementary(bits)), of))
     }
 
     /// A whole number as a LINT.
@@ -376,8 +363,7 @@ impl Lowering<'_> {
             {
                 let kind = syntax::TypeKind::Named(path.root.clone());
                 let span = value.span.clone();
-                self.resolve(&syntax::TypeName { kind, span })
-                    .map(|found| found.of)
+                self.resolve(&syntax::TypeName { kind, span }).map(|found| found.of)
             }
             _ => self.typed(value, None).map(|found| found.of),
         };

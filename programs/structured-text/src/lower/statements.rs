@@ -318,11 +318,7 @@ impl Lowering<'_> {
         let Operand::Typed(value) = &operand else {
             return self.coerce(operand, &wanted, &written.span);
         };
-        let from = value
-            .of
-            .elementary()
-            .filter(|of| is_whole(*of))
-            .map(as_integer);
+        let from = value.of.elementary().filter(|of| is_whole(*of)).map(as_integer);
         match (from, operand) {
             (Some(from), Operand::Typed(value)) => {
                 let ((least, most), (low, high)) = (limits(counter), limits(from));

@@ -28,11 +28,7 @@ pub(super) struct Resolved {
 
 impl Resolved {
     pub(super) fn new(of: Type, image: Image) -> Self {
-        Self {
-            of,
-            image,
-            range: None,
-        }
+        Self { of, image, range: None }
     }
 }
 
@@ -65,18 +61,14 @@ pub(super) fn elementary(key: &str) -> Option<Elementary> {
         "TOD" | "LTOD" | "LTIME_OF_DAY" => Elementary::TimeOfDay,
         "DT" | "LDT" | "LDATE_AND_TIME" => Elementary::DateAndTime,
         _ => {
-            return Elementary::ALL
-                .into_iter()
-                .find(|known| known.name() == key);
+            return Elementary::ALL.into_iter().find(|known| known.name() == key);
         }
     })
 }
 
 /// Blocks of Beremiz that Python or files of the controller answer.
 fn is_extension(key: &str) -> bool {
-    ["PYTHON_", "CSV_"]
-        .iter()
-        .any(|start| key.starts_with(start))
+    ["PYTHON_", "CSV_"].iter().any(|start| key.starts_with(start))
 }
 
 impl<'a> Lowering<'a> {
@@ -205,9 +197,8 @@ impl<'a> Lowering<'a> {
 
     fn subrange(&mut self, base: &Name, low: &Expression, high: &Expression) -> Option<Resolved> {
         let of = self.named_type(base)?.of;
-        let elementary = of
-            .elementary()
-            .filter(|found| found.is_integer() || found.is_bit_string());
+        let elementary =
+            of.elementary().filter(|found| found.is_integer() || found.is_bit_string());
         let Some(elementary) = elementary else {
             let message = format!("a subrange is one of an integer type; `{base}` is none");
             self.error("U1043", message, base.span());
@@ -225,10 +216,7 @@ impl<'a> Lowering<'a> {
         }
         let mut image = Builder::default();
         image.set(0, elementary.bits(), low as u64);
-        Some(Resolved {
-            range: Some((low, high)),
-            ..Resolved::new(of, image.done())
-        })
+        Some(Resolved { range: Some((low, high)), ..Resolved::new(of, image.done()) })
     }
 
     fn text_type(&mut self, length: Option<&Expression>) -> Option<Resolved> {
@@ -269,10 +257,7 @@ impl<'a> Lowering<'a> {
             }
         }
         let element = element?;
-        let array = Array {
-            ranges,
-            element: element.of,
-        };
+        let array = Array { ranges, element: element.of };
         let (length, stride) = (array.length(), array.stride());
         let of = Type::Array(Arc::new(array));
         if of.slots() > u64::from(MAXIMUM_SLOTS) {
@@ -306,10 +291,8 @@ impl<'a> Lowering<'a> {
                 continue;
             };
             if known.insert(declaration.name.key(), fields.len()).is_some() {
-                let message = format!(
-                    "two parts of the structure are called `{}`",
-                    declaration.name
-                );
+                let message =
+                    format!("two parts of the structure are called `{}`", declaration.name);
                 self.error("U1042", message, declaration.name.span());
                 continue;
             }
@@ -332,14 +315,8 @@ impl<'a> Lowering<'a> {
         }
         let image = image.done();
         let id = self.add_structure(
-            Structure {
-                name: name.to_owned(),
-                fields,
-            },
-            StructureInfo {
-                fields: known,
-                unit: None,
-            },
+            Structure { name: name.to_owned(), fields },
+            StructureInfo { fields: known, unit: None },
         );
         Some(Resolved::new(Type::Structure(id, slots as u32), image))
     }
@@ -388,28 +365,21 @@ impl<'a> Lowering<'a> {
         };
         let id = EnumerationId(self.program.enumerations.len() as u32);
         // Known at once, so that values may name each other.
-        self.program.enumerations.push(Enumeration {
-            name: name.to_owned(),
-            values: Vec::new(),
-        });
+        self.program.enumerations.push(Enumeration { name: name.to_owned(), values: Vec::new() });
         let mut next: i128 = 0;
         let (least, most) = super::convert::limits(elementary);
         for (value_name, value) in values {
             if let Some(value) = value {
                 next = self.constant_integer(value)?;
             }
-            let Some(value) = i64::try_from(next)
-                .ok()
-                .filter(|_| next >= least && next <= most)
+            let Some(value) = i64::try_from(next).ok().filter(|_| next >= least && next <= most)
             else {
                 let message = format!("the value {next} of `{value_name}` leaves {elementary}");
                 self.error("U1036", message, value_name.span());
                 return None;
             };
             let enumeration = &mut self.program.enumerations[id.0 as usize];
-            enumeration
-                .values
-                .push((value_name.as_str().to_owned(), value));
+            enumeration.values.push((value_name.as_str().to_owned(), value));
             let known = self.enumerators.entry(value_name.key()).or_default();
             known.push((id, elementary, value));
             next += 1;
@@ -418,9 +388,6 @@ impl<'a> Lowering<'a> {
         let first = first.map_or(0, |(_, value)| *value);
         let mut image = Builder::default();
         image.set(0, elementary.bits(), first as u64);
-        Some(Resolved::new(
-            Type::Enumeration(id, elementary),
-            image.done(),
-        ))
+        Some(Resolved::new(Type::Enumeration(id, elementary), image.done()))
     }
 }

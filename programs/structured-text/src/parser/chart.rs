@@ -7,9 +7,7 @@ use crate::syntax::{
 };
 
 /// Qualifiers of actions.
-const QUALIFIERS: [&str; 12] = [
-    "N", "R", "S", "L", "D", "P", "P0", "P1", "SD", "DS", "SL", "NC",
-];
+const QUALIFIERS: [&str; 12] = ["N", "R", "S", "L", "D", "P", "P0", "P1", "SD", "DS", "SL", "NC"];
 
 /// Words at which a part of a chart begins.
 const PARTS: [&str; 4] = ["INITIAL_STEP", "STEP", "TRANSITION", "ACTION"];
@@ -65,11 +63,7 @@ impl Parser<'_> {
             }
         }
         self.need_word("END_STEP");
-        Some(ChartStep {
-            name,
-            is_initial,
-            associations,
-        })
+        Some(ChartStep { name, is_initial, associations })
     }
 
     /// `action(L, T#3s, indicator)`
@@ -85,9 +79,7 @@ impl Parser<'_> {
             return Some(association);
         }
         let qualifier = self.word().filter(|word| {
-            let is_known = QUALIFIERS
-                .iter()
-                .any(|known| known.eq_ignore_ascii_case(word));
+            let is_known = QUALIFIERS.iter().any(|known| known.eq_ignore_ascii_case(word));
             is_known && matches!(self.ahead(1), Lexeme::Sign("," | ")"))
         });
         if let Some(qualifier) = qualifier {
@@ -143,29 +135,15 @@ impl Parser<'_> {
             self.recover_to(&["END_TRANSITION", "INITIAL_STEP", "STEP", "TRANSITION"]);
         }
         self.take_word("END_TRANSITION");
-        Some(Transition {
-            name,
-            priority,
-            from,
-            to,
-            condition,
-            span: self.since(start),
-        })
+        Some(Transition { name, priority, from, to, condition, span: self.since(start) })
     }
 
     /// A condition in an instruction list.
     fn condition_of_instructions(&mut self) -> Expression {
         let span = self.span();
-        if matches!(
-            self.body(&["END_TRANSITION"]),
-            Body::Instructions(_) | Body::Statements(_)
-        ) {
+        if matches!(self.body(&["END_TRANSITION"]), Body::Instructions(_) | Body::Statements(_)) {
             let help = "write the condition behind `:=`, such as `:= a AND NOT b;`";
-            self.refuse(
-                "conditions in other languages are",
-                span.clone(),
-                Some(help),
-            );
+            self.refuse("conditions in other languages are", span.clone(), Some(help));
         }
         let kind = ExpressionKind::Faulty;
         Expression { kind, span }

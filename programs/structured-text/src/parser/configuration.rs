@@ -136,12 +136,7 @@ impl Parser<'_> {
             false => Vec::new(),
         };
         self.need_semicolon(&PARTS);
-        Some(ProgramInstance {
-            name,
-            task,
-            of,
-            connections,
-        })
+        Some(ProgramInstance { name, task, of, connections })
     }
 
     /// What a program is connected to. The tasks of its blocks are read past.

@@ -98,11 +98,7 @@ impl Parser<'_> {
 
     /// The content between `VAR…` and `END_VAR`.
     pub(super) fn variables(&mut self, class: Class, into: &mut Vec<Declaration>) {
-        let mut block = Block {
-            class,
-            constant: false,
-            retained: false,
-        };
+        let mut block = Block { class, constant: false, retained: false };
         // A variable may be called so.
         while self.at_any(&QUALIFIERS) && !matches!(self.ahead(1), Lexeme::Sign(":" | ",")) {
             block.constant |= self.at_word("CONSTANT");

@@ -9,15 +9,8 @@ use crate::syntax::{
 };
 
 /// Functions of other dialects that work on addresses or on memory made at run time.
-const REFUSED_FUNCTIONS: [&str; 7] = [
-    "ADRINST",
-    "BITADR",
-    "INDEXOF",
-    "__NEW",
-    "__DELETE",
-    "__QUERYINTERFACE",
-    "__QUERYPOINTER",
-];
+const REFUSED_FUNCTIONS: [&str; 7] =
+    ["ADRINST", "BITADR", "INDEXOF", "__NEW", "__DELETE", "__QUERYINTERFACE", "__QUERYPOINTER"];
 
 /// Operators that are functions as well.
 const FUNCTION_OPERATORS: [&str; 6] = ["AND", "OR", "XOR", "MOD", "AND_THEN", "OR_ELSE"];
@@ -71,10 +64,7 @@ impl Parser<'_> {
                 rest.push((operator, self.chain(first.rank() + 1)));
             }
             let span = self.since(left.span.start);
-            left = Expression {
-                kind: ExpressionKind::Chain(Box::new(left), rest),
-                span,
-            };
+            left = Expression { kind: ExpressionKind::Chain(Box::new(left), rest), span };
         }
         left
     }
@@ -183,11 +173,7 @@ impl Parser<'_> {
         let path = if is_function {
             let span = self.span();
             let root = self.part_name("a function");
-            root.map(|root| Path {
-                root,
-                steps: Vec::new(),
-                span,
-            })
+            root.map(|root| Path { root, steps: Vec::new(), span })
         } else {
             self.path()
         };
@@ -290,11 +276,7 @@ impl Parser<'_> {
                 {
                     self.skip();
                     let width = 1;
-                    return Some(Step::Bits {
-                        width,
-                        number,
-                        span,
-                    });
+                    return Some(Step::Bits { width, number, span });
                 }
             }
             Lexeme::Address(address) => {
@@ -357,11 +339,7 @@ impl Parser<'_> {
                 if self.at_sign(",") || self.at_sign(")") {
                     return None;
                 }
-                Some(Argument::Taken {
-                    from,
-                    to: self.path()?,
-                    negated: is_negated,
-                })
+                Some(Argument::Taken { from, to: self.path()?, negated: is_negated })
             }
             _ => Some(Argument::Placed(self.expression())),
         }
@@ -379,9 +357,5 @@ fn partial(address: &str, span: Span) -> Option<Step> {
         _ => (1, rest),
     };
     let number = digits.parse().ok()?;
-    Some(Step::Bits {
-        width,
-        number,
-        span,
-    })
+    Some(Step::Bits { width, number, span })
 }

@@ -14,9 +14,7 @@ const OPERATORS: [&str; 29] = [
 const NEGATED: [&str; 7] = ["LDN", "STN", "ANDN", "ORN", "XORN", "JMPN", "CALN"];
 
 /// Operators that depend on the result.
-const CONDITIONAL: [&str; 8] = [
-    "JMPC", "JMPCN", "CALC", "CALCN", "RETC", "RETCN", "RET", "RETN",
-];
+const CONDITIONAL: [&str; 8] = ["JMPC", "JMPCN", "CALC", "CALCN", "RETC", "RETCN", "RET", "RETN"];
 
 /// Operators that an expression in brackets may follow, up to its bracket.
 const BRACKETED: [&str; 17] = [
@@ -54,9 +52,7 @@ impl Parser<'_> {
         let is_operand = match &next.lexeme {
             Lexeme::Word(word) => {
                 !is_keyword(word)
-                    || ["TRUE", "FALSE"]
-                        .iter()
-                        .any(|value| value.eq_ignore_ascii_case(word))
+                    || ["TRUE", "FALSE"].iter().any(|value| value.eq_ignore_ascii_case(word))
             }
             Lexeme::Literal(_) | Lexeme::Address(_) | Lexeme::Qualified(_) => true,
             Lexeme::Sign("-") => true,
@@ -67,8 +63,7 @@ impl Parser<'_> {
 
     fn line_has_semicolon(&self, ahead: usize) -> bool {
         let rest = self.lexemes[self.place + ahead + 1..].iter();
-        rest.take_while(|next| !next.starts_line)
-            .any(|next| next.lexeme == Lexeme::Sign(";"))
+        rest.take_while(|next| !next.starts_line).any(|next| next.lexeme == Lexeme::Sign(";"))
     }
 
     /// Instructions up to one of `ends`, each on its line.
@@ -122,12 +117,7 @@ impl Parser<'_> {
             self.expected("the end of the instruction");
             self.skip_line();
         }
-        Some(Instruction {
-            label,
-            operator,
-            operands,
-            span: self.since(start),
-        })
+        Some(Instruction { label, operator, operands, span: self.since(start) })
     }
 
     /// The operator with its bracket, and its operands on this line.
@@ -178,11 +168,7 @@ impl Parser<'_> {
             Some(word) if is_keyword(word) && !self.at_any(&["TRUE", "FALSE", "NOT"]) => {
                 let root = Name::new(word, span.clone());
                 self.skip();
-                let path = crate::syntax::Path {
-                    root,
-                    steps: Vec::new(),
-                    span: span.clone(),
-                };
+                let path = crate::syntax::Path { root, steps: Vec::new(), span: span.clone() };
                 let kind = ExpressionKind::Variable(path);
                 Expression { kind, span }
             }

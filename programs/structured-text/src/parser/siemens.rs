@@ -7,13 +7,7 @@ use crate::lexer::{Lexeme, Placed};
 use crate::syntax::{Class, Declaration, File, Literal, Name, TypeKind, TypeName};
 
 /// Words that begin a unit or a type, which has a quoted name in SCL.
-const NAMED: [&str; 5] = [
-    "FUNCTION",
-    "FUNCTION_BLOCK",
-    "ORGANIZATION_BLOCK",
-    "DATA_BLOCK",
-    "TYPE",
-];
+const NAMED: [&str; 5] = ["FUNCTION", "FUNCTION_BLOCK", "ORGANIZATION_BLOCK", "DATA_BLOCK", "TYPE"];
 
 /// Whether a text is SCL: it has a word that only SCL has, or a unit with a quoted name.
 pub(super) fn is_siemens(lexemes: &[Placed]) -> bool {
@@ -48,13 +42,7 @@ impl Parser<'_> {
         let written = self.written().trim_start_matches('#').trim_matches('"');
         let mut name: String = written
             .chars()
-            .map(|next| {
-                if next.is_ascii_alphanumeric() {
-                    next
-                } else {
-                    '_'
-                }
-            })
+            .map(|next| if next.is_ascii_alphanumeric() { next } else { '_' })
             .take(crate::lexer::MAXIMUM_NAME_LENGTH)
             .collect();
         if !name.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_') {
@@ -62,8 +50,7 @@ impl Parser<'_> {
         }
         if name != written {
             let message = format!("the name \"{written}\" is read as `{name}`");
-            self.diagnostics
-                .push(Diagnostic::warning("U1067", message, span.clone()));
+            self.diagnostics.push(Diagnostic::warning("U1067", message, span.clone()));
         }
         self.skip();
         Some(Name::new(name, span))
@@ -71,14 +58,8 @@ impl Parser<'_> {
 
     /// `TITLE = …`, `VERSION : 0.1`, `AUTHOR : …` behind the name of a unit.
     pub(super) fn siemens_header(&mut self) {
-        const HEADERS: [&str; 6] = [
-            "TITLE",
-            "VERSION",
-            "AUTHOR",
-            "FAMILY",
-            "NAME",
-            "KNOW_HOW_PROTECT",
-        ];
+        const HEADERS: [&str; 6] =
+            ["TITLE", "VERSION", "AUTHOR", "FAMILY", "NAME", "KNOW_HOW_PROTECT"];
         while self.is_siemens && self.at_any(&HEADERS) {
             self.skip();
             self.skip_line();
@@ -103,10 +84,7 @@ impl Parser<'_> {
         } else if self.at_word("VAR") {
             let mut fields = Vec::new();
             self.declaration_blocks(&mut fields);
-            Some(TypeName {
-                kind: TypeKind::Structure(fields),
-                span: self.since(start),
-            })
+            Some(TypeName { kind: TypeKind::Structure(fields), span: self.since(start) })
         } else {
             self.type_name()
         };

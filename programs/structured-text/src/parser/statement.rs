@@ -90,11 +90,7 @@ impl Parser<'_> {
             }
             match kind {
                 StatementKind::Nothing => {}
-                kind => statements.push(Statement {
-                    kind,
-                    span: self.since(start),
-                    comments,
-                }),
+                kind => statements.push(Statement { kind, span: self.since(start), comments }),
             }
         }
         // What is written below the last statement stands at one that does nothing.
@@ -279,10 +275,8 @@ impl Parser<'_> {
     fn compound(&mut self, path: Path, operator: Operator) -> StatementKind {
         self.skip();
         let right = self.expression();
-        let left = Expression {
-            span: path.span.clone(),
-            kind: ExpressionKind::Variable(path.clone()),
-        };
+        let left =
+            Expression { span: path.span.clone(), kind: ExpressionKind::Variable(path.clone()) };
         let value = Expression {
             span: right.span.clone(),
             kind: ExpressionKind::Chain(Box::new(left), vec![(operator, right)]),
@@ -300,11 +294,8 @@ impl Parser<'_> {
             kind: ExpressionKind::Literal(Literal::Boolean(value)),
             span: span.clone(),
         };
-        let statement = Statement {
-            kind: StatementKind::Assign(path, value),
-            span,
-            comments: Vec::new(),
-        };
+        let statement =
+            Statement { kind: StatementKind::Assign(path, value), span, comments: Vec::new() };
         StatementKind::If(vec![(condition, vec![statement])], Vec::new())
     }
 
@@ -374,13 +365,7 @@ impl Parser<'_> {
         let body = self.statements(&["END_FOR"]);
         self.close("END_FOR");
         match counter {
-            Some(counter) => StatementKind::For(Box::new(For {
-                counter,
-                from,
-                to,
-                by,
-                body,
-            })),
+            Some(counter) => StatementKind::For(Box::new(For { counter, from, to, by, body })),
             None => StatementKind::Nothing,
         }
     }

@@ -47,11 +47,7 @@ fn statements_of_every_kind() {
     ];
     for text in same {
         let expected = text.replace("NOT d;", "(NOT d);");
-        let expected = if text.contains("* NOT") {
-            expected
-        } else {
-            text.into()
-        };
+        let expected = if text.contains("* NOT") { expected } else { text.into() };
         assert_eq!(statements(text), expected);
     }
 }
@@ -59,24 +55,15 @@ fn statements_of_every_kind() {
 #[test]
 fn rules_of_other_compilers() {
     let check = |text, expected: &str| assert_eq!(statements(text), expected);
-    check(
-        "IF a THEN b := 1; END_IF c := 2;",
-        "IF a THEN b := 1; END_IF; c := 2;",
-    );
+    check("IF a THEN b := 1; END_IF c := 2;", "IF a THEN b := 1; END_IF; c := 2;");
     check("a += 2; b -= c;", "a := a + 2; b := b - c;");
     check("a S= b;", "IF b THEN a := TRUE; END_IF;");
     check("a R= b;", "IF b THEN a := FALSE; END_IF;");
     check("f(IN := , PT := T#1s, Q => );", "f(PT := T#1s);");
     check(";; a := 1;;", "a := 1;");
-    check(
-        "REGION one two\n #a := #\"b\" DIV 2; END_REGION",
-        "(* one two *) a := b / 2;",
-    );
+    check("REGION one two\n #a := #\"b\" DIV 2; END_REGION", "(* one two *) a := b / 2;");
     check("#a := NOT #b = #c;", "a := NOT (b = c);");
-    check(
-        "REPEAT a(); UNTIL b; END_REPEAT",
-        "REPEAT a(); UNTIL b END_REPEAT;",
-    );
+    check("REPEAT a(); UNTIL b; END_REPEAT", "REPEAT a(); UNTIL b END_REPEAT;");
 }
 
 #[test]
@@ -94,10 +81,7 @@ fn variables_and_types() {
     assert_eq!(found[6].class, Class::Static);
     let printed = print::declarations(&found);
     assert!(printed.contains("o : (red, green := 4) BYTE;"), "{printed}");
-    assert!(
-        printed.contains("old : ARRAY [0..4] OF INT := [1, 2, 3(0)];"),
-        "{printed}"
-    );
+    assert!(printed.contains("old : ARRAY [0..4] OF INT := [1, 2, 3(0)];"), "{printed}");
     let types = whole(
         "TYPE a : STRUCT x : INT; END_STRUCT; b : (on, off) := on; c : INT (0..9) := 3; d : UINT (r := 1, g) END_TYPE",
     );
@@ -125,15 +109,9 @@ fn units_members_and_configurations() {
     let (file, found) = parse_declarations(
         "FUNCTION_BLOCK FB_X EXTENDS Y\nVAR a : INT; END_VAR\nVAR_OUTPUT b : INT; END_VAR\n",
     );
-    assert!(
-        found.is_empty() && file.units[0].declarations.len() == 2,
-        "{found:?}"
-    );
+    assert!(found.is_empty() && file.units[0].declarations.len() == 2, "{found:?}");
     let (file, found) = parse_declarations("METHOD PRIVATE go : BOOL VAR_INPUT a : INT; END_VAR");
-    assert!(
-        found.is_empty() && file.units[0].kind == UnitKind::Method,
-        "{found:?}"
-    );
+    assert!(found.is_empty() && file.units[0].kind == UnitKind::Method, "{found:?}");
 }
 
 #[test]
@@ -157,17 +135,8 @@ fn charts() {
         STEP c: END_STEP TRANSITION FROM (b, c) TO Start := b.T > T#5s; END_TRANSITION ACTION go: z := 1; END_ACTION";
     let (body, found) = parse_body(text);
     assert!(found.is_empty(), "{found:?}");
-    let Body::Chart(chart) = body else {
-        panic!("{body:?}")
-    };
-    assert_eq!(
-        (
-            chart.steps.len(),
-            chart.transitions.len(),
-            chart.actions.len()
-        ),
-        (3, 2, 1)
-    );
+    let Body::Chart(chart) = body else { panic!("{body:?}") };
+    assert_eq!((chart.steps.len(), chart.transitions.len(), chart.actions.len()), (3, 2, 1));
     assert_eq!(chart.steps[1].associations.len(), 3);
     assert!(chart.steps[1].associations[0].duration.is_some());
     assert_eq!(chart.transitions[0].to.len(), 2);
@@ -178,13 +147,10 @@ fn instruction_lists() {
     let text = "LD a\nAND x\nANDN( b\nOR c\n)\nST d\nnext:\nCAL t(IN := d, PT := T#1s, Q => e)\nLD 3\nADD 4, x\nGT(5)\nJMPC next\nR1 f.g\nRET\n";
     let (body, found) = parse_body(text);
     assert!(found.is_empty(), "{found:?}");
-    let Body::Instructions(list) = body else {
-        panic!("{body:?}")
-    };
+    let Body::Instructions(list) = body else { panic!("{body:?}") };
     let operators: Vec<&str> = list.iter().map(|line| line.operator.as_str()).collect();
-    let expected = [
-        "LD", "AND", "ANDN(", "OR", ")", "ST", "", "CAL", "LD", "ADD", "GT", "JMPC", "R1", "RET",
-    ];
+    let expected =
+        ["LD", "AND", "ANDN(", "OR", ")", "ST", "", "CAL", "LD", "ADD", "GT", "JMPC", "R1", "RET"];
     assert_eq!(operators, expected);
     assert_eq!(list[7].operands.len(), 4);
     assert_eq!(list[9].operands.len(), 2);
@@ -206,29 +172,17 @@ fn what_is_not_supported_is_named() {
         "a := .b;",
         "__TRY a(); __ENDTRY",
     ] {
-        assert!(
-            codes_of_body(text).iter().all(|code| *code == "U1040"),
-            "{text}"
-        );
+        assert!(codes_of_body(text).iter().all(|code| *code == "U1040"), "{text}");
         assert!(!codes_of_body(text).is_empty(), "{text}");
     }
     let block = |text: &str| codes(&format!("FUNCTION_BLOCK a {text} END_FUNCTION_BLOCK"));
-    assert_eq!(
-        block("PROPERTY x : INT GET x := 1; END_GET END_PROPERTY"),
-        ["U1040"]
-    );
+    assert_eq!(block("PROPERTY x : INT GET x := 1; END_GET END_PROPERTY"), ["U1040"]);
     assert_eq!(
         block("VAR a AT b : INT; c : FB(1); d : UNION x : INT; END_UNION; END_VAR"),
         ["U1040"; 3]
     );
-    assert_eq!(
-        codes("INTERFACE I METHOD a END_METHOD END_INTERFACE"),
-        ["U1055"]
-    );
-    assert_eq!(
-        codes("TYPE a EXTENDS b : STRUCT x : INT; END_STRUCT END_TYPE"),
-        ["U1040"]
-    );
+    assert_eq!(codes("INTERFACE I METHOD a END_METHOD END_INTERFACE"), ["U1055"]);
+    assert_eq!(codes("TYPE a EXTENDS b : STRUCT x : INT; END_STRUCT END_TYPE"), ["U1040"]);
 }
 
 #[test]
@@ -251,10 +205,7 @@ fn hostile_texts_are_bounded() {
         format!("a := {};", deep("b[", "]")),
         deep("IF a THEN ", " END_IF;"),
         deep("CASE a OF 1: ", ""),
-        format!(
-            "PROGRAM p VAR x : {} INT; END_VAR END_PROGRAM",
-            "ARRAY [1..2] OF ".repeat(3_000)
-        ),
+        format!("PROGRAM p VAR x : {} INT; END_VAR END_PROGRAM", "ARRAY [1..2] OF ".repeat(3_000)),
         format!("TYPE x : {}", "STRUCT y : ".repeat(3_000)),
         format!("VAR x : INT := {}", deep("[", "]")),
         format!("VAR {}a : INT; END_VAR", "a, ".repeat(10_000)),
@@ -280,11 +231,7 @@ fn hostile_texts_are_bounded() {
     texts.extend((0..legal.len()).map(|length| legal[..length].to_owned()));
     for text in texts {
         let bound = 2 * understudy_text::MAXIMUM_FINDINGS + 8;
-        assert!(
-            parse(&text).1.len() <= bound,
-            "{}",
-            &text[..text.len().min(20)]
-        );
+        assert!(parse(&text).1.len() <= bound, "{}", &text[..text.len().min(20)]);
         assert!(parse_body(&text).1.len() <= bound);
         assert!(parse_declarations(&text).1.len() <= bound);
         assert!(parse_instructions(&text).1.len() <= bound);
@@ -295,8 +242,6 @@ fn hostile_texts_are_bounded() {
 #[test]
 fn an_empty_branch_is_no_label() {
     let (found, _) = parse_statements("CASE a OF 1: b := 1; c.d: e := 2; END_CASE;");
-    let StatementKind::Case(_, branches, _) = &found[0].kind else {
-        panic!("{found:?}")
-    };
+    let StatementKind::Case(_, branches, _) = &found[0].kind else { panic!("{found:?}") };
     assert_eq!(branches.len(), 2);
 }

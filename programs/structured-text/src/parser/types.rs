@@ -138,18 +138,10 @@ impl Parser<'_> {
     fn structure(&mut self) -> Option<TypeKind> {
         self.skip();
         if self.at_word("OVERLAP") {
-            self.refuse(
-                "`OVERLAP` is",
-                self.span(),
-                Some("use parts of words, such as `.%B1`"),
-            );
+            self.refuse("`OVERLAP` is", self.span(), Some("use parts of words, such as `.%B1`"));
             self.skip();
         }
-        let block = Block {
-            class: Class::Local,
-            constant: false,
-            retained: false,
-        };
+        let block = Block { class: Class::Local, constant: false, retained: false };
         let mut fields = Vec::new();
         self.fields(block, &mut fields);
         self.need_word("END_STRUCT");

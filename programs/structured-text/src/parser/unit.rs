@@ -6,15 +6,8 @@ use crate::lexer::Lexeme;
 use crate::syntax::{Body, Class, File, Name, Statement, TypeKind, Unit, UnitKind};
 
 /// Words that say who may use something, which are read past.
-const ACCESS: [&str; 7] = [
-    "PUBLIC",
-    "PRIVATE",
-    "PROTECTED",
-    "INTERNAL",
-    "FINAL",
-    "ABSTRACT",
-    "OVERRIDE",
-];
+const ACCESS: [&str; 7] =
+    ["PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL", "FINAL", "ABSTRACT", "OVERRIDE"];
 
 /// Words at which something of a file begins.
 const STARTS: [&str; 15] = [
@@ -38,18 +31,10 @@ const STARTS: [&str; 15] = [
 /// Words that begin a unit, what it is, and the word that ends it.
 const UNITS: [(&str, UnitKind, &str); 5] = [
     ("PROGRAM", UnitKind::Program, "END_PROGRAM"),
-    (
-        "FUNCTION_BLOCK",
-        UnitKind::FunctionBlock,
-        "END_FUNCTION_BLOCK",
-    ),
+    ("FUNCTION_BLOCK", UnitKind::FunctionBlock, "END_FUNCTION_BLOCK"),
     ("FUNCTION", UnitKind::Function, "END_FUNCTION"),
     ("CLASS", UnitKind::FunctionBlock, "END_CLASS"),
-    (
-        "ORGANIZATION_BLOCK",
-        UnitKind::Program,
-        "END_ORGANIZATION_BLOCK",
-    ),
+    ("ORGANIZATION_BLOCK", UnitKind::Program, "END_ORGANIZATION_BLOCK"),
 ];
 
 impl Parser<'_> {
@@ -344,11 +329,7 @@ impl Parser<'_> {
         match self.body(&[end]) {
             Body::Statements(statements) => statements,
             Body::Chart(_) => {
-                self.refuse(
-                    "a chart in an action is",
-                    span,
-                    Some("write it as a function block"),
-                );
+                self.refuse("a chart in an action is", span, Some("write it as a function block"));
                 Vec::new()
             }
             Body::Instructions(_) => {

@@ -78,7 +78,5 @@ const KEYWORDS: [&str; 72] = [
 
 /// Whether no variable can be called so.
 pub fn is_keyword(word: &str) -> bool {
-    KEYWORDS
-        .iter()
-        .any(|keyword| keyword.eq_ignore_ascii_case(word))
+    KEYWORDS.iter().any(|keyword| keyword.eq_ignore_ascii_case(word))
 }

@@ -103,14 +103,8 @@ impl Printer {
             }
             if let Some(interval) = task.interval {
                 let of = understudy_typed::Elementary::Time;
-                let literal = crate::syntax::Literal::Time {
-                    nanoseconds: interval,
-                    of,
-                };
-                settings.push(format!(
-                    "INTERVAL := {}",
-                    super::expression::literal(&literal)
-                ));
+                let literal = crate::syntax::Literal::Time { nanoseconds: interval, of };
+                settings.push(format!("INTERVAL := {}", super::expression::literal(&literal)));
             }
             if let Some(priority) = task.priority {
                 settings.push(format!("PRIORITY := {priority}"));

@@ -46,9 +46,9 @@ fn operand(of: &Expression, rank: u8, is_first: bool) -> String {
     let add = Operator::Add.rank();
     let compare = Operator::Compare(Comparison::Equal).rank();
     let is_bare = match &of.kind {
-        ExpressionKind::Chain(_, inner) => inner
-            .first()
-            .is_some_and(|(operator, _)| operator.rank() > rank),
+        ExpressionKind::Chain(_, inner) => {
+            inner.first().is_some_and(|(operator, _)| operator.rank() > rank)
+        }
         ExpressionKind::Minus(_) => is_first && rank <= add,
         ExpressionKind::Not(_) => rank < compare,
         ExpressionKind::Literal(Literal::Integer { value, .. }) => *value >= 0 || is_first,
@@ -108,9 +108,7 @@ pub(super) fn path(of: &Path) -> String {
                 let printed: Vec<String> = indices.iter().map(expression).collect();
                 write!(text, "[{}]", printed.join(", "))
             }
-            Step::Bits {
-                width: 1, number, ..
-            } => write!(text, ".{number}"),
+            Step::Bits { width: 1, number, .. } => write!(text, ".{number}"),
             Step::Bits { width, number, .. } => {
                 let letter = match width {
                     8 => 'B',
@@ -160,10 +158,7 @@ fn time(nanoseconds: i64, of: Elementary) -> String {
         let fraction = format!("{:09}", in_day % 1_000_000_000);
         let fraction = fraction.trim_end_matches('0');
         let point = if fraction.is_empty() { "" } else { "." };
-        format!(
-            "{hours:02}:{minutes:02}:{:02}{point}{fraction}",
-            seconds % 60
-        )
+        format!("{hours:02}:{minutes:02}:{:02}{point}{fraction}", seconds % 60)
     };
     match of {
         Elementary::Date => format!("D#{}", date()),
@@ -185,11 +180,7 @@ fn duration(nanoseconds: i64) -> String {
         ("ns", 1),
     ];
     let mut rest = nanoseconds.unsigned_abs();
-    let word = if rest.is_multiple_of(1_000_000) {
-        "T"
-    } else {
-        "LTIME"
-    };
+    let word = if rest.is_multiple_of(1_000_000) { "T" } else { "LTIME" };
     let sign = if nanoseconds < 0 { "-" } else { "" };
     let mut text = format!("{word}#{sign}");
     if rest == 0 {

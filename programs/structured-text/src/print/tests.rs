@@ -34,19 +34,13 @@ fn expression_of(kind: ExpressionKind) -> Expression {
 
 fn literal() -> impl Strategy<Value = Literal> {
     let integer = (0..i128::from(u64::MAX)).prop_map(|value| Literal::Integer { value, of: None });
-    let typed = (-128..128_i128).prop_map(|value| Literal::Integer {
-        value,
-        of: Some(Elementary::Sint),
+    let typed =
+        (-128..128_i128).prop_map(|value| Literal::Integer { value, of: Some(Elementary::Sint) });
+    let bits =
+        (0..65_536_i128).prop_map(|value| Literal::Integer { value, of: Some(Elementary::Word) });
+    let real = (0..1000_u32, 0..1000_u32, -30..30_i32).prop_map(|(whole, part, exponent)| {
+        Literal::Real { text: format!("{whole}.{part}E{exponent}"), of: None }
     });
-    let bits = (0..65_536_i128).prop_map(|value| Literal::Integer {
-        value,
-        of: Some(Elementary::Word),
-    });
-    let real =
-        (0..1000_u32, 0..1000_u32, -30..30_i32).prop_map(|(whole, part, exponent)| Literal::Real {
-            text: format!("{whole}.{part}E{exponent}"),
-            of: None,
-        });
     let kinds = prop::sample::select(vec![Elementary::Time, Elementary::DateAndTime]);
     let time = (any::<i64>(), kinds).prop_map(|(nanoseconds, of)| Literal::Time {
         nanoseconds: match of {
@@ -57,15 +51,7 @@ fn literal() -> impl Strategy<Value = Literal> {
     });
     let text = (prop::collection::vec(any::<u8>(), 0..8), any::<bool>());
     let text = text.prop_map(|(bytes, wide)| Literal::Text { bytes, wide });
-    prop_oneof![
-        any::<bool>().prop_map(Literal::Boolean),
-        integer,
-        typed,
-        bits,
-        real,
-        time,
-        text
-    ]
+    prop_oneof![any::<bool>().prop_map(Literal::Boolean), integer, typed, bits, real, time, text]
 }
 
 fn path(inner: impl Strategy<Value = Expression> + Clone + 'static) -> impl Strategy<Value = Path> {
@@ -73,26 +59,16 @@ fn path(inner: impl Strategy<Value = Expression> + Clone + 'static) -> impl Stra
     let step = prop_oneof![
         name().prop_map(Step::Field),
         prop::collection::vec(inner, 1..3).prop_map(Step::Index),
-        bits.prop_map(|(width, number)| Step::Bits {
-            width,
-            number,
-            span: 0..0
-        }),
+        bits.prop_map(|(width, number)| Step::Bits { width, number, span: 0..0 }),
         Just(Step::Follow),
     ];
     // A number behind a number would be a real one.
     let is_legal = |steps: &Vec<Step>| {
         let bits = |step: &Step| matches!(step, Step::Bits { .. });
-        !steps
-            .windows(2)
-            .any(|pair| bits(&pair[0]) && bits(&pair[1]))
+        !steps.windows(2).any(|pair| bits(&pair[0]) && bits(&pair[1]))
     };
     let steps = prop::collection::vec(step, 0..3).prop_filter("bits of bits", is_legal);
-    (name(), steps).prop_map(|(root, steps)| Path {
-        root,
-        steps,
-        span: 0..0,
-    })
+    (name(), steps).prop_map(|(root, steps)| Path { root, steps, span: 0..0 })
 }
 
 fn argument(
@@ -145,21 +121,12 @@ fn any_expression() -> impl Strategy<Value = Expression> + Clone {
     leaf.prop_recursive(4, 24, 4, |inner| {
         let inner = inner.boxed();
         let boxed = inner.clone().prop_map(Box::new);
-        let call = (
-            path(inner.clone()),
-            prop::collection::vec(argument(inner.clone()), 0..3),
-        );
+        let call = (path(inner.clone()), prop::collection::vec(argument(inner.clone()), 0..3));
         prop_oneof![
             path(inner.clone()).prop_map(|path| expression_of(ExpressionKind::Variable(path))),
-            boxed
-                .clone()
-                .prop_map(|inner| expression_of(ExpressionKind::Not(inner))),
+            boxed.clone().prop_map(|inner| expression_of(ExpressionKind::Not(inner))),
             boxed.prop_map(|inner| expression_of(ExpressionKind::Minus(inner))),
-            (
-                inner.clone(),
-                operator(),
-                prop::collection::vec(inner.clone(), 1..3)
-            )
+            (inner.clone(), operator(), prop::collection::vec(inner.clone(), 1..3))
                 .prop_map(|(first, operator, rest)| chain(first, operator, rest)),
             call.prop_map(|(path, arguments)| expression_of(ExpressionKind::Call(path, arguments))),
         ]
@@ -172,19 +139,14 @@ fn any_statement() -> impl Strategy<Value = Statement> {
     let leaf = prop_oneof![
         (path(value.clone()), value.clone())
             .prop_map(|(path, value)| StatementKind::Assign(path, value)),
-        (
-            path(value.clone()),
-            prop::collection::vec(argument(value.clone()), 0..3)
-        )
+        (path(value.clone()), prop::collection::vec(argument(value.clone()), 0..3))
             .prop_map(|(path, arguments)| StatementKind::Call(path, arguments)),
         Just(StatementKind::Exit),
         Just(StatementKind::Continue),
         Just(StatementKind::Return),
     ];
-    let comments = prop::collection::vec(
-        prop::sample::select(vec!["note".to_owned(), "a b".into()]),
-        0..2,
-    );
+    let comments =
+        prop::collection::vec(prop::sample::select(vec!["note".to_owned(), "a b".into()]), 0..2);
     let placed = move |kinds: BoxedStrategy<StatementKind>| {
         (kinds, comments.clone()).prop_map(|(kind, comments)| Statement {
             kind,
@@ -197,15 +159,9 @@ fn any_statement() -> impl Strategy<Value = Statement> {
         let body = prop::collection::vec(inner, 0..3).boxed();
         let label = (0..9_i128, prop::option::of(10..19_i128)).prop_map(|(first, last)| {
             let number = |value| {
-                expression_of(ExpressionKind::Literal(Literal::Integer {
-                    value,
-                    of: None,
-                }))
+                expression_of(ExpressionKind::Literal(Literal::Integer { value, of: None }))
             };
-            Label {
-                first: number(first),
-                last: last.map(number),
-            }
+            Label { first: number(first), last: last.map(number) }
         });
         let branch = (prop::collection::vec(label, 1..3), body.clone());
         let counted = (
@@ -216,27 +172,15 @@ fn any_statement() -> impl Strategy<Value = Statement> {
             body.clone(),
         );
         let kinds = prop_oneof![
-            (
-                prop::collection::vec((value.clone(), body.clone()), 1..3),
-                body.clone()
-            )
+            (prop::collection::vec((value.clone(), body.clone()), 1..3), body.clone())
                 .prop_map(|(branches, otherwise)| StatementKind::If(branches, otherwise)),
-            (
-                value.clone(),
-                prop::collection::vec(branch, 1..3),
-                body.clone()
-            )
-                .prop_map(|(selector, branches, otherwise)| StatementKind::Case(
+            (value.clone(), prop::collection::vec(branch, 1..3), body.clone()).prop_map(
+                |(selector, branches, otherwise)| StatementKind::Case(
                     selector, branches, otherwise
-                )),
+                )
+            ),
             counted.prop_map(|(counter, from, to, by, body)| {
-                StatementKind::For(Box::new(For {
-                    counter,
-                    from,
-                    to,
-                    by,
-                    body,
-                }))
+                StatementKind::For(Box::new(For { counter, from, to, by, body }))
             }),
             (value.clone(), body.clone())
                 .prop_map(|(condition, body)| StatementKind::While(condition, body)),
@@ -364,9 +308,7 @@ fn a_whole_file_is_read_as_it_is_printed() {
 #[test]
 fn parts_are_printed_alone() {
     assert_eq!(type_name(&named("REAL")), "REAL");
-    let value = Initializer::Value(expression_of(ExpressionKind::Literal(Literal::Boolean(
-        true,
-    ))));
+    let value = Initializer::Value(expression_of(ExpressionKind::Literal(Literal::Boolean(true))));
     assert_eq!(initializer(&value), "TRUE");
     assert_eq!(file(&File::default()), "");
     let (read, _) = parse("PROGRAM p END_PROGRAM");

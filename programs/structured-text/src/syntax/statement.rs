@@ -25,11 +25,7 @@ pub enum StatementKind {
     /// `IF … ELSIF … ELSE … END_IF`
     If(Vec<(Expression, Vec<Statement>)>, Vec<Statement>),
     /// `CASE`
-    Case(
-        Expression,
-        Vec<(Vec<Label>, Vec<Statement>)>,
-        Vec<Statement>,
-    ),
+    Case(Expression, Vec<(Vec<Label>, Vec<Statement>)>, Vec<Statement>),
     /// `FOR`
     For(Box<For>),
     /// `WHILE … DO … END_WHILE`

@@ -8,11 +8,7 @@ use understudy_typed::{Elementary, Fault, Interpreter, Machine, Point, Program, 
 /// What a text is lowered to, and everything that was found.
 pub(crate) fn read(text: &str, program: Option<&str>) -> (Lowered, Vec<Diagnostic>) {
     let (file, mut found) = parse(text);
-    let options = Options {
-        text,
-        program,
-        period: None,
-    };
+    let options = Options { text, program, period: None };
     let lowered = lower(&file, &options);
     found.extend(lowered.diagnostics.iter().cloned());
     (lowered, found)
@@ -23,26 +19,17 @@ pub(crate) fn program(text: &str) -> Program {
     let (lowered, found) = read(text, None);
     let shown = shown(text, &found, Severity::Error);
     assert!(shown.is_empty(), "{shown}");
-    lowered
-        .program
-        .expect("a text without errors has a program")
+    lowered.program.expect("a text without errors has a program")
 }
 
 /// The findings of a severity, a line each.
 pub(crate) fn shown(text: &str, found: &[Diagnostic], severity: Severity) -> String {
-    let report = Report {
-        name: String::new(),
-        text: text.to_owned(),
-        diagnostics: Vec::new(),
-    };
-    let lines = found
-        .iter()
-        .filter(|found| found.severity == severity)
-        .map(|found| {
-            let place = report.line_and_column(found.span.start);
-            let help = found.help.as_deref().unwrap_or("no help");
-            format!("{} {place} {} [{help}]\n", found.code, found.message)
-        });
+    let report = Report { name: String::new(), text: text.to_owned(), diagnostics: Vec::new() };
+    let lines = found.iter().filter(|found| found.severity == severity).map(|found| {
+        let place = report.line_and_column(found.span.start);
+        let help = found.help.as_deref().unwrap_or("no help");
+        format!("{} {place} {} [{help}]\n", found.code, found.message)
+    });
     lines.collect()
 }
 
@@ -92,21 +79,12 @@ impl Running {
             point.set(&mut self.inputs, *value);
         }
         let mut expected = vec![0; self.outputs.len()];
-        self.interpreter
-            .step(&mut self.reference, &self.inputs, &mut expected);
-        self.machine.step(
-            &mut self.scratch,
-            &mut self.state,
-            &self.inputs,
-            &mut self.outputs,
-        );
+        self.interpreter.step(&mut self.reference, &self.inputs, &mut expected);
+        self.machine.step(&mut self.scratch, &mut self.state, &self.inputs, &mut self.outputs);
         assert_eq!(self.outputs, expected, "the engines differ in an output");
         assert_eq!(self.state, self.reference, "the engines differ in a state");
         let points = self.outputs();
-        points
-            .iter()
-            .map(|point| point.get(&self.outputs))
-            .collect()
+        points.iter().map(|point| point.get(&self.outputs)).collect()
     }
 
     /// What stopped the program.
@@ -151,14 +129,11 @@ pub(crate) fn check(text: &str, scans: &[(&[i64], &str)]) {
             .collect();
         let found = running.scan(&values);
         assert_eq!(running.fault(), None, "{text}");
-        let found = outputs
-            .iter()
-            .zip(found)
-            .map(|(point, value)| match point.of {
-                of if of.bits() == 64 && of.is_real() => f64::from_bits(value).to_string(),
-                of if of.is_real() => f32::from_bits(value as u32).to_string(),
-                of => written(of, value),
-            });
+        let found = outputs.iter().zip(found).map(|(point, value)| match point.of {
+            of if of.bits() == 64 && of.is_real() => f64::from_bits(value).to_string(),
+            of if of.is_real() => f32::from_bits(value as u32).to_string(),
+            of => written(of, value),
+        });
         let found: Vec<String> = found.collect();
         assert_eq!(found.join(" "), *expected, "scan {scan} of {text}");
     }

@@ -27,14 +27,7 @@ pub struct Fields<'a, 't> {
 impl<'a, 't> Fields<'a, 't> {
     /// Of `table`.
     pub fn new(what: &'static str, table: Placed<&'a DeTable<'t>>, codes: &'static Codes) -> Self {
-        Self {
-            what,
-            table: table.value,
-            span: table.span,
-            codes,
-            asked: Vec::new(),
-            format: None,
-        }
+        Self { what, table: table.value, span: table.span, codes, asked: Vec::new(), format: None }
     }
 
     /// A table of a format. Bounds and required keys are those of the format; its reader asks for no other key.
@@ -43,10 +36,7 @@ impl<'a, 't> Fields<'a, 't> {
         table: Placed<&'a DeTable<'t>>,
         codes: &'static Codes,
     ) -> Self {
-        Self {
-            format: Some(format),
-            ..Self::new(format.what, table, codes)
-        }
+        Self { format: Some(format), ..Self::new(format.what, table, codes) }
     }
 
     /// The values of a key in the format.
@@ -115,9 +105,7 @@ impl<'a, 't> Fields<'a, 't> {
         let value = self.get(key);
         let tables = value.map_or_else(Vec::new, |value| value.tables(diagnostics));
         let tables = tables.into_iter().zip(format.into_iter().cycle());
-        tables
-            .map(|(table, format)| Self::of(format, table, self.codes))
-            .collect()
+        tables.map(|(table, format)| Self::of(format, table, self.codes)).collect()
     }
 
     /// The place of the table.
@@ -243,9 +231,7 @@ impl<'a, 't> Fields<'a, 't> {
         let value = self.get(key);
         let tables = value.map_or_else(Vec::new, |value| value.tables(diagnostics));
         let tables = tables.into_iter();
-        tables
-            .map(|table| Self::new(what, table, self.codes))
-            .collect()
+        tables.map(|table| Self::new(what, table, self.codes)).collect()
     }
 
     /// Reports every key that was not asked for.

@@ -60,20 +60,12 @@ pub enum Kind {
 
 /// A key that may be absent.
 pub const fn key(name: &'static str, kind: Kind) -> Key {
-    Key {
-        name,
-        required: false,
-        kind,
-    }
+    Key { name, required: false, kind }
 }
 
 /// A key that must be there.
 pub const fn required(name: &'static str, kind: Kind) -> Key {
-    Key {
-        name,
-        required: true,
-        kind,
-    }
+    Key { name, required: true, kind }
 }
 
 impl Table {
@@ -110,9 +102,8 @@ impl Table {
 
     fn properties(&self) -> Value {
         let properties = self.keys.iter();
-        let properties: Map<String, Value> = properties
-            .map(|key| (key.name.to_owned(), key.kind.schema()))
-            .collect();
+        let properties: Map<String, Value> =
+            properties.map(|key| (key.name.to_owned(), key.kind.schema())).collect();
         json!({
             "type": "object",
             "additionalProperties": false,

@@ -22,17 +22,12 @@ fn check<T: PartialEq + std::fmt::Debug>(
     let mut diagnostics = Vec::new();
     let root = parse(text, &CODES, &mut diagnostics).expect("it is TOML");
     let table: &DeTable<'_> = root.get_ref();
-    let table = Placed {
-        value: table,
-        span: 0..0,
-    };
+    let table = Placed { value: table, span: 0..0 };
     let mut fields = Fields::new("a test", table, &CODES);
     assert_eq!(read(&mut fields, &mut diagnostics), expected, "{text}");
     fields.finish(&mut diagnostics);
-    let found: Vec<(&str, &str)> = diagnostics
-        .iter()
-        .map(|found| (found.code, &text[found.span.clone()]))
-        .collect();
+    let found: Vec<(&str, &str)> =
+        diagnostics.iter().map(|found| (found.code, &text[found.span.clone()])).collect();
     assert_eq!(found, findings, "{text}");
 }
 
@@ -83,11 +78,7 @@ fn lists_give_what_is_right_in_them() {
     };
     check("a = \"x\"", &["x"], &[]);
     check("a = [\"x\", \"y\"]", &["x", "y"], &[]);
-    check(
-        "a = [\"x\", 1, \"y\", true]",
-        &["x", "y"],
-        &[("type", "1"), ("type", "true")],
-    );
+    check("a = [\"x\", 1, \"y\", true]", &["x", "y"], &[("type", "1"), ("type", "true")]);
     check("a = 1", &[], &[("type", "1")]);
 }
 
@@ -106,18 +97,12 @@ fn tables_words_and_entries() {
         let entries = fields.get("entries");
         let entries = entries.map_or_else(Vec::new, |value| value.entries("a table", found));
         let entries = entries.into_iter();
-        let bits: Vec<Option<bool>> = entries
-            .map(|(_, value)| value.flag(found).map(|bit| bit.value))
-            .collect();
+        let bits: Vec<Option<bool>> =
+            entries.map(|(_, value)| value.flag(found).map(|bit| bit.value)).collect();
         (word, sum, bits)
     };
     let text = "word = \"prompt\"\nentries = { x = true, y = 1 }\n[[table]]\nnumber = 0.5\n[[table]]\nnumber = 2\nother = 1\n";
-    let findings = [
-        ("missing", ""),
-        ("bounds", "2"),
-        ("key", "other"),
-        ("type", "1"),
-    ];
+    let findings = [("missing", ""), ("bounds", "2"), ("key", "other"), ("type", "1")];
     check(text, read, (1, 0.5, vec![Some(true), None]), &findings);
     check(
         "word = \"latt\"\nabsent = 1",

@@ -25,10 +25,7 @@ pub struct Placed<T> {
 impl<T> Placed<T> {
     /// Another value in the same place.
     pub fn map<U>(self, change: impl FnOnce(T) -> U) -> Placed<U> {
-        Placed {
-            value: change(self.value),
-            span: self.span,
-        }
+        Placed { value: change(self.value), span: self.span }
     }
 }
 
@@ -84,9 +81,7 @@ impl<'a, 't> Value<'a, 't> {
         match self.value.get_ref() {
             DeValue::Array(values) => {
                 let texts = values.iter();
-                texts
-                    .filter_map(|value| Self { value, ..self }.text(diagnostics))
-                    .collect()
+                texts.filter_map(|value| Self { value, ..self }.text(diagnostics)).collect()
             }
             _ => self.text_as(wanted, diagnostics).into_iter().collect(),
         }
@@ -94,11 +89,7 @@ impl<'a, 't> Value<'a, 't> {
 
     /// Yes or no.
     pub fn flag(self, diagnostics: &mut Vec<Diagnostic>) -> Option<Placed<bool>> {
-        self.expect(
-            self.value.get_ref().as_bool(),
-            "`true` or `false`",
-            diagnostics,
-        )
+        self.expect(self.value.get_ref().as_bool(), "`true` or `false`", diagnostics)
     }
 
     /// A value of a signal: yes or no, a number, or a text such as a duration.
@@ -156,16 +147,9 @@ impl<'a, 't> Value<'a, 't> {
         bounds: RangeInclusive<Duration>,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Option<Placed<Duration>> {
-        let (least, most) = (
-            duration::text(*bounds.start()),
-            duration::text(*bounds.end()),
-        );
+        let (least, most) = (duration::text(*bounds.start()), duration::text(*bounds.end()));
         let wanted = format!("a time with its unit in quotes, from \"{least}\" to \"{most}\"");
-        let time = self
-            .value
-            .get_ref()
-            .as_str()
-            .and_then(|text| duration::parse(text).ok());
+        let time = self.value.get_ref().as_str().and_then(|text| duration::parse(text).ok());
         let time = self.expect(time, &wanted, diagnostics)?.value;
         let inside = bounds.contains(&time).then_some(time);
         self.in_bounds(inside, &duration::text(time), &wanted, diagnostics)
@@ -199,10 +183,7 @@ impl<'a, 't> Value<'a, 't> {
 
     /// A table; nothing, and no diagnostic, where it is another value.
     pub fn as_table(self) -> Option<Placed<&'a DeTable<'t>>> {
-        self.value
-            .get_ref()
-            .as_table()
-            .map(|table| self.placed(table))
+        self.value.get_ref().as_table().map(|table| self.placed(table))
     }
 
     /// The tables under `[[name]]`.
@@ -211,9 +192,7 @@ impl<'a, 't> Value<'a, 't> {
         let values = self.value.get_ref().as_array();
         let values = self.expect(values, &wanted, diagnostics);
         let values = values.into_iter().flat_map(|values| values.value.iter());
-        values
-            .filter_map(|value| Self { value, ..self }.table(&wanted, diagnostics))
-            .collect()
+        values.filter_map(|value| Self { value, ..self }.table(&wanted, diagnostics)).collect()
     }
 
     /// The names and values of a table in which every name is possible.
@@ -226,20 +205,14 @@ impl<'a, 't> Value<'a, 't> {
         let entries = table.into_iter().flat_map(|table| table.value.iter());
         let entry = |(name, value): (&'a Spanned<_>, &'a Spanned<DeValue<'t>>)| {
             let text: &'a std::borrow::Cow<'t, str> = name.get_ref();
-            let placed = Placed {
-                value: text.as_ref(),
-                span: name.span(),
-            };
+            let placed = Placed { value: text.as_ref(), span: name.span() };
             (placed, Value::new(text, value, self.codes))
         };
         entries.map(entry).collect()
     }
 
     fn placed<T>(self, value: T) -> Placed<T> {
-        Placed {
-            value,
-            span: self.span(),
-        }
+        Placed { value, span: self.span() }
     }
 
     /// What was found, or that something else was wanted.

@@ -84,21 +84,9 @@ pub(crate) fn print() {
         return;
     };
     let programs = [
-        (
-            "100 PID loops",
-            programs::pid(100),
-            100 * programs::PID_OPERATIONS,
-        ),
-        (
-            "1000 integer turns",
-            programs::integer(1_000),
-            1_000 * programs::INTEGER_OPERATIONS,
-        ),
-        (
-            "1000 Boolean rungs",
-            programs::boolean(1_000),
-            1_000 * programs::BOOLEAN_OPERATIONS,
-        ),
+        ("100 PID loops", programs::pid(100), 100 * programs::PID_OPERATIONS),
+        ("1000 integer turns", programs::integer(1_000), 1_000 * programs::INTEGER_OPERATIONS),
+        ("1000 Boolean rungs", programs::boolean(1_000), 1_000 * programs::BOOLEAN_OPERATIONS),
     ];
     let mut out = std::io::stdout();
     for ((name, program, operations), c) in programs.into_iter().zip(seconds) {

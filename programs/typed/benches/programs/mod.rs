@@ -9,10 +9,7 @@ use understudy_typed::{
 };
 
 pub(crate) fn constant(of: Elementary, value: u64) -> Expression {
-    Expression {
-        of: Type::Elementary(of),
-        kind: ExpressionKind::Constant(value),
-    }
+    Expression { of: Type::Elementary(of), kind: ExpressionKind::Constant(value) }
 }
 
 fn real(value: f64) -> Expression {
@@ -31,10 +28,7 @@ fn apply<const N: usize>(operation: Operation, operands: [Expression; N]) -> Exp
     let understudy_typed::Operand::Number(of) = signature.result else {
         panic!("no number");
     };
-    Expression {
-        of: Type::Elementary(of),
-        kind: ExpressionKind::Apply(operation, operands.into()),
-    }
+    Expression { of: Type::Elementary(of), kind: ExpressionKind::Apply(operation, operands.into()) }
 }
 
 fn assign(root: Root, value: Expression) -> Statement {
@@ -107,10 +101,7 @@ pub(crate) fn pid(count: u32) -> Program {
             Root::Own(4),
             limit(
                 0.0,
-                add(
-                    add(times(2.0, own(5)), times(0.5, own(2))),
-                    times(0.1, derivative),
-                ),
+                add(add(times(2.0, own(5)), times(0.5, own(2))), times(0.1, derivative)),
                 100.0,
             ),
         ),
@@ -123,10 +114,8 @@ pub(crate) fn pid(count: u32) -> Program {
     let calls = (0..count)
         .map(|index| statement(StatementKind::Invoke(RoutineId(0), instance(index))))
         .collect();
-    let mut program = program(
-        Program::HEADER + 6 * count,
-        vec![routine("PID", block), routine("MAIN", calls)],
-    );
+    let mut program =
+        program(Program::HEADER + 6 * count, vec![routine("PID", block), routine("MAIN", calls)]);
     for index in 0..count {
         program.initial.push(understudy_typed::Initial {
             slot: Program::HEADER + 6 * index + 1,
@@ -148,12 +137,7 @@ pub(crate) fn integer(length: u32) -> Program {
     let element = || {
         let value = apply(O::Convert(Dint, Lint), [load(Root::Own(0), Dint)]);
         Place {
-            indices: vec![Index {
-                value,
-                low: 0,
-                high: i64::from(length) - 1,
-                stride: 32,
-            }],
+            indices: vec![Index { value, low: 0, high: i64::from(length) - 1, stride: 32 }],
             is_packed: true,
             ..Place::new(Root::Own(2), Type::Elementary(Dint))
         }
@@ -185,15 +169,9 @@ pub(crate) fn integer(length: u32) -> Program {
         by: constant(Dint, 1),
         body,
     }));
-    let array = Array {
-        ranges: vec![(0, i64::from(length) - 1)],
-        element: Type::Elementary(Dint),
-    };
+    let array = Array { ranges: vec![(0, i64::from(length) - 1)], element: Type::Elementary(Dint) };
     let slots = Type::Array(Arc::new(array)).slots() as u32;
-    program(
-        Program::HEADER + 2 + slots,
-        vec![routine("MAIN", vec![statement(counted)])],
-    )
+    program(Program::HEADER + 2 + slots, vec![routine("MAIN", vec![statement(counted)])])
 }
 
 /// Operations of a rung below.
@@ -214,10 +192,7 @@ pub(crate) fn boolean(rungs: u32) -> Program {
         .collect();
     let mut program = program(Program::HEADER + rungs, vec![routine("MAIN", body)]);
     for rung in (0..rungs).step_by(3) {
-        program.initial.push(understudy_typed::Initial {
-            slot: Program::HEADER + rung,
-            value: 1,
-        });
+        program.initial.push(understudy_typed::Initial { slot: Program::HEADER + rung, value: 1 });
     }
     program
 }

@@ -14,36 +14,25 @@ impl Run<'_> {
         line: u32,
         place: &Place,
     ) -> Result<Address, Fault> {
-        let fault = |cause| Fault {
-            cause,
-            routine: Some(context.routine),
-            line,
-        };
+        let fault = |cause| Fault { cause, routine: Some(context.routine), line };
         let frames = u64::from(self.program.state);
         let mut address = match place.root {
             Root::Global(slot) => 64 * u64::from(slot),
             Root::Own(slot) => 64 * (context.own + u64::from(slot)),
             Root::Frame(slot) => 64 * (frames + u64::from(slot)),
-            Root::OwnReference(slot) => self
-                .reference(context.own + u64::from(slot), place)
-                .map_err(fault)?,
-            Root::FrameReference(slot) => self
-                .reference(frames + u64::from(slot), place)
-                .map_err(fault)?,
+            Root::OwnReference(slot) => {
+                self.reference(context.own + u64::from(slot), place).map_err(fault)?
+            }
+            Root::FrameReference(slot) => {
+                self.reference(frames + u64::from(slot), place).map_err(fault)?
+            }
         };
         address += 64 * u64::from(place.offset) + u64::from(place.bit);
         for index in &place.indices {
             let value = self.number(context, line, &index.value)? as i64;
             if value < index.low || value > index.high {
-                let bound = if value < index.low {
-                    index.low
-                } else {
-                    index.high
-                };
-                return Err(fault(Cause::IndexOutOfRange {
-                    index: value,
-                    bound,
-                }));
+                let bound = if value < index.low { index.low } else { index.high };
+                return Err(fault(Cause::IndexOutOfRange { index: value, bound }));
             }
             address += value.abs_diff(index.low) * index.stride;
         }
@@ -128,19 +117,12 @@ impl Run<'_> {
     }
 
     fn call(&mut self, context: Context, line: u32, call: &Call) -> Result<Value, Fault> {
-        let fault = |cause| Fault {
-            cause,
-            routine: Some(context.routine),
-            line,
-        };
+        let fault = |cause| Fault { cause, routine: Some(context.routine), line };
         let own = match &call.own {
             Some(place) => self.address(context, line, place)?.0 / 64,
             None => 0,
         };
-        let inner = Context {
-            routine: call.routine,
-            own,
-        };
+        let inner = Context { routine: call.routine, own };
         let mut given = Vec::with_capacity(call.arguments.len());
         for argument in &call.arguments {
             given.push(match argument {

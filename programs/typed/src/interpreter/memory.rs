@@ -65,9 +65,7 @@ impl Memory {
             }
             Type::Text(capacity) => {
                 let length = self.0[first].min(u64::from(*capacity)) as usize;
-                let bytes = self.0[first + 1..]
-                    .iter()
-                    .flat_map(|word| word.to_le_bytes());
+                let bytes = self.0[first + 1..].iter().flat_map(|word| word.to_le_bytes());
                 Value::Text(bytes.take(length).collect())
             }
             _ => Value::Slots(self.0[first..][..of.slots() as usize].to_vec()),

@@ -138,11 +138,7 @@ impl Interpreter {
         let words = self.state_words();
         let mut state = state[..words].to_vec();
         if !self.frame.begin(&mut state, inputs) {
-            return Trace {
-                fault: Fault::read(&state),
-                memory: state,
-                ..Trace::default()
-            };
+            return Trace { fault: Fault::read(&state), memory: state, ..Trace::default() };
         }
         let mut run = self.prepared(&state, inputs);
         run.trace = Some(Recorder::default());
@@ -173,11 +169,7 @@ impl Run<'_> {
             (&mut self.trace, of.elementary(), value)
         {
             let value = *value;
-            recorder.results.push(Made {
-                operation,
-                of,
-                value,
-            });
+            recorder.results.push(Made { operation, of, value });
         }
     }
 
@@ -186,12 +178,7 @@ impl Run<'_> {
         if let (Some(recorder), Some(of)) = (&mut self.trace, of.elementary()) {
             let value = self.memory.get(Address(address), of);
             let by = recorder.writers.get(&address).copied();
-            recorder.reads.push(Read {
-                address,
-                of,
-                value,
-                by,
-            });
+            recorder.reads.push(Read { address, of, value, by });
         }
     }
 
@@ -207,9 +194,7 @@ impl Run<'_> {
         let Some(recorder) = &mut self.trace else {
             return;
         };
-        let value = of
-            .elementary()
-            .map(|of| (of, self.memory.get(Address(address), of)));
+        let value = of.elementary().map(|of| (of, self.memory.get(Address(address), of)));
         let effect = Effect::Assigned { address, value };
         let Some(place) = recorder.push(context, line, effect, reads) else {
             return;

@@ -119,11 +119,7 @@ pub(super) fn compile(program: &Program) -> Compiled {
     let levels = levels(program);
     let count = levels.iter().max().map_or(1, |highest| highest + 1);
     let memory = program.state + program.frames;
-    let mut layout = Layout {
-        levels: vec![(memory + 1, 0); count],
-        constants: 1 << 30,
-        texts: 0,
-    };
+    let mut layout = Layout { levels: vec![(memory + 1, 0); count], constants: 1 << 30, texts: 0 };
     let first = Compiler::pass(program, &costs, &levels, layout.clone(), None);
     let used = first.used;
     let (mut slot, mut text) = (memory + 1, 0);
@@ -168,10 +164,7 @@ fn levels(program: &Program) -> Vec<usize> {
         crate::visit::calls(&program.routines[index].body, &mut |routine| {
             called.push(routine.0 as usize);
         });
-        let highest = called
-            .into_iter()
-            .map(|routine| level(program, routine, levels) + 1)
-            .max();
+        let highest = called.into_iter().map(|routine| level(program, routine, levels) + 1).max();
         levels[index] = highest;
         highest.unwrap_or_else(|| {
             levels[index] = Some(0);
@@ -179,9 +172,7 @@ fn levels(program: &Program) -> Vec<usize> {
         })
     }
     let mut levels = vec![None; program.routines.len()];
-    (0..levels.len())
-        .map(|index| level(program, index, &mut levels))
-        .collect()
+    (0..levels.len()).map(|index| level(program, index, &mut levels)).collect()
 }
 
 impl<'a> Compiler<'a> {
@@ -234,12 +225,7 @@ impl<'a> Compiler<'a> {
         for (jump, Label(label)) in std::mem::take(&mut compiler.jumps) {
             compiler.tables.code[jump].c = compiler.labels[label];
         }
-        Passed {
-            tables: compiler.tables,
-            tasks,
-            used: compiler.used,
-            measured: compiler.measured,
-        }
+        Passed { tables: compiler.tables, tasks, used: compiler.used, measured: compiler.measured }
     }
 
     fn compile_unit(&mut self, routine: RoutineId, own: Option<u32>) {
@@ -302,17 +288,9 @@ impl<'a> Compiler<'a> {
         let last = self.tables.lines.last();
         if last.is_none_or(|&(_, routine, line)| (routine, line) != statement) {
             let first = self.tables.code.len() as u32;
-            self.tables
-                .lines
-                .push((first, self.context.routine, self.context.line));
+            self.tables.lines.push((first, self.context.routine, self.context.line));
         }
-        self.tables.code.push(Instruction {
-            code,
-            extra,
-            a,
-            b,
-            c,
-        });
+        self.tables.code.push(Instruction { code, extra, a, b, c });
     }
 
     fn jump(&mut self, code: Code, a: u32, b: u32, to: Label) {

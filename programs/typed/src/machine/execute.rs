@@ -59,10 +59,7 @@ impl<O: Copy + Into<u32>, R: Row + ?Sized> Run<'_, O, R> {
         }
         macro_rules! stop {
             ($cause:expr) => {
-                return Err(Stop {
-                    at: at - 1,
-                    cause: $cause,
-                })
+                return Err(Stop { at: at - 1, cause: $cause })
             };
         }
         loop {
@@ -85,20 +82,12 @@ impl<O: Copy + Into<u32>, R: Row + ?Sized> Run<'_, O, R> {
                             of: Elementary::ALL[usize::from(extra)],
                         });
                     }
-                    set!(
-                        a,
-                        (get!(b) as $signed).$function(divisor) as $unsigned as u64
-                    )
+                    set!(a, (get!(b) as $signed).$function(divisor) as $unsigned as u64)
                 }};
             }
             macro_rules! real {
                 ($type:ty, $function:ident) => {
-                    set!(
-                        a,
-                        <$type>::unpack(get!(b))
-                            .$function(<$type>::unpack(get!(c)))
-                            .pack()
-                    )
+                    set!(a, <$type>::unpack(get!(b)).$function(<$type>::unpack(get!(c))).pack())
                 };
             }
             macro_rules! fourth {
@@ -117,10 +106,7 @@ impl<O: Copy + Into<u32>, R: Row + ?Sized> Run<'_, O, R> {
             macro_rules! with_product {
                 ($type:ty, $function:ident) => {{
                     let product = <$type>::unpack(get!(b)).multiply(<$type>::unpack(get!(c)));
-                    set!(
-                        a,
-                        <$type>::unpack(get!(fourth!())).$function(product).pack()
-                    )
+                    set!(a, <$type>::unpack(get!(fourth!())).$function(product).pack())
                 }};
             }
             macro_rules! one_real {
@@ -174,9 +160,7 @@ impl<O: Copy + Into<u32>, R: Row + ?Sized> Run<'_, O, R> {
                 ($turn:expr) => {
                     match self.budget.checked_sub($turn) {
                         Some(rest) => self.budget = rest,
-                        None => stop!(Cause::BudgetExceeded {
-                            budget: tables.budget,
-                        }),
+                        None => stop!(Cause::BudgetExceeded { budget: tables.budget }),
                     }
                 };
             }

@@ -80,11 +80,7 @@ pub(super) fn next(each: &Loop, counter: u64, by: u64) -> Option<u64> {
 
 pub(super) fn has_passed(each: &Loop, counter: u64, limit: u64, by: u64) -> bool {
     let [counter, limit, by] = [counter, limit, by].map(|stored| each.of.signed(stored));
-    if by >= 0 {
-        counter > limit
-    } else {
-        counter < limit
-    }
+    if by >= 0 { counter > limit } else { counter < limit }
 }
 
 pub(super) fn load_text(slots: &[u64], capacity: usize, text: &mut Vec<u8>) {

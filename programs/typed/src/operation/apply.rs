@@ -17,20 +17,12 @@ impl Operation {
         use Operation as O;
         Ok(match self {
             O::Add(of) => arithmetic(of, operands, u64::wrapping_add, Float::add, Float::add),
-            O::Subtract(of) => arithmetic(
-                of,
-                operands,
-                u64::wrapping_sub,
-                Float::subtract,
-                Float::subtract,
-            ),
-            O::Multiply(of) => arithmetic(
-                of,
-                operands,
-                u64::wrapping_mul,
-                Float::multiply,
-                Float::multiply,
-            ),
+            O::Subtract(of) => {
+                arithmetic(of, operands, u64::wrapping_sub, Float::subtract, Float::subtract)
+            }
+            O::Multiply(of) => {
+                arithmetic(of, operands, u64::wrapping_mul, Float::multiply, Float::multiply)
+            }
             O::Divide(Elementary::Real) => binary(operands, f32::divide),
             O::Divide(Elementary::Lreal) => binary(operands, f64::divide),
             O::Divide(of) => quotient(of, operands)?.0,
@@ -64,10 +56,7 @@ impl Operation {
                 let among = &operands[1..];
                 *chosen
                     .and_then(|chosen| among.get(chosen))
-                    .ok_or(Cause::NoSuchOperand {
-                        number,
-                        count: among.len() as u64,
-                    })?
+                    .ok_or(Cause::NoSuchOperand { number, count: among.len() as u64 })?
             }
             O::Convert(from, to) => convert(from, to, operands[0]),
             O::Truncate(from, to) => truncate(from, to, operands[0]),
@@ -111,10 +100,7 @@ fn real(function: RealFunction, of: Elementary, operands: &[u64]) -> u64 {
 fn quotient(of: Elementary, operands: &[u64]) -> Result<(u64, u64), Cause> {
     let (dividend, divisor) = (of.signed(operands[0]), of.signed(operands[1]));
     if divisor == 0 {
-        return Err(Cause::DivisionByZero {
-            dividend: operands[0],
-            of,
-        });
+        return Err(Cause::DivisionByZero { dividend: operands[0], of });
     }
     // Of 65 bits at most, so neither overflows here.
     let (quotient, remainder) = (dividend / divisor, dividend % divisor);
@@ -122,13 +108,10 @@ fn quotient(of: Elementary, operands: &[u64]) -> Result<(u64, u64), Cause> {
 }
 
 fn extreme(comparison: Comparison, of: Elementary, operands: &[u64]) -> u64 {
-    let best = operands.iter().copied().reduce(|best, next| {
-        if stands(comparison, of, next, best) {
-            next
-        } else {
-            best
-        }
-    });
+    let best = operands
+        .iter()
+        .copied()
+        .reduce(|best, next| if stands(comparison, of, next, best) { next } else { best });
     canonical(of, best.unwrap_or(0))
 }
 
@@ -152,9 +135,7 @@ fn stands(comparison: Comparison, of: Elementary, left: u64, right: u64) -> bool
 
 fn shift(of: Elementary, operands: &[u64], by: fn(u64, u32) -> Option<u64>) -> u64 {
     let within = operands[1] < u64::from(of.bits());
-    let shifted = within
-        .then(|| by(operands[0], operands[1] as u32))
-        .flatten();
+    let shifted = within.then(|| by(operands[0], operands[1] as u32)).flatten();
     shifted.unwrap_or(0) & of.mask()
 }
 
@@ -210,9 +191,7 @@ fn saturate(to: Elementary, number: i128) -> u64 {
 fn from_bcd(from: Elementary, stored: u64) -> u64 {
     let digits = (0..from.bits().div_ceil(4)).rev();
     digits.fold(0_u64, |number, digit| {
-        number
-            .wrapping_mul(10)
-            .wrapping_add(stored >> (4 * digit) & 0xf)
+        number.wrapping_mul(10).wrapping_add(stored >> (4 * digit) & 0xf)
     })
 }
 

@@ -86,20 +86,13 @@ fn write_date(moment: i64) -> String {
     let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
     let shifted = (5 * day_of_year + 2) / 153;
     let day = day_of_year - (153 * shifted + 2) / 5 + 1;
-    let month = if shifted < 10 {
-        shifted + 3
-    } else {
-        shifted - 9
-    };
+    let month = if shifted < 10 { shifted + 3 } else { shifted - 9 };
     let year = era * 400 + year_of_era + i64::from(month <= 2);
     format!("{year:04}-{month:02}-{day:02}")
 }
 
 fn write_time_of_day(nanoseconds: i64) -> String {
-    let (seconds, fraction) = (
-        nanoseconds.div_euclid(SECOND),
-        nanoseconds.rem_euclid(SECOND),
-    );
+    let (seconds, fraction) = (nanoseconds.div_euclid(SECOND), nanoseconds.rem_euclid(SECOND));
     let (hours, minutes) = (seconds.div_euclid(3_600), seconds.rem_euclid(3_600) / 60);
     let mut text = format!("{hours:02}:{minutes:02}:{:02}", seconds.rem_euclid(60));
     if fraction > 0 {
@@ -142,22 +135,16 @@ fn behind_hash(text: &str) -> &str {
 fn read_digits(text: &str) -> (u64, usize, &str) {
     let end = text.find(|c: char| !c.is_ascii_digit());
     let (digits, rest) = text.split_at(end.unwrap_or(text.len()));
-    let number = digits.bytes().fold(0_u64, |number, digit| {
-        number
-            .wrapping_mul(10)
-            .wrapping_add(u64::from(digit - b'0'))
-    });
+    let number = digits
+        .bytes()
+        .fold(0_u64, |number, digit| number.wrapping_mul(10).wrapping_add(u64::from(digit - b'0')));
     (number, digits.len(), rest)
 }
 
 fn read_integer(text: &str) -> u64 {
     let (is_negative, rest) = read_sign(text);
     let (number, _, _) = read_digits(rest);
-    if is_negative {
-        number.wrapping_neg()
-    } else {
-        number
-    }
+    if is_negative { number.wrapping_neg() } else { number }
 }
 
 fn read_sign(text: &str) -> (bool, &str) {
@@ -176,9 +163,7 @@ fn read_real(text: &str) -> &str {
     }
     let digits = |from: usize| {
         let rest = &text[from..];
-        from + rest
-            .find(|c: char| !c.is_ascii_digit())
-            .unwrap_or(rest.len())
+        from + rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len())
     };
     let mut end = digits(sign);
     if text[end..].starts_with('.') {
@@ -254,7 +239,5 @@ fn read_time_of_day(text: &str) -> i64 {
         .wrapping_mul(3_600)
         .wrapping_add((minutes as i64).wrapping_mul(60))
         .wrapping_add(seconds as i64);
-    seconds
-        .wrapping_mul(SECOND)
-        .wrapping_add(fraction.parse().unwrap_or(0))
+    seconds.wrapping_mul(SECOND).wrapping_add(fraction.parse().unwrap_or(0))
 }

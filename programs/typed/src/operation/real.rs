@@ -122,36 +122,8 @@ macro_rules! float {
     };
 }
 
-float!(
-    f32,
-    u32,
-    0x7fc0_0000,
-    powf,
-    sinf,
-    cosf,
-    tanf,
-    asinf,
-    acosf,
-    atanf,
-    expf,
-    logf,
-    log10f
-);
-float!(
-    f64,
-    u64,
-    0x7ff8_0000_0000_0000,
-    pow,
-    sin,
-    cos,
-    tan,
-    asin,
-    acos,
-    atan,
-    exp,
-    log,
-    log10
-);
+float!(f32, u32, 0x7fc0_0000, powf, sinf, cosf, tanf, asinf, acosf, atanf, expf, logf, log10f);
+float!(f64, u64, 0x7ff8_0000_0000_0000, pow, sin, cos, tan, asin, acos, atan, exp, log, log10);
 
 /// a ∘ b of two stored reals.
 pub(crate) fn binary<F: Float>(operands: &[u64], function: fn(F, F) -> F) -> u64 {

@@ -26,10 +26,7 @@ pub struct Signature {
 
 impl Signature {
     fn new(operands: impl Into<Vec<Operand>>, result: Operand) -> Self {
-        Self {
-            operands: operands.into(),
-            result,
-        }
+        Self { operands: operands.into(), result }
     }
 }
 
@@ -55,10 +52,9 @@ impl Operation {
             }
             Self::Modulo(of) => (is_whole(of), binary(of)),
             Self::Negate(of) | Self::Absolute(of) => (is_number(of), unary(of)),
-            Self::Minimum(of) | Self::Maximum(of) => (
-                count >= 2,
-                Signature::new(vec![Number(of); count], Number(of)),
-            ),
+            Self::Minimum(of) | Self::Maximum(of) => {
+                (count >= 2, Signature::new(vec![Number(of); count], Number(of)))
+            }
             Self::Power(of) => (of.is_real(), binary(of)),
             Self::Real(_, of) => (of.is_real(), unary(of)),
             Self::Not(of) => (of.is_bit_string(), unary(of)),
@@ -68,10 +64,7 @@ impl Operation {
             | Self::RotateLeft(of)
             | Self::RotateRight(of) => (!of.is_real(), by_count(of)),
             Self::Compare(_, of) => (true, Signature::new([Number(of); 2], BOOL)),
-            Self::Select(of) => (
-                true,
-                Signature::new([BOOL, Number(of), Number(of)], Number(of)),
-            ),
+            Self::Select(of) => (true, Signature::new([BOOL, Number(of), Number(of)], Number(of))),
             Self::Multiplex(of) => {
                 let mut operands = vec![Number(of); count];
                 if let Some(first) = operands.first_mut() {
@@ -82,10 +75,9 @@ impl Operation {
             Self::Convert(from, to) => (true, change(from, to)),
             Self::Truncate(from, to) => (from.is_real() && !to.is_real(), change(from, to)),
             Self::Reinterpret(from, to) => (from.bits() == to.bits(), change(from, to)),
-            Self::Extract { from, to, at } => (
-                to.is_bit_string() && u32::from(at) + to.bits() <= from.bits(),
-                change(from, to),
-            ),
+            Self::Extract { from, to, at } => {
+                (to.is_bit_string() && u32::from(at) + to.bits() <= from.bits(), change(from, to))
+            }
             Self::Insert { of, part, at } => (
                 part.is_bit_string() && u32::from(at) + part.bits() <= of.bits(),
                 Signature::new([Number(of), Number(part)], Number(of)),

@@ -115,8 +115,6 @@ fn find(text: &[u8], sought: &[u8]) -> u64 {
     if sought.is_empty() {
         return 0;
     }
-    let at = text
-        .windows(sought.len())
-        .position(|window| window == sought);
+    let at = text.windows(sought.len()).position(|window| window == sought);
     at.map_or(0, |at| at as u64 + 1)
 }

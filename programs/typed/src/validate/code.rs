@@ -30,9 +30,7 @@ impl Check<'_> {
         depth: usize,
         is_loop: bool,
     ) {
-        self.expect(depth <= Program::NESTING, || {
-            "statements are nested too deep".to_owned()
-        });
+        self.expect(depth <= Program::NESTING, || "statements are nested too deep".to_owned());
         if depth > Program::NESTING {
             return;
         }
@@ -87,9 +85,7 @@ impl Check<'_> {
                 self.place(routine, &each.counter);
                 let of = each.counter.of.elementary();
                 let is_integer = of.is_some_and(Elementary::is_integer);
-                self.expect(is_integer, || {
-                    "FOR with a counter that is no integer".to_owned()
-                });
+                self.expect(is_integer, || "FOR with a counter that is no integer".to_owned());
                 for bound in [&each.from, &each.to, &each.by] {
                     self.expression(routine, bound, 0);
                     self.alike(&each.counter.of, &bound.of);
@@ -107,9 +103,7 @@ impl Check<'_> {
     }
 
     fn alike(&mut self, wanted: &Type, found: &Type) {
-        self.expect(wanted.is_stored_like(found), || {
-            format!("{found:?} in place of {wanted:?}")
-        });
+        self.expect(wanted.is_stored_like(found), || format!("{found:?} in place of {wanted:?}"));
     }
 
     /// A place in a routine.
@@ -135,26 +129,17 @@ impl Check<'_> {
         for index in &place.indices {
             self.expression(routine, &index.value, 0);
             self.alike(&Type::Elementary(Elementary::Lint), &index.value.of);
-            self.expect(index.low <= index.high, || {
-                "an array without elements".to_owned()
-            });
+            self.expect(index.low <= index.high, || "an array without elements".to_owned());
         }
     }
 
     /// Elements of packed arrays, and no others, share slots.
     fn bits(&mut self, place: &Place) {
         let width = place.of.elementary().map_or(64, Elementary::bits);
-        let grain = if place.is_packed {
-            u64::from(width)
-        } else {
-            64
-        };
+        let grain = if place.is_packed { u64::from(width) } else { 64 };
         let fits = place.bit < 64
             && u64::from(place.bit).is_multiple_of(grain)
-            && place
-                .indices
-                .iter()
-                .all(|index| index.stride.is_multiple_of(grain));
+            && place.indices.iter().all(|index| index.stride.is_multiple_of(grain));
         let is_part = !place.is_packed || place.of.elementary().is_some();
         self.expect(fits && is_part, || {
             format!("bit {} of {:?} + {}", place.bit, place.root, place.offset)
@@ -176,16 +161,12 @@ impl Check<'_> {
             let slots = place.of.slots();
             let needed = self.own[index];
             let fits = needed <= slots && place.of.elementary().is_none();
-            self.expect(fits, || {
-                format!("{} needs an instance of {needed} slots", routine.name)
-            });
+            self.expect(fits, || format!("{} needs an instance of {needed} slots", routine.name));
         }
     }
 
     fn expression(&mut self, routine: &Routine, expression: &Expression, depth: usize) {
-        self.expect(depth <= Program::NESTING, || {
-            "expressions are nested too deep".to_owned()
-        });
+        self.expect(depth <= Program::NESTING, || "expressions are nested too deep".to_owned());
         if depth > Program::NESTING {
             return;
         }
@@ -276,8 +257,6 @@ impl Check<'_> {
     fn variable(&mut self, called: &Routine, place: &Place) {
         self.place(called, place);
         let is_plain = place.indices.is_empty() && matches!(place.root, Root::Frame(_));
-        self.expect(is_plain, || {
-            "a call uses what is no variable of its frame".to_owned()
-        });
+        self.expect(is_plain, || "a call uses what is no variable of its frame".to_owned());
     }
 }

@@ -22,13 +22,7 @@ pub(super) struct Writer<'a> {
 pub(crate) fn body(to: &mut Generator, scope: &[Known], statements: usize) -> Vec<Statement> {
     let mut scope = scope.to_vec();
     scope.extend(to.globals.iter().cloned());
-    let mut writer = Writer {
-        to,
-        scope,
-        line: 0,
-        loops: 0,
-        within: 0,
-    };
+    let mut writer = Writer { to, scope, line: 0, loops: 0, within: 0 };
     writer.statements(statements, 3)
 }
 
@@ -60,19 +54,13 @@ pub(crate) fn outputs(to: &mut Generator, scope: &[Known]) -> Vec<Statement> {
                 }
                 false => writer.number(point.of, 2),
             };
-            Statement {
-                line: 1_000,
-                kind: StatementKind::Assign(place, value),
-            }
+            Statement { line: 1_000, kind: StatementKind::Assign(place, value) }
         })
         .collect()
 }
 
 pub(crate) fn constant(of: Elementary, value: u64) -> Expression {
-    Expression {
-        of: Type::Elementary(of),
-        kind: ExpressionKind::Constant(value),
-    }
+    Expression { of: Type::Elementary(of), kind: ExpressionKind::Constant(value) }
 }
 
 impl Writer<'_> {
@@ -135,10 +123,7 @@ impl Writer<'_> {
                     let line = self.line;
                     let exit = Branch {
                         condition: self.number(Elementary::Bool, 2),
-                        body: vec![Statement {
-                            line,
-                            kind: StatementKind::Exit,
-                        }],
+                        body: vec![Statement { line, kind: StatementKind::Exit }],
                     };
                     let otherwise = match self.percent(80) {
                         true => exit.body.clone(),
@@ -220,13 +205,7 @@ impl Writer<'_> {
         self.loops += 1;
         let body = self.statements(3, depth - 1);
         self.loops -= 1;
-        StatementKind::For(Box::new(For {
-            counter,
-            from,
-            to,
-            by,
-            body,
-        }))
+        StatementKind::For(Box::new(For { counter, from, to, by, body }))
     }
 
     /// A block or method of which an instance can be reached, and that instance.
@@ -264,11 +243,8 @@ impl Writer<'_> {
         let Some(target) = self.place(&of, false) else {
             return self.invoke();
         };
-        let holder = Place {
-            offset: instance.offset + slot,
-            of: target.of.clone(),
-            ..instance.clone()
-        };
+        let holder =
+            Place { offset: instance.offset + slot, of: target.of.clone(), ..instance.clone() };
         let bind = StatementKind::Bind(holder, target);
         if is_method {
             return bind;
@@ -305,10 +281,7 @@ impl Writer<'_> {
                 }
             }
         };
-        Expression {
-            of: of.clone(),
-            kind,
-        }
+        Expression { of: of.clone(), kind }
     }
 
     pub(super) fn number(&mut self, of: Elementary, depth: usize) -> Expression {
@@ -335,10 +308,7 @@ impl Writer<'_> {
             ])),
             _ => return self.call_for(Type::Elementary(of), depth),
         };
-        Expression {
-            of: Type::Elementary(of),
-            kind,
-        }
+        Expression { of: Type::Elementary(of), kind }
     }
 
     fn text(&mut self, depth: usize) -> Expression {
@@ -375,10 +345,7 @@ impl Writer<'_> {
                 }
             }
         };
-        Expression {
-            of: Type::Text(24),
-            kind,
-        }
+        Expression { of: Type::Text(24), kind }
     }
 
     fn operands(

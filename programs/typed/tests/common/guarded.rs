@@ -55,10 +55,7 @@ impl Writer<'_> {
             }
         };
         let line = self.line;
-        let body = vec![Statement {
-            line,
-            kind: StatementKind::Assign(place, value),
-        }];
+        let body = vec![Statement { line, kind: StatementKind::Assign(place, value) }];
         StatementKind::If(vec![Branch { condition, body }], Vec::new())
     }
 }

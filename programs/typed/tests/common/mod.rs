@@ -139,8 +139,7 @@ impl Generator {
             values: vec![("off".to_owned(), 0), ("on".to_owned(), 1)],
         });
         self.types = Elementary::ALL.map(Type::Elementary).to_vec();
-        self.types
-            .push(Type::Enumeration(EnumerationId(0), Elementary::Int));
+        self.types.push(Type::Enumeration(EnumerationId(0), Elementary::Int));
         self.types.push(Type::Text(5));
         self.types.push(Type::Text(24));
         for _ in 0..5 {
@@ -163,30 +162,18 @@ impl Generator {
         for index in 0..1 + self.random.below(4) {
             let of = self.random.pick(&self.types).clone();
             let slots = of.slots() as u32;
-            fields.push(Field {
-                name: format!("f{index}"),
-                of,
-                slot,
-                is_reference: false,
-            });
+            fields.push(Field { name: format!("f{index}"), of, slot, is_reference: false });
             slot += slots;
         }
         let id = self.program.structures.len();
-        self.program.structures.push(Structure {
-            name: format!("{name}{id}"),
-            fields,
-        });
+        self.program.structures.push(Structure { name: format!("{name}{id}"), fields });
         Type::Structure(StructureId(id as u32), slot)
     }
 
     fn global(&mut self, name: String, of: Type) -> u32 {
         let slot = self.program.state;
         self.program.state += of.slots() as u32;
-        self.globals.push(Known {
-            root: Root::Global(slot),
-            of: of.clone(),
-            is_constant: false,
-        });
+        self.globals.push(Known { root: Root::Global(slot), of: of.clone(), is_constant: false });
         self.program.variables.push(Variable {
             name,
             of,
@@ -254,11 +241,7 @@ impl Generator {
                 callable.result = Some(place.clone());
             } else if kind != 1 && self.random.percent(25) {
                 self.program.frames += 1;
-                scope.push(Known {
-                    root: Root::FrameReference(slot),
-                    of,
-                    is_constant: false,
-                });
+                scope.push(Known { root: Root::FrameReference(slot), of, is_constant: false });
                 callable.references.push(place);
                 continue;
             } else if self.random.percent(50) {
@@ -271,11 +254,7 @@ impl Generator {
                 initial.push(Initial { slot, value });
             }
             self.program.frames += of.slots() as u32;
-            scope.push(Known {
-                root: Root::Frame(slot),
-                of,
-                is_constant: false,
-            });
+            scope.push(Known { root: Root::Frame(slot), of, is_constant: false });
         }
         if kind == 1 {
             callable.values.clear();
@@ -328,10 +307,7 @@ impl Generator {
         let of = Type::Structure(id, slots);
         self.global(format!("instance{}", id.0), of.clone());
         if self.random.percent(50) {
-            let array = Array {
-                ranges: vec![(1, 3)],
-                element: of.clone(),
-            };
+            let array = Array { ranges: vec![(1, 3)], element: of.clone() };
             self.global(format!("instances{}", id.0), Type::Array(Arc::new(array)));
         }
         (of, bound)
@@ -344,11 +320,7 @@ impl Generator {
             for index in 0..4 {
                 let of = self.random.pick(&self.types).clone();
                 let slot = self.global(format!("m{task}{index}"), of.clone());
-                scope.push(Known {
-                    root: Root::Own(slot - own),
-                    of,
-                    is_constant: false,
-                });
+                scope.push(Known { root: Root::Own(slot - own), of, is_constant: false });
             }
             // Variables of its own are found as such only.
             self.globals.truncate(self.globals.len() - 4);
@@ -363,11 +335,7 @@ impl Generator {
                 initial: Vec::new(),
                 body,
             });
-            self.program.tasks.push(Task {
-                routine,
-                own,
-                every: 1 + self.random.below(3) as u32,
-            });
+            self.program.tasks.push(Task { routine, own, every: 1 + self.random.below(3) as u32 });
         }
     }
 }

@@ -61,16 +61,8 @@ pub(crate) fn with_result(random: &mut Random, of: Elementary) -> (Operation, Si
             27 => Operation::Multiplex(of),
             28 => Operation::Truncate(other, of),
             29 => Operation::Reinterpret(other, of),
-            30 => Operation::Extract {
-                from: other,
-                to: of,
-                at,
-            },
-            31 => Operation::Insert {
-                of,
-                part: other,
-                at,
-            },
+            30 => Operation::Extract { from: other, to: of, at },
+            31 => Operation::Insert { of, part: other, at },
             32 => match random.below(5) {
                 0 => Operation::FromBcd(other, of),
                 1 => Operation::ToBcd(other, of),

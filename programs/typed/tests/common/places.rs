@@ -18,12 +18,8 @@ impl Writer<'_> {
                 return Some(place);
             }
         }
-        let all: Vec<Known> = self
-            .scope
-            .iter()
-            .filter(|known| known.of.is_stored_like(of))
-            .cloned()
-            .collect();
+        let all: Vec<Known> =
+            self.scope.iter().filter(|known| known.of.is_stored_like(of)).cloned().collect();
         match all.is_empty() {
             true => None,
             false => {
@@ -65,15 +61,7 @@ impl Writer<'_> {
                 self.within += 1;
                 let value = self.index(low, high);
                 self.within -= 1;
-                place.indices.insert(
-                    0,
-                    Index {
-                        value,
-                        low,
-                        high,
-                        stride,
-                    },
-                );
+                place.indices.insert(0, Index { value, low, high, stride });
             }
             stride *= high.abs_diff(low) + 1;
         }
@@ -92,10 +80,7 @@ impl Writer<'_> {
             0..=1 => self.number(lint, 1),
             2..=15 => {
                 let of =
-                    *self
-                        .to
-                        .random
-                        .pick(&[Elementary::Int, Elementary::Usint, Elementary::Dint]);
+                    *self.to.random.pick(&[Elementary::Int, Elementary::Usint, Elementary::Dint]);
                 let rest = Expression {
                     of: Type::Elementary(of),
                     kind: ExpressionKind::Apply(
@@ -111,17 +96,12 @@ impl Writer<'_> {
             }
             16..=50 => {
                 let value = self.number(Elementary::Usint, 2);
-                let wide = |kind| Expression {
-                    of: Type::Elementary(lint),
-                    kind,
-                };
+                let wide = |kind| Expression { of: Type::Elementary(lint), kind };
                 let convert = Operation::Convert(Elementary::Usint, lint);
                 let value = wide(ExpressionKind::Apply(convert, vec![value]));
                 let length = constant(lint, length);
-                let rest = wide(ExpressionKind::Apply(
-                    Operation::Modulo(lint),
-                    vec![value, length],
-                ));
+                let rest =
+                    wide(ExpressionKind::Apply(Operation::Modulo(lint), vec![value, length]));
                 let low = constant(lint, low as u64);
                 wide(ExpressionKind::Apply(Operation::Add(lint), vec![rest, low]))
             }

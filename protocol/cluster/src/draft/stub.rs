@@ -40,22 +40,13 @@ impl<'a> Stub<'a> {
             namer.name(name);
         }
         let mut terminals = |signals: &'a [Signal]| -> Vec<Named<'a>> {
-            let named = signals
-                .iter()
-                .map(|signal| (namer.name(&signal.name), signal));
+            let named = signals.iter().map(|signal| (namer.name(&signal.name), signal));
             named.collect()
         };
         let inputs = terminals(&program.program.inputs);
         let outputs = terminals(&program.program.outputs);
         let [tick, pace, step] = ["tick", "pace", "step"].map(|name| namer.name(name));
-        Self {
-            program,
-            inputs,
-            outputs,
-            tick,
-            pace,
-            step,
-        }
+        Self { program, inputs, outputs, tick, pace, step }
     }
 
     pub(super) fn file(&self) -> String {
@@ -117,9 +108,7 @@ program {}
         if inputs.is_empty() {
             return;
         }
-        let Self {
-            tick, pace, step, ..
-        } = self;
+        let Self { tick, pace, step, .. } = self;
         let half = inputs.len().min(MAXIMUM_PRESET_VALUE as usize / 2);
         let cycles = (ROUND_CYCLES / (2 * half)).clamp(2, 10);
         let time = duration::text(period * cycles as u32);
@@ -139,35 +128,23 @@ rung \"each input is on for half a round\"
             let from = place % half;
             let to = from + half;
             let title = if place == 0 { "" } else { "rung\n" };
-            let _ = writeln!(
-                text,
-                "{title}    {step}.CV > {from} {step}.CV <= {to} ( {terminal} )"
-            );
+            let _ =
+                writeln!(text, "{title}    {step}.CV > {from} {step}.CV <= {to} ( {terminal} )");
         }
     }
 
     fn push_finished(&self, text: &mut String) {
-        let edges: Vec<String> = self
-            .outputs
-            .iter()
-            .map(|(terminal, _)| format!("+{terminal}"))
-            .collect();
+        let edges: Vec<String> =
+            self.outputs.iter().map(|(terminal, _)| format!("+{terminal}")).collect();
         let power = match edges.as_slice() {
             [only] => only.clone(),
             edges => format!("[ {} ]", edges.join("\n    | ")),
         };
-        let _ = write!(
-            text,
-            "\nrung \"count what the program does\"\n    {power} ( finished )\n"
-        );
+        let _ = write!(text, "\nrung \"count what the program does\"\n    {power} ( finished )\n");
     }
 }
 
 fn declare(text: &mut String, kind: &str, terminal: &str, signal: &Signal, initial: &str) {
     let note = note(signal).map(|note| format!("  -- {note}"));
-    let _ = writeln!(
-        text,
-        "{kind} {terminal}{initial}{}",
-        note.unwrap_or_default()
-    );
+    let _ = writeln!(text, "{kind} {terminal}{initial}{}", note.unwrap_or_default());
 }

@@ -213,10 +213,7 @@ fn is_negative(value: &Constant) -> bool {
 fn moved(of: Elementary, limit: u64, distance: u64, is_lowered: bool) -> Option<u64> {
     match of {
         Elementary::Real => {
-            let (limit, by) = (
-                f32::from_bits(limit as u32),
-                f32::from_bits(distance as u32),
-            );
+            let (limit, by) = (f32::from_bits(limit as u32), f32::from_bits(distance as u32));
             let moved = if is_lowered { limit - by } else { limit + by };
             moved.is_finite().then(|| u64::from(moved.to_bits()))
         }

@@ -24,37 +24,13 @@ pub(super) fn device(
 ) -> Option<FieldDevice> {
     let (_, interface) = member.code.as_ref()?;
     let before = diagnostics.len();
-    let inputs = side(
-        &section.inputs,
-        &interface.inputs,
-        "input",
-        member,
-        diagnostics,
-    );
-    let outputs = side(
-        &section.outputs,
-        &interface.outputs,
-        "output",
-        member,
-        diagnostics,
-    );
+    let inputs = side(&section.inputs, &interface.inputs, "input", member, diagnostics);
+    let outputs = side(&section.outputs, &interface.outputs, "output", member, diagnostics);
     check_driven(&section.outputs, diagnostics);
     let mut warned = false;
     for (points, entries, side, code, effect) in [
-        (
-            &interface.inputs,
-            &section.inputs,
-            "input",
-            "U0251",
-            "it stays 0",
-        ),
-        (
-            &interface.outputs,
-            &section.outputs,
-            "output",
-            "U0252",
-            "it moves nothing",
-        ),
+        (&interface.inputs, &section.inputs, "input", "U0251", "it stays 0"),
+        (&interface.outputs, &section.outputs, "output", "U0252", "it moves nothing"),
     ] {
         // The points of a program fault are for the operator and need no wire.
         let optional = [TypedProgram::RESET, TypedProgram::FAULT];
@@ -115,9 +91,7 @@ fn check_driven(entries: &BTreeMap<String, PlaceEntry>, diagnostics: &mut Vec<Di
             ) => vec![(false, *address, 0)],
             Place::Number(registers) => {
                 let addresses = (0..registers.count()).map(|at| registers.address + at);
-                addresses
-                    .flat_map(|address| (0..16).map(move |bit| (true, address, bit)))
-                    .collect()
+                addresses.flat_map(|address| (0..16).map(move |bit| (true, address, bit))).collect()
             }
         };
         let taken = bits.iter().find_map(|bit| driven.get(bit));
@@ -181,12 +155,7 @@ fn side(
     }
     let mut bindings = Vec::new();
     for point in points {
-        let Some(PlaceEntry {
-            place: Some(place),
-            span,
-            ..
-        }) = entries.get(&point.name)
-        else {
+        let Some(PlaceEntry { place: Some(place), span, .. }) = entries.get(&point.name) else {
             continue;
         };
         if let Err((message, help)) = fit(point, place, side == "input") {
@@ -199,10 +168,7 @@ fn side(
             place: *place,
         });
     }
-    Side {
-        width: points.width(),
-        bindings,
-    }
+    Side { width: points.width(), bindings }
 }
 
 /// Whether values of a signal and of its place convert into each other.
@@ -211,12 +177,8 @@ fn side(
 /// Message and help.
 fn fit(point: &Point, place: &Place, is_input: bool) -> Result<(), (String, String)> {
     let Point { name, of, .. } = point;
-    let misfit = |help: String| {
-        Err((
-            format!("`{name}` is {of}, and its place is `{place}`"),
-            help,
-        ))
-    };
+    let misfit =
+        |help: String| Err((format!("`{name}` is {of}, and its place is `{place}`"), help));
     let registers = match place {
         Place::Bit(_) if *of == Elementary::Bool => return Ok(()),
         Place::Bit(_) => {
@@ -230,9 +192,7 @@ fn fit(point: &Point, place: &Place, is_input: bool) -> Result<(), (String, Stri
     };
     let Registers { table, address, .. } = registers;
     if *of == Elementary::Bool {
-        return misfit(format!(
-            "a BOOL is one bit: write for example \"{table}:{address}.0\""
-        ));
+        return misfit(format!("a BOOL is one bit: write for example \"{table}:{address}.0\""));
     }
     if of.is_time() {
         return misfit("registers have no times: declare a DINT, such as milliseconds, and convert it in the program".into());
@@ -249,9 +209,7 @@ fn fit(point: &Point, place: &Place, is_input: bool) -> Result<(), (String, Stri
     }
     if registers.is_scaled() {
         return match of.is_bit_string() {
-            true => misfit(format!(
-                "{of} is a bit string: leave `scale` and `offset` out"
-            )),
+            true => misfit(format!("{of} is a bit string: leave `scale` and `offset` out")),
             false => Ok(()),
         };
     }

@@ -57,18 +57,12 @@ pub(super) fn ramps(
         };
         let step = per_second * period.as_secs_f64();
         let problem = if !is_number {
-            format!(
-                "`{}` is {}: only a number has a ramp",
-                output.name, output.of
-            )
+            format!("`{}` is {}: only a number has a ramp", output.name, output.of)
         } else if !(step > 0.0 && step.is_finite()) {
             let name = &output.name;
             format!("the ramp of `{name}` is not above 0: write units per second, such as 5.0")
         } else {
-            let place = PointPlace {
-                bit: u16::try_from(output.bit).ok()?,
-                of: output.of,
-            };
+            let place = PointPlace { bit: u16::try_from(output.bit).ok()?, of: output.of };
             return Some(Ramp { place, step });
         };
         diagnostics.push(Diagnostic::error("U0204", problem, name.span.clone()));

@@ -44,11 +44,7 @@ fn followed(
     };
     if plant == draft.name {
         let message = format!("the plant `{plant}` follows itself");
-        report(
-            "U0215",
-            message,
-            "what a plant knows of itself is in its ladder",
-        );
+        report("U0215", message, "what a plant knows of itself is in its ladder");
         return None;
     }
     let Some(other) = drafts.iter().find(|other| other.name == plant) else {

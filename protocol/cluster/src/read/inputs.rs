@@ -64,11 +64,7 @@ pub(super) fn resolve(
             let has_place = field.is_some_and(|field| field.inputs.contains_key(&valid.name));
             is_signal && (valid.name.ends_with(VALID[0]) || !has_entry && !has_place)
         });
-        for name in [Some(point), valid]
-            .into_iter()
-            .flatten()
-            .map(|point| &point.name)
-        {
+        for name in [Some(point), valid].into_iter().flatten().map(|point| &point.name) {
             let has_place = field.is_some_and(|field| field.inputs.contains_key(name));
             if !taken.insert(name.clone()) || has_place {
                 let message = format!("two sources of the input `{name}` of `{}`", member.name);
@@ -80,11 +76,7 @@ pub(super) fn resolve(
         }
         let kind = match source {
             SourceText::Operator(text) => operator(text, point, period, diagnostics),
-            SourceText::Signal {
-                from,
-                default,
-                stale_after,
-            } => {
+            SourceText::Signal { from, default, stale_after } => {
                 let signal = Signal {
                     from: from.as_ref(),
                     default: default.as_ref(),
@@ -96,10 +88,7 @@ pub(super) fn resolve(
                 }
             }
         };
-        sources.extend(kind.map(|kind| InputSource {
-            name: point.name.clone(),
-            kind,
-        }));
+        sources.extend(kind.map(|kind| InputSource { name: point.name.clone(), kind }));
     }
     sources
 }
@@ -159,19 +148,14 @@ fn operator(
         );
         if !fits {
             let message = format!("`{}` does not belong to a {word}", key.value);
-            diagnostics.push(
-                Diagnostic::error("U0202", message, key.span.clone()).with_help(
-                    "`duration` belongs to a pulse; `low`, `high` and `unit` belong to a setpoint",
-                ),
-            );
+            diagnostics.push(Diagnostic::error("U0202", message, key.span.clone()).with_help(
+                "`duration` belongs to a pulse; `low`, `high` and `unit` belong to a setpoint",
+            ));
         }
     }
     let is_number = point.of != Elementary::Bool;
     if is_number != (word == "setpoint") {
-        let message = format!(
-            "a {word} for the input `{}`, which is {}",
-            point.name, point.of
-        );
+        let message = format!("a {word} for the input `{}`, which is {}", point.name, point.of);
         let help = "a level and a pulse are for a BOOL, a setpoint is for a number or a TIME";
         diagnostics.push(misfit(message, text.span.clone(), help));
         return None;
@@ -179,10 +163,7 @@ fn operator(
     let mut optional = |key: &str, found: Option<&Placed<Constant>>| {
         found.and_then(|found| value(key, found, point.of, diagnostics))
     };
-    let (low, high) = (
-        optional("low", text.low.as_ref()),
-        optional("high", text.high.as_ref()),
-    );
+    let (low, high) = (optional("low", text.low.as_ref()), optional("high", text.high.as_ref()));
     let initial = optional("initial", text.initial.as_ref());
     let kind = match word {
         "level" => OperatorInputKind::Level,
@@ -219,14 +200,8 @@ fn operator(
         && in_order(point.of, low, high)
         && !(in_order(point.of, low, input.initial) && in_order(point.of, input.initial, high))
     {
-        let message = format!(
-            "`initial` of the setpoint `{}` is outside its limits",
-            point.name
-        );
-        let span = text
-            .initial
-            .as_ref()
-            .map_or(text.span.clone(), |it| it.span.clone());
+        let message = format!("`initial` of the setpoint `{}` is outside its limits", point.name);
+        let span = text.initial.as_ref().map_or(text.span.clone(), |it| it.span.clone());
         diagnostics.push(Diagnostic::error("U0205", message, span));
     }
     (diagnostics.len() == before).then(|| {
@@ -285,28 +260,20 @@ impl Signal<'_> {
         period: Duration,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Option<InputSourceKind> {
-        let default = self
-            .default
-            .and_then(|default| value("default", default, point.of, diagnostics));
+        let default =
+            self.default.and_then(|default| value("default", default, point.of, diagnostics));
         let Placed { value: from, span } = self.from?;
         let is_name = |text: &str| !text.is_empty() && !text.contains(['/', '*', '$', '?', '#']);
-        if ![&group.group, &group.controller, &group.output]
-            .into_iter()
-            .all(|text| is_name(text))
-        {
+        if ![&group.group, &group.controller, &group.output].into_iter().all(|text| is_name(text)) {
             let message = format!("`{from}` names no output of another group");
             let help = "write cluster, controller and output, such as \"line-1/press.done\"";
             diagnostics.push(Diagnostic::error("U0209", message, span.clone()).with_help(help));
             return None;
         }
-        let least = GROUP_STALE_AFTER
-            .as_nanos()
-            .div_ceil(period.as_nanos().max(1));
+        let least = GROUP_STALE_AFTER.as_nanos().div_ceil(period.as_nanos().max(1));
         if u128::from(self.stale_after) < least {
-            let message = format!(
-                "`stale_after` of the signal `{from}` is {} cycles",
-                self.stale_after
-            );
+            let message =
+                format!("`stale_after` of the signal `{from}` is {} cycles", self.stale_after);
             let help = format!(
                 "a signal of another group takes at least 1 s: write `stale_after = {least}` or more"
             );
@@ -316,10 +283,7 @@ impl Signal<'_> {
         Some(InputSourceKind::Operator(OperatorDeclaration {
             input: OperatorInput {
                 place: place(point),
-                kind: OperatorInputKind::Group {
-                    stale_after: self.stale_after,
-                    valid,
-                },
+                kind: OperatorInputKind::Group { stale_after: self.stale_after, valid },
                 initial: default?,
                 role: Role::Operator,
             },
@@ -338,9 +302,8 @@ impl Signal<'_> {
         members: &[Member],
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Option<InputSourceKind> {
-        let default = self
-            .default
-            .and_then(|default| value("default", default, point.of, diagnostics));
+        let default =
+            self.default.and_then(|default| value("default", default, point.of, diagnostics));
         let Placed { value: from, span } = self.from?;
         let unknown = |message: String, help: String| {
             Diagnostic::error("U0209", message, span.clone()).with_help(help)
@@ -354,10 +317,7 @@ impl Signal<'_> {
         let Some(source) = members.iter().position(|member| member.name == controller) else {
             let known = members.iter().map(|member| member.name.as_str());
             let help = suggestion(controller, known);
-            diagnostics.push(unknown(
-                format!("there is no controller `{controller}`"),
-                help,
-            ));
+            diagnostics.push(unknown(format!("there is no controller `{controller}`"), help));
             return None;
         };
         if source == index {
@@ -370,22 +330,13 @@ impl Signal<'_> {
         let (_, Interface { outputs, .. }) = members[source].code.as_ref()?;
         let Some(found) = outputs.find(output) else {
             let help = suggestion(output, outputs.names());
-            diagnostics.push(unknown(
-                format!("`{controller}` has no output `{output}`"),
-                help,
-            ));
+            diagnostics.push(unknown(format!("`{controller}` has no output `{output}`"), help));
             return None;
         };
         if found.of != point.of {
-            let message = format!(
-                "`{from}` is {}, and the input `{}` is {}",
-                found.of, point.name, point.of
-            );
-            diagnostics.push(misfit(
-                message,
-                span.clone(),
-                "declare both with the same type",
-            ));
+            let message =
+                format!("`{from}` is {}, and the input `{}` is {}", found.of, point.name, point.of);
+            diagnostics.push(misfit(message, span.clone(), "declare both with the same type"));
             return None;
         }
         let valid = valid_bit(valid, span, diagnostics)?;

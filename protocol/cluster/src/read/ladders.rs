@@ -32,11 +32,7 @@ pub(crate) struct Ladders<'a> {
 
 impl<'a> Ladders<'a> {
     pub(crate) fn new(open: Open<'a>) -> Self {
-        Self {
-            open,
-            places: BTreeMap::new(),
-            read: Vec::new(),
-        }
+        Self { open, places: BTreeMap::new(), read: Vec::new() }
     }
 
     /// The program of `file` under the name `name`.
@@ -108,24 +104,12 @@ impl<'a> Ladders<'a> {
             return place.clone();
         }
         let place = (self.open)(file).map(|text| {
-            let wanted = Wanted {
-                period: Some(period),
-                program: None,
-            };
-            let SourceFile {
-                source,
-                mut diagnostics,
-                ..
-            } = read_source(file, &text, wanted);
+            let wanted = Wanted { period: Some(period), program: None };
+            let SourceFile { source, mut diagnostics, .. } = read_source(file, &text, wanted);
             if let Some(Source::Library(_)) = source {
                 diagnostics.push(no_program());
             }
-            self.read.push(File {
-                name: file.to_owned(),
-                text,
-                source,
-                diagnostics,
-            });
+            self.read.push(File { name: file.to_owned(), text, source, diagnostics });
             self.read.len() - 1
         });
         self.places.insert(file.to_owned(), place.clone());

@@ -56,13 +56,9 @@ pub(crate) fn check(
     diagnostics: &mut Vec<Diagnostic>,
 ) {
     let has_operator_inputs = |index: usize| {
-        remote_ios
-            .get(index)
-            .is_some_and(|it| it.operator_inputs().next().is_some())
+        remote_ios.get(index).is_some_and(|it| it.operator_inputs().next().is_some())
     };
-    let written = (0..members.len())
-        .filter(|&index| has_operator_inputs(index))
-        .count();
+    let written = (0..members.len()).filter(|&index| has_operator_inputs(index)).count();
     let (mut widest, mut widest_inputs) = (0, 0);
     for (index, member) in members.iter().enumerate() {
         let Some((code, interface)) = &member.code else {
@@ -127,10 +123,7 @@ mod tests {
 
     use super::*;
 
-    const LATE: Moment = Moment {
-        epoch: Epoch(u64::MAX),
-        cycle: Cycle(u64::MAX),
-    };
+    const LATE: Moment = Moment { epoch: Epoch(u64::MAX), cycle: Cycle(u64::MAX) };
 
     fn ones(bits: usize) -> Image {
         Image::from_bits(std::iter::repeat_n(true, bits))
@@ -152,10 +145,7 @@ mod tests {
 
     fn all_writes() -> SmallVec<[WriteId; 1]> {
         let sessions = (0..MAXIMUM_SESSIONS as u64).rev();
-        let write = |below| WriteId {
-            session: u64::MAX - below,
-            number: u32::MAX,
-        };
+        let write = |below| WriteId { session: u64::MAX - below, number: u32::MAX };
         sessions.map(write).collect()
     }
 
@@ -202,10 +192,7 @@ mod tests {
                     },
                     inputs: ones(bits),
                 };
-                let word = Word {
-                    mask: ProgramSet::first(programs),
-                    sum: ones(bits),
-                };
+                let word = Word { mask: ProgramSet::first(programs), sum: ones(bits) };
                 let turn = Turn {
                     heard: StationSet::first(128),
                     holdings: (0..programs as u8).map(holding).collect(),
@@ -214,11 +201,7 @@ mod tests {
                     lacks: ProgramSet::first(128),
                     relayed: Vec::new(),
                 };
-                check_body(
-                    station,
-                    Body::Turn(turn),
-                    turn_bytes(programs, written, bits, bits),
-                );
+                check_body(station, Body::Turn(turn), turn_bytes(programs, written, bits, bits));
             }
         }
     }

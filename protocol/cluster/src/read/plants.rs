@@ -90,13 +90,7 @@ pub(crate) fn place(
             None => None,
         };
         if let Some(program) = program {
-            drafts.push(Draft {
-                section,
-                name,
-                program,
-                kind,
-                code,
-            });
+            drafts.push(Draft { section, name, program, kind, code });
         }
     }
     let mut plants = Plants {
@@ -109,22 +103,10 @@ pub(crate) fn place(
         let (Some(kind), Some((_, interface))) = (&draft.kind, &members[draft.program].code) else {
             continue;
         };
-        plants.texts[draft.program] = plant_text(
-            kind,
-            draft.code.as_ref(),
-            &signals(&draft.section),
-            fed_by,
-            &follows,
-        );
-        plants.places[draft.program] = bound(
-            draft,
-            kind,
-            interface,
-            fed_by,
-            follows,
-            remote_ios,
-            diagnostics,
-        );
+        plants.texts[draft.program] =
+            plant_text(kind, draft.code.as_ref(), &signals(&draft.section), fed_by, &follows);
+        plants.places[draft.program] =
+            bound(draft, kind, interface, fed_by, follows, remote_ios, diagnostics);
     }
     plants
 }
@@ -154,9 +136,7 @@ fn bound(
         Plant::following(kind, interface, &signals, &terminals, fed_by.is_some());
     let stays_zero = |problem: &BindingProblem, name: &str| matches!(problem, BindingProblem::InputStaysZero { input } if input == name);
     for source in &remote_io.inputs {
-        let is_driven = !problems
-            .iter()
-            .any(|problem| stays_zero(problem, &source.name));
+        let is_driven = !problems.iter().any(|problem| stays_zero(problem, &source.name));
         if is_driven && plant.is_some() {
             let message = format!(
                 "the plant `{}` drives the input `{}`, which has another source",
@@ -188,10 +168,7 @@ fn bound(
     let problems = problems.into_iter().take(MAXIMUM_MISFITS);
     diagnostics.extend(problems.map(|problem| describe(problem, draft)));
     if more > 0 {
-        let message = format!(
-            "{more} more signals of the plant `{}` do not fit",
-            draft.name
-        );
+        let message = format!("{more} more signals of the plant `{}` do not fit", draft.name);
         let span = section.span.clone();
         diagnostics.push(match plant {
             Some(_) => Diagnostic::warning("U0251", message, span),
@@ -257,11 +234,8 @@ fn feeder(draft: &Draft, drafts: &[Draft], diagnostics: &mut Vec<Diagnostic>) ->
 
 fn describe(problem: BindingProblem, draft: &Draft) -> Diagnostic {
     let section = &draft.section;
-    let controller = section
-        .controller
-        .as_ref()
-        .map(|controller| controller.value.clone())
-        .unwrap_or_default();
+    let controller =
+        section.controller.as_ref().map(|controller| controller.value.clone()).unwrap_or_default();
     // Where the model is named: the place to look at when nothing was written about a terminal.
     let model: Range<usize> = match &section.model {
         Some(ModelSection::Ladder(file)) => file.span.clone(),
@@ -281,20 +255,13 @@ fn describe(problem: BindingProblem, draft: &Draft) -> Diagnostic {
             let span = entry.map_or(model.clone(), |(span, _)| span.clone());
             Diagnostic::error("U0209", message, span).with_help(known_names(&terminal, &known))
         }
-        BindingProblem::UnknownSignal {
-            terminal,
-            direction,
-            signal,
-            known,
-        } => {
+        BindingProblem::UnknownSignal { terminal, direction, signal, known } => {
             let side = match direction {
                 Direction::Sensor => "input",
                 Direction::Actuator => "output",
             };
-            let message = format!(
-                "`{controller}` has no {side} `{signal}` for the plant `{}`",
-                draft.name
-            );
+            let message =
+                format!("`{controller}` has no {side} `{signal}` for the plant `{}`", draft.name);
             // A terminal that nothing was written about is bound by its own name: the way out is to write it.
             let near = nearest(&signal, known.iter().map(String::as_str));
             let help = match near {
@@ -307,11 +274,7 @@ fn describe(problem: BindingProblem, draft: &Draft) -> Diagnostic {
             };
             Diagnostic::error("U0209", message, signal_span(&terminal)).with_help(help)
         }
-        BindingProblem::OtherType {
-            terminal,
-            signal,
-            of,
-        } => {
+        BindingProblem::OtherType { terminal, signal, of } => {
             let message = format!(
                 "`{signal}` of `{controller}` is {of}, and `{}` of the plant `{}` is {}",
                 terminal.name, draft.name, terminal.of

@@ -27,11 +27,8 @@ pub(super) fn check(
         if is_simulated || remote_io.field.is_some() {
             continue;
         }
-        let names: Vec<&str> = interface
-            .inputs
-            .names()
-            .filter(|name| !is_driven(remote_io, name))
-            .collect();
+        let names: Vec<&str> =
+            interface.inputs.names().filter(|name| !is_driven(remote_io, name)).collect();
         let Some(first) = names.first() else {
             continue;
         };

@@ -65,18 +65,9 @@ text = "Long pause"
         panic!("four alarms");
     };
     let bits = |value: f32| u64::from(value.to_bits());
-    assert_eq!(
-        (level.name.as_str(), level.program),
-        ("level-high", ProgramId(0))
-    );
-    assert_eq!(
-        (level.point.name.as_str(), level.is_output),
-        ("level", false)
-    );
-    let condition = AlarmCondition::Above {
-        limit: bits(90.0),
-        over: bits(87.5),
-    };
+    assert_eq!((level.name.as_str(), level.program), ("level-high", ProgramId(0)));
+    assert_eq!((level.point.name.as_str(), level.is_output), ("level", false));
+    let condition = AlarmCondition::Above { limit: bits(90.0), over: bits(87.5) };
     assert_eq!(level.condition, condition);
     // Rounded up to whole cycles.
     assert_eq!((level.on_delay, level.off_delay), (3, 0));
@@ -86,10 +77,7 @@ text = "Long pause"
     assert_eq!(open.condition, AlarmCondition::Is(false));
     assert_eq!((open.off_delay, open.priority), (50, Priority::Low));
     assert_eq!(count.condition, AlarmCondition::Below { limit: 3, over: 3 });
-    let condition = AlarmCondition::Above {
-        limit: 1_500_000_000,
-        over: 1_000_000_000,
-    };
+    let condition = AlarmCondition::Above { limit: 1_500_000_000, over: 1_000_000_000 };
     assert_eq!(pause.condition, condition);
 }
 
@@ -162,14 +150,9 @@ fn the_number_of_alarms_is_bounded() {
             "[[alarm]]\nname = \"a{number}\"\nsignal = \"tank.open\"\nwhen = true\ntext = \"x\"\n"
         )
     };
-    let many: String = (0..=understudy_cluster::MAXIMUM_ALARMS)
-        .map(alarm)
-        .collect();
+    let many: String = (0..=understudy_cluster::MAXIMUM_ALARMS).map(alarm).collect();
     let findings = check(&many);
-    assert!(
-        findings.contains("U0213 there are more than 1000 alarms"),
-        "{findings}"
-    );
+    assert!(findings.contains("U0213 there are more than 1000 alarms"), "{findings}");
 }
 
 #[test]

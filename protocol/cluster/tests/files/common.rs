@@ -15,9 +15,7 @@ pub(crate) fn load(cluster: &str, files: &[(&str, &str)]) -> Loaded {
 pub(crate) fn load_with(cluster: &str, files: &[(&str, &str)], overrides: Overrides) -> Loaded {
     let mut open = |name: &str| {
         let found = files.iter().find(|(file, _)| *file == name);
-        found
-            .map(|(_, text)| (*text).to_owned())
-            .ok_or_else(|| "no such file".to_owned())
+        found.map(|(_, text)| (*text).to_owned()).ok_or_else(|| "no such file".to_owned())
     };
     read_with("cluster.toml", cluster, overrides, &mut open)
 }

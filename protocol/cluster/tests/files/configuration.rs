@@ -23,10 +23,8 @@ fn cell(edits: &[(&str, &str, &str)]) -> Cluster {
         *text = text.replacen(from, to, 1);
     }
     let (_, cluster) = files.pop().expect("it was put there");
-    let ladders: Vec<(&str, &str)> = files
-        .iter()
-        .map(|(name, text)| (*name, text.as_str()))
-        .collect();
+    let ladders: Vec<(&str, &str)> =
+        files.iter().map(|(name, text)| (*name, text.as_str())).collect();
     let loaded = load(&cluster, &ladders);
     let findings = crate::common::findings(&loaded.reports);
     loaded.cluster.unwrap_or_else(|| panic!("{findings}"))
@@ -42,11 +40,7 @@ const FILE: &str = "cluster.toml";
 fn what_does_not_matter_is_not_in_the_hash() {
     let same: [&[(&str, &str, &str)]; 7] = [
         &[(FILE, "[cluster]", "# a comment\n[cluster]\n\n\n")],
-        &[(
-            FILE,
-            "period = \"10ms\"",
-            "period = \"10000us\"\ncopies = 2\nhistory = 8",
-        )],
+        &[(FILE, "period = \"10ms\"", "period = \"10000us\"\ncopies = 2\nhistory = 8")],
         &[(
             FILE,
             "ladder = \"robot.ladder\"",
@@ -54,15 +48,8 @@ fn what_does_not_matter_is_not_in_the_hash() {
         )],
         &[(FILE, "period", "link = \"zenoh\"\nperiod")],
         &[(FILE, "[[understudy]]\nname = \"understudy\"", "")],
-        &[(
-            "robot.ladder",
-            "program robot",
-            "-- a comment\nprogram rover -- another",
-        )],
-        &[
-            ("robot.ladder", "%IX0.0", "%IX7.0"),
-            ("robot.ladder", "drive to the right", "go east"),
-        ],
+        &[("robot.ladder", "program robot", "-- a comment\nprogram rover -- another")],
+        &[("robot.ladder", "%IX0.0", "%IX7.0"), ("robot.ladder", "drive to the right", "go east")],
     ];
     for edits in same {
         assert_eq!(hash(edits), hash(&[]), "{edits:?}");
@@ -81,47 +68,19 @@ fn whatever_matters_is_in_the_hash() {
         &[(FILE, "period", "shadow_cycles = 4\nperiod")],
         &[(FILE, "period", "listen_cycles = 5\nperiod")],
         &[(FILE, "name = \"understudy\"", "name = \"spare\"")],
-        &[(
-            FILE,
-            "[[understudy]]",
-            "[[understudy]]\nname = \"second\"\n[[understudy]]",
-        )],
+        &[(FILE, "[[understudy]]", "[[understudy]]\nname = \"second\"\n[[understudy]]")],
         &[(FILE, "robot-io", "robot-remote")],
         &[(FILE, "grip = true", "grip = false")],
         &[(FILE, "grip = true", "move_up = true")],
-        &[(
-            FILE,
-            "controller = \"press\"\n",
-            "controller = \"press\"\nhold_cycles = 4\n",
-        )],
-        &[(
-            FILE,
-            "controller = \"press\"\n",
-            "controller = \"press\"\nrelease = \"operator\"\n",
-        )],
+        &[(FILE, "controller = \"press\"\n", "controller = \"press\"\nhold_cycles = 4\n")],
+        &[(FILE, "controller = \"press\"\n", "controller = \"press\"\nrelease = \"operator\"\n")],
         &[(FILE, "fed_by = \"arm\"", "")],
         &[(FILE, "fed_by", "watchdog_cycles = 4\nfed_by")],
-        &[(
-            FILE,
-            "fed_by",
-            "follows = { move_up = \"arm.arm_up\" }\nfed_by",
-        )],
-        &[(
-            FILE,
-            "fed_by",
-            "follows = { move_up = \"arm.arm_down\" }\nfed_by",
-        )],
+        &[(FILE, "fed_by", "follows = { move_up = \"arm.arm_up\" }\nfed_by")],
+        &[(FILE, "fed_by", "follows = { move_up = \"arm.arm_down\" }\nfed_by")],
         &[(FILE, "fed_by", "parameters = { ram_cycles = 9 }\nfed_by")],
-        &[(
-            "robot.ladder",
-            "moving_right arm_up /stop",
-            "moving_right /stop",
-        )],
-        &[(
-            "robot.ladder",
-            "moving_right   at %MX0.0 = 0",
-            "moving_right   at %MX0.0 = 1",
-        )],
+        &[("robot.ladder", "moving_right arm_up /stop", "moving_right /stop")],
+        &[("robot.ladder", "moving_right   at %MX0.0 = 0", "moving_right   at %MX0.0 = 1")],
         &[("press.ladder", "raising /stop", "raising /stop /pressing")],
     ];
     let mut seen = HashMap::from([(hash(&[]), 0)]);
@@ -144,10 +103,7 @@ fn a_program_has_the_same_hash_whoever_runs_it() {
     ]);
     let hashes: Vec<_> = twice.controllers().iter().map(|one| one.hash).collect();
     assert_eq!(hashes[0], hashes[1]);
-    assert_eq!(
-        twice.parity().expect("all Boolean").circuit().inputs()[6],
-        "press.part_present"
-    );
+    assert_eq!(twice.parity().expect("all Boolean").circuit().inputs()[6], "press.part_present");
     let once = cell(&[]);
     assert_eq!(once.controllers()[0].hash, hashes[0]);
     assert_ne!(once.controllers()[1].hash, hashes[0]);
@@ -169,15 +125,8 @@ fn the_command_line_replaces_what_the_file_says() {
     assert_eq!(loaded.security(), Security::Off);
     let written = hash(&[(FILE, "10ms", "20ms")]);
     assert_eq!(loaded.agreement().configuration, written);
-    for period in [
-        Duration::ZERO,
-        Duration::from_micros(199),
-        Duration::from_secs(9999),
-    ] {
-        let loaded = replaced(Overrides {
-            period: Some(period),
-            ..Overrides::default()
-        });
+    for period in [Duration::ZERO, Duration::from_micros(199), Duration::from_secs(9999)] {
+        let loaded = replaced(Overrides { period: Some(period), ..Overrides::default() });
         assert!(loaded.cluster.is_none());
         assert!(crate::common::findings(&loaded.reports).contains("U0213"));
     }

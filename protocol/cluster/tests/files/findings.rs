@@ -32,9 +32,7 @@ fn check(cluster: &str) -> String {
 
 #[test]
 fn a_text_that_is_no_toml() {
-    insta::assert_snapshot!(check(
-        "[cluster]\nname = cell\nperiod = \"10ms\n[[controller]\n"
-    ));
+    insta::assert_snapshot!(check("[cluster]\nname = cell\nperiod = \"10ms\n[[controller]\n"));
 }
 
 #[test]
@@ -174,10 +172,7 @@ diagnosis = "diagnosis.ladder"
     // With the channel's status among the inputs, and a signal that the program has, it fits.
     let program = ROBOT.replace("input lost", "input lost\ninput there.failed");
     let fitting = diagnosis.replace("goes", "go");
-    let files = [
-        ("robot.ladder", program.as_str()),
-        ("diagnosis.ladder", &fitting),
-    ];
+    let files = [("robot.ladder", program.as_str()), ("diagnosis.ladder", &fitting)];
     let cluster = load(&cluster, &files).cluster.expect("it fits");
     assert!(cluster.canonical_text().contains("diagnosis"));
 }
@@ -243,9 +238,8 @@ fed_by = "belt"
 fn inputs_that_nothing_drives() {
     let operator = |inputs: &[&str]| {
         let inputs = inputs.iter();
-        let inputs: String = inputs
-            .map(|name| format!("{name} = {{ operator = \"level\" }}\n"))
-            .collect();
+        let inputs: String =
+            inputs.map(|name| format!("{name} = {{ operator = \"level\" }}\n")).collect();
         format!("{HEAD}[[remote_io]]\ncontroller = \"robot\"\n[remote_io.inputs]\n{inputs}")
     };
     let check_it = |text: &str, expected: &[&str]| {
@@ -255,20 +249,14 @@ fn inputs_that_nothing_drives() {
     };
     check_it(
         HEAD,
-        &[
-            "inputs `there`, `lost` of `robot`",
-            "station = \"robot-io\", input = \"there\"",
-        ],
+        &["inputs `there`, `lost` of `robot`", "station = \"robot-io\", input = \"there\""],
     );
     check_it(&operator(&["there"]), &["the input `lost` of `robot`"]);
     check_it(&operator(&["there", "lost"]), &[]);
     // Its own warning says what a plant leaves out, and what an error left out is not known.
     let belt = "[[plant]]\ncontroller = \"robot\"\nladder = \"belt.ladder\"\n";
     check_it(&format!("{HEAD}{belt}"), &[]);
-    check_it(
-        &format!("{HEAD}[[remote_io]]\ncontroller = \"gone\"\n"),
-        &[],
-    );
+    check_it(&format!("{HEAD}[[remote_io]]\ncontroller = \"gone\"\n"), &[]);
 }
 
 #[test]
@@ -326,14 +314,8 @@ fn findings_are_bounded() {
     let loaded = load(&cluster, &[("robot.ladder", ROBOT), ("belt.ladder", &belt)]);
     let found = findings(&loaded.reports[..1]);
     assert_eq!(loaded.reports[0].diagnostics.len(), 202);
-    assert!(
-        found.contains("`robot` has none of 50 more outputs"),
-        "{found}"
-    );
-    assert!(
-        found.contains("50 more signals of the plant `robot-plant` do not fit"),
-        "{found}"
-    );
+    assert!(found.contains("`robot` has none of 50 more outputs"), "{found}");
+    assert!(found.contains("50 more signals of the plant `robot-plant` do not fit"), "{found}");
 }
 
 proptest! {
@@ -435,9 +417,7 @@ outputs = { flow = "holding:5 real", step = "holding:6 uint", open = "holding:5.
 "#
     ));
     insta::assert_snapshot!(field("modbus = \"rtu:ttyUSB0\"\nbaud = 300\n"));
-    insta::assert_snapshot!(field(
-        "modbus = \"rtu:/dev/ttyUSB0\"\nbaud = 14400\nunit = 0\n"
-    ));
+    insta::assert_snapshot!(field("modbus = \"rtu:/dev/ttyUSB0\"\nbaud = 14400\nunit = 0\n"));
 }
 
 /// Each would be called, and nothing answers there.
@@ -454,10 +434,7 @@ fn addresses_at_which_nothing_can_be_reached() {
         ("192.168.1.11:0", "port 0"),
     ] {
         let found = member(address);
-        assert!(
-            found.contains("U0210") && found.contains(why),
-            "{address}: {found}"
-        );
+        assert!(found.contains("U0210") && found.contains(why), "{address}: {found}");
         let device = format!(
             "{HEAD}[[remote_io]]\ncontroller = \"robot\"\n[remote_io.field]\nmodbus = \"{address}\"\n\
              inputs = {{ there = \"discrete:0\", lost = \"discrete:1\" }}\noutputs = {{ go = \"coil:0\" }}\n"

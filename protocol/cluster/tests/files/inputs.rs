@@ -54,9 +54,7 @@ ready = { from = "right.done", default = true, stale_after = 7 }
 "#,
     );
     let cluster = load(&text, &FILES).cluster.expect("it is right");
-    let settings = cluster
-        .remote_io_settings(ProgramId(0))
-        .expect("it is there");
+    let settings = cluster.remote_io_settings(ProgramId(0)).expect("it is there");
     let place = |bit, of| PointPlace { bit, of };
     let bits = |value: f32| u64::from(value.to_bits());
     let start = OperatorInput {
@@ -68,10 +66,7 @@ ready = { from = "right.done", default = true, stale_after = 7 }
     };
     let speed = OperatorInput {
         place: place(32, Elementary::Real),
-        kind: OperatorInputKind::Setpoint {
-            low: bits(-5.0),
-            high: bits(12.5),
-        },
+        kind: OperatorInputKind::Setpoint { low: bits(-5.0), high: bits(12.5) },
         initial: bits(-5.0),
         role: Role::Operator,
     };
@@ -85,11 +80,7 @@ ready = { from = "right.done", default = true, stale_after = 7 }
         stale_after: 7,
     };
     assert_eq!(settings.signals, [ready]);
-    let source = SignalSource {
-        program: ProgramId(1),
-        outputs: 34,
-        stopped: Some(33),
-    };
+    let source = SignalSource { program: ProgramId(1), outputs: 34, stopped: Some(33) };
     assert_eq!(settings.signal_sources, [source]);
     let pair = [1, 0].map(|program| Member::RemoteIo(ProgramId(program)));
     let roster = cluster.roster();
@@ -99,32 +90,17 @@ ready = { from = "right.done", default = true, stale_after = 7 }
 #[test]
 fn a_signal_of_another_group_is_an_input_that_ends() {
     let declared = |from: &str, stale_after: u32| {
-        let default = if from.contains("level") {
-            "-1.5"
-        } else {
-            "true"
-        };
-        let name = if from.contains("level") {
-            "speed"
-        } else {
-            "ready"
-        };
+        let default = if from.contains("level") { "-1.5" } else { "true" };
+        let name = if from.contains("level") { "speed" } else { "ready" };
         format!(
             "{name} = {{ from = \"{from}\", default = {default}, stale_after = {stale_after} }}\n"
         )
     };
     let inputs = declared("line-1/press.done", 50) + &declared("line-1/press.level", 75);
-    let cluster = load(&with_inputs(&inputs), &FILES)
-        .cluster
-        .expect("it is right");
-    let settings = cluster
-        .remote_io_settings(ProgramId(0))
-        .expect("it is there");
+    let cluster = load(&with_inputs(&inputs), &FILES).cluster.expect("it is right");
+    let settings = cluster.remote_io_settings(ProgramId(0)).expect("it is there");
     let kinds: Vec<OperatorInputKind> = settings.operator_inputs.iter().map(|it| it.kind).collect();
-    let group = |stale_after| OperatorInputKind::Group {
-        stale_after,
-        valid: None,
-    };
+    let group = |stale_after| OperatorInputKind::Group { stale_after, valid: None };
     assert_eq!(kinds, [group(50), group(75)]);
     assert_eq!(settings.operator_inputs[0].initial, 1);
     assert!(settings.signals.is_empty());
@@ -137,19 +113,13 @@ fn a_signal_of_another_group_is_an_input_that_ends() {
 #[test]
 fn structured_text_reads_whether_a_signal_is_valid() {
     let left = LEFT.replace("ready : BOOL;", "ready : BOOL; ready_valid : BOOL;");
-    let left = left.replace(
-        "velocity := speed;",
-        "IF ready AND ready_valid THEN velocity := speed; END_IF;",
-    );
+    let left = left
+        .replace("velocity := speed;", "IF ready AND ready_valid THEN velocity := speed; END_IF;");
     let files = [("left.st", left.as_str()), FILES[1]];
     let signal = "ready = { from = \"right.done\", default = false }\n";
     let settings = |inputs: &str| {
-        let cluster = load(&with_inputs(inputs), &files)
-            .cluster
-            .expect("it is right");
-        cluster
-            .remote_io_settings(ProgramId(0))
-            .expect("it is there")
+        let cluster = load(&with_inputs(inputs), &files).cluster.expect("it is right");
+        cluster.remote_io_settings(ProgramId(0)).expect("it is there")
     };
     assert_eq!(settings(signal).signals[0].valid, Some(65));
     // An input with a source of its own is another one.
@@ -187,11 +157,7 @@ ready = { from = "right", stale_after = -1 }
 fn behaviour_is_in_the_hash_and_texts_for_people_are_not() {
     let hash = |inputs: &str| {
         let loaded = load_with(&with_inputs(inputs), &FILES, Overrides::default());
-        loaded
-            .cluster
-            .expect("it is right")
-            .agreement()
-            .configuration
+        loaded.cluster.expect("it is right").agreement().configuration
     };
     let plain = hash("start = { operator = \"level\" }");
     let titled = hash("start = { operator = \"level\", title = \"Start\", confirm = true }");
@@ -208,18 +174,9 @@ fn behaviour_is_in_the_hash_and_texts_for_people_are_not() {
     ];
     let mut hashes: Vec<_> = others.into_iter().map(hash).chain([plain]).collect();
     let period = Some(Duration::from_millis(40));
-    let overrides = Overrides {
-        period,
-        ..Overrides::default()
-    };
+    let overrides = Overrides { period, ..Overrides::default() };
     let slower = load_with(&with_inputs(others[1]), &FILES, overrides);
-    hashes.push(
-        slower
-            .cluster
-            .expect("it is right")
-            .agreement()
-            .configuration,
-    );
+    hashes.push(slower.cluster.expect("it is right").agreement().configuration);
     let count = hashes.len();
     hashes.sort_unstable();
     hashes.dedup();

@@ -44,11 +44,7 @@ fn every_member_has_a_name_a_place_and_settings() {
     assert_eq!(cell.member("nobody"), None);
     assert_eq!(cell.member_name(Member::Plant(ProgramId(2))), None);
     let robot = cell.remote_io_settings(ProgramId(0)).expect("it is there");
-    assert_eq!(
-        robot.fail_safe.to_string(),
-        "00001",
-        "the gripper stays closed"
-    );
+    assert_eq!(robot.fail_safe.to_string(), "00001", "the gripper stays closed");
     assert_eq!(robot.inputs, 6);
     let ram = cell.plant_settings(ProgramId(1)).expect("it is there");
     assert_eq!(ram.fed_by, Some(ProgramId(0)));
@@ -62,11 +58,7 @@ fn its_agreement_and_its_understudy_are_those_of_the_paper() {
     assert_eq!(agreement.schedule.period(), Duration::from_millis(10));
     assert_eq!((agreement.mode, cell.link()), (Mode::Full, Link::Udp));
     let parity = cell.parity().expect("all Boolean").circuit();
-    let shape = (
-        parity.registers().len(),
-        parity.inputs().len(),
-        parity.outputs().len(),
-    );
+    let shape = (parity.registers().len(), parity.inputs().len(), parity.outputs().len());
     assert_eq!(shape, (9, 10, 5), "x31 to x39, u10 to u23, y31 to y35");
     assert_eq!(parity.inputs()[6], "press.part_present");
 }

@@ -29,17 +29,9 @@ pub(crate) struct Telemetry {
 pub(crate) fn followed<W: Write>(inner: W) -> (Followed<W>, Telemetry) {
     let (sender, lines) = sync_channel(WAITING_LINES);
     let lost = Arc::new(AtomicU64::new(0));
-    let followed = Followed {
-        inner,
-        begun: Vec::new(),
-        lines: sender.clone(),
-        lost: Arc::clone(&lost),
-    };
-    let telemetry = Telemetry {
-        lines,
-        wake: sender,
-        lost,
-    };
+    let followed =
+        Followed { inner, begun: Vec::new(), lines: sender.clone(), lost: Arc::clone(&lost) };
+    let telemetry = Telemetry { lines, wake: sender, lost };
     (followed, telemetry)
 }
 
@@ -79,13 +71,8 @@ mod tests {
             followed.write_all(b"more\n").expect("it is memory");
         }
         assert_eq!(telemetry.lost.load(Ordering::Relaxed), 7);
-        followed
-            .write_all(&[b'x'; LINE_BYTES * 2])
-            .expect("it is memory");
-        assert_eq!(
-            followed.inner.len(),
-            8 + 5 * (WAITING_LINES + 7) + LINE_BYTES * 2
-        );
+        followed.write_all(&[b'x'; LINE_BYTES * 2]).expect("it is memory");
+        assert_eq!(followed.inner.len(), 8 + 5 * (WAITING_LINES + 7) + LINE_BYTES * 2);
         assert!(followed.begun.len() <= LINE_BYTES);
     }
 }

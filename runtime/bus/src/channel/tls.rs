@@ -38,10 +38,8 @@ impl Admitted {
 }
 
 /// Where a member takes writes, by the role that may ask there.
-pub(crate) const WRITE_KEYS: [(Role, &str); 2] = [
-    (Role::Operator, "write/operator"),
-    (Role::Engineer, "write/engineer"),
-];
+pub(crate) const WRITE_KEYS: [(Role, &str); 2] =
+    [(Role::Operator, "write/operator"), (Role::Engineer, "write/engineer")];
 
 /// Where a member's keys begin.
 pub(crate) fn prefix(cluster: ClusterHash, name: &str) -> String {
@@ -131,9 +129,8 @@ pub(super) fn access_control(prefix: &str, hash: &str, admitted: &Admitted) -> s
         .clone()
         .map(|(id, names, _)| json!({"id": id, "cert_common_names": names, "link_protocols": ["tls"]}))
         .collect();
-    let policies: Vec<serde_json::Value> = groups
-        .map(|(id, _, rules)| json!({"subjects": [id], "rules": rules}))
-        .collect();
+    let policies: Vec<serde_json::Value> =
+        groups.map(|(id, _, rules)| json!({"subjects": [id], "rules": rules})).collect();
     json!({
         "enabled": true,
         "default_permission": "deny",
@@ -157,11 +154,7 @@ mod tests {
 
     #[test]
     fn nobody_is_not_everybody() {
-        let rules = access_control(
-            "understudy/1/robot",
-            &hash_key("robot"),
-            &Admitted::default(),
-        );
+        let rules = access_control("understudy/1/robot", &hash_key("robot"), &Admitted::default());
         assert_eq!(rules["default_permission"], "deny");
         assert_eq!(rules["subjects"], json!([]));
         assert_eq!(rules["policies"], json!([]));

@@ -92,30 +92,23 @@ impl Relay {
         inner: SocketAddr,
     ) -> io::Result<Self> {
         listener.set_nonblocking(true)?;
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build()?;
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
         let listener = {
             let _inside = runtime.enter();
             TcpListener::from_std(listener)?
         };
         let listener = Listener::new(listener, connections, patience);
         let (stop, stopped) = oneshot::channel();
-        let thread = std::thread::Builder::new()
-            .name("relay".into())
-            .spawn(move || {
-                run_in_background();
-                runtime.block_on(async {
-                    tokio::select! {
-                        never = relay(listener, inner) => match never {},
-                        _ = stopped => {}
-                    }
-                });
-            })?;
-        Ok(Self {
-            stop: Some(stop),
-            thread: Some(thread),
-        })
+        let thread = std::thread::Builder::new().name("relay".into()).spawn(move || {
+            run_in_background();
+            runtime.block_on(async {
+                tokio::select! {
+                    never = relay(listener, inner) => match never {},
+                    _ = stopped => {}
+                }
+            });
+        })?;
+        Ok(Self { stop: Some(stop), thread: Some(thread) })
     }
 }
 

@@ -55,10 +55,7 @@ pub fn examine_machine(period: Duration) -> Vec<Finding> {
         )),
         Some(scheduler(tried_real_time(), &caller)),
         Some(memory(lock_memory(), &caller)),
-        Some(descriptors(
-            getrlimit(Resource::RLIMIT_NOFILE).map_or(0, |(_, hard)| hard),
-            &caller,
-        )),
+        Some(descriptors(getrlimit(Resource::RLIMIT_NOFILE).map_or(0, |(_, hard)| hard), &caller)),
         processors(&governors(Path::new(PROCESSORS))),
         read(RECEIVE_BUFFER_LIMIT).and_then(|limit| sockets(&limit)),
         Some(sleeps(period)),
@@ -115,10 +112,7 @@ fn memory(locked: Result<(), String>, caller: &Caller) -> Finding {
 
 fn descriptors(hard: u64, caller: &Caller) -> Finding {
     if hard >= WANTED_DESCRIPTORS {
-        return Finding::good(
-            "descriptors",
-            format!("up to {hard} descriptors are granted"),
-        );
+        return Finding::good("descriptors", format!("up to {hard} descriptors are granted"));
     }
     let found = format!(
         "at most {hard} descriptors are granted: the cycle keeps its share, and few operators can connect"
@@ -196,21 +190,14 @@ mod tests {
     use super::*;
 
     fn caller(user: Option<&str>) -> Caller {
-        Caller {
-            user: user.map(str::to_owned),
-            program: PathBuf::from("/opt/understudy"),
-        }
+        Caller { user: user.map(str::to_owned), program: PathBuf::from("/opt/understudy") }
     }
 
     fn check(finding: Finding, health: Health, command: Option<&str>) {
         let repair = finding.repair.as_ref();
         let made = repair.map(|repair| repair.command.as_str());
         assert_eq!((finding.health, made), (health, command), "{finding:?}");
-        assert_eq!(
-            finding.remedy.is_some(),
-            health != Health::Good,
-            "{finding:?}"
-        );
+        assert_eq!(finding.remedy.is_some(), health != Health::Good, "{finding:?}");
     }
 
     #[test]
@@ -218,11 +205,7 @@ mod tests {
         check(clock_source("tsc", "tsc hpet"), Health::Good, None);
         check(clock_source("", ""), Health::Good, None);
         let command = "echo tsc > /sys/devices/system/clocksource/clocksource0/current_clocksource";
-        check(
-            clock_source("hpet", "tsc hpet"),
-            Health::Warning,
-            Some(command),
-        );
+        check(clock_source("hpet", "tsc hpet"), Health::Warning, Some(command));
         check(clock_source("hpet", "hpet acpi_pm"), Health::Warning, None);
     }
 
@@ -255,11 +238,7 @@ mod tests {
         check(mixed, Health::Warning, Some(&command));
         assert_eq!(sockets("no number"), None);
         let small = sockets("212992").expect("a finding");
-        check(
-            small,
-            Health::Warning,
-            Some("sysctl -w net.core.rmem_max=1048576"),
-        );
+        check(small, Health::Warning, Some("sysctl -w net.core.rmem_max=1048576"));
         check(sockets("1048576").expect("a finding"), Health::Good, None);
     }
 }

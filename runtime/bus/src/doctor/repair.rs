@@ -37,10 +37,7 @@ impl Repair {
     /// Selects a clock that is fast to read, where the kernel has one.
     pub(super) fn clock_source(available: &str, file: &str) -> Option<Self> {
         let fast = available.split_whitespace().find(|name| *name == "tsc")?;
-        Some(Self {
-            command: format!("echo {fast} > {file}"),
-            effect: UNTIL_RESTART,
-        })
+        Some(Self { command: format!("echo {fast} > {file}"), effect: UNTIL_RESTART })
     }
 
     /// Lets the program run in real time, whoever starts it.
@@ -73,10 +70,7 @@ impl Repair {
 
     /// Lets sockets have the receive buffer that a member asks for.
     pub(super) fn receive_buffer(bytes: usize) -> Self {
-        Self {
-            command: format!("sysctl -w net.core.rmem_max={bytes}"),
-            effect: UNTIL_RESTART,
-        }
+        Self { command: format!("sysctl -w net.core.rmem_max={bytes}"), effect: UNTIL_RESTART }
     }
 }
 
@@ -96,10 +90,7 @@ mod tests {
             Repair::limit("anna", "memlock", "unlimited"),
             "sudo sh -c \"echo 'anna - memlock unlimited' > /etc/security/limits.d/90-understudy-memlock.conf\"",
         );
-        check(
-            Repair::receive_buffer(1024),
-            "sudo sysctl -w net.core.rmem_max=1024",
-        );
+        check(Repair::receive_buffer(1024), "sudo sysctl -w net.core.rmem_max=1024");
         check(
             Repair::real_time(Path::new("/home/anna/my programs/understudy")),
             "sudo sh -c \"setcap cap_sys_nice+ep '/home/anna/my programs/understudy'\"",

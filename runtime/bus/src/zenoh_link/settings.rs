@@ -36,13 +36,8 @@ pub(super) fn settings(endpoints: &Endpoints) -> zenoh::Result<zenoh::Config> {
     let connect = endpoints.called().map(|peer| locator(peer.address));
     let connect = connect.collect::<zenoh::Result<Vec<String>>>()?;
     let peers = endpoints.others().iter();
-    let peers = peers
-        .filter(|peer| endpoints.talks_with(peer.member))
-        .count();
-    let random = format!(
-        "{:032x}",
-        u128::from_le_bytes(ZenohId::default().to_le_bytes())
-    );
+    let peers = peers.filter(|peer| endpoints.talks_with(peer.member)).count();
+    let random = format!("{:032x}", u128::from_le_bytes(ZenohId::default().to_le_bytes()));
     let mut id = identity(endpoints.cluster(), endpoints.own().member);
     id.push_str(&random[id.len()..]);
     let mut config = zenoh::Config::default();
@@ -71,23 +66,14 @@ pub(super) fn settings(endpoints: &Endpoints) -> zenoh::Result<zenoh::Config> {
         // Each frame is a batch of its own, and a member sends some in a row.
         ("transport/link/tx/queue/size/real_time", "8".into()),
         ("transport/link/tx/batch_size", BATCH_BYTES.to_string()),
-        (
-            "transport/unicast/open_timeout",
-            OPEN_TIMEOUT_MS.to_string(),
-        ),
-        (
-            "transport/unicast/accept_timeout",
-            OPEN_TIMEOUT_MS.to_string(),
-        ),
+        ("transport/unicast/open_timeout", OPEN_TIMEOUT_MS.to_string()),
+        ("transport/unicast/accept_timeout", OPEN_TIMEOUT_MS.to_string()),
         // Every peer, the last life of each, and no more, so that strangers do not take all descriptors.
         ("transport/unicast/max_sessions", (2 * peers).to_string()),
         ("transport/unicast/accept_pending", (2 * peers).to_string()),
         ("transport/link/tx/lease", LEASE_MS.to_string()),
         ("transport/link/tx/keep_alive", "4".into()),
-        (
-            "transport/link/tx/queue/congestion_control/drop/wait_before_drop",
-            "0".into(),
-        ),
+        ("transport/link/tx/queue/congestion_control/drop/wait_before_drop", "0".into()),
     ] {
         config
             .insert_json5(setting, &value)

@@ -40,13 +40,7 @@ pub(super) struct Silence {
 
 impl Silence {
     pub(super) fn new(now: Time, place: u32) -> Self {
-        Self {
-            place,
-            since: now,
-            pulses: 0,
-            mute: BTreeMap::new(),
-            patience: 1,
-        }
+        Self { place, since: now, pulses: 0, mute: BTreeMap::new(), patience: 1 }
     }
 
     /// At each pulse: the reason to open the session anew. `heard` where a peer was received since the last one; `mute` are the peers that
@@ -80,19 +74,13 @@ impl Silence {
 
     /// How long no peer was received.
     pub(super) fn of_all(&self, now: Time) -> Silent {
-        Silent {
-            peer: None,
-            lasts: now.since(self.since),
-        }
+        Silent { peer: None, lasts: now.since(self.since) }
     }
 
     fn longest_mute(&self) -> Option<Silent> {
         let (&peer, &pulses) = self.mute.iter().max_by_key(|(_, pulses)| **pulses)?;
         let is_due = pulses >= self.patience * MUTE_PULSES + self.place;
-        is_due.then(|| Silent {
-            peer: Some(peer),
-            lasts: PULSE * pulses,
-        })
+        is_due.then(|| Silent { peer: Some(peer), lasts: PULSE * pulses })
     }
 }
 
@@ -145,10 +133,7 @@ mod tests {
         assert_eq!(found, [(12, Some(station(2))), (36, Some(station(2)))]);
         // Heard again, and as patient as at first.
         assert!(opened(&mut silence, 41..=41, &both, &both).is_empty());
-        assert_eq!(
-            opened(&mut silence, 42..=54, &both[..1], &both),
-            [(53, Some(station(2)))]
-        );
+        assert_eq!(opened(&mut silence, 42..=54, &both[..1], &both), [(53, Some(station(2)))]);
     }
 
     #[test]

@@ -42,14 +42,7 @@ pub(crate) struct Chatter {
 
 impl Chatter {
     pub(crate) fn new(own: Member, life: u64) -> Self {
-        Self {
-            own,
-            life,
-            cycle: 0,
-            due: Time(0),
-            heard: BTreeSet::new(),
-            said: VecDeque::new(),
-        }
+        Self { own, life, cycle: 0, due: Time(0), heard: BTreeSet::new(), said: VecDeque::new() }
     }
 
     fn report_once(&mut self, chat: Chat) {
@@ -77,10 +70,7 @@ impl Machine for Chatter {
                     header: Header {
                         cluster: agreement.cluster,
                         configuration: agreement.configuration,
-                        moment: Moment {
-                            epoch: Epoch(self.life),
-                            cycle: Cycle(self.cycle),
-                        },
+                        moment: Moment { epoch: Epoch(self.life), cycle: Cycle(self.cycle) },
                         sender: self.own,
                         alone: false,
                     },
@@ -172,13 +162,7 @@ pub(crate) fn plant(program: u8) -> Member {
 pub(crate) fn peers(members: &[Member]) -> Vec<Peer> {
     let addresses = free_addresses(members.len()).expect("free ports");
     let named = members.iter().zip(addresses);
-    named
-        .map(|(&member, address)| Peer {
-            member,
-            name: format!("{member:?}"),
-            address,
-        })
-        .collect()
+    named.map(|(&member, address)| Peer { member, name: format!("{member:?}"), address }).collect()
 }
 
 /// The key of a member, in a cluster whose secret everybody knows.
@@ -204,12 +188,7 @@ pub(crate) fn guard(own: Member, life: u64, peers: &[Peer]) -> Guard {
     let heard = heard.filter(|&member| roster.is_received(member, own));
     Guard::with_keys(
         Seal::new(own, key(own), life as u32, []),
-        Opener::new(
-            own,
-            heard.map(|member| (member, key(member))),
-            [],
-            Arc::default(),
-        ),
+        Opener::new(own, heard.map(|member| (member, key(member))), [], Arc::default()),
     )
 }
 

@@ -36,10 +36,7 @@ impl Converter<'_> {
             self.recognise(label, &bits, group.again);
             self.transitions(label, &bits, group.again);
         }
-        let alphabets = self
-            .automata
-            .iter()
-            .flat_map(|automaton| automaton.alphabet().labels());
+        let alphabets = self.automata.iter().flat_map(|automaton| automaton.alphabet().labels());
         let commands: std::collections::BTreeSet<Label> =
             alphabets.filter(|label| label.is_controllable()).collect();
         for label in commands {
@@ -63,10 +60,8 @@ impl Converter<'_> {
                 bits.distinct.push((own.clone(), true));
                 Some((own, true))
             } else {
-                let shared = bits
-                    .shared
-                    .clone()
-                    .unwrap_or_else(|| self.memory(&[&event, word], ""));
+                let shared =
+                    bits.shared.clone().unwrap_or_else(|| self.memory(&[&event, word], ""));
                 if bits.shared.is_none() {
                     bits.shared = Some(shared.clone());
                     bits.distinct.push((shared.clone(), has_bit));
@@ -85,9 +80,8 @@ impl Converter<'_> {
             return Vec::new();
         };
         let bits = &self.states[index];
-        let (able, unable): (Vec<_>, Vec<_>) = automaton
-            .states()
-            .partition(|&state| automaton.successor(state, event).is_some());
+        let (able, unable): (Vec<_>, Vec<_>) =
+            automaton.states().partition(|&state| automaton.successor(state, event).is_some());
         if unable.is_empty() {
             return Vec::new();
         }
@@ -96,14 +90,9 @@ impl Converter<'_> {
             return vec![open(&bits[0]), closed(&bits[0])];
         }
         if able.len() <= unable.len() {
-            any(able.iter().map(|state| &bits[state.index()]))
-                .into_iter()
-                .collect()
+            any(able.iter().map(|state| &bits[state.index()])).into_iter().collect()
         } else {
-            unable
-                .iter()
-                .map(|state| closed(&bits[state.index()]))
-                .collect()
+            unable.iter().map(|state| closed(&bits[state.index()])).collect()
         }
     }
 
@@ -125,11 +114,7 @@ impl Converter<'_> {
         network.extend(self.started.iter().map(open));
         if again {
             let coils = bits.distinct.iter().map(|(bit, _)| reset(bit)).collect();
-            self.push(
-                &format!("{event} can occur after another event"),
-                Vec::new(),
-                coils,
-            );
+            self.push(&format!("{event} can occur after another event"), Vec::new(), coils);
         }
         let mut coils = self.announcements(bits);
         coils.extend(self.bits.get(&label).map(reset));
@@ -143,8 +128,7 @@ impl Converter<'_> {
 
     fn announcements(&mut self, bits: &Bits) -> Vec<Coil> {
         let bits = bits.distinct.iter();
-        bits.map(|(bit, is_consumed)| self.announce(bit, *is_consumed))
-            .collect()
+        bits.map(|(bit, is_consumed)| self.announce(bit, *is_consumed)).collect()
     }
 
     /// The rungs that move the automata.

@@ -18,9 +18,7 @@ impl Converter<'_> {
         let groups = self.groups.clone();
         for group in &groups {
             let label = group.label;
-            let stands_again = groups
-                .iter()
-                .any(|other| other.label == label && other.again);
+            let stands_again = groups.iter().any(|other| other.label == label && other.again);
             let consumed = stands_again || repeats(automaton, label);
             if !group.again && (consumed || !self.is_level(label)) {
                 let bit = self.detect(label, consumed);
@@ -44,9 +42,7 @@ impl Converter<'_> {
 
     fn title(&self, row: &Row, label: Label, again: bool) -> String {
         let automaton = self.automata[0];
-        let source = row
-            .source
-            .map_or_else(String::new, |state| self.shown(0, state));
+        let source = row.source.map_or_else(String::new, |state| self.shown(0, state));
         let again = if again { ", after another event" } else { "" };
         format!(
             "{}: {source} -- {} --> {}{again}",
@@ -57,9 +53,7 @@ impl Converter<'_> {
     }
 
     fn moves(&self, row: &Row) -> (Option<Name>, Name) {
-        let source = row
-            .source
-            .map(|state| self.states[0][state.index()].clone());
+        let source = row.source.map(|state| self.states[0][state.index()].clone());
         (source, self.states[0][row.target.index()].clone())
     }
 

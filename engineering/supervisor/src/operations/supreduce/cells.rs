@@ -88,11 +88,7 @@ impl Cells {
     /// Whether the targets of all states and events fit.
     pub(super) fn check_fits(supervisor: &Automaton, bounds: Bounds) -> Result<(), TooLarge> {
         let (states, events) = (supervisor.state_count(), supervisor.alphabet().len());
-        if states
-            .saturating_mul(events)
-            .saturating_mul(size_of::<u32>())
-            <= bounds.memory_bytes
-        {
+        if states.saturating_mul(events).saturating_mul(size_of::<u32>()) <= bounds.memory_bytes {
             return Ok(());
         }
         Err(TooLarge::Memory {
@@ -302,11 +298,7 @@ impl Cells {
             if !goes_on || !self.may_merge(left, right) || !self.join(left, right) {
                 self.take_back();
                 self.left = before;
-                return if goes_on {
-                    Attempt::Refused
-                } else {
-                    Attempt::Stopped
-                };
+                return if goes_on { Attempt::Refused } else { Attempt::Stopped };
             }
             self.left -= 1;
         }
@@ -353,10 +345,7 @@ impl Cells {
     fn join_targets(&mut self, kept: u32, joined: u32, set: usize) -> bool {
         let sets = self.events.div_ceil(64);
         let place = kept as usize * sets + set;
-        let (to, from) = (
-            self.defined[place],
-            self.defined[joined as usize * sets + set],
-        );
+        let (to, from) = (self.defined[place], self.defined[joined as usize * sets + set]);
         let row = |cell: u32| cell as usize * self.events + set * 64;
         let (kept, joined) = (row(kept), row(joined));
         for bit in ones(from & to) {
@@ -415,10 +404,7 @@ impl Cells {
                 let target = self.targets[root.index() * self.events + event];
                 if target != NONE {
                     let target = State::new(numbers[self.root(target) as usize]);
-                    edges.push(Edge {
-                        event: event as u32,
-                        target,
-                    });
+                    edges.push(Edge { event: event as u32, target });
                 }
             }
             first.push(edges.len() as u32);

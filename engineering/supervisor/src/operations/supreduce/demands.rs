@@ -31,10 +31,7 @@ impl Demands {
         let alphabet = supervisor.alphabet();
         let marking = alphabet.len();
         let words = 2 * (marking + 1).div_ceil(64);
-        let mut demands = Self {
-            words,
-            sets: vec![0; supervisor.state_count() * words],
-        };
+        let mut demands = Self { words, sets: vec![0; supervisor.state_count() * words] };
         for number in 0..product.state_count() {
             let of_plant = product.component_state(number, 0);
             let state = product.component_state(number, 1);
@@ -61,14 +58,10 @@ impl Demands {
         let states = self.sets.len() / self.words;
         let some =
             |event: usize, enabled: bool| (0..states).any(|state| self.has(state, event, enabled));
-        let contested: Vec<usize> = (0..count)
-            .filter(|&event| some(event, true) && some(event, false))
-            .collect();
+        let contested: Vec<usize> =
+            (0..count).filter(|&event| some(event, true) && some(event, false)).collect();
         let words = 2 * contested.len().div_ceil(64).max(1);
-        let mut found = Self {
-            words,
-            sets: vec![0; states * words],
-        };
+        let mut found = Self { words, sets: vec![0; states * words] };
         for state in 0..states {
             for (place, &event) in contested.iter().enumerate() {
                 for enabled in [true, false] {

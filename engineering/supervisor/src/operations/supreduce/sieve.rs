@@ -61,10 +61,8 @@ impl<'a> Sieve<'a> {
             insert(&mut sieve.open, place);
             let asked = &demands.sets[state.index() * demands.words..][..demands.words];
             let (enabled, disabled) = asked.split_at(half);
-            for (asked, sets) in [
-                (enabled, &mut sieve.enabling),
-                (disabled, &mut sieve.disabling),
-            ] {
+            for (asked, sets) in [(enabled, &mut sieve.enabling), (disabled, &mut sieve.disabling)]
+            {
                 for event in ones_in(asked) {
                     insert(&mut sets[event * words..], place);
                 }
@@ -97,8 +95,7 @@ impl<'a> Sieve<'a> {
                 continue;
             }
             // The states that have the event go elsewhere, except those that go to the same cell.
-            self.out
-                .copy_from_slice(&self.defined[event * words..][..words]);
+            self.out.copy_from_slice(&self.defined[event * words..][..words]);
             for member in cells.members(target) {
                 for (source, _) in self.predecessors.of_state(member as usize) {
                     let source = State::new(source as u32);

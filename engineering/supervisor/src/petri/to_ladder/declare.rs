@@ -34,9 +34,7 @@ impl<'a> Maker<'a> {
             }
         };
         for transition in net.transitions() {
-            transition
-                .condition
-                .visit(&mut |name, _| declare(&mut program.inputs, name));
+            transition.condition.visit(&mut |name, _| declare(&mut program.inputs, name));
         }
         for place in net.places() {
             for Action::Level(name) | Action::Impulse(name) in &place.actions {
@@ -63,10 +61,7 @@ impl<'a> Maker<'a> {
 
     pub(super) fn memory(&mut self, parts: &[&str], initial: bool) -> Name {
         let name = self.names.fresh(parts);
-        self.program.memory.push(Signal {
-            initial: Some(initial),
-            ..Signal::new(name.clone())
-        });
+        self.program.memory.push(Signal { initial: Some(initial), ..Signal::new(name.clone()) });
         name
     }
 
@@ -116,10 +111,7 @@ impl<'a> Maker<'a> {
         }
         for index in 0..net.places().len() {
             let is_counter = matches!(self.tokens[index], Tokens::Counter { .. });
-            let holds = net
-                .transitions()
-                .iter()
-                .any(|taker| self.rests(index, taker));
+            let holds = net.transitions().iter().any(|taker| self.rests(index, taker));
             if holds && !is_counter {
                 let bit = self.memory(&[&net.places()[index].name, "fresh"], false);
                 self.fresh.insert(index, bit);
@@ -138,11 +130,7 @@ impl<'a> Maker<'a> {
             });
             edges
         };
-        let mut givers = self
-            .net
-            .transitions()
-            .iter()
-            .filter(|giver| giver.given(place) > 0);
+        let mut givers = self.net.transitions().iter().filter(|giver| giver.given(place) > 0);
         let edges = edges_of(taker);
         taker.taken(place) > 0
             && givers.any(|giver| {

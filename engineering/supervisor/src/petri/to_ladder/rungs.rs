@@ -93,16 +93,9 @@ impl Maker<'_> {
             }
         }
         for (tokens, place) in self.tokens.clone().iter().zip(self.net.places()) {
-            if let Tokens::Counter {
-                comes, goes, busy, ..
-            } = tokens
-            {
+            if let Tokens::Counter { comes, goes, busy, .. } = tokens {
                 let moved = any([comes, goes]).into_iter().collect();
-                self.push(
-                    format!("{}: counter updated", place.name),
-                    moved,
-                    vec![write(busy)],
-                );
+                self.push(format!("{}: counter updated", place.name), moved, vec![write(busy)]);
                 coils.extend([reset(comes), reset(goes)]);
             }
         }
@@ -115,11 +108,7 @@ impl Maker<'_> {
         for ((signal, rises), bit) in self.edges.clone() {
             let signal = Name::from(signal);
             if rises {
-                self.push(
-                    format!("{signal} rises"),
-                    vec![rising(&signal)],
-                    vec![write(&bit)],
-                );
+                self.push(format!("{signal} rises"), vec![rising(&signal)], vec![write(&bit)]);
             } else {
                 let last = self.memory(&[&signal, "last"], false);
                 let network = vec![open(&last), closed(&signal)];
@@ -281,10 +270,7 @@ impl Maker<'_> {
         for (place, tokens) in self.net.places().iter().zip(&self.tokens) {
             for action in &place.actions {
                 if let Action::Level(signal) = action {
-                    places
-                        .entry(signal.to_string())
-                        .or_default()
-                        .push(tokens.at_least(1));
+                    places.entry(signal.to_string()).or_default().push(tokens.at_least(1));
                 }
             }
         }

@@ -53,10 +53,7 @@ impl ClosedLoop {
                 }
                 if let Some(&first) = refusing.first() {
                     let plants = modules.supervisors.len()..;
-                    let known = modules
-                        .plants
-                        .iter()
-                        .any(|plant| plant.alphabet().contains(label));
+                    let known = modules.plants.iter().any(|plant| plant.alphabet().contains(label));
                     if !label.is_controllable()
                         && known
                         && !refusing.iter().any(|place| plants.contains(place))
@@ -70,16 +67,10 @@ impl ClosedLoop {
                     closed.parents.push(Some((source, label)));
                     State::new(states.len() as u32 - 1)
                 });
-                transitions.push(Transition {
-                    source,
-                    label,
-                    target,
-                });
+                transitions.push(Transition { source, label, target });
             }
             if states.len() > MAXIMUM_CLOSED_LOOP {
-                return Err(ProofError::TooLarge {
-                    limit: MAXIMUM_CLOSED_LOOP,
-                });
+                return Err(ProofError::TooLarge { limit: MAXIMUM_CLOSED_LOOP });
             }
             index += 1;
         }
@@ -126,14 +117,7 @@ impl ClosedLoop {
             at = Some(parent);
         }
         run.reverse();
-        Finding {
-            kind,
-            severity,
-            message,
-            states,
-            events,
-            run,
-        }
+        Finding { kind, severity, message, states, events, run }
     }
 
     pub(super) fn name(&self, label: Label) -> String {

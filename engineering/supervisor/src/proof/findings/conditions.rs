@@ -68,9 +68,7 @@ impl ClosedLoop {
             arriving[target] += 1;
         }
         let states = self.automaton.states();
-        let mut pending: Vec<State> = states
-            .filter(|state| arriving[state.index()] == 0)
-            .collect();
+        let mut pending: Vec<State> = states.filter(|state| arriving[state.index()] == 0).collect();
         while let Some(state) = pending.pop() {
             for (_, target) in self.edges(state, true) {
                 arriving[target.index()] -= 1;
@@ -90,22 +88,15 @@ impl ClosedLoop {
         let message = format!(
             "commands can follow each other without end, as from state {first}; in automatic mode the PLC generates them for ever"
         );
-        Some(self.finding(
-            FindingKind::Response,
-            FindingSeverity::Warning,
-            message,
-            states,
-            events,
-        ))
+        Some(self.finding(FindingKind::Response, FindingSeverity::Warning, message, states, events))
     }
 
     /// A controlled run generates commands wherever it can; it has come to rest where it cannot.
     pub(super) fn blocking_under_control(&self) -> Option<Finding> {
         let rests = |state: State| self.edges(state, true).next().is_none();
         let goals = self.automaton.marked().filter(|&state| rests(state));
-        let reaching = self.reaching(goals, |source, label| {
-            label.is_controllable() || rests(source)
-        });
+        let reaching =
+            self.reaching(goals, |source, label| label.is_controllable() || rests(source));
         let states = self.unreached(&reaching);
         let first = *states.first()?;
         let message = format!(
@@ -140,10 +131,7 @@ impl ClosedLoop {
                         }
                         _ => "can occur together in one order only; that one is taken",
                     };
-                    pairs
-                        .entry((first, second, reason))
-                        .or_default()
-                        .push(state);
+                    pairs.entry((first, second, reason)).or_default().push(state);
                 }
             }
         }

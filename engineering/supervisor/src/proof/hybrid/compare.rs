@@ -9,19 +9,12 @@ impl Reference<'_> {
         let places = self.net.places().iter().zip(&now.marking);
         for ((place, &expected), tokens) in places.zip(&seen.tokens) {
             if *tokens != Some(expected) {
-                return Err(HybridDeviation::Tokens {
-                    place: place.name.clone(),
-                    expected,
-                });
+                return Err(HybridDeviation::Tokens { place: place.name.clone(), expected });
             }
         }
         let supervisors = self.supervisors.iter().zip(&now.states);
         for ((supervisor, &expected), bits) in supervisors.zip(&seen.states) {
-            if supervisor
-                .states()
-                .zip(bits)
-                .any(|(state, on)| (state == expected) != *on)
-            {
+            if supervisor.states().zip(bits).any(|(state, on)| (state == expected) != *on) {
                 return Err(HybridDeviation::State {
                     supervisor: supervisor.name().to_owned(),
                     expected: supervisor.state_name(expected).into_owned(),
@@ -34,16 +27,10 @@ impl Reference<'_> {
                 fired.any(|&giver| self.net.transitions()[giver].given(place) > 0)
             };
             let drives = |&(place, is_level): &(usize, bool)| {
-                if is_level {
-                    now.marking[place] > 0
-                } else {
-                    came(place)
-                }
+                if is_level { now.marking[place] > 0 } else { came(place) }
             };
             if *on != drivers.iter().any(drives) {
-                return Err(HybridDeviation::Action {
-                    signal: signal.to_string(),
-                });
+                return Err(HybridDeviation::Action { signal: signal.to_string() });
             }
         }
         Ok(())

@@ -120,9 +120,7 @@ impl<'a> Reference<'a> {
     pub(super) fn names(&self, chosen: impl IntoIterator<Item = bool>) -> Vec<String> {
         let transitions = self.net.transitions().iter().zip(chosen);
         let chosen = transitions.filter(|(_, chosen)| *chosen);
-        chosen
-            .map(|(transition, _)| transition.name.clone())
-            .collect()
+        chosen.map(|(transition, _)| transition.name.clone()).collect()
     }
 
     /// Tokens and states as the bits say them.
@@ -166,26 +164,17 @@ impl<'a> Reference<'a> {
             if seen.fires[number] {
                 self.fire(&mut now, number, seen)?;
             } else if self.must_fire(joint, &now, number, seen) {
-                return Err(HybridDeviation::Omitted {
-                    transition: transition.name.clone(),
-                });
+                return Err(HybridDeviation::Omitted { transition: transition.name.clone() });
             }
         }
         self.compare(&now, seen)?;
         let moved = |place: usize| {
-            let mut fired = now
-                .fired
-                .iter()
-                .map(|&number| &self.net.transitions()[number]);
+            let mut fired = now.fired.iter().map(|&number| &self.net.transitions()[number]);
             fired.any(|transition| transition.taken(place) != transition.given(place))
         };
         let still = joint.still.iter().enumerate().map(|(place, &still)| {
             let counts = self.is_counter[place];
-            if counts && moved(place) {
-                0
-            } else {
-                (still + 1).min(2)
-            }
+            if counts && moved(place) { 0 } else { (still + 1).min(2) }
         });
         Ok(Joint {
             still: still.collect(),
@@ -250,14 +239,10 @@ impl<'a> Reference<'a> {
             let supervisor = supervisor.name().to_owned();
             let transition = name;
             return Err(match self.net.transitions()[number].label {
-                Some(label) if label.is_controllable() => HybridDeviation::Disabled {
-                    transition,
-                    supervisor,
-                },
-                _ => HybridDeviation::Uncontrollable {
-                    transition,
-                    supervisor,
-                },
+                Some(label) if label.is_controllable() => {
+                    HybridDeviation::Disabled { transition, supervisor }
+                }
+                _ => HybridDeviation::Uncontrollable { transition, supervisor },
             });
         }
         for arc in &transition.takes {
@@ -287,10 +272,7 @@ impl<'a> Reference<'a> {
     /// Whether a token that came to `place` in this scan must not be taken by `taker` in it.
     fn rests(&self, now: &Now<'_>, place: usize, taker: &NetTransition) -> bool {
         let edges = edges(taker);
-        let givers = now
-            .fired
-            .iter()
-            .map(|&giver| &self.net.transitions()[giver]);
+        let givers = now.fired.iter().map(|&giver| &self.net.transitions()[giver]);
         let mut givers = givers.filter(|giver| giver.given(place) > 0);
         !self.net.places()[place].actions.is_empty()
             || taker.delay.is_some()

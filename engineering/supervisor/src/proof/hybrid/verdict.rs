@@ -107,43 +107,25 @@ impl fmt::Display for HybridDeviation {
             Self::WithoutCondition { transition } => {
                 write!(formatter, "{transition} fires without its condition")
             }
-            Self::Disabled {
-                transition,
-                supervisor,
-            } => write!(
-                formatter,
-                "{transition} fires, and {supervisor} disables it"
-            ),
-            Self::Uncontrollable {
-                transition,
-                supervisor,
-            } => write!(
-                formatter,
-                "{supervisor} would have to forbid {transition}, and cannot"
-            ),
+            Self::Disabled { transition, supervisor } => {
+                write!(formatter, "{transition} fires, and {supervisor} disables it")
+            }
+            Self::Uncontrollable { transition, supervisor } => {
+                write!(formatter, "{supervisor} would have to forbid {transition}, and cannot")
+            }
             Self::Omitted { transition } => {
-                write!(
-                    formatter,
-                    "{transition} does not fire, and nothing holds it back"
-                )
+                write!(formatter, "{transition} does not fire, and nothing holds it back")
             }
             Self::Passed { transition, place } => write!(
                 formatter,
                 "{transition} takes a token from {place} in the scan in which it came"
             ),
             Self::Tokens { place, expected } => {
-                write!(
-                    formatter,
-                    "{place} holds {expected}, and its bits say otherwise"
-                )
+                write!(formatter, "{place} holds {expected}, and its bits say otherwise")
             }
-            Self::State {
-                supervisor,
-                expected,
-            } => write!(
-                formatter,
-                "{supervisor} is in {expected}, and its bits say otherwise"
-            ),
+            Self::State { supervisor, expected } => {
+                write!(formatter, "{supervisor} is in {expected}, and its bits say otherwise")
+            }
             Self::Delay { transition } => write!(
                 formatter,
                 "the delay of {transition} lasts where it should not, or not where it should"

@@ -37,9 +37,7 @@ impl Reference<'_> {
         if if runs { may_run } else { !must_run } {
             return Ok(());
         }
-        Err(HybridDeviation::Delay {
-            transition: transition.name.clone(),
-        })
+        Err(HybridDeviation::Delay { transition: transition.name.clone() })
     }
 
     /// Whether nothing holds back a transition that has not fired: it is enabled, by tokens that did not come in this scan, and
@@ -66,11 +64,7 @@ impl Reference<'_> {
         let waits = self.disabling(now, transition);
         self.net.fire(&now.marking, transition).is_some()
             && self.condition(now, number, seen)
-            && waits.is_none_or(|_| {
-                !transition
-                    .label
-                    .is_some_and(|label| label.is_controllable())
-            })
+            && waits.is_none_or(|_| !transition.label.is_some_and(|label| label.is_controllable()))
             && !transition.takes.iter().any(|arc| came(arc.place))
             && !places(transition).any(counts)
     }
@@ -79,8 +73,6 @@ impl Reference<'_> {
 /// The places that a transition touches or reads.
 fn places(transition: &NetTransition) -> impl Iterator<Item = usize> {
     let arcs = transition.takes.iter().chain(&transition.gives);
-    let arcs = arcs
-        .chain(&transition.inhibitors)
-        .chain(&transition.enablers);
+    let arcs = arcs.chain(&transition.inhibitors).chain(&transition.enablers);
     arcs.map(|arc| arc.place)
 }

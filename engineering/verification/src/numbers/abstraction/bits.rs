@@ -45,9 +45,9 @@ impl Pass<'_> {
         let width = of.bits();
         let node = self.system.terms.node(term).clone();
         match node {
-            Node::Constant(stored) => (0..width)
-                .map(|bit| self.constant(stored >> bit & 1 == 1))
-                .collect(),
+            Node::Constant(stored) => {
+                (0..width).map(|bit| self.constant(stored >> bit & 1 == 1)).collect()
+            }
             Node::Variable(Variable::Input(number)) if has_bits(of) => {
                 let name = self.system.inputs[number as usize].name.clone();
                 (0..width)
@@ -109,9 +109,7 @@ impl Pass<'_> {
         let pairs = then.iter().zip(otherwise);
         pairs
             .map(|(&then, &otherwise)| {
-                self.builder
-                    .graph()
-                    .if_then_else(condition, then, otherwise)
+                self.builder.graph().if_then_else(condition, then, otherwise)
             })
             .collect()
     }
@@ -129,10 +127,7 @@ impl Pass<'_> {
         let constant = |this: &Self, place: usize| this.system.terms.value(operands[place]);
         let no = self.constant(false);
         Some(match operation {
-            O::Not(_) => terms[0]
-                .iter()
-                .map(|&bit| self.builder.graph().not(bit))
-                .collect(),
+            O::Not(_) => terms[0].iter().map(|&bit| self.builder.graph().not(bit)).collect(),
             O::And(_) | O::Or(_) | O::Xor(_) => {
                 let pairs = terms[0].iter().zip(&terms[1]);
                 pairs
@@ -224,8 +219,7 @@ impl Pass<'_> {
                             O::ShiftLeft(_) => at.checked_sub(by),
                             _ => at.checked_add(by),
                         };
-                        from.and_then(|from| terms[0].get(from).copied())
-                            .unwrap_or(no)
+                        from.and_then(|from| terms[0].get(from).copied()).unwrap_or(no)
                     })
                     .collect()
             }
@@ -236,9 +230,7 @@ impl Pass<'_> {
                     _ => by.wrapping_neg(),
                 };
                 let by = by.rem_euclid(width as i64) as usize;
-                (0..width)
-                    .map(|at| terms[0][(at + width - by) % width])
-                    .collect()
+                (0..width).map(|at| terms[0][(at + width - by) % width]).collect()
             }
             O::Divide(of) | O::Modulo(of) => {
                 if width > PRODUCT && constant(self, 1).is_none() {

@@ -34,11 +34,7 @@ pub(in crate::numbers) fn real(of: Elementary, stored: u64) -> Option<f64> {
 /// Reals in their order as integers; both zeros are 0.
 pub(in crate::numbers) fn rank(value: f64) -> i64 {
     let bits = value.to_bits() as i64;
-    if bits < 0 {
-        i64::MIN.wrapping_sub(bits)
-    } else {
-        bits
-    }
+    if bits < 0 { i64::MIN.wrapping_sub(bits) } else { bits }
 }
 
 /// A number of type `of` above one boundary and at most at the next.
@@ -59,11 +55,7 @@ pub(in crate::numbers) fn between(
         return Some(value as u64 & of.mask());
     }
     let unrank = |rank: i64| {
-        let bits = if rank < 0 {
-            i64::MIN.wrapping_sub(rank)
-        } else {
-            rank
-        };
+        let bits = if rank < 0 { i64::MIN.wrapping_sub(rank) } else { rank };
         f64::from_bits(bits as u64)
     };
     let greatest = match of {
@@ -72,9 +64,7 @@ pub(in crate::numbers) fn between(
     };
     let (least, greatest) = (rank(-greatest), rank(greatest));
     // The position 2 r + 1 lies above `above` and is at most `at_most`.
-    let low = above.map_or(least.into(), |above| {
-        above.div_euclid(2) + above.rem_euclid(2)
-    });
+    let low = above.map_or(least.into(), |above| above.div_euclid(2) + above.rem_euclid(2));
     let high = at_most.map_or(greatest.into(), |at_most| (at_most - 1).div_euclid(2));
     let low = i64::try_from(low.max(least.into())).ok()?;
     let high = i64::try_from(high.min(greatest.into())).ok()?;
@@ -122,11 +112,7 @@ pub(in crate::numbers) fn boundary_text(of: Elementary, boundary: i128) -> Strin
     }
     let is_included = boundary.rem_euclid(2) == 1;
     let rank = i64::try_from(boundary.div_euclid(2)).unwrap_or(0);
-    let bits = if rank < 0 {
-        i64::MIN.wrapping_sub(rank)
-    } else {
-        rank
-    };
+    let bits = if rank < 0 { i64::MIN.wrapping_sub(rank) } else { rank };
     let value = f64::from_bits(bits as u64);
     let stored = match of {
         Elementary::Real => u64::from((value as f32).to_bits()),

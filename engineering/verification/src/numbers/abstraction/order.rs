@@ -68,14 +68,12 @@ impl Pass<'_> {
             };
         }
         // less, equal; neither where one of them is NaN.
-        let (less, equal, nan) = match (
-            self.system.terms.value(left),
-            self.system.terms.value(right),
-        ) {
-            (_, Some(constant)) => self.against(left, of, constant, false),
-            (Some(constant), None) => self.against(right, of, constant, true),
-            (None, None) => self.order(left, right),
-        };
+        let (less, equal, nan) =
+            match (self.system.terms.value(left), self.system.terms.value(right)) {
+                (_, Some(constant)) => self.against(left, of, constant, false),
+                (Some(constant), None) => self.against(right, of, constant, true),
+                (None, None) => self.order(left, right),
+            };
         let graph = self.builder.graph();
         let either = graph.or(less, equal);
         match comparison {
@@ -134,11 +132,8 @@ impl Pass<'_> {
             () => match self.orders.get(&(left, right)) {
                 Some(&known) => known,
                 None => {
-                    let name = format!(
-                        "{} < {}",
-                        self.system.describe(left),
-                        self.system.describe(right)
-                    );
+                    let name =
+                        format!("{} < {}", self.system.describe(left), self.system.describe(right));
                     let less = self.input(&name, Meaning::Less(left, right));
                     let equal = self.input(&format!("{name}, or ="), Meaning::Equal(left, right));
                     let graph = self.builder.graph();
@@ -179,9 +174,8 @@ impl Pass<'_> {
                 return self.constant(boundary >= greatest);
             }
             let bits = self.bits(term);
-            let limit: Vec<Expression> = (0..of.bits())
-                .map(|bit| self.constant(boundary as u64 >> bit & 1 == 1))
-                .collect();
+            let limit: Vec<Expression> =
+                (0..of.bits()).map(|bit| self.constant(boundary as u64 >> bit & 1 == 1)).collect();
             let greater = self.less(of, &limit, &bits);
             return self.builder.graph().not(greater);
         }
@@ -190,9 +184,7 @@ impl Pass<'_> {
                 let condition = self.bits(condition)[0];
                 let then = self.at_most(then, boundary);
                 let otherwise = self.at_most(otherwise, boundary);
-                self.builder
-                    .graph()
-                    .if_then_else(condition, then, otherwise)
+                self.builder.graph().if_then_else(condition, then, otherwise)
             }
             Node::Variable(Variable::Cell(cell)) => self.cell_at_most(cell, of, boundary),
             // The position of -x is 2 - that of x.
@@ -249,13 +241,7 @@ impl Pass<'_> {
     /// Free inputs of a number, with their order kept.
     pub(super) fn line(&mut self, term: Term, boundary: i128) -> Expression {
         if !self.lines.contains_key(&term) {
-            let known: Vec<i128> = self
-                .known
-                .get(&term)
-                .into_iter()
-                .flatten()
-                .copied()
-                .collect();
+            let known: Vec<i128> = self.known.get(&term).into_iter().flatten().copied().collect();
             let name = self.system.describe(term);
             let of = self.system.terms.of(term);
             let mut line = BTreeMap::new();
@@ -292,9 +278,7 @@ impl Pass<'_> {
             Node::Variable(Variable::Input(_)) => self.constant(false),
             Node::Variable(Variable::Cell(cell)) => {
                 let initial = position(of, self.system.cells[cell as usize].initial).is_none();
-                let made = self
-                    .builder
-                    .register(format!("cell {cell} is NaN"), initial);
+                let made = self.builder.register(format!("cell {cell} is NaN"), initial);
                 self.cell_nans.insert(cell, made);
                 self.pending.push(Pending::NotANumber(cell));
                 made.1
@@ -303,9 +287,7 @@ impl Pass<'_> {
                 let condition = self.bits(condition)[0];
                 let then = self.nan(then);
                 let otherwise = self.nan(otherwise);
-                self.builder
-                    .graph()
-                    .if_then_else(condition, then, otherwise)
+                self.builder.graph().if_then_else(condition, then, otherwise)
             }
             Node::Apply(Operation::Convert(from, _), _) if !from.is_real() => self.constant(false),
             Node::Apply(Operation::Negate(_) | Operation::Absolute(_), operands) => {

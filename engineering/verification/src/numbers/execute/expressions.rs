@@ -131,10 +131,7 @@ impl Execution<'_> {
             Some(place) => self.address(context, place)? / 64,
             None => 0,
         };
-        let inner = Context {
-            routine: call.routine,
-            own,
-        };
+        let inner = Context { routine: call.routine, own };
         let mut given = Vec::with_capacity(call.arguments.len());
         for argument in &call.arguments {
             given.push(match argument {

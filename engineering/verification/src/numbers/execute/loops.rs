@@ -18,11 +18,7 @@ impl Execution<'_> {
         if self.terms.value(by).is_none() {
             return self.unsupported(context, "a FOR whose BY is not constant");
         }
-        let test = Test::For {
-            counter: (counter, of),
-            to,
-            by,
-        };
+        let test = Test::For { counter: (counter, of), to, by };
         let body = &each.body;
         self.turns(context, &Loop { body, test }, 0)
     }

@@ -112,11 +112,7 @@ impl Execution<'_> {
         let mut parts = Vec::new();
         self.leaves(0, of, &mut parts);
         let parts = parts.into_iter();
-        Value::Parts(
-            parts
-                .map(|(offset, of)| (offset, self.typed(address + offset, of)))
-                .collect(),
-        )
+        Value::Parts(parts.map(|(offset, of)| (offset, self.typed(address + offset, of))).collect())
     }
 
     /// The number at an address as one of type `of`, which has the width of what was stored there.

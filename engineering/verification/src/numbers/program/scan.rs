@@ -64,12 +64,7 @@ impl System {
         scan: &Scan<'_>,
         numbers: &mut HashMap<u64, u32>,
     ) -> Result<Scanned, Unsupported> {
-        let Scan {
-            prefix,
-            program,
-            inputs,
-            ..
-        } = *scan;
+        let Scan { prefix, program, inputs, .. } = *scan;
         let mut cells = ProgramCells {
             program,
             prefix,
@@ -86,9 +81,7 @@ impl System {
             None => scan.scans,
         };
         let period = self.terms.constant(Elementary::Time, program.period as u64);
-        let elapsed = self
-            .terms
-            .apply(Operation::Elapsed, Elementary::Time, &[count, period]);
+        let elapsed = self.terms.apply(Operation::Elapsed, Elementary::Time, &[count, period]);
         // What is shown or read by others has a cell, whether the scan reads it or not.
         for point in &program.outputs {
             if point.slot != 0 {
@@ -110,9 +103,7 @@ impl System {
                 every => {
                     let every = execution.terms.constant(Elementary::Ulint, every.into());
                     let modulo = Operation::Modulo(Elementary::Ulint);
-                    let rest = execution
-                        .terms
-                        .apply(modulo, Elementary::Ulint, &[count, every]);
+                    let rest = execution.terms.apply(modulo, Elementary::Ulint, &[count, every]);
                     execution.terms.equals(rest, 0)
                 }
             };

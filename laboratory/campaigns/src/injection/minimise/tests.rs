@@ -28,18 +28,9 @@ fn schedule() -> Schedule {
 
 /// Minimises against `cause`, which is asked whether a faultload still violates; counts the trials.
 fn check(faultload: Faultload, cause: &dyn Fn(&Faultload) -> bool) -> (Violating, u32) {
-    let symptom = Symptom {
-        cycle: CYCLES - 1,
-        member: None,
-        what: String::new(),
-    };
+    let symptom = Symptom { cycle: CYCLES - 1, member: None, what: String::new() };
     let mut trials = 0;
-    let found = Violating {
-        faultload,
-        cycles: CYCLES,
-        seed: 1,
-        symptom: symptom.clone(),
-    };
+    let found = Violating { faultload, cycles: CYCLES, seed: 1, symptom: symptom.clone() };
     let small = minimise(found, &schedule(), false, &mut |faultload, _, _| {
         trials += 1;
         cause(faultload).then(|| symptom.clone())
@@ -60,27 +51,16 @@ fn exactly_the_culprits_are_left() {
         let crashed = |faultload: &Faultload| {
             let steps = faultload.steps();
             let crashes = steps.iter().filter(|step| step.action == Action::Crash);
-            let mut ranks: Vec<Member> = crashes
-                .filter(|step| is_culprit(step))
-                .map(|step| step.member)
-                .collect();
+            let mut ranks: Vec<Member> =
+                crashes.filter(|step| is_culprit(step)).map(|step| step.member).collect();
             ranks.dedup();
             ranks.len() == culprits.count_ones() as usize
         };
-        let faultload = Faultload {
-            injections: all.clone(),
-            network: None,
-        };
+        let faultload = Faultload { injections: all.clone(), network: None };
         let (small, trials) = check(faultload, &crashed);
         let left = small.faultload.injections.len();
         assert_eq!(left, culprits.count_ones() as usize, "{culprits:b}");
-        assert!(
-            small
-                .faultload
-                .injections
-                .iter()
-                .all(|injection| injection.steps.len() == 1)
-        );
+        assert!(small.faultload.injections.iter().all(|injection| injection.steps.len() == 1));
         assert!(trials <= MAXIMUM_TRIALS);
     }
 }
@@ -90,33 +70,21 @@ fn exactly_the_culprits_are_left() {
 fn numbers_become_small() {
     let lasts = |faultload: &Faultload| {
         let outages = faultload.injections.iter().map(Injection::cycles);
-        outages
-            .into_iter()
-            .any(|cycles| cycles.end - cycles.start >= 4)
+        outages.into_iter().any(|cycles| cycles.end - cycles.start >= 4)
     };
     let faultload = Faultload {
         injections: vec![outage(4, 90, 30), outage(2, 50, 3)],
         network: Some(Disturbance {
-            network: Network {
-                loss: 0.137,
-                ..Network::default()
-            },
+            network: Network { loss: 0.137, ..Network::default() },
             cycles: Some(40..80),
         }),
     };
     let (small, _) = check(faultload, &lasts);
     assert_eq!(small.faultload.network, None);
     let steps = small.faultload.steps();
-    let times: Vec<(u64, f64)> = steps
-        .iter()
-        .map(|step| (step.at_cycle, step.phase))
-        .collect();
+    let times: Vec<(u64, f64)> = steps.iter().map(|step| (step.at_cycle, step.phase)).collect();
     assert_eq!(times, [(FIRST_CYCLE, 0.0), (FIRST_CYCLE + 3, 0.0)]);
-    assert!(
-        steps
-            .iter()
-            .all(|step| step.member == Member::Station(StationId(0)))
-    );
+    assert!(steps.iter().all(|step| step.member == Member::Station(StationId(0))));
 }
 
 /// A network that has to be there stays, with round numbers, for as short as it may be.
@@ -143,13 +111,8 @@ fn a_network_becomes_simple() {
     };
     let (small, _) = check(faultload, &lossy);
     assert_eq!(small.faultload.injections, []);
-    let expected = Disturbance {
-        network: Network {
-            loss: 0.15,
-            ..Network::default()
-        },
-        cycles: Some(70..71),
-    };
+    let expected =
+        Disturbance { network: Network { loss: 0.15, ..Network::default() }, cycles: Some(70..71) };
     assert_eq!(small.faultload.network, Some(expected));
 }
 

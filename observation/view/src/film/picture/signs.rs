@@ -17,11 +17,7 @@ pub(super) struct Sign {
 }
 
 const fn sign(sign: &'static str, colour: &'static str, dashes: &'static str) -> Sign {
-    Sign {
-        sign,
-        colour,
-        dashes,
-    }
+    Sign { sign, colour, dashes }
 }
 
 pub(super) const fn of_state(state: StationState) -> Sign {

@@ -21,10 +21,7 @@ fn taken(follower: &mut Follower) -> Vec<Option<u64>> {
     let mut all = Vec::new();
     while follower.poll(&mut |found| {
         all.push(found.ok().map(|record| {
-            assert!(matches!(
-                record.event,
-                Happening::Run(RunEvent::ScenarioOver { .. })
-            ));
+            assert!(matches!(record.event, Happening::Run(RunEvent::ScenarioOver { .. })));
             record.at_ns
         }));
     }) > 0
@@ -95,9 +92,7 @@ fn what_is_gone_is_said() {
         let first = 5000 - numbers.len() as u64;
         // The one who was early has the rest of the file that he had open.
         let unbroken = numbers.iter().rev().zip((0..5000).rev());
-        let unbroken = unbroken
-            .take_while(|(seen, number)| **seen == *number)
-            .count();
+        let unbroken = unbroken.take_while(|(seen, number)| **seen == *number).count();
         assert!(unbroken > 200, "{unbroken} of {first}");
         assert!(numbers.is_sorted());
     }
@@ -156,10 +151,7 @@ fn only_the_end_is_taken_for_the_end() {
             for _ in 0..random.random_range(0..4) {
                 follower.poll(&mut |found| seen += u64::from(found.is_ok()));
                 let is_at_end = follower.progress().is_at_end();
-                assert!(
-                    !(flushed && is_at_end) || seen == complete,
-                    "seed {seed}: {seen}"
-                );
+                assert!(!(flushed && is_at_end) || seen == complete, "seed {seed}: {seen}");
             }
             let mut rest = &bytes[cut..];
             while !rest.is_empty() {

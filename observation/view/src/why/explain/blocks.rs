@@ -22,11 +22,7 @@ impl Explainer<'_> {
             });
             found
         })?;
-        let place = if rung <= below {
-            place
-        } else {
-            self.history.before(place)?
-        };
+        let place = if rung <= below { place } else { self.history.before(place)? };
         self.block_at(name, rung, place, depth)
     }
 
@@ -45,10 +41,7 @@ impl Explainer<'_> {
         let kind = found.block.kind;
         let mut reason = self.leaf(name, found.node.flow.leaves, place, "");
         reason.rung = Some(rung + 1);
-        reason.title = self.program.rungs[rung]
-            .title
-            .clone()
-            .filter(|title| !title.is_empty());
+        reason.title = self.program.rungs[rung].title.clone().filter(|title| !title.is_empty());
         if depth > DEEPEST || self.count > MOST {
             reason.text = "and so on".to_owned();
             return Some(reason);
@@ -68,11 +61,8 @@ impl Explainer<'_> {
                     BlockKind::Rs => found.feed("R1"),
                     _ => (false, Vec::new()),
                 };
-                let elements = if reset.0 && !found.node.flow.leaves {
-                    reset.1
-                } else {
-                    found.wire.clone()
-                };
+                let elements =
+                    if reset.0 && !found.node.flow.leaves { reset.1 } else { found.wire.clone() };
                 self.elements(&elements, rung, place, depth + 1)
             }
         };
@@ -112,11 +102,8 @@ impl Explainer<'_> {
             BlockKind::Ton(_) | BlockKind::Tof(_) => {
                 let on = matches!(found.block.kind, BlockKind::Ton(_));
                 if enters != on {
-                    let power = if enters {
-                        "its input has power"
-                    } else {
-                        "its input has no power"
-                    };
+                    let power =
+                        if enters { "its input has power" } else { "its input has no power" };
                     return (power.to_owned(), None);
                 }
                 let (since, known) = self.unchanged(name, rung, place, |flow| flow.enters);
@@ -125,11 +112,7 @@ impl Explainer<'_> {
                 } else {
                     "for long".to_owned()
                 };
-                let what = if on {
-                    "its input has power"
-                } else {
-                    "its input has no power"
-                };
+                let what = if on { "its input has power" } else { "its input has no power" };
                 let over = if leaves == on {
                     format!("its {preset:?} are over")
                 } else {
@@ -162,10 +145,7 @@ impl Explainer<'_> {
                 } else {
                     String::new()
                 };
-                (
-                    format!("CV is {elapsed}, PV {preset}{since_text}"),
-                    Some(since),
-                )
+                (format!("CV is {elapsed}, PV {preset}{since_text}"), Some(since))
             }
             BlockKind::Sr | BlockKind::Rs => {
                 if leaves && !enters {

@@ -113,12 +113,8 @@ impl Layout<'_> {
             Goal::Step(_) => (Part::SelectionConvergence, 2),
             Goal::Join(_) => (Part::SimultaneousConvergence, 6),
         };
-        let place = Place {
-            x: first - BEYOND,
-            y: bottom + GAP,
-            width: last - first + 2 * BEYOND,
-            height,
-        };
+        let place =
+            Place { x: first - BEYOND, y: bottom + GAP, width: last - first + 2 * BEYOND, height };
         let object = self.add(part, place, &opens, 1);
         // What waits leads down next to what comes now.
         let left = match waits {

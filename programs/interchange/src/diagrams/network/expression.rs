@@ -26,10 +26,7 @@ impl Maker<'_> {
         match &value.kind {
             ExpressionKind::Not(inner) => {
                 let value = self.source(inner, network);
-                Value {
-                    negated: !value.negated,
-                    ..value
-                }
+                Value { negated: !value.negated, ..value }
             }
             ExpressionKind::Variable(path) => match self.connected(path, network) {
                 Some(from) => {
@@ -54,20 +51,14 @@ impl Maker<'_> {
     pub(super) fn connected(&self, path: &Path, network: &Network) -> Option<Source> {
         let (last, before) = path.steps.split_last()?;
         let Step::Field(pin) = last else { return None };
-        let instance = Path {
-            steps: before.to_vec(),
-            ..path.clone()
-        };
+        let instance = Path { steps: before.to_vec(), ..path.clone() };
         let instance = print_path(&instance).to_uppercase();
         let open = self.open.iter().find(|open| open.instance == instance)?;
         let object = network.objects.get(open.object)?;
         // It was taken into this network.
         let is_own = matches!(&object.kind, Kind::Block { instance: Some(own), .. } if own.to_uppercase() == instance);
         let is_own = is_own && open.network == self.networks.len();
-        let place = object
-            .outputs
-            .iter()
-            .position(|output| pin.is(&output.name))?;
+        let place = object.outputs.iter().position(|output| pin.is(&output.name))?;
         let from = (open.object, place);
         let is_last = is_own && !feeds_a_block(network, open.object);
         let is_taken = self.taken.borrow().contains(&from);
@@ -176,18 +167,11 @@ impl Maker<'_> {
 }
 
 pub(super) fn plain(from: Source) -> Value {
-    Value {
-        from,
-        negated: false,
-        is_function: false,
-    }
+    Value { from, negated: false, is_function: false }
 }
 
 fn made(from: Source) -> Value {
-    Value {
-        is_function: true,
-        ..plain(from)
-    }
+    Value { is_function: true, ..plain(from) }
 }
 
 /// An expression as it is written.

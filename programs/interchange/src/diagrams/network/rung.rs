@@ -144,11 +144,9 @@ fn contact(value: &Expression) -> Option<Contacts> {
         _ => (false, value),
     };
     match &inner.kind {
-        ExpressionKind::Variable(_) => Some(Contacts::Contact {
-            name: print::expression(inner),
-            negated,
-            value: None,
-        }),
+        ExpressionKind::Variable(_) => {
+            Some(Contacts::Contact { name: print::expression(inner), negated, value: None })
+        }
         ExpressionKind::Literal(Literal::Boolean(true)) if !negated => {
             Some(Contacts::Series(Vec::new()))
         }
@@ -160,10 +158,7 @@ fn contact(value: &Expression) -> Option<Contacts> {
 fn positive(value: Value, network: &mut Network) -> Source {
     match value.negated {
         true => {
-            let value = Value {
-                negated: false,
-                ..value
-            };
+            let value = Value { negated: false, ..value };
             function("NOT", &[value], network)
         }
         false => value.from,

@@ -17,11 +17,7 @@ impl Reader {
     fn whole(&mut self, node: Node<'_, '_>, word: &Name, what: &str) -> Option<usize> {
         let found = word.parse().ok();
         if found.is_none() {
-            let span = if word.is_empty() {
-                xml::start_tag(node)
-            } else {
-                word.span()
-            };
+            let span = if word.is_empty() { xml::start_tag(node) } else { word.span() };
             self.error(
                 "U1061",
                 format!("{what} is `{}`: expected a whole number", word.as_str()),
@@ -43,9 +39,7 @@ impl Reader {
         vertices: Option<&[usize]>,
         used: &mut Vec<Use>,
     ) -> Option<RawEdge> {
-        let elements = [
-            "from", "to", "address", "symbol", "relation", "value", "block", "preset",
-        ];
+        let elements = ["from", "to", "address", "symbol", "relation", "value", "block", "preset"];
         self.only(node, &elements, &["type"]);
         let end = |reader: &mut Self, name: &str| {
             let word = xml::child(node, name).map(xml::word).unwrap_or_default();
@@ -57,9 +51,7 @@ impl Reader {
             Some(number)
         };
         let (from, to) = (end(self, "from"), end(self, "to"));
-        let symbol = xml::child(node, "symbol")
-            .map(xml::word)
-            .unwrap_or_default();
+        let symbol = xml::child(node, "symbol").map(xml::word).unwrap_or_default();
         if symbol.is_empty() {
             self.error("U1061", "an edge needs a symbol", xml::start_tag(node));
             return None;
@@ -76,9 +68,7 @@ impl Reader {
                 Content::Element(Element::Block(block)) => Some(block.name.to_string()),
                 _ => None,
             },
-            address: xml::child(node, "address")
-                .map(xml::word)
-                .filter(|word| !word.is_empty()),
+            address: xml::child(node, "address").map(xml::word).filter(|word| !word.is_empty()),
             symbol,
         });
         let (from, to) = (from?, to?);
@@ -90,12 +80,7 @@ impl Reader {
             );
             return None;
         }
-        Some(RawEdge {
-            from,
-            to,
-            content,
-            span: xml::start_tag(node),
-        })
+        Some(RawEdge { from, to, content, span: xml::start_tag(node) })
     }
 
     fn content(&mut self, node: Node<'_, '_>, symbol: &Name) -> Option<Content> {
@@ -110,27 +95,17 @@ impl Reader {
         let name = self.names.legal(&plain, &mut self.diagnostics);
         if let Some(kind) = contact_kind(&word) {
             use understudy_ladder::ContactKind::{NormallyClosed, NormallyOpen};
-            let kind = if kind == NormallyOpen && is_marked {
-                NormallyClosed
-            } else {
-                kind
-            };
-            return Some(Content::Element(Element::Contact(Contact {
-                kind,
-                operand: name,
-            })));
+            let kind = if kind == NormallyOpen && is_marked { NormallyClosed } else { kind };
+            return Some(Content::Element(Element::Contact(Contact { kind, operand: name })));
         }
         if let Some(kind) = coil_kind(&word) {
             return Some(Content::Coil(Coil { kind, target: name }));
         }
         match word.as_str() {
             "ComparisonEdge" => {
-                let relation = xml::child(node, "relation")
-                    .map(xml::word)
-                    .unwrap_or_default();
-                let found = Relation::ALL
-                    .into_iter()
-                    .find(|known| known.sign() == relation.as_str());
+                let relation = xml::child(node, "relation").map(xml::word).unwrap_or_default();
+                let found =
+                    Relation::ALL.into_iter().find(|known| known.sign() == relation.as_str());
                 let value = xml::child(node, "value").map(xml::word).unwrap_or_default();
                 let value = self.whole(node, &value, "the value of a comparison")?;
                 let value = u16::try_from(value)
@@ -157,8 +132,7 @@ impl Reader {
                     format!("an edge cannot be a `{}`", word.as_str()),
                     word.span(),
                 );
-                self.diagnostics
-                    .push(finding.with_help(format!("edges are {}", edge_types())));
+                self.diagnostics.push(finding.with_help(format!("edges are {}", edge_types())));
                 None
             }
         }
@@ -166,9 +140,7 @@ impl Reader {
 
     fn block_kind(&mut self, node: Node<'_, '_>) -> Option<BlockKind> {
         let word = xml::child(node, "block").map(xml::word).unwrap_or_default();
-        let preset = xml::child(node, "preset")
-            .map(xml::word)
-            .unwrap_or_default();
+        let preset = xml::child(node, "preset").map(xml::word).unwrap_or_default();
         let time = duration::parse(&preset).ok();
         let number = preset
             .parse::<u16>()
@@ -186,20 +158,12 @@ impl Reader {
             "R_TRIG" => Some(BlockKind::RTrig),
             "F_TRIG" => Some(BlockKind::FTrig),
             other => {
-                self.error(
-                    "U1061",
-                    format!("unknown block `{other}`"),
-                    xml::start_tag(node),
-                );
+                self.error("U1061", format!("unknown block `{other}`"), xml::start_tag(node));
                 return None;
             }
         };
         if kind.is_none() {
-            let message = format!(
-                "invalid preset `{}` of a {}",
-                preset.as_str(),
-                word.as_str()
-            );
+            let message = format!("invalid preset `{}` of a {}", preset.as_str(), word.as_str());
             self.error("U1061", message, xml::start_tag(node));
         }
         kind

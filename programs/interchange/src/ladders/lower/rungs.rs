@@ -142,11 +142,8 @@ impl<'a> Rungs<'a> {
 
     /// Rungs in an order in which each reads the old values of the others; in a circle one is held.
     fn ordered(&mut self, pending: Vec<(String, CoilKind, Series)>) {
-        let place_of: HashMap<String, usize> = pending
-            .iter()
-            .enumerate()
-            .map(|(place, (name, ..))| (name.clone(), place))
-            .collect();
+        let place_of: HashMap<String, usize> =
+            pending.iter().enumerate().map(|(place, (name, ..))| (name.clone(), place)).collect();
         let reads: Vec<HashSet<usize>> = pending
             .iter()
             .enumerate()
@@ -155,9 +152,7 @@ impl<'a> Rungs<'a> {
                 visit(series, &mut |element| {
                     if let Element::Contact(contact) = element {
                         read.extend(
-                            place_of
-                                .get(contact.operand.as_str())
-                                .filter(|other| **other != place),
+                            place_of.get(contact.operand.as_str()).filter(|other| **other != place),
                         );
                     }
                 });
@@ -166,10 +161,8 @@ impl<'a> Rungs<'a> {
             .collect();
         let mut readers = vec![0_usize; pending.len()];
         reads.iter().flatten().for_each(|read| readers[*read] += 1);
-        let mut free: Vec<usize> = (0..pending.len())
-            .rev()
-            .filter(|place| readers[*place] == 0)
-            .collect();
+        let mut free: Vec<usize> =
+            (0..pending.len()).rev().filter(|place| readers[*place] == 0).collect();
         let mut contents: Vec<Option<(String, CoilKind, Series)>> =
             pending.into_iter().map(Some).collect();
         let mut late = Vec::new();
@@ -222,17 +215,11 @@ impl<'a> Rungs<'a> {
         let mut roots = vec![wire];
         roots.extend(feeds.iter().map(|(_, root)| *root));
         let mut networks = self.networks(graph, leaves, &roots).into_iter();
-        let mut series = networks
-            .next()
-            .map(|network| self.passing(network))
-            .unwrap_or_default();
+        let mut series = networks.next().map(|network| self.passing(network)).unwrap_or_default();
         let mut pins = Vec::new();
         for ((pin, root), network) in feeds.iter().zip(networks) {
             let off = graph.operation(*root) == Operation::Constant(false);
-            let needed = kind
-                .side_inputs()
-                .iter()
-                .any(|(side, required)| side == pin && *required);
+            let needed = kind.side_inputs().iter().any(|(side, required)| side == pin && *required);
             if off && !needed {
                 continue;
             }
@@ -243,16 +230,9 @@ impl<'a> Rungs<'a> {
                 self.push(Vec::new(), vec![coil(CoilKind::Plain, &on)]);
                 network = vec![contact(&on)];
             }
-            pins.push(Feed {
-                pin: Name::from(*pin),
-                network,
-            });
+            pins.push(Feed { pin: Name::from(*pin), network });
         }
-        series.push(Element::Block(Block {
-            name: Name::from(name),
-            kind,
-            pins,
-        }));
+        series.push(Element::Block(Block { name: Name::from(name), kind, pins }));
         self.push(series, Vec::new());
         for pin in kind.outputs() {
             self.written.insert(format!("{name}.{pin}"));
@@ -282,11 +262,9 @@ impl<'a> Rungs<'a> {
                 read.push(&leaves[place as usize]);
             }
         }
-        let roots = builder
-            .graph()
-            .import(graph, roots, |_, variable| match variable {
-                Variable::Input(place) | Variable::Register(place) => inputs[&place],
-            });
+        let roots = builder.graph().import(graph, roots, |_, variable| match variable {
+            Variable::Input(place) | Variable::Register(place) => inputs[&place],
+        });
         for (place, root) in roots.iter().enumerate() {
             builder.output(format!("o{place}"), *root);
         }
@@ -311,15 +289,11 @@ impl<'a> Rungs<'a> {
         for mut rung in program.rungs {
             rename(&mut rung.network, &meanings);
             for written in &rung.coils {
-                match (
-                    outputs.get(written.target.as_str()),
-                    meanings.get(written.target.as_str()),
-                ) {
+                match (outputs.get(written.target.as_str()), meanings.get(written.target.as_str()))
+                {
                     (Some(place), _) => {
-                        networks[*place] = Some(Network {
-                            series: rung.network.clone(),
-                            coil: written.kind,
-                        });
+                        networks[*place] =
+                            Some(Network { series: rung.network.clone(), coil: written.kind });
                     }
                     (None, Some(Leaf::Signal(name))) => {
                         let name = name.clone();
@@ -329,10 +303,7 @@ impl<'a> Rungs<'a> {
                 }
             }
         }
-        networks
-            .into_iter()
-            .map(|network| network.expect("every output has its rung"))
-            .collect()
+        networks.into_iter().map(|network| network.expect("every output has its rung")).collect()
     }
 
     /// Everything as a program.
@@ -366,27 +337,17 @@ impl<'a> Rungs<'a> {
                 }
             }
         }
-        program.memory.extend(
-            self.helpers
-                .iter()
-                .map(|helper| Signal::new(helper.as_str())),
-        );
+        program.memory.extend(self.helpers.iter().map(|helper| Signal::new(helper.as_str())));
         program
     }
 }
 
 fn coil(kind: CoilKind, target: &str) -> Coil {
-    Coil {
-        kind,
-        target: Name::from(target),
-    }
+    Coil { kind, target: Name::from(target) }
 }
 
 fn contact(operand: &str) -> Element {
-    Element::Contact(Contact {
-        kind: ContactKind::NormallyOpen,
-        operand: Name::from(operand),
-    })
+    Element::Contact(Contact { kind: ContactKind::NormallyOpen, operand: Name::from(operand) })
 }
 
 /// Puts what the contacts mean in their place.
@@ -399,19 +360,15 @@ fn rename(series: &mut Series, meanings: &HashMap<String, Leaf>) {
                     let closed = contact.kind == ContactKind::NormallyClosed;
                     *element = Element::Comparison(Comparison {
                         counter: Name::from(counter.as_str()),
-                        relation: if closed {
-                            relation.opposite()
-                        } else {
-                            *relation
-                        },
+                        relation: if closed { relation.opposite() } else { *relation },
                         value: *value,
                     });
                 }
                 None => {}
             },
-            Element::Branches(branches) => branches
-                .iter_mut()
-                .for_each(|branch| rename(branch, meanings)),
+            Element::Branches(branches) => {
+                branches.iter_mut().for_each(|branch| rename(branch, meanings))
+            }
             Element::Comparison(_) | Element::Block(_) => {}
         }
     }

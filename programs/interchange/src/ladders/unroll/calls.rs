@@ -38,10 +38,7 @@ impl Unrolling<'_> {
             Some(place) => self.address(context, place)? / 64,
             None => 0,
         };
-        let inner = Context {
-            routine: call.routine,
-            own,
-        };
+        let inner = Context { routine: call.routine, own };
         let expressions = call.arguments.iter().filter_map(|argument| match argument {
             Argument::Value(_, value) if value.of.elementary().is_some() => Some(value),
             _ => None,
@@ -124,10 +121,7 @@ impl Unrolling<'_> {
         let first = u64::from(self.program.state) + u64::from(first);
         let range = 64 * first..64 * (first + u64::from(slots));
         let cells = self.cells.iter();
-        cells
-            .filter(|(address, _)| range.contains(address))
-            .map(|(_, cell)| *cell)
-            .collect()
+        cells.filter(|(address, _)| range.contains(address)).map(|(_, cell)| *cell).collect()
     }
 
     /// Runs the body of a block on an instance.
@@ -152,10 +146,7 @@ impl Unrolling<'_> {
             }
         }
         self.begin(routine, &[])?;
-        self.body(Context {
-            routine,
-            own: address / 64,
-        })
+        self.body(Context { routine, own: address / 64 })
     }
 
     /// The word of a routine that is one of the ladder's standard blocks.
@@ -172,9 +163,7 @@ impl Unrolling<'_> {
         if let Type::Structure(id, _) = place.of {
             for field in &self.program.structures[id.0 as usize].fields {
                 let known = inputs(word).iter().chain(outputs(word)).copied();
-                let known = known
-                    .chain(preset(word))
-                    .chain(["ET", "CV", "M", "LAST", "STATE"]);
+                let known = known.chain(preset(word)).chain(["ET", "CV", "M", "LAST", "STATE"]);
                 let found = known.chain(["START", "LAST_UP", "LAST_DOWN"]);
                 let mut found = found.filter(|part| field.name.eq_ignore_ascii_case(part));
                 if let Some(part) = found.next() {
@@ -262,11 +251,7 @@ impl Unrolling<'_> {
         if facts.is_timer() && !facts.is_exclusive() {
             let timer = self.timer(block)?;
             let preset = setting.map(|time| Duration::from_nanos(time.max(0) as u64));
-            return self.push(Action::Timer {
-                timer,
-                wire,
-                preset,
-            });
+            return self.push(Action::Timer { timer, wire, preset });
         }
         let name = self.block_name(block);
         let Some(kind) = self.block_kind(&facts, &wire, setting) else {
@@ -279,12 +264,7 @@ impl Unrolling<'_> {
             self.expand(block);
             return Ok(());
         };
-        self.push(Action::Block {
-            name,
-            kind,
-            wire,
-            feeds: fed,
-        })
+        self.push(Action::Block { name, kind, wire, feeds: fed })
     }
 
     fn block_kind(

@@ -50,9 +50,7 @@ impl Unrolling<'_> {
                 self.chosen(which, second, first, Some(of))
             }
             O::Multiplex(_) => {
-                let which = values[0]
-                    .constant()
-                    .and_then(|which| usize::try_from(which).ok());
+                let which = values[0].constant().and_then(|which| usize::try_from(which).ok());
                 let found = which.and_then(|which| values.get(which.saturating_add(1)).cloned());
                 found.ok_or_else(|| self.refuse("it uses MUX with a number that varies"))
             }
@@ -80,10 +78,7 @@ impl Unrolling<'_> {
     }
 
     pub(super) fn truths(&mut self, values: Vec<Value>) -> Found<Vec<Truth>> {
-        values
-            .into_iter()
-            .map(|value| self.truth_of(value))
-            .collect()
+        values.into_iter().map(|value| self.truth_of(value)).collect()
     }
 
     pub(super) fn arithmetic(
@@ -117,11 +112,7 @@ impl Unrolling<'_> {
             }
             _ => {
                 let is_least = matches!(operation, O::Minimum(_));
-                let relation = if is_least {
-                    Relation::Less
-                } else {
-                    Relation::Greater
-                };
+                let relation = if is_least { Relation::Less } else { Relation::Greater };
                 let mut numbers = numbers.into_iter();
                 let mut best = numbers.next().unwrap_or(Number::Constant(0));
                 for other in numbers {
@@ -192,20 +183,12 @@ impl Unrolling<'_> {
             (Some(Kind::Truth), Some(Kind::Number { .. })) => {
                 let truth = Box::new(self.truth_of(value)?);
                 let (one, zero) = (Number::Constant(1), Number::Constant(0));
-                Ok(Value::Number(Number::Choice(
-                    truth,
-                    Box::new(one),
-                    Box::new(zero),
-                )))
+                Ok(Value::Number(Number::Choice(truth, Box::new(one), Box::new(zero))))
             }
             (Some(Kind::Number { .. }), Some(Kind::Truth)) => {
                 let number = Box::new(self.number_of(value)?);
                 let zero = Box::new(Number::Constant(0));
-                Ok(Value::Truth(Truth::Compare(
-                    Relation::NotEqual,
-                    number,
-                    zero,
-                )))
+                Ok(Value::Truth(Truth::Compare(Relation::NotEqual, number, zero)))
             }
             (Some(Kind::Number { wide: from, .. }), Some(Kind::Number { wide, .. })) => {
                 let fits = wide.0 <= from.0 && from.1 <= wide.1;

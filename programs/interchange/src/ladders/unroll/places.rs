@@ -157,12 +157,7 @@ impl Unrolling<'_> {
         let started = self.fresh(&format!("{name}.started"), Kind::Truth, Role::Memory)?;
         let output = self.fresh(&format!("{name}.Q"), Kind::Truth, Role::Held)?;
         let timer = self.resolved.timers.len();
-        self.resolved.timers.push(Timer {
-            name,
-            word,
-            started,
-            output,
-        });
+        self.resolved.timers.push(Timer { name, word, started, output });
         self.cells.insert(q, output);
         self.timers.insert(block, timer);
         Ok(timer)
@@ -174,9 +169,7 @@ impl Unrolling<'_> {
         }
         // The first part of the block lies where the block does.
         let (name, _) = self.name(block, Elementary::Bool);
-        let name = name
-            .rsplit_once('.')
-            .map_or(name.as_str(), |(name, _)| name);
+        let name = name.rsplit_once('.').map_or(name.as_str(), |(name, _)| name);
         let name = self.unique(name);
         self.blocks.insert(block, name.clone());
         name

@@ -49,11 +49,7 @@ impl Unrolling<'_> {
         self.depth -= 1;
         let known = self.known.pop().unwrap_or_default();
         let steps = std::mem::replace(&mut self.steps, around);
-        Ok(Arm {
-            steps,
-            known,
-            result: result?,
-        })
+        Ok(Arm { steps, known, result: result? })
     }
 
     /// What is known behind a choice: what all of its ways agree on.
@@ -61,9 +57,7 @@ impl Unrolling<'_> {
         let addresses: HashSet<u64> = ways.iter().flat_map(HashMap::keys).copied().collect();
         for address in addresses {
             let before = self.known_before(address);
-            let mut values = ways
-                .iter()
-                .map(|way| way.get(&address).copied().unwrap_or(before));
+            let mut values = ways.iter().map(|way| way.get(&address).copied().unwrap_or(before));
             let first = values.next().flatten();
             let agreed = first.filter(|first| values.all(|value| value == Some(*first)));
             self.set_known(address, agreed);
@@ -73,9 +67,7 @@ impl Unrolling<'_> {
     fn known_before(&self, address: u64) -> Option<u64> {
         // What is written somewhere is not known by its initial value.
         let mut overlays = self.known.iter().rev();
-        overlays
-            .find_map(|overlay| overlay.get(&address).copied())
-            .flatten()
+        overlays.find_map(|overlay| overlay.get(&address).copied()).flatten()
     }
 
     /// The body of a routine.
@@ -228,9 +220,7 @@ impl Unrolling<'_> {
                 }
                 StatementKind::Invoke(_, instance) if instance.indices.is_empty() => {
                     let address = self.address(context, instance)?;
-                    return Ok(found
-                        .filter(|block| *block == address)
-                        .map(|block| (place, block)));
+                    return Ok(found.filter(|block| *block == address).map(|block| (place, block)));
                 }
                 _ => return Ok(None),
             }
@@ -275,19 +265,11 @@ impl Unrolling<'_> {
             Leave::Loop | Leave::Turn => self.floor,
         };
         if self.depth == floor {
-            return Ok(Left {
-                is_always: true,
-                sure: Some(what),
-                cells: Vec::new(),
-            });
+            return Ok(Left { is_always: true, sure: Some(what), cells: Vec::new() });
         }
         let cell = self.fresh("left", Kind::Truth, Role::Passing)?;
         self.push(Action::SetTruth(cell, Truth::Constant(true)))?;
-        Ok(Left {
-            is_always: true,
-            sure: None,
-            cells: vec![(what, cell)],
-        })
+        Ok(Left { is_always: true, sure: None, cells: vec![(what, cell)] })
     }
 
     fn choice(
@@ -342,10 +324,7 @@ impl Unrolling<'_> {
         let comments = self.comments.remove(&line).unwrap_or_default();
         let mut known = Vec::new();
         let mut branches = Vec::new();
-        let mut left = Left {
-            is_always: true,
-            ..Left::default()
-        };
+        let mut left = Left { is_always: true, ..Left::default() };
         for (condition, body) in conditions.into_iter().zip(bodies) {
             let arm = self.arm(|own| own.list(context, body, is_library))?;
             known.push(arm.known);
@@ -468,10 +447,7 @@ impl Unrolling<'_> {
                 return Ok(found);
             }
             let all_leave = found.is_always && !goes_on;
-            let new = found
-                .cells
-                .into_iter()
-                .filter(|(what, _)| *what != Leave::Turn);
+            let new = found.cells.into_iter().filter(|(what, _)| *what != Leave::Turn);
             left.cells.extend(new);
             left.combine(self)?;
             if is_over || ends || all_leave {
@@ -498,12 +474,8 @@ impl Left {
     /// One cell for each way, however many there were.
     fn combine(&mut self, unrolling: &mut Unrolling<'_>) -> Found<()> {
         for what in [Leave::Loop, Leave::Routine] {
-            let cells: Vec<usize> = self
-                .cells
-                .iter()
-                .filter(|(way, _)| *way == what)
-                .map(|(_, cell)| *cell)
-                .collect();
+            let cells: Vec<usize> =
+                self.cells.iter().filter(|(way, _)| *way == what).map(|(_, cell)| *cell).collect();
             if cells.len() < 2 {
                 continue;
             }

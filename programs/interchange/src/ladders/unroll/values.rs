@@ -282,11 +282,7 @@ impl Unrolling<'_> {
             Some(Kind::Number { .. }) => {
                 let (then, otherwise) = (self.number_of(then)?, self.number_of(otherwise)?);
                 let (then, otherwise) = (Box::new(then), Box::new(otherwise));
-                Ok(Value::Number(Number::Choice(
-                    Box::new(condition),
-                    then,
-                    otherwise,
-                )))
+                Ok(Value::Number(Number::Choice(Box::new(condition), then, otherwise)))
             }
             None => Ok(Value::Unknown("it chooses between times".into())),
         }
@@ -340,10 +336,7 @@ impl Unrolling<'_> {
 
     fn hold_number_always(&mut self, number: Number) -> Found<Number> {
         let wide = (i64::MIN >> 1, i64::MAX >> 1);
-        let kind = Kind::Number {
-            declared: wide,
-            wide,
-        };
+        let kind = Kind::Number { declared: wide, wide };
         let cell = self.fresh("value", kind, Role::Memory)?;
         self.push(Action::SetNumber(cell, number))?;
         Ok(Number::Cell(cell))

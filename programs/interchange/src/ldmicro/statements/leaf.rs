@@ -21,10 +21,8 @@ impl Writer {
             }
             Kind::Edge(Edge::Falling) => {
                 // Unlike an F_TRIG, it does not fire in the first cycle.
-                let (shot, before) = (
-                    self.helper("one_shot", "BOOL"),
-                    self.helper("one_shot_before", "BOOL"),
-                );
+                let (shot, before) =
+                    (self.helper("one_shot", "BOOL"), self.helper("one_shot_before", "BOOL"));
                 let power = self.held(power, span);
                 self.line(&format!("{shot} := NOT {power} AND {before};"), span);
                 self.line(&format!("{before} := {power};"), span);
@@ -36,8 +34,7 @@ impl Writer {
                 if scans > 0x7fff {
                     let message =
                         format!("the timer counts {scans} cycles, more than 16 bits hold");
-                    self.diagnostics
-                        .push(Diagnostic::error("U1072", message, span.clone()));
+                    self.diagnostics.push(Diagnostic::error("U1072", message, span.clone()));
                 }
                 let full = self.helper("full", "BOOL");
                 let power = self.held(power, span);
@@ -54,14 +51,9 @@ impl Writer {
                 if !is_new {
                     let message =
                         format!("two elements share the timer `{name}`, which is not supported");
-                    self.diagnostics
-                        .push(Diagnostic::error("U1074", message, span.clone()));
+                    self.diagnostics.push(Diagnostic::error("U1074", message, span.clone()));
                 }
-                let word = if *timer == Timer::OnDelay {
-                    "TON"
-                } else {
-                    "TOF"
-                };
+                let word = if *timer == Timer::OnDelay { "TON" } else { "TOF" };
                 self.blocks.push((name.clone(), word));
                 let delay = delay.as_micros();
                 self.line(&format!("{name}(IN := {power}, PT := T#{delay}us);"), span);
@@ -93,37 +85,22 @@ impl Writer {
                 }
             }
             Kind::Reset(name) => {
-                let power = if is_last {
-                    power
-                } else {
-                    self.held(power, span)
-                };
+                let power = if is_last { power } else { self.held(power, span) };
                 let name = self.name(name, Use::Number, span);
                 self.line(&format!("IF {power} THEN {name} := 0; END_IF;"), span);
                 power
             }
             Kind::Move(to, from) => {
-                let power = if is_last {
-                    power
-                } else {
-                    self.held(power, span)
-                };
+                let power = if is_last { power } else { self.held(power, span) };
                 let (to, from) = (self.name(to, Use::Number, span), self.operand(from, span));
                 self.line(&format!("IF {power} THEN {to} := {from}; END_IF;"), span);
                 power
             }
             Kind::Calculate(sign, to, left, right) => {
-                let power = if is_last {
-                    power
-                } else {
-                    self.held(power, span)
-                };
+                let power = if is_last { power } else { self.held(power, span) };
                 let to = self.name(to, Use::Number, span);
                 let (left, right) = (self.operand(left, span), self.operand(right, span));
-                self.line(
-                    &format!("IF {power} THEN {to} := {left} {sign} {right}; END_IF;"),
-                    span,
-                );
+                self.line(&format!("IF {power} THEN {to} := {left} {sign} {right}; END_IF;"), span);
                 power
             }
             Kind::MasterRelay => {

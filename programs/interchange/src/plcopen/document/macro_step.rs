@@ -73,10 +73,9 @@ impl Ends {
 
 fn chart(reader: &mut Reader, node: Node<'_, '_>, name: &Name) -> Option<Vec<Object>> {
     let message = match child(node, "body").map(|body| reader.body(body)) {
-        Some(Some(Body::Graph(Graph {
-            language: Language::Sequence,
-            objects,
-        }))) => return Some(objects),
+        Some(Some(Body::Graph(Graph { language: Language::Sequence, objects }))) => {
+            return Some(objects);
+        }
         Some(_) => {
             format!("the body of the macro step `{name}` is not a sequential function chart")
         }
@@ -90,10 +89,8 @@ fn chart(reader: &mut Reader, node: Node<'_, '_>, name: &Name) -> Option<Vec<Obj
 
 /// Gives the objects of a chart numbers that no other object of the file has.
 fn renumber(reader: &mut Reader, chart: &mut [Object], node: Node<'_, '_>) {
-    let own: HashMap<u64, u64> = chart
-        .iter()
-        .map(|object| (object.id, FIRST_ID + object.span.start as u64))
-        .collect();
+    let own: HashMap<u64, u64> =
+        chart.iter().map(|object| (object.id, FIRST_ID + object.span.start as u64)).collect();
     for object in chart {
         object.id = own[&object.id];
         for wire in object.inputs.iter_mut().flat_map(|pin| &mut pin.wires) {
@@ -122,24 +119,16 @@ fn firsts(chart: &[Object]) -> Vec<usize> {
         true => is_initial(&object),
         false => is_step(object) && !is_entered(object),
     };
-    (0..chart.len())
-        .filter(|place| is_first(&chart[*place]))
-        .collect()
+    (0..chart.len()).filter(|place| is_first(&chart[*place])).collect()
 }
 
 /// The steps that nothing but actions leaves.
 fn lasts(chart: &[Object]) -> Vec<usize> {
-    let others = chart
-        .iter()
-        .filter(|object| !matches!(object.kind, Kind::Actions(_)));
-    let wires = others
-        .flat_map(|object| &object.inputs)
-        .flat_map(|pin| &pin.wires);
+    let others = chart.iter().filter(|object| !matches!(object.kind, Kind::Actions(_)));
+    let wires = others.flat_map(|object| &object.inputs).flat_map(|pin| &pin.wires);
     let left: HashSet<u64> = wires.map(|wire| wire.from).collect();
     let is_last = |object: &Object| is_step(object) && !left.contains(&object.id);
-    (0..chart.len())
-        .filter(|place| is_last(&chart[*place]))
-        .collect()
+    (0..chart.len()).filter(|place| is_last(&chart[*place])).collect()
 }
 
 fn only(

@@ -23,10 +23,7 @@ const MAXIMUM_OBJECTS: usize = 200_000;
 
 /// Reads all objects of a body.
 pub(super) fn graph(reader: &mut Reader, body: Node<'_, '_>, language: Language) -> Graph {
-    let mut graph = Graph {
-        language,
-        objects: Vec::new(),
-    };
+    let mut graph = Graph { language, objects: Vec::new() };
     let mut rungs = 0;
     let mut ends = Ends::default();
     for node in elements(body) {
@@ -72,11 +69,7 @@ fn object(reader: &mut Reader, node: Node<'_, '_>) -> Option<Object> {
         return None;
     }
     let Some(id) = attribute(node, "localId").and_then(|id| id.parse::<u64>().ok()) else {
-        reader.error(
-            "U1002",
-            format!("`{name}` has no localId that is a number"),
-            node,
-        );
+        reader.error("U1002", format!("`{name}` has no localId that is a number"), node);
         return None;
     };
     let mut inputs = Vec::new();
@@ -89,10 +82,7 @@ fn object(reader: &mut Reader, node: Node<'_, '_>) -> Option<Object> {
             "connectionPointOut" => {
                 unread_expression(reader, part);
                 let name = attribute(part, "formalParameter").unwrap_or_default();
-                outputs.push(Pin {
-                    name,
-                    ..Pin::default()
-                });
+                outputs.push(Pin { name, ..Pin::default() });
             }
             "inputVariables" => {
                 let pins = pins(reader, part);
@@ -106,21 +96,14 @@ fn object(reader: &mut Reader, node: Node<'_, '_>) -> Option<Object> {
             "inOutVariables" => {
                 let both = pins(reader, part).into_iter();
                 let both: Vec<Pin> = both.map(|(pin, _)| pin).collect();
-                outputs.extend(both.iter().map(|pin| Pin {
-                    wires: Vec::new(),
-                    ..pin.clone()
-                }));
+                outputs.extend(both.iter().map(|pin| Pin { wires: Vec::new(), ..pin.clone() }));
                 inputs.extend(both);
             }
             "outputVariables" => {
                 let pins = pins(reader, part);
                 outputs.extend(pins.into_iter().map(|(pin, node)| {
                     if pin.modifier.storage.is_some() || pin.modifier.edge.is_some() {
-                        changed(
-                            reader,
-                            "an output that is set or reset, or sees edges,",
-                            node,
-                        );
+                        changed(reader, "an output that is set or reset, or sees edges,", node);
                     }
                     pin
                 }));
@@ -154,12 +137,7 @@ fn object(reader: &mut Reader, node: Node<'_, '_>) -> Option<Object> {
         "connector" => Kind::Connector(reader.needed(node, "name")?),
         "continuation" => Kind::Continuation(reader.needed(node, "name")?),
         "comment" => Kind::Comment(
-            child(node, "content")
-                .map(text)
-                .unwrap_or_default()
-                .as_str()
-                .trim()
-                .to_owned(),
+            child(node, "content").map(text).unwrap_or_default().as_str().trim().to_owned(),
         ),
         "step" | "macroStep" => {
             let initial = attribute(node, "initialStep")
@@ -208,11 +186,7 @@ fn pins<'a, 'i>(reader: &mut Reader, list: Node<'a, 'i>) -> Vec<(Pin, Node<'a, '
         }
         let pin = match child(node, "connectionPointIn") {
             Some(point) => input(reader, point, name, modifier),
-            None => Pin {
-                name,
-                modifier,
-                wires: Vec::new(),
-            },
+            None => Pin { name, modifier, wires: Vec::new() },
         };
         pins.push((pin, node));
     }
@@ -252,11 +226,7 @@ fn input(reader: &mut Reader, point: Node<'_, '_>, name: Name, modifier: Modifie
             ),
         }
     }
-    Pin {
-        name,
-        modifier,
-        wires,
-    }
+    Pin { name, modifier, wires }
 }
 
 /// `negated`, `edge` and `storage`, with a suffix for objects that have two of each.
@@ -369,9 +339,7 @@ fn actions(reader: &mut Reader, node: Node<'_, '_>) -> Vec<Action> {
 fn position(node: Node<'_, '_>) -> (i64, i64) {
     let coordinate = |name| {
         let place = child(node, "position").and_then(|position| attribute(position, name));
-        let value = place
-            .and_then(|value| value.parse::<f64>().ok())
-            .unwrap_or(0.0);
+        let value = place.and_then(|value| value.parse::<f64>().ok()).unwrap_or(0.0);
         // Saturates, and is 0 for what is no number.
         (value * 1000.0).round() as i64
     };

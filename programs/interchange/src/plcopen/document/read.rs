@@ -33,11 +33,7 @@ pub(crate) fn read_bodies(root: Node<'_, '_>) -> (Project, Vec<Diagnostic>) {
 }
 
 fn read_parts(root: Node<'_, '_>, has_variables: bool) -> (Project, Vec<Diagnostic>) {
-    let mut reader = Reader {
-        project: Project::default(),
-        diagnostics: Vec::new(),
-        has_variables,
-    };
+    let mut reader = Reader { project: Project::default(), diagnostics: Vec::new(), has_variables };
     for part in elements(root) {
         match part.tag_name().name() {
             "types" => {
@@ -81,10 +77,7 @@ impl Reader {
     }
 
     pub(super) fn ignore(&mut self, what: impl Into<String>, node: Node<'_, '_>) {
-        self.project.ignored.push(Ignored {
-            what: what.into(),
-            span: start_tag(node),
-        });
+        self.project.ignored.push(Ignored { what: what.into(), span: start_tag(node) });
     }
 
     /// An attribute that the reader cannot do without.
@@ -116,11 +109,8 @@ impl Reader {
                 }
             };
             let unit = self.pou(pou, name, kind);
-            let twin = self
-                .project
-                .pous
-                .iter()
-                .find(|known| known.name.eq_ignore_ascii_case(&unit.name));
+            let twin =
+                self.project.pous.iter().find(|known| known.name.eq_ignore_ascii_case(&unit.name));
             if let Some(twin) = twin {
                 let error = Diagnostic::error(
                     "U1003",
@@ -176,11 +166,9 @@ impl Reader {
                     name.span(),
                 );
                 self.diagnostics.push(
-                    error
-                        .with_related(first.span(), "the first is here")
-                        .with_help(
-                            "names of IEC 61131-3 do not distinguish case; rename one of the two",
-                        ),
+                    error.with_related(first.span(), "the first is here").with_help(
+                        "names of IEC 61131-3 do not distinguish case; rename one of the two",
+                    ),
                 );
             }
         }
@@ -341,17 +329,13 @@ impl Reader {
                     else {
                         continue;
                     };
-                    let task = node
-                        .parent_element()
-                        .filter(|task| task.tag_name().name() == "task");
+                    let task =
+                        node.parent_element().filter(|task| task.tag_name().name() == "task");
                     let interval = task
                         .and_then(|task| attribute(task, "interval"))
                         .filter(|interval| !interval.is_empty())
                         .and_then(|interval| self.interval(&interval));
-                    self.project.instances.push(Instance {
-                        type_name,
-                        interval,
-                    });
+                    self.project.instances.push(Instance { type_name, interval });
                 }
                 "task" if attribute(node, "single").is_some_and(|single| !single.is_empty()) => {
                     self.ignore(
@@ -378,8 +362,7 @@ impl Reader {
                 PERIODS.end()
             );
             let error = Diagnostic::error("U1011", message, text.span());
-            self.diagnostics
-                .push(error.with_help("write it as a literal such as T#20ms"));
+            self.diagnostics.push(error.with_help("write it as a literal such as T#20ms"));
         }
         interval
     }

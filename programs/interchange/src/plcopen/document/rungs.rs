@@ -20,43 +20,18 @@ pub(super) fn rung(
     number: usize,
     objects: &mut Vec<Object>,
 ) {
-    let mut rung = Rung {
-        objects,
-        number,
-        column: 0,
-    };
+    let mut rung = Rung { objects, number, column: 0 };
     let rail = rung.add(node, Kind::LeftRail, Vec::new());
-    let mut power = Wire {
-        from: rail,
-        pin: None,
-        span: start_tag(node),
-    };
+    let mut power = Wire { from: rail, pin: None, span: start_tag(node) };
     for part in elements(node) {
-        let input = Pin {
-            wires: vec![power.clone()],
-            ..Pin::default()
-        };
+        let input = Pin { wires: vec![power.clone()], ..Pin::default() };
         let variable = attribute(part, "variable").unwrap_or_default();
         let known = match part.tag_name().name() {
             "block" => &["localId", "lineNumber", "typeName", "instanceName"][..],
-            _ => &[
-                "localId",
-                "lineNumber",
-                "variable",
-                "negated",
-                "edge",
-                "storage",
-                "kind",
-            ],
+            _ => &["localId", "lineNumber", "variable", "negated", "edge", "storage", "kind"],
         };
-        for given in part
-            .attributes()
-            .filter(|given| !known.contains(&given.name()))
-        {
-            let message = format!(
-                "the attribute `{}` in a rung is not supported",
-                given.name()
-            );
+        for given in part.attributes().filter(|given| !known.contains(&given.name())) {
+            let message = format!("the attribute `{}` in a rung is not supported", given.name());
             reader.error("U1010", message, part);
         }
         let mut inner = elements(part);
@@ -134,27 +109,13 @@ impl Rung<'_> {
         for pin in children(node, "variable") {
             let name = attribute(pin, "formalParameter").unwrap_or_default();
             if standard.has_output(&name) {
-                outputs.push(Pin {
-                    name: name.clone(),
-                    ..Pin::default()
-                });
+                outputs.push(Pin { name: name.clone(), ..Pin::default() });
                 taken.push((name, word(pin), pin));
             } else {
-                let from = self.add(
-                    pin,
-                    Kind::InVariable(word(pin), Modifier::default()),
-                    Vec::new(),
-                );
-                let wire = Wire {
-                    from,
-                    pin: None,
-                    span: start_tag(pin),
-                };
-                inputs.push(Pin {
-                    name,
-                    wires: vec![wire],
-                    ..Pin::default()
-                });
+                let from =
+                    self.add(pin, Kind::InVariable(word(pin), Modifier::default()), Vec::new());
+                let wire = Wire { from, pin: None, span: start_tag(pin) };
+                inputs.push(Pin { name, wires: vec![wire], ..Pin::default() });
             }
         }
         let fed = self
@@ -164,11 +125,7 @@ impl Rung<'_> {
         let first = standard.wire_input();
         if fed && !inputs.iter().any(|pin| pin.name.as_str() == first) {
             let name = Name::at(first, start_tag(node));
-            inputs.push(Pin {
-                name,
-                wires: vec![power.clone()],
-                ..Pin::default()
-            });
+            inputs.push(Pin { name, wires: vec![power.clone()], ..Pin::default() });
         }
         let block = Block {
             type_name,
@@ -179,20 +136,9 @@ impl Rung<'_> {
             object.outputs = outputs;
         }
         for (pin, variable, node) in taken {
-            let wire = Wire {
-                from: id,
-                pin: Some(pin),
-                span: start_tag(node),
-            };
-            let input = Pin {
-                wires: vec![wire],
-                ..Pin::default()
-            };
-            self.add(
-                node,
-                Kind::OutVariable(variable, Modifier::default()),
-                vec![input],
-            );
+            let wire = Wire { from: id, pin: Some(pin), span: start_tag(node) };
+            let input = Pin { wires: vec![wire], ..Pin::default() };
+            self.add(node, Kind::OutVariable(variable, Modifier::default()), vec![input]);
         }
         Wire {
             from: id,

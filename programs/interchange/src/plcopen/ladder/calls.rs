@@ -38,12 +38,10 @@ impl Drawing<'_> {
                 );
             });
         }
-        let by_name = self.pending.iter().any(|pending| {
-            action
-                .powers()
-                .iter()
-                .any(|power| names(power, &pending.instance))
-        });
+        let by_name = self
+            .pending
+            .iter()
+            .any(|pending| action.powers().iter().any(|power| names(power, &pending.instance)));
         // One step after the other: what one does not take at once gets a rung of its own.
         if uses != self.pending.len() || self.pending.len() > 1 || by_name {
             self.flush();
@@ -73,10 +71,7 @@ impl Drawing<'_> {
 
     pub(super) fn call(&mut self, call: &Call, span: &Range<usize>) {
         let Some(standard) = StandardBlock::of(&call.type_name) else {
-            self.general(
-                format!("the block {}", call.type_name),
-                call.type_name.span(),
-            );
+            self.general(format!("the block {}", call.type_name), call.type_name.span());
             return;
         };
         if call.enable.is_some() {
@@ -98,10 +93,7 @@ impl Drawing<'_> {
         }
         let name = self.scope.declare_instance(&call.instance);
         if !self.drawn.insert(name.clone()) {
-            self.general(
-                format!("`{}` is called twice", call.instance),
-                call.instance.span(),
-            );
+            self.general(format!("`{}` is called twice", call.instance), call.instance.span());
             return;
         }
         let mut wire = Vec::new();
@@ -156,10 +148,7 @@ impl Drawing<'_> {
         for (pin, needed) in kind.side_inputs() {
             if *needed && !pins.iter().any(|feed| feed.pin.as_str() == *pin) {
                 let network = vec![self.constant_contact(false)];
-                pins.push(Feed {
-                    pin: (*pin).into(),
-                    network,
-                });
+                pins.push(Feed { pin: (*pin).into(), network });
             }
         }
         for feed in pins.iter_mut().filter(|feed| feed.network.is_empty()) {
@@ -174,11 +163,8 @@ impl Drawing<'_> {
 
     /// The network of an input, with what its pin makes of it.
     fn input(&mut self, input: &Input, span: &Range<usize>) -> Series {
-        let power = if input.modifier.negated {
-            input.power.clone().not()
-        } else {
-            input.power.clone()
-        };
+        let power =
+            if input.modifier.negated { input.power.clone().not() } else { input.power.clone() };
         let network = self.series(&power);
         let kind = match input.modifier.edge {
             None => return network,
@@ -186,10 +172,7 @@ impl Drawing<'_> {
             Some(Edge::Falling) => CoilKind::Falling,
         };
         let operand = self.bit_of(network, kind, &format!("{}_edge", input.pin), span);
-        vec![Element::Contact(Contact {
-            kind: ContactKind::NormallyOpen,
-            operand,
-        })]
+        vec![Element::Contact(Contact { kind: ContactKind::NormallyOpen, operand })]
     }
 
     fn kind(
@@ -275,17 +258,11 @@ impl Drawing<'_> {
                 return None;
             }
             (None, None) => {
-                self.error(
-                    "U1011",
-                    format!("`{}` is not a number", read.text),
-                    read.text.span(),
-                );
+                self.error("U1011", format!("`{}` is not a number", read.text), read.text.span());
                 return None;
             }
         };
-        let preset = u16::try_from(value)
-            .ok()
-            .filter(|value| *value <= MAXIMUM_PRESET_VALUE);
+        let preset = u16::try_from(value).ok().filter(|value| *value <= MAXIMUM_PRESET_VALUE);
         if preset.is_none() {
             let message = format!("the preset {value} is not between 0 and {MAXIMUM_PRESET_VALUE}");
             self.error("U1011", message, read.text.span());
@@ -296,9 +273,9 @@ impl Drawing<'_> {
     /// Whether any step writes the variable.
     pub(super) fn writes(&self, variable: &Name) -> bool {
         self.plan.steps.iter().any(|step| match &step.action {
-            Action::Write { targets, .. } => targets
-                .iter()
-                .any(|(target, _)| target.eq_ignore_ascii_case(variable)),
+            Action::Write { targets, .. } => {
+                targets.iter().any(|(target, _)| target.eq_ignore_ascii_case(variable))
+            }
             _ => false,
         })
     }

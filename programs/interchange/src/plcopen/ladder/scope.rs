@@ -55,9 +55,8 @@ impl<'a> Scope<'a> {
             used: RefCell::default(),
         };
         for variable in &pou.variables {
-            let global = globals
-                .iter()
-                .find(|global| global.name.eq_ignore_ascii_case(&variable.name));
+            let global =
+                globals.iter().find(|global| global.name.eq_ignore_ascii_case(&variable.name));
             match (variable.section, global) {
                 (Section::External, Some(global)) => scope.declare(global),
                 _ => scope.declare(variable),
@@ -74,19 +73,14 @@ impl<'a> Scope<'a> {
         let initial = variable.initial.as_deref();
         let binding = match &variable.kind {
             kind if kind.is_bool() => {
-                let address = variable
-                    .address
-                    .as_ref()
-                    .and_then(|address| bit_address(address));
+                let address = variable.address.as_ref().and_then(|address| bit_address(address));
                 let known = address
                     .as_ref()
                     .and_then(|address| self.located.borrow().get(&address.to_string()).cloned());
                 let alias = known.is_some();
                 let name = known.unwrap_or_else(|| self.fresh(&variable.name));
                 if let Some(address) = address {
-                    self.located
-                        .borrow_mut()
-                        .insert(address.to_string(), name.clone());
+                    self.located.borrow_mut().insert(address.to_string(), name.clone());
                 }
                 if alias {
                     self.aliases.insert(key.clone());
@@ -143,9 +137,7 @@ impl<'a> Scope<'a> {
         let wanted = key.trim_start_matches('%').replace('.', "_");
         let bit = self.fresh(&wanted);
         self.located.borrow_mut().insert(key, bit.clone());
-        self.direct
-            .borrow_mut()
-            .push((bit.clone(), address, name.clone()));
+        self.direct.borrow_mut().push((bit.clone(), address, name.clone()));
         Some(Binding::Bit(bit))
     }
 
@@ -167,11 +159,7 @@ impl<'a> Scope<'a> {
 
     pub(super) fn program_name(&self, pou: &Pou) -> Name {
         let name = legal(&pou.name);
-        let name = if KEYWORDS.contains(&name.as_str()) {
-            format!("{name}_")
-        } else {
-            name
-        };
+        let name = if KEYWORDS.contains(&name.as_str()) { format!("{name}_") } else { name };
         Name::at(name, pou.name.span())
     }
 
@@ -196,17 +184,10 @@ impl<'a> Scope<'a> {
     ) -> (Vec<Signal>, Vec<Signal>, Vec<Signal>) {
         let (mut inputs, mut outputs, mut memory) = (Vec::new(), Vec::new(), Vec::new());
         for variable in &self.variables {
-            let mut ignore = |what: String| {
-                ignored.push(Ignored {
-                    what,
-                    span: variable.name.span(),
-                })
-            };
+            let mut ignore =
+                |what: String| ignored.push(Ignored { what, span: variable.name.span() });
             if variable.retain {
-                ignore(format!(
-                    "the retention of `{}` over a loss of power",
-                    variable.name
-                ));
+                ignore(format!("the retention of `{}` over a loss of power", variable.name));
             }
             let key = variable.name.to_uppercase();
             let name = match self.bindings.get(&key) {
@@ -228,10 +209,7 @@ impl<'a> Scope<'a> {
                 continue;
             }
             if *name != variable.name.as_str() {
-                ignore(format!(
-                    "the name `{}`, which is `{name}` here,",
-                    variable.name
-                ));
+                ignore(format!("the name `{}`, which is `{name}` here,", variable.name));
             }
             let address = match &variable.address {
                 None => None,

@@ -61,11 +61,7 @@ impl Drawing<'_> {
 
     fn read(&mut self, read: &Read, negated: bool) -> Series {
         if let Some(value) = boolean(&read.text) {
-            return if value == negated {
-                vec![self.constant_contact(false)]
-            } else {
-                Vec::new()
-            };
+            return if value == negated { vec![self.constant_contact(false)] } else { Vec::new() };
         }
         let kind = match (read.edge, negated) {
             (Some(Edge::Rising), _) => ContactKind::Rising,
@@ -114,9 +110,8 @@ impl Drawing<'_> {
                 _ => {}
             }
         }
-        let is_name = text
-            .chars()
-            .all(|letter| letter.is_alphanumeric() || matches!(letter, '_' | '.'));
+        let is_name =
+            text.chars().all(|letter| letter.is_alphanumeric() || matches!(letter, '_' | '.'));
         if is_name && !text.starts_with(|first: char| first.is_ascii_digit()) {
             self.undefined(text);
         } else {
@@ -131,25 +126,15 @@ impl Drawing<'_> {
         }
         let block = self.scope.find(instance);
         let Some(Binding::Instance(block)) = block else {
-            self.general(
-                format!("`{instance}` is a unit of the file"),
-                instance.span(),
-            );
+            self.general(format!("`{instance}` is a unit of the file"), instance.span());
             return Vec::new();
         };
         let pin_name = pin.to_ascii_uppercase();
         if matches!(pin_name.as_str(), "ET" | "CV") {
-            self.general(
-                format!("`{instance}.{pin}` is a number or a time"),
-                pin.span(),
-            );
+            self.general(format!("`{instance}.{pin}` is a number or a time"), pin.span());
             return Vec::new();
         }
-        let kind = if negated {
-            ContactKind::NormallyClosed
-        } else {
-            ContactKind::NormallyOpen
-        };
+        let kind = if negated { ContactKind::NormallyClosed } else { ContactKind::NormallyOpen };
         let operand = Name::at(format!("{block}.{pin_name}"), pin.span());
         vec![contact(kind, operand)]
     }
@@ -182,11 +167,7 @@ impl Drawing<'_> {
                 let gate = self.single(gate, name);
                 let branches = [gate.clone().not().and(zero.clone()), gate.and(one.clone())];
                 let power = Power::any(branches.to_vec());
-                if negated {
-                    self.negated(&power)
-                } else {
-                    self.series(&power)
-                }
+                if negated { self.negated(&power) } else { self.series(&power) }
             }
             _ => {
                 self.general(format!("the function {name}"), name.span());
@@ -212,11 +193,7 @@ impl Drawing<'_> {
         let network = self.series(power);
         let bit = self.bit_of(network, CoilKind::Plain, "value", &span);
         self.scope.declare_bit(&bit);
-        Power::Read(Read {
-            text: bit,
-            edge: None,
-            object: usize::MAX,
-        })
+        Power::Read(Read { text: bit, edge: None, object: usize::MAX })
     }
 
     /// A counter's value and a number.
@@ -227,11 +204,7 @@ impl Drawing<'_> {
         inputs: &[(Name, Power)],
         negated: bool,
     ) -> Series {
-        let relation = if negated {
-            relation.opposite()
-        } else {
-            relation
-        };
+        let relation = if negated { relation.opposite() } else { relation };
         let found = match inputs {
             [(_, left), (_, right)] => match (self.counter(left), self.number(right)) {
                 (Some(counter), Some(value)) => Some((counter, relation, value)),
@@ -244,11 +217,7 @@ impl Drawing<'_> {
         };
         match found {
             Some((counter, relation, value)) => {
-                vec![Element::Comparison(Comparison {
-                    counter,
-                    relation,
-                    value,
-                })]
+                vec![Element::Comparison(Comparison { counter, relation, value })]
             }
             None => {
                 self.general(format!("the function {name}"), name.span());
@@ -261,9 +230,7 @@ impl Drawing<'_> {
     fn counter(&mut self, power: &Power) -> Option<Name> {
         let (instance, pin) = match power {
             Power::Output(instance, pin) => (instance.as_str(), pin.as_str()),
-            Power::Read(Read {
-                text, edge: None, ..
-            }) => text.split_once('.')?,
+            Power::Read(Read { text, edge: None, .. }) => text.split_once('.')?,
             _ => return None,
         };
         let span = match power {
@@ -280,10 +247,7 @@ impl Drawing<'_> {
     }
 
     fn number(&self, power: &Power) -> Option<u16> {
-        let Power::Read(Read {
-            text, edge: None, ..
-        }) = power
-        else {
+        let Power::Read(Read { text, edge: None, .. }) = power else {
             return None;
         };
         let value = match integer(text) {
@@ -293,9 +257,7 @@ impl Drawing<'_> {
                 _ => return None,
             },
         };
-        u16::try_from(value)
-            .ok()
-            .filter(|value| *value <= MAXIMUM_PRESET_VALUE)
+        u16::try_from(value).ok().filter(|value| *value <= MAXIMUM_PRESET_VALUE)
     }
 }
 

@@ -33,10 +33,7 @@ pub(super) fn check(graph: &Graph, plan: &Plan, diagnostics: &mut Vec<Diagnostic
     // From the first step that a jump skips up to its label, by the label's place: the longest.
     let mut skipped: HashMap<usize, usize> = HashMap::new();
     for (place, step) in plan.steps.iter().enumerate() {
-        let Action::Jump {
-            label: Some(label), ..
-        } = &step.action
-        else {
+        let Action::Jump { label: Some(label), .. } = &step.action else {
             continue;
         };
         let target = labels.get(&label.to_uppercase()).copied();

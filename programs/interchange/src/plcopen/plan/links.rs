@@ -69,13 +69,8 @@ impl Links {
                 diagnostics.push(error.with_related(first, "the first is here"));
             }
         }
-        let resolver = Resolver {
-            graph,
-            places,
-            connectors,
-            is_block: &blocks,
-            looks: Cell::new(0),
-        };
+        let resolver =
+            Resolver { graph, places, connectors, is_block: &blocks, looks: Cell::new(0) };
         let mut sources = Vec::with_capacity(graph.objects.len());
         let mut fan_out = vec![0; graph.objects.len()];
         for object in &graph.objects {
@@ -116,17 +111,10 @@ impl Links {
         }
         if resolver.looks.get() > MAXIMUM_LOOKS {
             let message = "the connections of a body are too many to be followed";
-            let span = graph
-                .objects
-                .first()
-                .map_or(0..0, |object| object.span.clone());
+            let span = graph.objects.first().map_or(0..0, |object| object.span.clone());
             diagnostics.push(Diagnostic::error("U1001", message, span));
         }
-        Self {
-            sources,
-            fan_out,
-            is_block: blocks,
-        }
+        Self { sources, fan_out, is_block: blocks }
     }
 
     /// How many connections name an object, whatever becomes of them.
@@ -241,10 +229,7 @@ impl Resolver<'_> {
         let Kind::Block(block) = &object.kind else {
             return;
         };
-        let declared = object
-            .outputs
-            .iter()
-            .any(|output| output.name.eq_ignore_ascii_case(name));
+        let declared = object.outputs.iter().any(|output| output.name.eq_ignore_ascii_case(name));
         let standard = StandardBlock::of(&block.type_name);
         let known = match standard {
             Some(standard) => standard.has_output(name) || name.eq_ignore_ascii_case("ENO"),

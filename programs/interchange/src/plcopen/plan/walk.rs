@@ -79,9 +79,7 @@ impl<'a> Walk<'a> {
 
     pub(super) fn run(mut self, diagnostics: &mut Vec<Diagnostic>) -> (Plan, Trace) {
         let objects = &self.graph.objects;
-        let mut acting: Vec<usize> = (0..objects.len())
-            .filter(|&place| self.acts(place))
-            .collect();
+        let mut acting: Vec<usize> = (0..objects.len()).filter(|&place| self.acts(place)).collect();
         acting.sort_by_cached_key(|&place| {
             let object = &objects[place];
             (self.order(object), object.position.1, object.position.0)
@@ -126,11 +124,7 @@ impl<'a> Walk<'a> {
                 let is_used = objects.any(
                     |object| matches!(&object.kind, Kind::Continuation(other) if other == name),
                 );
-                if is_used {
-                    None
-                } else {
-                    lost(&format!("the connector `{name}`"))
-                }
+                if is_used { None } else { lost(&format!("the connector `{name}`")) }
             }
             Kind::Continuation(name) if self.links.fan_out_of(self.graph, object) == 0 => {
                 lost(&format!("the continuation `{name}`"))
@@ -251,10 +245,8 @@ impl<'a> Walk<'a> {
             .map(|place| self.graph.objects[*place].id.to_string())
             .collect();
         let more = if open.len() - start > 8 { ", …" } else { "" };
-        let message = format!(
-            "the connections of objects {}{more} go round in a circle",
-            ring.join(", ")
-        );
+        let message =
+            format!("the connections of objects {}{more} go round in a circle", ring.join(", "));
         let objects = &self.graph.objects;
         Diagnostic::error("U1006", message, objects[last].span.clone())
             .with_related(objects[first].span.clone(), "which feeds this, and so itself")
@@ -285,21 +277,15 @@ impl<'a> Walk<'a> {
             return self.powers[place].clone().unwrap_or(Power::Constant(false));
         };
         let pin = pin.cloned().or_else(|| {
-            let first = object
-                .outputs
-                .iter()
-                .find(|pin| !pin.name.eq_ignore_ascii_case("ENO"));
+            let first = object.outputs.iter().find(|pin| !pin.name.eq_ignore_ascii_case("ENO"));
             first.map(|pin| pin.name.clone())
         });
-        let declared = object.outputs.iter().find(|output| {
-            pin.as_ref()
-                .is_some_and(|pin| output.name.eq_ignore_ascii_case(pin))
-        });
+        let declared = object
+            .outputs
+            .iter()
+            .find(|output| pin.as_ref().is_some_and(|pin| output.name.eq_ignore_ascii_case(pin)));
         let modifier = declared.map(|output| output.modifier).unwrap_or_default();
-        let power = if pin
-            .as_ref()
-            .is_some_and(|pin| pin.eq_ignore_ascii_case("ENO"))
-        {
+        let power = if pin.as_ref().is_some_and(|pin| pin.eq_ignore_ascii_case("ENO")) {
             self.enable(place).unwrap_or(Power::Constant(true))
         } else if self.links.is_block[place] {
             let instance = self.instance(object);
@@ -343,11 +329,7 @@ impl<'a> Walk<'a> {
             .iter()
             .position(|pin| pin.name.eq_ignore_ascii_case("EN") && !pin.wires.is_empty())?;
         let power = self.power(place, input);
-        let power = if object.inputs[input].modifier.negated {
-            power.not()
-        } else {
-            power
-        };
+        let power = if object.inputs[input].modifier.negated { power.not() } else { power };
         (power != Power::Constant(true)).then_some(power)
     }
 }

@@ -42,21 +42,12 @@ const KNOWN: [(&str, &str); 97] = [
     ("tempVars", VARIABLES),
     ("externalVars", VARIABLES),
     ("globalVars", VARIABLES),
-    (
-        "variable",
-        "name address formalParameter negated edge storage|globalId hidden",
-    ),
+    ("variable", "name address formalParameter negated edge storage|globalId hidden"),
     ("type", ""),
     ("actions", ""),
-    (
-        "action",
-        "name qualifier duration indicator|localId width height globalId executionOrderId",
-    ),
+    ("action", "name qualifier duration indicator|localId width height globalId executionOrderId"),
     ("transitions", ""),
-    (
-        "transition",
-        "name localId priority negated|height width globalId executionOrderId",
-    ),
+    ("transition", "name localId priority negated|height width globalId executionOrderId"),
     ("body", "|WorksheetName globalId"),
     ("ST", "|globalId"),
     ("IL", "|globalId"),
@@ -79,10 +70,7 @@ const KNOWN: [(&str, &str); 97] = [
         "coil",
         "localId negated edge storage kind executionOrderId variable|height width globalId lineNumber",
     ),
-    (
-        "block",
-        "localId typeName instanceName executionOrderId|height width globalId lineNumber",
-    ),
+    ("block", "localId typeName instanceName executionOrderId|height width globalId lineNumber"),
     ("inputVariables", ""),
     ("outputVariables", ""),
     ("inOutVariables", ""),
@@ -96,57 +84,27 @@ const KNOWN: [(&str, &str); 97] = [
     ("connectionPointIn", "|globalId"),
     ("connectionPointOut", "formalParameter|globalId"),
     ("connection", "refLocalId formalParameter|globalId"),
-    (
-        "connector",
-        "name localId|executionOrderId height width globalId",
-    ),
-    (
-        "continuation",
-        "name localId|executionOrderId height width globalId",
-    ),
+    ("connector", "name localId|executionOrderId height width globalId"),
+    ("continuation", "name localId|executionOrderId height width globalId"),
     ("comment", "|localId height width globalId executionOrderId"),
-    (
-        "step",
-        "localId name initialStep negated|height width globalId executionOrderId",
-    ),
+    ("step", "localId name initialStep negated|height width globalId executionOrderId"),
     ("condition", "negated"),
     ("reference", "name"),
     ("inline", "|name"),
     ("connectionPointOutAction", "|formalParameter globalId"),
     ("selectionDivergence", PLACED),
     ("selectionConvergence", PLACED),
-    (
-        "simultaneousDivergence",
-        "localId|name height width globalId executionOrderId",
-    ),
+    ("simultaneousDivergence", "localId|name height width globalId executionOrderId"),
     ("simultaneousConvergence", PLACED),
-    (
-        "jumpStep",
-        "localId targetName|height width globalId executionOrderId",
-    ),
-    (
-        "actionBlock",
-        "localId negated|height width globalId executionOrderId",
-    ),
-    (
-        "jump",
-        "localId label executionOrderId|height width globalId",
-    ),
-    (
-        "label",
-        "localId label executionOrderId|height width globalId",
-    ),
+    ("jumpStep", "localId targetName|height width globalId executionOrderId"),
+    ("actionBlock", "localId negated|height width globalId executionOrderId"),
+    ("jump", "localId label executionOrderId|height width globalId"),
+    ("label", "localId label executionOrderId|height width globalId"),
     ("return", "localId executionOrderId|height width globalId"),
     ("rung", "localId|lineNumber"),
-    (
-        "macroStep",
-        "localId name|height width globalId executionOrderId",
-    ),
+    ("macroStep", "localId name|height width globalId executionOrderId"),
     // Refused where objects are read.
-    (
-        "vendorElement",
-        "localId|height width globalId executionOrderId",
-    ),
+    ("vendorElement", "localId|height width globalId executionOrderId"),
     ("error", "localId|height width globalId executionOrderId"),
     ("qualifier", ""),
     // Places on the sheet.
@@ -195,15 +153,8 @@ const ELEMENTARY: [&str; 27] = [
 ];
 
 /// Elements whose contents are texts, headers or pictures: what stands in them is read as a whole, or changes nothing.
-const WHOLE: [&str; 7] = [
-    "fileHeader",
-    "contentHeader",
-    "documentation",
-    "content",
-    "ST",
-    "IL",
-    "expression",
-];
+const WHOLE: [&str; 7] =
+    ["fileHeader", "contentHeader", "documentation", "content", "ST", "IL", "expression"];
 
 /// Additional data of tools that holds parts of the program.
 const PROGRAM_DATA: [&str; 9] = [
@@ -248,10 +199,8 @@ pub(super) fn check(root: Node<'_, '_>, diagnostics: &mut Vec<Diagnostic>) {
             for attribute in node.attributes() {
                 let mut words = attributes.split([' ', '|']);
                 if !words.any(|word| word == attribute.name()) && !attribute.value().is_empty() {
-                    let message = format!(
-                        "the attribute `{}` of `{name}` is not known",
-                        attribute.name()
-                    );
+                    let message =
+                        format!("the attribute `{}` of `{name}` is not known", attribute.name());
                     diagnostics.push(Diagnostic::error("U1010", message, attribute.range()));
                 }
             }
@@ -267,10 +216,7 @@ fn data(node: Node<'_, '_>, diagnostics: &mut Vec<Diagnostic>) {
     for data in node.children().filter(Node::is_element) {
         let name = data.attribute("name").unwrap_or_default();
         let last = name.rsplit('/').next().unwrap_or_default();
-        if PROGRAM_DATA
-            .iter()
-            .any(|word| last.eq_ignore_ascii_case(word))
-        {
+        if PROGRAM_DATA.iter().any(|word| last.eq_ignore_ascii_case(word)) {
             let message =
                 format!("the additional data `{last}` of a tool holds a part of the program");
             let found = Diagnostic::error("U1010", message, start_tag(data));

@@ -41,22 +41,13 @@ struct Reader<'a, 'n> {
 
 pub(super) fn chart<'a>(pou: &'a Pou, graph: &'a Graph, network: &mut Network<'a>) -> Charted {
     let structure = structure(graph, network.diagnostics);
-    let mut reader = Reader {
-        pou,
-        graph,
-        structure,
-        network,
-        methods: Vec::new(),
-        chart: Chart::default(),
-    };
+    let mut reader =
+        Reader { pou, graph, structure, network, methods: Vec::new(), chart: Chart::default() };
     let wired = reader.wired();
     reader.steps();
     reader.transitions(&wired);
     reader.actions();
-    Charted {
-        chart: reader.chart,
-        methods: reader.methods,
-    }
+    Charted { chart: reader.chart, methods: reader.methods }
 }
 
 impl Reader<'_, '_> {
@@ -98,9 +89,7 @@ impl Reader<'_, '_> {
         for object in &self.graph.objects {
             if matches!(object.kind, Kind::Transition(_)) {
                 let target = wired(object).to_uppercase();
-                let name = self
-                    .network
-                    .declare("condition", make::named("BOOL", &span));
+                let name = self.network.declare("condition", make::named("BOOL", &span));
                 conditions.insert(target.clone(), make::variable(&name, &object.span));
                 self.network.renamed.insert(target, name);
             }
@@ -163,14 +152,9 @@ impl Reader<'_, '_> {
             let span = object.span.clone();
             let mut condition = match &transition.condition {
                 Condition::Wired => {
-                    let has = object
-                        .inputs
-                        .iter()
-                        .any(|pin| pin.name.as_str() == CONDITION);
+                    let has = object.inputs.iter().any(|pin| pin.name.as_str() == CONDITION);
                     let value = wired_values.get(&wired(object).to_uppercase()).cloned();
-                    value
-                        .filter(|_| has)
-                        .unwrap_or_else(|| make::boolean(false, &span))
+                    value.filter(|_| has).unwrap_or_else(|| make::boolean(false, &span))
                 }
                 Condition::Inline(body) => self.condition(place, None, body),
                 Condition::Reference(name) => {
@@ -224,14 +208,10 @@ impl Reader<'_, '_> {
                 self.method("condition", bool, Body::Instructions(list), &span)
             }
             Drawn::Graph(graph) => {
-                let written = graph
-                    .objects
-                    .iter()
-                    .rev()
-                    .find_map(|object| match &object.kind {
-                        Kind::Coil(variable, _) | Kind::OutVariable(variable, _) => Some(variable),
-                        _ => None,
-                    });
+                let written = graph.objects.iter().rev().find_map(|object| match &object.kind {
+                    Kind::Coil(variable, _) | Kind::OutVariable(variable, _) => Some(variable),
+                    _ => None,
+                });
                 let named = |name: &&Written| {
                     graph.objects.iter().any(|object| match &object.kind {
                         Kind::Coil(variable, _) | Kind::OutVariable(variable, _) => {
@@ -245,12 +225,8 @@ impl Reader<'_, '_> {
                     self.error("U1015", message, span.clone());
                     return make::boolean(false, &span);
                 };
-                let value = self
-                    .network
-                    .declare("condition", make::named("BOOL", &span));
-                self.network
-                    .renamed
-                    .insert(answer.to_uppercase(), value.clone());
+                let value = self.network.declare("condition", make::named("BOOL", &span));
+                self.network.renamed.insert(answer.to_uppercase(), value.clone());
                 let mut statements = self.network.statements(graph);
                 self.network.renamed.clear();
                 let method = self.method_name("condition");
@@ -367,19 +343,13 @@ impl Reader<'_, '_> {
         {
             taken.push(name.key());
             let body = self.deed(body, &action.span);
-            self.chart.actions.push(Action {
-                name: name.clone(),
-                body,
-            });
+            self.chart.actions.push(Action { name: name.clone(), body });
         }
         let qualifier = match action.qualifier.is_empty() {
             true => Name::new("N", action.span.clone()),
             false => make::name(&action.qualifier),
         };
-        let duration = action
-            .duration
-            .as_ref()
-            .filter(|duration| !duration.is_empty());
+        let duration = action.duration.as_ref().filter(|duration| !duration.is_empty());
         Some(Association {
             action: name,
             qualifier,
@@ -423,7 +393,5 @@ fn is_plain(power: &Power) -> bool {
 }
 
 fn find<'a>(parts: &'a [Part], name: &Written) -> Option<&'a Part> {
-    parts
-        .iter()
-        .find(|part| part.name.eq_ignore_ascii_case(name))
+    parts.iter().find(|part| part.name.eq_ignore_ascii_case(name))
 }

@@ -59,12 +59,7 @@ impl Typed {
             value
         });
         let priority = given("priority").and_then(|priority| priority.parse().ok());
-        self.file.tasks.push(Task {
-            name: name(&called),
-            interval,
-            priority,
-            single,
-        });
+        self.file.tasks.push(Task { name: name(&called), interval, priority, single });
         let before = self.file.instances.len();
         self.runs(node);
         for instance in &mut self.file.instances[before..] {
@@ -100,10 +95,7 @@ fn nanoseconds(text: &str) -> Option<i64> {
     if let Some(found) = clock(text) {
         return i64::try_from(found.as_nanos()).ok();
     }
-    if let Some(seconds) = text
-        .strip_prefix("PT")
-        .and_then(|rest| rest.strip_suffix('S'))
-    {
+    if let Some(seconds) = text.strip_prefix("PT").and_then(|rest| rest.strip_suffix('S')) {
         return seconds_of(seconds);
     }
     let (value, found) = parse_expression_at(text, &|span| span);

@@ -90,10 +90,7 @@ impl Typed {
             "derived" => {
                 let written = self.needed(kind, "name")?;
                 match panel(&written) {
-                    Some("STRING") => TypeKind::Text {
-                        wide: false,
-                        length: None,
-                    },
+                    Some("STRING") => TypeKind::Text { wide: false, length: None },
                     Some(usual) => TypeKind::Named(Name::new(usual, written.span())),
                     None => TypeKind::Named(name(&written)),
                 }
@@ -106,11 +103,7 @@ impl Typed {
                 let range = child(kind, "range").unwrap_or(kind);
                 let (lower, upper) = self.bounds(range)?;
                 let base = child(kind, "baseType").and_then(|base| self.type_in(base, depth + 1));
-                let Some(TypeName {
-                    kind: TypeKind::Named(base),
-                    ..
-                }) = base
-                else {
+                let Some(TypeName { kind: TypeKind::Named(base), .. }) = base else {
                     let message = "a subrange is one of an integer type".to_owned();
                     self.error("U1002", message, span);
                     return None;
@@ -141,9 +134,8 @@ impl Typed {
             }
             "enum" => {
                 let mut values = Vec::new();
-                for value in child(kind, "values")
-                    .iter()
-                    .flat_map(|values| children(*values, "value"))
+                for value in
+                    child(kind, "values").iter().flat_map(|values| children(*values, "value"))
                 {
                     let written = self.needed(value, "name")?;
                     let number = match attribute(value, "value") {
@@ -252,11 +244,7 @@ impl Typed {
             };
             let initial = child(node, "initialValue");
             let initial = initial.and_then(|value| self.initial(value, &of, 0));
-            self.file.types.push(TypeDefinition {
-                name: name(&written),
-                of,
-                initial,
-            });
+            self.file.types.push(TypeDefinition { name: name(&written), of, initial });
         }
     }
 }

@@ -22,10 +22,7 @@ pub(crate) fn path(name: &str, part: Option<&str>, span: &Span) -> Path {
 }
 
 pub(crate) fn read(path: Path) -> Expression {
-    Expression {
-        span: path.span.clone(),
-        kind: ExpressionKind::Variable(path),
-    }
+    Expression { span: path.span.clone(), kind: ExpressionKind::Variable(path) }
 }
 
 pub(crate) fn variable(name: &str, span: &Span) -> Expression {
@@ -33,10 +30,7 @@ pub(crate) fn variable(name: &str, span: &Span) -> Expression {
 }
 
 pub(crate) fn boolean(value: bool, span: &Span) -> Expression {
-    Expression {
-        kind: ExpressionKind::Literal(Literal::Boolean(value)),
-        span: span.clone(),
-    }
+    Expression { kind: ExpressionKind::Literal(Literal::Boolean(value)), span: span.clone() }
 }
 
 pub(crate) fn integer(value: i128, span: &Span) -> Expression {
@@ -47,10 +41,7 @@ pub(crate) fn integer(value: i128, span: &Span) -> Expression {
 }
 
 pub(crate) fn not(value: Expression) -> Expression {
-    Expression {
-        span: value.span.clone(),
-        kind: ExpressionKind::Not(Box::new(value)),
-    }
+    Expression { span: value.span.clone(), kind: ExpressionKind::Not(Box::new(value)) }
 }
 
 /// Two or more values with one operator between them; one is itself.
@@ -63,30 +54,16 @@ pub(crate) fn chain(values: Vec<Expression>, operator: Operator, span: &Span) ->
     if rest.is_empty() {
         return first;
     }
-    Expression {
-        kind: ExpressionKind::Chain(Box::new(first), rest),
-        span: span.clone(),
-    }
+    Expression { kind: ExpressionKind::Chain(Box::new(first), rest), span: span.clone() }
 }
 
 pub(crate) fn call(name: Name, arguments: Vec<Argument>, span: &Span) -> Expression {
-    let path = Path {
-        span: name.span(),
-        root: name,
-        steps: Vec::new(),
-    };
-    Expression {
-        kind: ExpressionKind::Call(path, arguments),
-        span: span.clone(),
-    }
+    let path = Path { span: name.span(), root: name, steps: Vec::new() };
+    Expression { kind: ExpressionKind::Call(path, arguments), span: span.clone() }
 }
 
 pub(crate) fn statement(kind: StatementKind, span: &Span) -> Statement {
-    Statement {
-        kind,
-        span: span.clone(),
-        comments: Vec::new(),
-    }
+    Statement { kind, span: span.clone(), comments: Vec::new() }
 }
 
 pub(crate) fn assign(to: Path, value: Expression, span: &Span) -> Statement {
@@ -98,10 +75,7 @@ pub(crate) fn when(condition: Expression, body: Vec<Statement>, span: &Span) -> 
 }
 
 pub(crate) fn named(of: &str, span: &Span) -> TypeName {
-    TypeName {
-        kind: TypeKind::Named(Name::new(of, span.clone())),
-        span: span.clone(),
-    }
+    TypeName { kind: TypeKind::Named(Name::new(of, span.clone())), span: span.clone() }
 }
 
 pub(crate) fn declare(name: &str, class: Class, of: TypeName, span: &Span) -> Declaration {

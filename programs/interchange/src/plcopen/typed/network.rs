@@ -105,8 +105,7 @@ impl<'a> Network<'a> {
     }
 
     fn error(&mut self, code: &'static str, message: String, span: Range<usize>) {
-        self.diagnostics
-            .push(Diagnostic::error(code, message, span));
+        self.diagnostics.push(Diagnostic::error(code, message, span));
     }
 
     fn push(&mut self, statement: Statement) {
@@ -123,8 +122,7 @@ impl<'a> Network<'a> {
     ) -> String {
         let name = format!("{what}.{}", self.made.len());
         let span = of.span.clone();
-        self.made
-            .push(make::declare(&name, Class::Local, of, &span));
+        self.made.push(make::declare(&name, Class::Local, of, &span));
         name
     }
 
@@ -144,8 +142,7 @@ impl<'a> Network<'a> {
         // One for each network that has jumps.
         let made = self.made.iter().rev();
         let mut made = made.filter(|made| made.name.as_str().starts_with(NEXT));
-        made.next()
-            .map_or(NEXT.to_owned(), |made| made.name.as_str().to_owned())
+        made.next().map_or(NEXT.to_owned(), |made| made.name.as_str().to_owned())
     }
 
     /// An expression as it is written in an object.
@@ -187,9 +184,8 @@ impl<'a> Network<'a> {
                 None => make::boolean(false, span),
             },
             Power::Function(name, inputs) => {
-                let inputs = inputs
-                    .iter()
-                    .map(|(pin, power)| (pin.clone(), self.value(power, span)));
+                let inputs =
+                    inputs.iter().map(|(pin, power)| (pin.clone(), self.value(power, span)));
                 let inputs = inputs.collect();
                 self.function(name, inputs, span)
             }
@@ -222,10 +218,7 @@ impl<'a> Network<'a> {
             return known.clone();
         }
         let mut path = self.instance(instance);
-        path.steps
-            .push(understudy_structured_text::syntax::Step::Field(make::name(
-                pin,
-            )));
+        path.steps.push(understudy_structured_text::syntax::Step::Field(make::name(pin)));
         make::read(path)
     }
 
@@ -257,9 +250,7 @@ impl<'a> Network<'a> {
         }
         if !own
             && inputs.len() == 1
-            && ["MOVE", "ADD", "MUL", "XOR"]
-                .iter()
-                .any(|word| name.eq_ignore_ascii_case(word))
+            && ["MOVE", "ADD", "MUL", "XOR"].iter().any(|word| name.eq_ignore_ascii_case(word))
         {
             return inputs
                 .into_iter()
@@ -270,11 +261,7 @@ impl<'a> Network<'a> {
     }
 
     fn type_of(&self, value: &Expression) -> understudy_structured_text::syntax::TypeName {
-        let values = Values {
-            file: self.file,
-            declarations: self.declarations,
-            made: &self.made,
-        };
+        let values = Values { file: self.file, declarations: self.declarations, made: &self.made };
         values.of(value)
     }
 
@@ -282,11 +269,7 @@ impl<'a> Network<'a> {
         &self,
         value: &Expression,
     ) -> Option<understudy_structured_text::syntax::TypeName> {
-        let values = Values {
-            file: self.file,
-            declarations: self.declarations,
-            made: &self.made,
-        };
+        let values = Values { file: self.file, declarations: self.declarations, made: &self.made };
         values.strong(value)
     }
 

@@ -9,11 +9,7 @@ use super::Typed;
 /// Blocks that have no effect on what a program does: their names, their declaration, and the warning. Python has no
 /// outputs here, so a program that reads its answer is refused.
 const BLOCKS: [(&[&str], &str, &str); 3] = [
-    (
-        &["LOGGER", "LOGLEVEL"],
-        LOG,
-        "what a LOGGER writes is not kept: there is no log here",
-    ),
+    (&["LOGGER", "LOGLEVEL"], LOG, "what a LOGGER writes is not kept: there is no log here"),
     (
         &["PYTHON_EVAL"],
         "FUNCTION_BLOCK PYTHON_EVAL VAR_INPUT TRIG : BOOL; CODE : STRING; END_VAR END_FUNCTION_BLOCK",

@@ -12,9 +12,8 @@ use super::make::named;
 const MAXIMUM_ALIASES: usize = 32;
 
 /// Numbers, the narrower first.
-const NUMBERS: [&str; 10] = [
-    "SINT", "USINT", "INT", "UINT", "DINT", "UDINT", "LINT", "ULINT", "REAL", "LREAL",
-];
+const NUMBERS: [&str; 10] =
+    ["SINT", "USINT", "INT", "UINT", "DINT", "UDINT", "LINT", "ULINT", "REAL", "LREAL"];
 
 /// What is known where a value stands.
 pub(crate) struct Values<'a> {
@@ -72,10 +71,7 @@ impl<'a> Values<'a> {
 
     /// The type of operands together: the widest.
     fn joined(&self, values: &[&Expression], operator: Operator) -> Option<TypeName> {
-        let types: Vec<TypeName> = values
-            .iter()
-            .filter_map(|value| self.strong(value))
-            .collect();
+        let types: Vec<TypeName> = values.iter().filter_map(|value| self.strong(value)).collect();
         let is =
             |of: &TypeName, word: &str| matches!(&of.kind, TypeKind::Named(name) if name.is(word));
         let moments = ["TIME_OF_DAY", "TOD", "DATE_AND_TIME", "DT", "DATE"];
@@ -189,10 +185,9 @@ impl<'a> Values<'a> {
     fn field(&self, of: &TypeName, name: &Name) -> Option<TypeName> {
         let of = self.resolved(of.clone());
         match of.kind {
-            TypeKind::Structure(fields) => fields
-                .into_iter()
-                .find(|field| field.name == *name)
-                .map(|field| field.of),
+            TypeKind::Structure(fields) => {
+                fields.into_iter().find(|field| field.name == *name).map(|field| field.of)
+            }
             TypeKind::Named(block) => {
                 let unit = unit(self.file, block.as_str())?;
                 let mut variables = unit.declarations.iter();
@@ -240,18 +235,11 @@ fn weak(value: &Expression, span: &Span) -> Option<TypeName> {
 }
 
 fn text(wide: bool, span: &Span) -> TypeName {
-    TypeName {
-        kind: TypeKind::Text { wide, length: None },
-        span: span.clone(),
-    }
+    TypeName { kind: TypeKind::Text { wide, length: None }, span: span.clone() }
 }
 
 fn address(written: &str) -> &'static str {
-    match written
-        .chars()
-        .nth(2)
-        .map(|letter| letter.to_ascii_uppercase())
-    {
+    match written.chars().nth(2).map(|letter| letter.to_ascii_uppercase()) {
         Some('B') => "BYTE",
         Some('W') => "WORD",
         Some('D') => "DWORD",

@@ -39,15 +39,8 @@ pub(super) fn write(tree: &mut Tree, file: &File, networks: &[Network], style: S
         Style::Ladder => "LD",
     };
     tree.open(body, &[]);
-    let mut sheet = Sheet {
-        tree,
-        file,
-        next: 1,
-        order: 0,
-        rail: None,
-        ends: Vec::new(),
-        coils: Vec::new(),
-    };
+    let mut sheet =
+        Sheet { tree, file, next: 1, order: 0, rail: None, ends: Vec::new(), coils: Vec::new() };
     if style == Style::Ladder {
         sheet.left_rail(top);
     }
@@ -118,16 +111,10 @@ impl Sheet<'_> {
 
     fn left_rail(&mut self, bottom: i64) {
         let id = self.id();
-        let place = Place {
-            x: RAIL,
-            y: 0,
-            width: 2,
-            height: bottom,
-        };
+        let place = Place { x: RAIL, y: 0, width: 2, height: bottom };
         self.rail = Some(id);
         self.open("leftPowerRail", id, place, &[]);
-        self.tree
-            .open("connectionPointOut", &[("formalParameter", "")]);
+        self.tree.open("connectionPointOut", &[("formalParameter", "")]);
         position(self.tree, "relPosition", place.width, GAP);
         self.tree.close("connectionPointOut");
         self.tree.close("leftPowerRail");
@@ -135,12 +122,7 @@ impl Sheet<'_> {
 
     fn right_rail(&mut self, x: i64, bottom: i64) {
         let id = self.id();
-        let place = Place {
-            x,
-            y: 0,
-            width: 2,
-            height: bottom,
-        };
+        let place = Place { x, y: 0, width: 2, height: bottom };
         self.open("rightPowerRail", id, place, &[]);
         for coil in std::mem::take(&mut self.coils) {
             let to = Point { x, y: coil.at.y };
@@ -155,20 +137,11 @@ impl Sheet<'_> {
         let placed = &plan.objects[at];
         let place = placed.place;
         if let Kind::Contacts(contacts) = &object.kind {
-            let from = Point {
-                x: place.x,
-                y: place.y + CONTACT_HEAD,
-            };
+            let from = Point { x: place.x, y: place.y + CONTACT_HEAD };
             let inputs = (0..object.inputs.len()).map(|input| self.wires(plan, (at, input)));
             let inputs: Vec<Vec<_>> = inputs.collect();
-            let rail = self.rail.map(|id| End {
-                id,
-                pin: None,
-                at: Point {
-                    x: RAIL + 2,
-                    y: from.y,
-                },
-            });
+            let rail =
+                self.rail.map(|id| End { id, pin: None, at: Point { x: RAIL + 2, y: from.y } });
             let before: Vec<_> = rail.into_iter().map(|end| (end, Vec::new())).collect();
             let ends = self.contacts(contacts, from, before, &inputs);
             return vec![ends.into_iter().map(|(end, _)| end).collect()];
@@ -199,19 +172,13 @@ impl Sheet<'_> {
                     Coil::Set => Some(("storage", "set")),
                     Coil::Reset => Some(("storage", "reset")),
                 });
-                let sign = Place {
-                    width: COIL_WIDTH,
-                    ..place
-                };
+                let sign = Place { width: COIL_WIDTH, ..place };
                 self.open("coil", id, sign, &more);
                 self.input(plan, (at, 0));
                 self.out(sign, placed.inputs[0]);
                 self.tree.text("variable", text);
                 self.tree.close("coil");
-                let at = Point {
-                    x: sign.right(),
-                    y: place.y + placed.inputs[0],
-                };
+                let at = Point { x: sign.right(), y: place.y + placed.inputs[0] };
                 self.coils.push(End { id, pin: None, at });
             }
             Kind::Block { of, instance } => {
@@ -230,14 +197,9 @@ impl Sheet<'_> {
         let end = |name: &str, row: i64| End {
             id,
             pin: is_block.then(|| name.to_owned()),
-            at: Point {
-                x: place.right(),
-                y: place.y + row,
-            },
+            at: Point { x: place.right(), y: place.y + row },
         };
-        outputs
-            .map(|(output, row)| vec![end(&output.name, *row)])
-            .collect()
+        outputs.map(|(output, row)| vec![end(&output.name, *row)]).collect()
     }
 
     /// Writes contacts behind wires; the wires behind them.
@@ -260,18 +222,12 @@ impl Sheet<'_> {
                 };
                 let negated = negated.to_string();
                 self.open("contact", id, place, &[("negated", &negated)]);
-                let to = Point {
-                    x: place.x,
-                    y: from.y,
-                };
+                let to = Point { x: place.x, y: from.y };
                 self.connection_in(to, place, &before);
                 self.out(place, CONTACT_HEIGHT / 2);
                 self.tree.text("variable", name);
                 self.tree.close("contact");
-                let at = Point {
-                    x: place.right(),
-                    y: from.y,
-                };
+                let at = Point { x: place.right(), y: from.y };
                 vec![(End { id, pin: None, at }, Vec::new())]
             }
             Contacts::Series(all) => {
@@ -352,10 +308,7 @@ impl Sheet<'_> {
 
     fn input(&mut self, plan: &BlockPlan, to: (usize, usize)) {
         let placed = &plan.objects[to.0];
-        let at = Point {
-            x: placed.place.x,
-            y: placed.place.y + placed.inputs[to.1],
-        };
+        let at = Point { x: placed.place.x, y: placed.place.y + placed.inputs[to.1] };
         let wires = self.wires(plan, to);
         self.connection_in(at, placed.place, &wires);
     }

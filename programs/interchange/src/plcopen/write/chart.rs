@@ -64,12 +64,9 @@ pub(super) fn parts(
 /// The body of an action: a list that is called, or statements.
 fn deed(tree: &mut Tree, unit: &Unit, action: &Action) {
     let called = match action.body.as_slice() {
-        [
-            Statement {
-                kind: StatementKind::Call(path, arguments),
-                ..
-            },
-        ] if arguments.is_empty() && path.steps.is_empty() => {
+        [Statement { kind: StatementKind::Call(path, arguments), .. }]
+            if arguments.is_empty() && path.steps.is_empty() =>
+        {
             unit.methods.iter().find(|method| method.name == path.root)
         }
         _ => None,
@@ -106,12 +103,10 @@ fn condition(tree: &mut Tree, file: &File, unit: &Unit, method: &Unit) -> Result
         Body::Statements(statements) => statements,
         Body::Chart(_) => return Err("a chart in a condition".to_owned()),
     };
-    let answer = statements
-        .split_last()
-        .and_then(|(last, before)| match &last.kind {
-            StatementKind::Assign(to, value) if to.root == method.name => Some((before, value)),
-            _ => None,
-        });
+    let answer = statements.split_last().and_then(|(last, before)| match &last.kind {
+        StatementKind::Assign(to, value) if to.root == method.name => Some((before, value)),
+        _ => None,
+    });
     let (before, value) = match answer {
         Some((before, value)) => (before, print::expression(value)),
         None => (statements.as_slice(), "FALSE".to_owned()),
@@ -145,14 +140,8 @@ fn condition(tree: &mut Tree, file: &File, unit: &Unit, method: &Unit) -> Result
 pub(super) fn body(tree: &mut Tree, unit: &Unit, of: &syntax::Chart) -> Result<(), String> {
     let (chart, order) = drawn(of)?;
     let plan = lay_out(&chart, 20);
-    let mut sheet = Sheet {
-        tree,
-        unit,
-        of,
-        chart: &chart,
-        plan: &plan,
-        next: plan.objects.len() + 1,
-    };
+    let mut sheet =
+        Sheet { tree, unit, of, chart: &chart, plan: &plan, next: plan.objects.len() + 1 };
     let competes = |step: usize| {
         let transitions = chart.transitions.iter();
         transitions.filter(|it| it.from.contains(&step)).count() > 1
@@ -211,18 +200,12 @@ impl Sheet<'_> {
 
     /// An input for each line into an object, or one for all of them.
     fn inputs(&mut self, object: &ChartObject) {
-        let is_convergence = matches!(
-            object.part,
-            Part::SelectionConvergence | Part::SimultaneousConvergence
-        );
+        let is_convergence =
+            matches!(object.part, Part::SelectionConvergence | Part::SimultaneousConvergence);
         if object.inputs.is_empty() {
             return;
         }
-        let each = if is_convergence {
-            1
-        } else {
-            object.inputs.len()
-        };
+        let each = if is_convergence { 1 } else { object.inputs.len() };
         for links in object.inputs.chunks(each) {
             self.tree.open("connectionPointIn", &[]);
             if let Some(end) = links.first().and_then(|link| link.points.last()) {
@@ -244,20 +227,14 @@ impl Sheet<'_> {
     /// The lines out of an object, at its lower edge. Steps and divergences name each.
     fn outputs(&mut self, object: &ChartObject, name: Option<&str>) {
         let own = object as *const ChartObject;
-        let place = self
-            .plan
-            .objects
-            .iter()
-            .position(|other| std::ptr::eq(other, own));
+        let place = self.plan.objects.iter().position(|other| std::ptr::eq(other, own));
         for output in 0..object.outputs {
             let links = self.plan.objects.iter().flat_map(|other| &other.inputs);
             let mut links = links.filter(|link| Some(link.from) == place && link.output == output);
             let begin = links.next().and_then(|link| link.points.first());
             let x = begin.map_or(object.place.width / 2, |begin| begin.x - object.place.x);
-            let attributes: Vec<_> = name
-                .map(|name| ("formalParameter", name))
-                .into_iter()
-                .collect();
+            let attributes: Vec<_> =
+                name.map(|name| ("formalParameter", name)).into_iter().collect();
             self.tree.open("connectionPointOut", &attributes);
             position(self.tree, "relPosition", x, object.place.height);
             self.tree.close("connectionPointOut");
@@ -301,19 +278,12 @@ impl Sheet<'_> {
 
     fn association(&mut self, association: &Association, y: i64) -> Result<(), String> {
         if !association.indicators.is_empty() {
-            return Err(format!(
-                "an indicator variable at the action `{}`",
-                association.action
-            ));
+            return Err(format!("an indicator variable at the action `{}`", association.action));
         }
         let id = self.next.to_string();
         self.next += 1;
         let qualifier = association.qualifier.key();
-        let qualifier = if qualifier.is_empty() {
-            "N"
-        } else {
-            &qualifier
-        };
+        let qualifier = if qualifier.is_empty() { "N" } else { &qualifier };
         let duration = association.duration.as_ref().map(print::expression);
         let mut attributes = vec![("localId", id.as_str()), ("qualifier", qualifier)];
         attributes.extend(duration.as_deref().map(|duration| ("duration", duration)));
@@ -333,11 +303,7 @@ impl Sheet<'_> {
         priority: Option<usize>,
     ) -> Result<(), String> {
         let priority = priority.map(|priority| priority.to_string());
-        let more: Vec<_> = priority
-            .as_deref()
-            .map(|it| ("priority", it))
-            .into_iter()
-            .collect();
+        let more: Vec<_> = priority.as_deref().map(|it| ("priority", it)).into_iter().collect();
         self.open("transition", id, object.place, &more);
         self.inputs(object);
         self.outputs(object, None);
@@ -346,8 +312,7 @@ impl Sheet<'_> {
                 let attributes: Vec<_> =
                     negated.then_some(("negated", "true")).into_iter().collect();
                 self.tree.open("condition", &attributes);
-                self.tree
-                    .empty("reference", &[("name", method.name.as_str())]);
+                self.tree.empty("reference", &[("name", method.name.as_str())]);
             }
             None => {
                 self.tree.open("condition", &[]);

@@ -32,10 +32,7 @@ pub(super) struct Sheet<'a> {
 
 impl<'a> Sheet<'a> {
     pub(super) fn of(rungs: &[Rung], footer: &[String], names: &'a StandardNames) -> Self {
-        let mut sheet = Self {
-            names,
-            objects: Vec::new(),
-        };
+        let mut sheet = Self { names, objects: Vec::new() };
         let mut y = ROW;
         for rung in rungs {
             y = sheet.rung(rung, y) + ROW / 2;
@@ -61,12 +58,7 @@ impl<'a> Sheet<'a> {
             return y;
         }
         let height = 10 + 20 * i64::try_from(lines.len()).unwrap_or(1);
-        let place = Place {
-            x: LEFT,
-            y,
-            width: 500,
-            height,
-        };
+        let place = Place { x: LEFT, y, width: 500, height };
         self.add(place, What::Comment(lines.join("\n")));
         y + height + 10
     }
@@ -74,26 +66,11 @@ impl<'a> Sheet<'a> {
     fn rung(&mut self, rung: &Rung, top: i64) -> i64 {
         let lines: Vec<String> = rung.title.iter().chain(&rung.comments).cloned().collect();
         let top = self.comment(&lines, top);
-        let rail = Place {
-            x: LEFT,
-            y: top,
-            width: 10,
-            height: ROW,
-        };
+        let rail = Place { x: LEFT, y: top, width: 10, height: ROW };
         let id = self.add(rail, What::LeftRail);
-        let rail = Source {
-            id,
-            pin: None,
-            x: LEFT + 10,
-            y: top + WIRE,
-        };
-        let reached = self.series(
-            &rung.network,
-            &rail,
-            std::slice::from_ref(&rail),
-            LEFT + COLUMN / 2,
-            top,
-        );
+        let rail = Source { id, pin: None, x: LEFT + 10, y: top + WIRE };
+        let reached =
+            self.series(&rung.network, &rail, std::slice::from_ref(&rail), LEFT + COLUMN / 2, top);
         let mut y = top;
         let mut ends = Vec::new();
         for coil in &rung.coils {
@@ -102,34 +79,16 @@ impl<'a> Sheet<'a> {
         }
         let x = reached.x + COLUMN;
         let bottom = reached.bottom.max(y);
-        let place = Place {
-            x,
-            y: top,
-            width: 10,
-            height: bottom - top,
-        };
+        let place = Place { x, y: top, width: 10, height: bottom - top };
         self.add(place, What::RightRail(ends));
         bottom
     }
 
     fn coil(&mut self, coil: &Coil, reached: &Reached, y: i64) -> Source {
-        let place = Place {
-            x: reached.x,
-            y,
-            width: 21,
-            height: 20,
-        };
+        let place = Place { x: reached.x, y, width: 21, height: 20 };
         let variable = self.names.operand(&coil.target);
-        let id = self.add(
-            place,
-            What::Coil(coil.kind, variable, reached.sources.clone()),
-        );
-        Source {
-            id,
-            pin: None,
-            x: place.x + place.width,
-            y: y + WIRE,
-        }
+        let id = self.add(place, What::Coil(coil.kind, variable, reached.sources.clone()));
+        Source { id, pin: None, x: place.x + place.width, y: y + WIRE }
     }
 
     fn series(
@@ -140,11 +99,7 @@ impl<'a> Sheet<'a> {
         x: i64,
         y: i64,
     ) -> Reached {
-        let mut reached = Reached {
-            sources: from.to_vec(),
-            x,
-            bottom: y + ROW,
-        };
+        let mut reached = Reached { sources: from.to_vec(), x, bottom: y + ROW };
         for element in series {
             let next = match element {
                 Element::Contact(contact) => self.contact(contact, &reached, y),
@@ -156,45 +111,21 @@ impl<'a> Sheet<'a> {
                 Element::Branches(branches) => self.branches(branches, rail, &reached, y),
                 Element::Block(block) => self.block(block, rail, &reached, y),
             };
-            reached = Reached {
-                bottom: reached.bottom.max(next.bottom),
-                ..next
-            };
+            reached = Reached { bottom: reached.bottom.max(next.bottom), ..next };
         }
         reached
     }
 
     fn contact(&mut self, contact: &Contact, from: &Reached, y: i64) -> Reached {
-        let place = Place {
-            x: from.x,
-            y,
-            width: 21,
-            height: 20,
-        };
+        let place = Place { x: from.x, y, width: 21, height: 20 };
         let variable = self.names.operand(&contact.operand);
-        let id = self.add(
-            place,
-            What::Contact(contact.kind, variable, from.sources.clone()),
-        );
-        let source = Source {
-            id,
-            pin: None,
-            x: place.x + place.width,
-            y: y + WIRE,
-        };
-        Reached {
-            sources: vec![source],
-            x: from.x + COLUMN,
-            bottom: y + ROW,
-        }
+        let id = self.add(place, What::Contact(contact.kind, variable, from.sources.clone()));
+        let source = Source { id, pin: None, x: place.x + place.width, y: y + WIRE };
+        Reached { sources: vec![source], x: from.x + COLUMN, bottom: y + ROW }
     }
 
     fn branches(&mut self, branches: &[Series], rail: &Source, from: &Reached, y: i64) -> Reached {
-        let mut joined = Reached {
-            sources: Vec::new(),
-            x: from.x,
-            bottom: y,
-        };
+        let mut joined = Reached { sources: Vec::new(), x: from.x, bottom: y };
         for branch in branches {
             let reached = self.series(branch, rail, &from.sources, from.x, joined.bottom);
             joined.sources.extend(reached.sources);
@@ -228,10 +159,7 @@ impl<'a> Sheet<'a> {
         let mut reached = self.function(word, inputs, from.x + COLUMN, y);
         let is_rail = matches!(from.sources.as_slice(), [only] if only.id == rail.id);
         if !is_rail {
-            let inputs = vec![
-                ("IN1", from.sources.clone()),
-                ("IN2", reached.sources.clone()),
-            ];
+            let inputs = vec![("IN1", from.sources.clone()), ("IN2", reached.sources.clone())];
             reached = self.function("AND", inputs, reached.x, y);
         }
         reached
@@ -244,40 +172,16 @@ impl<'a> Sheet<'a> {
         x: i64,
         y: i64,
     ) -> Reached {
-        let place = Place {
-            x,
-            y: y - WIRE,
-            width: 60,
-            height: 60,
-        };
+        let place = Place { x, y: y - WIRE, width: 60, height: 60 };
         let id = self.add(place, What::Block(word, None, inputs, vec!["OUT"]));
-        let source = Source {
-            id,
-            pin: Some("OUT"),
-            x: x + place.width,
-            y: y + 20,
-        };
-        Reached {
-            sources: vec![source],
-            x: x + COLUMN,
-            bottom: y + 2 * ROW,
-        }
+        let source = Source { id, pin: Some("OUT"), x: x + place.width, y: y + 20 };
+        Reached { sources: vec![source], x: x + COLUMN, bottom: y + 2 * ROW }
     }
 
     fn variable(&mut self, text: String, x: i64, y: i64) -> Source {
-        let place = Place {
-            x,
-            y,
-            width: 60,
-            height: 20,
-        };
+        let place = Place { x, y, width: 60, height: 20 };
         let id = self.add(place, What::InVariable(text));
-        Source {
-            id,
-            pin: None,
-            x: x + place.width,
-            y: y + WIRE,
-        }
+        Source { id, pin: None, x: x + place.width, y: y + WIRE }
     }
 
     fn block(&mut self, block: &Block, rail: &Source, from: &Reached, y: i64) -> Reached {
@@ -312,24 +216,11 @@ impl<'a> Sheet<'a> {
         let mut outputs = block.kind.outputs().to_vec();
         outputs.extend(pin_of_value(block));
         let rows = i64::try_from(inputs.len().max(outputs.len())).unwrap_or(1);
-        let place = Place {
-            x,
-            y: y - 20,
-            width: 60,
-            height: 20 + 20 * rows,
-        };
+        let place = Place { x, y: y - 20, width: 60, height: 20 + 20 * rows };
         let name = self.names.signal(&block.name).to_owned();
         let first = block.kind.outputs()[0];
-        let id = self.add(
-            place,
-            What::Block(block.kind.word(), Some(name), inputs, outputs),
-        );
-        let source = Source {
-            id,
-            pin: Some(first),
-            x: x + place.width,
-            y: y + WIRE,
-        };
+        let id = self.add(place, What::Block(block.kind.word(), Some(name), inputs, outputs));
+        let source = Source { id, pin: Some(first), x: x + place.width, y: y + WIRE };
         Reached {
             sources: vec![source],
             x: x + COLUMN,

@@ -10,17 +10,13 @@ pub(super) struct Tree {
 
 impl Tree {
     pub(super) fn new() -> Self {
-        let mut tree = Self {
-            writer: Writer::new_with_indent(Vec::new(), b' ', 2),
-        };
+        let mut tree = Self { writer: Writer::new_with_indent(Vec::new(), b' ', 2) };
         tree.event(Event::Decl(BytesDecl::new("1.0", Some("utf-8"), None)));
         tree
     }
 
     fn event(&mut self, event: Event<'_>) {
-        self.writer
-            .write_event(event)
-            .expect("a vector takes everything");
+        self.writer.write_event(event).expect("a vector takes everything");
     }
 
     pub(super) fn open(&mut self, name: &str, attributes: &[(&str, &str)]) {
@@ -68,7 +64,5 @@ fn printable(text: &str) -> String {
         '\u{fffe}' | '\u{ffff}' => false,
         other => !other.is_control(),
     };
-    text.chars()
-        .map(|letter| if allowed(letter) { letter } else { ' ' })
-        .collect()
+    text.chars().map(|letter| if allowed(letter) { letter } else { ' ' }).collect()
 }

@@ -211,11 +211,7 @@ fn type_of(tree: &mut Tree, of: &TypeName) -> Result<(), String> {
         }
         TypeKind::Subrange(base, lower, upper) => {
             let is_unsigned = base.key().starts_with('U');
-            let element = if is_unsigned {
-                "subrangeUnsigned"
-            } else {
-                "subrangeSigned"
-            };
+            let element = if is_unsigned { "subrangeUnsigned" } else { "subrangeSigned" };
             let (lower, upper) = (print::expression(lower), print::expression(upper));
             tree.open(element, &[]);
             tree.empty("range", &[("lower", &lower), ("upper", &upper)]);
@@ -339,9 +335,7 @@ fn instances(tree: &mut Tree, file: &File) -> Result<(), String> {
         tree.open("configuration", &[("name", "Configuration0")]);
         tree.open("resource", &[("name", "Resource0")]);
         for task in &file.tasks {
-            let interval = task
-                .interval
-                .and_then(|interval| u64::try_from(interval).ok());
+            let interval = task.interval.and_then(|interval| u64::try_from(interval).ok());
             let interval =
                 interval.map(|interval| standard_time(std::time::Duration::from_nanos(interval)));
             let single = task.single.as_ref().map(print::expression);
@@ -353,11 +347,7 @@ fn instances(tree: &mut Tree, file: &File) -> Result<(), String> {
             let is_own = |task_of: &Option<understudy_structured_text::syntax::Name>| {
                 task_of.as_ref().is_some_and(|name| *name == task.name)
             };
-            for instance in file
-                .instances
-                .iter()
-                .filter(|instance| is_own(&instance.task))
-            {
+            for instance in file.instances.iter().filter(|instance| is_own(&instance.task)) {
                 run(tree, instance)?;
             }
             tree.close("task");
@@ -368,11 +358,7 @@ fn instances(tree: &mut Tree, file: &File) -> Result<(), String> {
         for block in blocks {
             variables(tree, block)?;
         }
-        for instance in file
-            .instances
-            .iter()
-            .filter(|instance| instance.task.is_none())
-        {
+        for instance in file.instances.iter().filter(|instance| instance.task.is_none()) {
             run(tree, instance)?;
         }
         tree.close("resource");

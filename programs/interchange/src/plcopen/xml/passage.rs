@@ -86,10 +86,8 @@ impl Passage {
     /// A part of the text, with its places.
     pub(crate) fn slice(&self, part: Range<usize>) -> Self {
         let first = self.place(part.start..part.start).start;
-        let inner = self
-            .places
-            .iter()
-            .filter(|(start, _)| part.contains(start) && *start > part.start);
+        let inner =
+            self.places.iter().filter(|(start, _)| part.contains(start) && *start > part.start);
         let inner = inner.map(|(start, place)| (start - part.start, *place));
         Self {
             text: self.text[part.clone()].to_owned(),
@@ -120,14 +118,8 @@ mod tests {
     #[test]
     fn each_part_has_its_exact_place() {
         check("<a>one two</a>", &[("one", "one"), ("two", "two")]);
-        check(
-            "<a>\n   <p>one two</p>\n</a>",
-            &[("one", "one"), ("two", "two")],
-        );
-        check(
-            "<a>\r\none\r\ntwo\r\n</a>",
-            &[("one", "one"), ("two", "two")],
-        );
+        check("<a>\n   <p>one two</p>\n</a>", &[("one", "one"), ("two", "two")]);
+        check("<a>\r\none\r\ntwo\r\n</a>", &[("one", "one"), ("two", "two")]);
         check(
             "<a> <p><![CDATA[\nLD a\r\nST y]]></p></a>",
             &[("LD", "LD"), ("a\nST", "a\r\nST"), ("y", "y")],

@@ -31,11 +31,7 @@ pub(crate) enum Statement {
     SetTruth(&'static str, Truth),
     SetNumber(&'static str, Number),
     If(Vec<(Truth, Vec<Statement>)>, Vec<Statement>),
-    Case(
-        &'static str,
-        Vec<(i64, i64, Vec<Statement>)>,
-        Vec<Statement>,
-    ),
+    Case(&'static str, Vec<(i64, i64, Vec<Statement>)>, Vec<Statement>),
     For(i64, i64, Vec<Statement>),
     /// RETURN, or EXIT or CONTINUE in a loop.
     Leave(Truth, &'static str),
@@ -98,11 +94,7 @@ fn truth(dice: &mut Dice, depth: usize) -> Truth {
         4 => Truth::Not(Box::new(truth(dice, depth - 1))),
         5 | 6 => {
             let word = pick(dice, &["AND", "OR", "XOR", "=", "<>"]);
-            let count = if word.len() < 3 && word != "OR" {
-                2
-            } else {
-                2 + dice.below(2)
-            };
+            let count = if word.len() < 3 && word != "OR" { 2 } else { 2 + dice.below(2) };
             Truth::Join(word, (0..count).map(|_| truth(dice, depth - 1)).collect())
         }
         _ => {

@@ -77,11 +77,7 @@ pub(super) fn statements(
     for step in &chart.steps {
         let span = step.name.span();
         let name = step.name.as_str();
-        let last = assign(
-            path(name, Some("last"), &span),
-            part(name, "X", &span),
-            &span,
-        );
+        let last = assign(path(name, Some("last"), &span), part(name, "X", &span), &span);
         writer.statements.push(last);
     }
     (writer.declarations, writer.statements)
@@ -89,8 +85,7 @@ pub(super) fn statements(
 
 impl Writer<'_> {
     fn error(&mut self, code: &'static str, message: String, span: Span) {
-        self.diagnostics
-            .push(Diagnostic::error(code, message, span));
+        self.diagnostics.push(Diagnostic::error(code, message, span));
     }
 
     /// A hidden variable; a name with a dot is none that a person can write.
@@ -104,12 +99,9 @@ impl Writer<'_> {
     /// A hidden TON.
     fn timer(&mut self, span: &Span) -> String {
         let name = format!("timer.{}", self.declarations.len());
-        let of = TypeName {
-            kind: TypeKind::Named(Name::new("TON", span.clone())),
-            span: span.clone(),
-        };
-        self.declarations
-            .push(declare(&name, Class::Local, of, None, span));
+        let of =
+            TypeName { kind: TypeKind::Named(Name::new("TON", span.clone())), span: span.clone() };
+        self.declarations.push(declare(&name, Class::Local, of, None, span));
         name
     }
 
@@ -120,12 +112,7 @@ impl Writer<'_> {
             let has = |names: &[Name]| names.iter().any(|name| name.is(step));
             has(&transition.from) && has(&transition.to)
         };
-        if self
-            .chart
-            .transitions
-            .iter()
-            .any(|transition| again(&transition))
-        {
+        if self.chart.transitions.iter().any(|transition| again(&transition)) {
             let begins = self.entered.get(&step.to_ascii_uppercase()).cloned();
             let begins =
                 begins.map(|fires| fires.iter().map(|name| variable(name, span)).collect());
@@ -148,8 +135,7 @@ impl Writer<'_> {
             if let Some(before) = seen.insert(step.name.key(), span.clone()) {
                 let message = format!("two steps are called `{name}`");
                 let found = Diagnostic::error("U1003", message, span);
-                self.diagnostics
-                    .push(found.with_related(before, "the first"));
+                self.diagnostics.push(found.with_related(before, "the first"));
                 continue;
             }
             let fields = [
@@ -161,16 +147,12 @@ impl Writer<'_> {
             let fields = fields.into_iter().map(|(field, of)| {
                 declare(field, Class::Local, elementary(of, &span), None, &span)
             });
-            let of = TypeName {
-                kind: TypeKind::Structure(fields.collect()),
-                span: span.clone(),
-            };
+            let of = TypeName { kind: TypeKind::Structure(fields.collect()), span: span.clone() };
             let initial = step.is_initial.then(|| {
                 let value = Initializer::Value(boolean(true, &span));
                 Initializer::Structure(vec![(Name::new("X", span.clone()), value)], span.clone())
             });
-            self.declarations
-                .push(declare(name, Class::Local, of, initial, &span));
+            self.declarations.push(declare(name, Class::Local, of, initial, &span));
             if step.is_initial {
                 let now = call("TIME", Vec::new(), &span);
                 first.push(assign(path(name, Some("since"), &span), now, &span));
@@ -209,16 +191,10 @@ impl Writer<'_> {
             if from.is_empty() {
                 continue;
             }
-            let steps = from
-                .iter()
-                .map(|name| part(name.as_str(), "X", &name.span()));
+            let steps = from.iter().map(|name| part(name.as_str(), "X", &name.span()));
             let mut rivals = Vec::new();
             for (other, fires) in &fired {
-                if chart.transitions[*other]
-                    .from
-                    .iter()
-                    .any(|name| from.contains(&name))
-                {
+                if chart.transitions[*other].from.iter().any(|name| from.contains(&name)) {
                     rivals.push(not(variable(fires, span)));
                 }
             }
@@ -226,24 +202,16 @@ impl Writer<'_> {
             // The condition is looked at only where it counts.
             condition = join(condition, Operator::AndThen, transition.condition.clone());
             let fires = self.hidden("fires", Elementary::Bool, span);
-            self.statements
-                .push(assign(path(&fires, None, span), condition, span));
+            self.statements.push(assign(path(&fires, None, span), condition, span));
             for name in transition.to.iter().filter(|name| known(name)) {
-                self.entered
-                    .entry(name.key())
-                    .or_default()
-                    .push(fires.clone());
+                self.entered.entry(name.key()).or_default().push(fires.clone());
             }
             fired.push((at, fires));
         }
         for is_end in [true, false] {
             for (at, fires) in &fired {
                 let transition = &chart.transitions[*at];
-                let steps = if is_end {
-                    &transition.from
-                } else {
-                    &transition.to
-                };
+                let steps = if is_end { &transition.from } else { &transition.to };
                 let mut body = Vec::new();
                 for step in steps.iter().filter(|name| known(name)) {
                     let (name, span) = (step.as_str(), &transition.span);
@@ -260,8 +228,7 @@ impl Writer<'_> {
                     }
                 }
                 let condition = variable(fires, &transition.span);
-                self.statements
-                    .push(when(condition, body, &transition.span));
+                self.statements.push(when(condition, body, &transition.span));
             }
         }
     }
@@ -308,11 +275,7 @@ impl Writer<'_> {
             _ => boolean(false, &span),
         };
         let is_timed = matches!(qualifier.as_str(), "L" | "D" | "DS");
-        let timer = if is_timed {
-            self.step_timer(step, &duration, &span)
-        } else {
-            String::new()
-        };
+        let timer = if is_timed { self.step_timer(step, &duration, &span) } else { String::new() };
         let is_over = || part(&timer, "Q", &span);
         match qualifier.as_str() {
             "" | "N" => deed.drives.push(is_active()),
@@ -323,12 +286,8 @@ impl Writer<'_> {
                 let ends = join(was_active(), Operator::And, not(is_active()));
                 deed.drives.push(ends);
             }
-            "L" => deed
-                .drives
-                .push(join(is_active(), Operator::And, not(is_over()))),
-            "D" => deed
-                .drives
-                .push(join(is_active(), Operator::And, is_over())),
+            "L" => deed.drives.push(join(is_active(), Operator::And, not(is_over()))),
+            "D" => deed.drives.push(join(is_active(), Operator::And, is_over())),
             "DS" => deed.sets.push(join(is_active(), Operator::And, is_over())),
             "SD" | "SL" => {
                 let stored = self.hidden("stored", Elementary::Bool, &span);
@@ -339,13 +298,8 @@ impl Writer<'_> {
                 let given = [("IN", variable(&stored, &span)), ("PT", duration)];
                 deed.timers.push(invoke(&timer, given, &span));
                 let passed = part(&timer, "Q", &span);
-                let passed = if qualifier == "SD" {
-                    passed
-                } else {
-                    not(passed)
-                };
-                deed.drives
-                    .push(join(variable(&stored, &span), Operator::And, passed));
+                let passed = if qualifier == "SD" { passed } else { not(passed) };
+                deed.drives.push(join(variable(&stored, &span), Operator::And, passed));
                 deed.memories.push(stored);
             }
             _ => {
@@ -359,11 +313,7 @@ impl Writer<'_> {
 
     fn deed(&mut self, name: &Name, mut deed: Deed) {
         let span = name.span();
-        let action = self
-            .chart
-            .actions
-            .iter()
-            .find(|action| action.name == *name);
+        let action = self.chart.actions.iter().find(|action| action.name == *name);
         self.statements.append(&mut deed.before);
         let mut memories = std::mem::take(&mut deed.memories);
         if !deed.sets.is_empty() || !deed.resets.is_empty() && memories.is_empty() {

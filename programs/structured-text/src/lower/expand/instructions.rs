@@ -81,10 +81,7 @@ pub(super) fn statements(
         is_over: false,
         diagnostics,
     };
-    for label in list
-        .iter()
-        .filter_map(|instruction| instruction.label.as_ref())
-    {
+    for label in list.iter().filter_map(|instruction| instruction.label.as_ref()) {
         let part = writer.labels.len() as i128 + 1;
         if writer.labels.insert(label.key(), part).is_some() {
             let message = format!("two labels are called `{label}`");
@@ -146,8 +143,7 @@ fn operation(word: &str) -> Option<(Operator, bool, bool)> {
 
 impl Writer<'_> {
     fn error(&mut self, code: &'static str, message: String, span: Span) {
-        self.diagnostics
-            .push(Diagnostic::error(code, message, span));
+        self.diagnostics.push(Diagnostic::error(code, message, span));
     }
 
     /// Reports a result that nothing has taken.
@@ -199,8 +195,7 @@ impl Writer<'_> {
         }
         let name = format!("list.{}", self.declarations.len());
         let of = elementary(Elementary::Bool, span);
-        self.declarations
-            .push(declare(&name, Class::Temporary, of, None, span));
+        self.declarations.push(declare(&name, Class::Temporary, of, None, span));
         self.push(assign(path(&name, None, span), value, span));
         self.result = Some(variable(&name, span));
         self.result.clone()
@@ -209,13 +204,10 @@ impl Writer<'_> {
     fn instruction(&mut self, instruction: &Instruction) {
         let span = &instruction.span;
         let word = instruction.operator.as_str();
-        let first = instruction
-            .operands
-            .iter()
-            .find_map(|operand| match operand {
-                Argument::Placed(value) => Some(value.clone()),
-                _ => None,
-            });
+        let first = instruction.operands.iter().find_map(|operand| match operand {
+            Argument::Placed(value) => Some(value.clone()),
+            _ => None,
+        });
         match word {
             "" => {}
             ")" => self.close(span),
@@ -315,11 +307,7 @@ impl Writer<'_> {
                 self.error("U1017", message, span.clone());
                 return;
             }
-            self.open.push(Open {
-                before: Some(before),
-                operator,
-                negated,
-            });
+            self.open.push(Open { before: Some(before), operator, negated });
             self.result = first;
             return;
         }
@@ -411,10 +399,7 @@ impl Writer<'_> {
         }
         arguments.extend(instruction.operands.iter().cloned());
         let name = path(&instruction.operator, None, span);
-        let value = Expression {
-            kind: ExpressionKind::Call(name, arguments),
-            span: span.clone(),
-        };
+        let value = Expression { kind: ExpressionKind::Call(name, arguments), span: span.clone() };
         self.result = Some(value);
         self.idle = Some(span.clone());
     }

@@ -77,10 +77,7 @@ fn pointer(unit: &mut Unit, at: usize) -> Option<()> {
         let Body::Statements(statements) = &mut method.body else {
             return None;
         };
-        let hides = method
-            .declarations
-            .iter()
-            .any(|found| found.name == follower.name);
+        let hides = method.declarations.iter().any(|found| found.name == follower.name);
         if !hides {
             follower.statements(statements)?;
         }
@@ -115,9 +112,7 @@ struct Follower {
 
 impl Follower {
     fn statements(&mut self, statements: &mut [Statement]) -> Option<()> {
-        statements
-            .iter_mut()
-            .try_for_each(|statement| self.statement(statement))
+        statements.iter_mut().try_for_each(|statement| self.statement(statement))
     }
 
     fn statement(&mut self, statement: &mut Statement) -> Option<()> {
@@ -177,12 +172,10 @@ impl Follower {
     }
 
     fn arguments(&mut self, arguments: &mut [Argument]) -> Option<()> {
-        arguments
-            .iter_mut()
-            .try_for_each(|argument| match argument {
-                Argument::Placed(value) | Argument::Given(_, value) => self.expression(value),
-                Argument::Taken { to, .. } => self.path(to),
-            })
+        arguments.iter_mut().try_for_each(|argument| match argument {
+            Argument::Placed(value) | Argument::Given(_, value) => self.expression(value),
+            Argument::Taken { to, .. } => self.path(to),
+        })
     }
 
     /// A variable that is not a pointer, or an input that is followed.
@@ -198,9 +191,7 @@ impl Follower {
 
     fn indices(&mut self, path: &mut Path) -> Option<()> {
         path.steps.iter_mut().try_for_each(|step| match step {
-            Step::Index(indices) => indices
-                .iter_mut()
-                .try_for_each(|index| self.expression(index)),
+            Step::Index(indices) => indices.iter_mut().try_for_each(|index| self.expression(index)),
             _ => Some(()),
         })
     }
@@ -218,8 +209,7 @@ impl Follower {
             ExpressionKind::Not(inner) | ExpressionKind::Minus(inner) => self.expression(inner),
             ExpressionKind::Chain(first, rest) => {
                 self.expression(first)?;
-                rest.iter_mut()
-                    .try_for_each(|(_, value)| self.expression(value))
+                rest.iter_mut().try_for_each(|(_, value)| self.expression(value))
             }
             ExpressionKind::Call(path, arguments) => {
                 self.path(path)?;
@@ -311,11 +301,7 @@ impl Follower {
                     ),
                     span: span.clone(),
                 };
-                Some(join(
-                    own,
-                    Operator::Add,
-                    join(from, Operator::Multiply, size),
-                ))
+                Some(join(own, Operator::Add, join(from, Operator::Multiply, size)))
             }
             _ => None,
         }
@@ -335,10 +321,8 @@ impl Follower {
         value: Option<Expression>,
         span: &Span,
     ) -> Option<Expression> {
-        let target = Expression {
-            kind: ExpressionKind::Variable(self.target.clone()?),
-            span: span.clone(),
-        };
+        let target =
+            Expression { kind: ExpressionKind::Variable(self.target.clone()?), span: span.clone() };
         let of = variable(self.element.as_ref()?.as_str(), span);
         let mut values = vec![target, distance, of];
         values.extend(value);

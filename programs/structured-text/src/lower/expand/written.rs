@@ -25,17 +25,11 @@ pub(super) fn part(name: &str, part: &str, span: &Span) -> Expression {
 }
 
 pub(super) fn of_path(path: Path) -> Expression {
-    Expression {
-        span: path.span.clone(),
-        kind: ExpressionKind::Variable(path),
-    }
+    Expression { span: path.span.clone(), kind: ExpressionKind::Variable(path) }
 }
 
 pub(super) fn literal(literal: Literal, span: &Span) -> Expression {
-    Expression {
-        kind: ExpressionKind::Literal(literal),
-        span: span.clone(),
-    }
+    Expression { kind: ExpressionKind::Literal(literal), span: span.clone() }
 }
 
 pub(super) fn boolean(value: bool, span: &Span) -> Expression {
@@ -47,10 +41,7 @@ pub(super) fn integer(value: i128, span: &Span) -> Expression {
 }
 
 pub(super) fn not(value: Expression) -> Expression {
-    Expression {
-        span: value.span.clone(),
-        kind: ExpressionKind::Not(Box::new(value)),
-    }
+    Expression { span: value.span.clone(), kind: ExpressionKind::Not(Box::new(value)) }
 }
 
 pub(super) fn join(left: Expression, operator: Operator, right: Expression) -> Expression {
@@ -61,17 +52,11 @@ pub(super) fn join(left: Expression, operator: Operator, right: Expression) -> E
             if rest.iter().all(|(found, _)| *found == operator) && is_chained(operator) =>
         {
             rest.push((operator, right));
-            Expression {
-                kind: ExpressionKind::Chain(first, rest),
-                span,
-            }
+            Expression { kind: ExpressionKind::Chain(first, rest), span }
         }
         kind => Expression {
             kind: ExpressionKind::Chain(
-                Box::new(Expression {
-                    kind,
-                    span: span.clone(),
-                }),
+                Box::new(Expression { kind, span: span.clone() }),
                 vec![(operator, right)],
             ),
             span,
@@ -80,16 +65,11 @@ pub(super) fn join(left: Expression, operator: Operator, right: Expression) -> E
 }
 
 fn is_chained(operator: Operator) -> bool {
-    matches!(
-        operator,
-        Operator::And | Operator::Or | Operator::AndThen | Operator::Add
-    )
+    matches!(operator, Operator::And | Operator::Or | Operator::AndThen | Operator::Add)
 }
 
 pub(super) fn all(values: Vec<Expression>, operator: Operator, span: &Span) -> Expression {
-    let joined = values
-        .into_iter()
-        .reduce(|left, right| join(left, operator, right));
+    let joined = values.into_iter().reduce(|left, right| join(left, operator, right));
     joined.unwrap_or_else(|| boolean(operator == Operator::And, span))
 }
 
@@ -108,10 +88,7 @@ pub(super) fn invoke<const N: usize>(
 
 pub(super) fn call(name: &str, arguments: Vec<Expression>, span: &Span) -> Expression {
     let arguments = arguments.into_iter().map(Argument::Placed).collect();
-    Expression {
-        kind: ExpressionKind::Call(path(name, None, span), arguments),
-        span: span.clone(),
-    }
+    Expression { kind: ExpressionKind::Call(path(name, None, span), arguments), span: span.clone() }
 }
 
 /// TIME() - since
@@ -120,11 +97,7 @@ pub(super) fn since(moment: Expression, span: &Span) -> Expression {
 }
 
 pub(super) fn statement(kind: StatementKind, span: &Span) -> Statement {
-    Statement {
-        kind,
-        span: span.clone(),
-        comments: Vec::new(),
-    }
+    Statement { kind, span: span.clone(), comments: Vec::new() }
 }
 
 pub(super) fn assign(to: Path, value: Expression, span: &Span) -> Statement {
@@ -136,10 +109,7 @@ pub(super) fn when(condition: Expression, body: Vec<Statement>, span: &Span) -> 
 }
 
 pub(super) fn elementary(of: Elementary, span: &Span) -> TypeName {
-    TypeName {
-        kind: TypeKind::Named(Name::new(of.name(), span.clone())),
-        span: span.clone(),
-    }
+    TypeName { kind: TypeKind::Named(Name::new(of.name(), span.clone())), span: span.clone() }
 }
 
 pub(super) fn declare(

@@ -90,11 +90,7 @@ impl Lowering<'_> {
                         let (least, most) = limits(hinted);
                         least <= *value && *value <= most
                     };
-                    if fits {
-                        hinted
-                    } else {
-                        Number::Integer(*value).default_type()
-                    }
+                    if fits { hinted } else { Number::Integer(*value).default_type() }
                 }
                 _ => value.default_type(),
             };

@@ -58,10 +58,7 @@ impl Conversion {
             return Some(Self::Truncate(None, Some(elementary(to)?)));
         }
         if let Some((from, to)) = key.split_once("_TRUNC_") {
-            return Some(Self::Truncate(
-                Some(elementary(from)?),
-                Some(elementary(to)?),
-            ));
+            return Some(Self::Truncate(Some(elementary(from)?), Some(elementary(to)?)));
         }
         if let Some((from, to)) = key.split_once("_BCD_TO_") {
             return Some(Self::FromBcd(Some(elementary(from)?), elementary(to)?));
@@ -171,11 +168,7 @@ impl Lowering<'_> {
         let from = match (&value.of, to) {
             (Type::Text(_), End::Text) => return Some(value),
             (Type::Text(_), End::Elementary(to, _)) => {
-                return Some(text(
-                    TextOperation::To(to),
-                    vec![value],
-                    Type::Elementary(to),
-                ));
+                return Some(text(TextOperation::To(to), vec![value], Type::Elementary(to)));
             }
             (of, _) => of.elementary()?,
         };
@@ -208,11 +201,9 @@ impl Lowering<'_> {
         let hinted = hint.and_then(Type::elementary).filter(|of| of.is_integer());
         let to = to.or(hinted).unwrap_or(Elementary::Dint);
         match found.of.elementary() {
-            Some(from) if from.is_real() => Some(apply(
-                Operation::Truncate(from, to),
-                vec![found],
-                Type::Elementary(to),
-            )),
+            Some(from) if from.is_real() => {
+                Some(apply(Operation::Truncate(from, to), vec![found], Type::Elementary(to)))
+            }
             Some(from) if is_whole(from) => Some(convert(found, to)),
             _ => self.not_a_number(&found, &value.span),
         }
@@ -229,11 +220,7 @@ fn from_time(value: Expression, unit: i64, to: Elementary) -> Expression {
         let double = Type::Elementary(Elementary::Lreal);
         let value = convert(value, Elementary::Lreal);
         let unit = convert(lint(unit), Elementary::Lreal);
-        let value = apply(
-            Operation::Divide(Elementary::Lreal),
-            vec![value, unit],
-            double,
-        );
+        let value = apply(Operation::Divide(Elementary::Lreal), vec![value, unit], double);
         return convert(value, to);
     }
     if to == Elementary::Bool {
@@ -248,11 +235,7 @@ fn to_time(value: Expression, from: Elementary, to: Elementary, unit: i64) -> Ex
         let double = Type::Elementary(Elementary::Lreal);
         let value = convert(value, Elementary::Lreal);
         let unit = convert(lint(unit), Elementary::Lreal);
-        let value = apply(
-            Operation::Multiply(Elementary::Lreal),
-            vec![value, unit],
-            double,
-        );
+        let value = apply(Operation::Multiply(Elementary::Lreal), vec![value, unit], double);
         return convert(value, to);
     }
     let value = convert(value, Elementary::Lint);

@@ -75,10 +75,7 @@ impl Lowering<'_> {
             self.error_with("U1049", message, span.clone(), help);
             return None;
         }
-        Some(Values {
-            of: found.into_iter().flatten().collect(),
-            enable,
-        })
+        Some(Values { of: found.into_iter().flatten().collect(), enable })
     }
 }
 

@@ -116,10 +116,8 @@ fn within(distance: Expression, most: i64, value: Expression) -> Expression {
         let operation = Operation::Compare(comparison, Elementary::Lint);
         apply(operation, operands, bool.clone())
     };
-    let (least, most) = (
-        compare(Comparison::GreaterOrEqual, 0),
-        compare(Comparison::LessOrEqual, most),
-    );
+    let (least, most) =
+        (compare(Comparison::GreaterOrEqual, 0), compare(Comparison::LessOrEqual, most));
     let operands = vec![least, most];
     let is_within = apply(Operation::And(Elementary::Bool), operands, bool);
     let which = choose(is_within, lint(0), lint(1));
@@ -139,8 +137,5 @@ fn element(distance: Expression, size: i64) -> Expression {
     let bool = Type::Elementary(Elementary::Bool);
     let operation = Operation::Compare(Comparison::Equal, Elementary::Lint);
     let is_whole = apply(operation, vec![rest, lint(0)], bool);
-    convert(
-        choose(is_whole, parted(Operation::Divide), lint(-1)),
-        Elementary::Lint,
-    )
+    convert(choose(is_whole, parted(Operation::Divide), lint(-1)), Elementary::Lint)
 }

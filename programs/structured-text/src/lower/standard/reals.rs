@@ -46,11 +46,7 @@ impl Lowering<'_> {
         hint: Option<&Type>,
     ) -> Option<Expression> {
         let (value, of) = self.real_value(value, hint)?;
-        Some(apply(
-            Operation::Real(function, of),
-            vec![value],
-            Type::Elementary(of),
-        ))
+        Some(apply(Operation::Real(function, of), vec![value], Type::Elementary(of)))
     }
 
     /// FLOOR, CEIL, ROUND: of the type that is wanted, DINT where none is.
@@ -62,11 +58,7 @@ impl Lowering<'_> {
     ) -> Option<Expression> {
         let (value, of) = self.real_value(value, hint)?;
         let real = |function, value| {
-            apply(
-                Operation::Real(function, of),
-                vec![value],
-                Type::Elementary(of),
-            )
+            apply(Operation::Real(function, of), vec![value], Type::Elementary(of))
         };
         let rounded = match key {
             "FLOOR" => real(RealFunction::Floor, value),
@@ -79,11 +71,7 @@ impl Lowering<'_> {
                     Type::Elementary(Elementary::Lint),
                 );
                 let operands = vec![value, convert(whole, of)];
-                return Some(apply(
-                    Operation::Subtract(of),
-                    operands,
-                    Type::Elementary(of),
-                ));
+                return Some(apply(Operation::Subtract(of), operands, Type::Elementary(of)));
             }
         };
         match hint.and_then(Type::elementary) {
@@ -103,11 +91,7 @@ impl Lowering<'_> {
             Some(of) if is_number(of) || of == Elementary::Time => {
                 let of = as_integer(of);
                 let found = reinterpret(found, of);
-                Some(apply(
-                    Operation::Absolute(of),
-                    vec![found],
-                    Type::Elementary(of),
-                ))
+                Some(apply(Operation::Absolute(of), vec![found], Type::Elementary(of)))
             }
             _ => self.not_a_number(&found, &value.span),
         }

@@ -59,16 +59,8 @@ impl Lowering<'_> {
                 }
                 let elementary = self.plain(key, &of, span)?;
                 let [least, value, most] = <[_; 3]>::try_from(values).ok()?;
-                let raised = apply(
-                    Operation::Maximum(elementary),
-                    vec![least, value],
-                    of.clone(),
-                );
-                Some(apply(
-                    Operation::Minimum(elementary),
-                    vec![most, raised],
-                    of,
-                ))
+                let raised = apply(Operation::Maximum(elementary), vec![least, value], of.clone());
+                Some(apply(Operation::Minimum(elementary), vec![most, raised], of))
             }
             _ => {
                 let (values, of) = self.alike(values, hint)?;
@@ -124,11 +116,7 @@ impl Lowering<'_> {
         let chosen = values.zip(1..).fold(first, |chosen, (value, at)| {
             let equal = Operation::Compare(Comparison::Equal, Elementary::Lint);
             let is_it = apply(equal, vec![number.clone(), lint(at)], bool.clone());
-            text(
-                TextOperation::Select,
-                vec![is_it, chosen, value],
-                of.clone(),
-            )
+            text(TextOperation::Select, vec![is_it, chosen, value], of.clone())
         });
         Some(chosen)
     }
@@ -147,11 +135,7 @@ impl Lowering<'_> {
         values.into_iter().reduce(|best, next| {
             let operands = vec![next.clone(), best.clone()];
             let is_better = text(TextOperation::Compare(comparison), operands, bool.clone());
-            text(
-                TextOperation::Select,
-                vec![is_better, best, next],
-                of.clone(),
-            )
+            text(TextOperation::Select, vec![is_better, best, next], of.clone())
         })
     }
 
@@ -166,21 +150,13 @@ impl Lowering<'_> {
         let (x, other) = self.real_value(values[1], hint)?;
         let of = common(of, other)?;
         let unit = *self.unit_names.get("ARC_TANGENT_OF_TWO")?;
-        let key = Key {
-            owner: Owner { unit, method: None },
-            class: None,
-            open: Vec::new(),
-        };
+        let key = Key { owner: Owner { unit, method: None }, class: None, open: Vec::new() };
         let routine = self.routine(key, span)?;
         let double = Type::Elementary(Elementary::Lreal);
-        let given = routine
-            .parameters
-            .iter()
-            .zip([y, x])
-            .map(|(parameter, value)| {
-                let to = place(Root::Frame(parameter.slot), double.clone());
-                Argument::Value(to, convert(value, Elementary::Lreal))
-            });
+        let given = routine.parameters.iter().zip([y, x]).map(|(parameter, value)| {
+            let to = place(Root::Frame(parameter.slot), double.clone());
+            Argument::Value(to, convert(value, Elementary::Lreal))
+        });
         let call = Call {
             routine: routine.id,
             own: None,
@@ -188,10 +164,7 @@ impl Lowering<'_> {
             outputs: Vec::new(),
             result: routine.result.clone(),
         };
-        let value = Expression {
-            of: double,
-            kind: ExpressionKind::Call(Box::new(call)),
-        };
+        let value = Expression { of: double, kind: ExpressionKind::Call(Box::new(call)) };
         Some(convert(value, of))
     }
 }

@@ -52,13 +52,10 @@ impl Lowering<'_> {
             "SHL" | "SHR" | "ROL" | "ROR" | "EXPT" => Some(1),
             _ => None,
         };
-        let given = values
-            .iter()
-            .enumerate()
-            .map(|(at, value)| match other == Some(at) {
-                true => (*value).clone(),
-                false => mark(value, typed.of),
-            });
+        let given = values.iter().enumerate().map(|(at, value)| match other == Some(at) {
+            true => (*value).clone(),
+            false => mark(value, typed.of),
+        });
         let given: Vec<Expression> = given.collect();
         let given: Vec<&Expression> = given.iter().collect();
         let of = Type::Elementary(typed.of);
@@ -74,8 +71,5 @@ fn mark(value: &Expression, of: Elementary) -> Expression {
         steps: Vec::new(),
         span: span.clone(),
     };
-    Expression {
-        kind: ExpressionKind::Call(path, vec![Argument::Placed(value.clone())]),
-        span,
-    }
+    Expression { kind: ExpressionKind::Call(path, vec![Argument::Placed(value.clone())]), span }
 }

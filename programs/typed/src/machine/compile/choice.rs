@@ -62,14 +62,7 @@ fn is_next(place: &Place, value: &Expression) -> bool {
     let ExpressionKind::Apply(Operation::Add(of), operands) = &value.kind else {
         return false;
     };
-    let [
-        Expression {
-            kind: ExpressionKind::Load(loaded),
-            ..
-        },
-        added,
-    ] = &**operands
-    else {
+    let [Expression { kind: ExpressionKind::Load(loaded), .. }, added] = &**operands else {
         return false;
     };
     let is_one = matches!(added.kind, ExpressionKind::Constant(1));

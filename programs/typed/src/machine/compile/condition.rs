@@ -44,11 +44,7 @@ impl Compiler<'_> {
             }
             _ => {
                 let operand = self.operand(condition);
-                let code = if wanted {
-                    Code::JumpIf
-                } else {
-                    Code::JumpUnless
-                };
+                let code = if wanted { Code::JumpIf } else { Code::JumpUnless };
                 self.jump(code, operand, 0, to);
             }
         }
@@ -119,19 +115,11 @@ fn jumping(code: Code, wanted: bool) -> (Code, bool) {
         Code::EqualReal => (Code::JumpEqualReal, Code::JumpNotEqualReal, false),
         Code::NotEqualReal => (Code::JumpNotEqualReal, Code::JumpEqualReal, false),
         Code::LessReal => (Code::JumpLessReal, Code::JumpNotLessReal, false),
-        Code::LessOrEqualReal => (
-            Code::JumpLessOrEqualReal,
-            Code::JumpNotLessOrEqualReal,
-            false,
-        ),
+        Code::LessOrEqualReal => (Code::JumpLessOrEqualReal, Code::JumpNotLessOrEqualReal, false),
         Code::EqualLreal => (Code::JumpEqualLreal, Code::JumpNotEqualLreal, false),
         Code::NotEqualLreal => (Code::JumpNotEqualLreal, Code::JumpEqualLreal, false),
         Code::LessLreal => (Code::JumpLessLreal, Code::JumpNotLessLreal, false),
-        _ => (
-            Code::JumpLessOrEqualLreal,
-            Code::JumpNotLessOrEqualLreal,
-            false,
-        ),
+        _ => (Code::JumpLessOrEqualLreal, Code::JumpNotLessOrEqualLreal, false),
     };
     match wanted {
         true => (if_true, false),

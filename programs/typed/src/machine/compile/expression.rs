@@ -46,11 +46,7 @@ impl Compiler<'_> {
         later: impl IntoIterator<Item = &'e Expression>,
     ) -> u32 {
         let operand = self.operand(expression);
-        if later.into_iter().any(calls) {
-            self.kept(operand)
-        } else {
-            operand
-        }
+        if later.into_iter().any(calls) { self.kept(operand) } else { operand }
     }
 
     /// Several operands, each of which keeps its value.
@@ -153,10 +149,7 @@ impl Compiler<'_> {
         if self.apply_fast(operation, operands, to).is_some() {
             return;
         }
-        self.tables.applications.push(Application {
-            operation,
-            operands: operands.into(),
-        });
+        self.tables.applications.push(Application { operation, operands: operands.into() });
         let table = self.tables.applications.len() as u32 - 1;
         self.emit(Code::Apply, to, table, 0);
     }
@@ -251,11 +244,7 @@ impl Compiler<'_> {
     }
 
     fn convert(&mut self, from: Elementary, target: Elementary, value: u32, to: u32) -> Option<()> {
-        let unused = if from.is_signed() {
-            64 - from.bits()
-        } else {
-            0
-        };
+        let unused = if from.is_signed() { 64 - from.bits() } else { 0 };
         match (from, target) {
             (Elementary::Real, Elementary::Lreal) => self.emit(Code::RealToLreal, to, value, 0),
             (Elementary::Lreal, Elementary::Real) => self.emit(Code::LrealToReal, to, value, 0),
@@ -326,24 +315,12 @@ fn binary(operation: Operation) -> Option<Code> {
         O::Divide(Real) => Code::DivideReal,
         O::Divide(Lreal) => Code::DivideLreal,
         O::Add(of) => width(of, [Code::Add8, Code::Add16, Code::Add32, Code::Add64])?,
-        O::Subtract(of) => width(
-            of,
-            [
-                Code::Subtract8,
-                Code::Subtract16,
-                Code::Subtract32,
-                Code::Subtract64,
-            ],
-        )?,
-        O::Multiply(of) => width(
-            of,
-            [
-                Code::Multiply8,
-                Code::Multiply16,
-                Code::Multiply32,
-                Code::Multiply64,
-            ],
-        )?,
+        O::Subtract(of) => {
+            width(of, [Code::Subtract8, Code::Subtract16, Code::Subtract32, Code::Subtract64])?
+        }
+        O::Multiply(of) => {
+            width(of, [Code::Multiply8, Code::Multiply16, Code::Multiply32, Code::Multiply64])?
+        }
         O::Divide(of) if !of.is_signed() => Code::DivideU,
         O::Modulo(of) if !of.is_signed() => Code::ModuloU,
         O::Divide(of) => match of.bits() {
@@ -379,18 +356,12 @@ fn width(of: Elementary, codes: [Code; 4]) -> Option<Code> {
 /// Instructions for =, <>, < and <= of a type.
 pub(super) fn comparing(comparison: Comparison, of: Elementary) -> Compared {
     let [equal, not_equal, less, less_or_equal] = match of {
-        Elementary::Real => [
-            Code::EqualReal,
-            Code::NotEqualReal,
-            Code::LessReal,
-            Code::LessOrEqualReal,
-        ],
-        Elementary::Lreal => [
-            Code::EqualLreal,
-            Code::NotEqualLreal,
-            Code::LessLreal,
-            Code::LessOrEqualLreal,
-        ],
+        Elementary::Real => {
+            [Code::EqualReal, Code::NotEqualReal, Code::LessReal, Code::LessOrEqualReal]
+        }
+        Elementary::Lreal => {
+            [Code::EqualLreal, Code::NotEqualLreal, Code::LessLreal, Code::LessOrEqualLreal]
+        }
         _ => {
             let [less, less_or_equal] = match (of.is_signed(), of.bits()) {
                 (true, 8) => [Code::LessS8, Code::LessOrEqualS8],

@@ -51,11 +51,7 @@ impl Compiler<'_> {
                     mask: of.mask(),
                     extension,
                 });
-                if is_part {
-                    Location::Packed(table, value)
-                } else {
-                    Location::Word(table, value)
-                }
+                if is_part { Location::Packed(table, value) } else { Location::Word(table, value) }
             }
             _ => Location::Address(self.address(place)),
         }

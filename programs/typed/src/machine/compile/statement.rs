@@ -20,11 +20,7 @@ impl Compiler<'_> {
             StatementKind::Assign(place, value) => self.assign(place, value),
             StatementKind::Bind(slot, place) => {
                 let address = self.address(place);
-                let address = if place_calls(slot) {
-                    self.kept(address)
-                } else {
-                    address
-                };
+                let address = if place_calls(slot) { self.kept(address) } else { address };
                 let holder = self.location(&slot.holder(), Elementary::Lword);
                 self.store(holder, Elementary::Lword, address);
             }
@@ -202,13 +198,7 @@ impl Compiler<'_> {
         let by = self.operand(&each.by);
         let by = self.kept(by);
         let charge = self.costs.turn(&statement.kind).unwrap_or(0);
-        self.tables.loops.push(Loop {
-            of,
-            counter: slot,
-            limit,
-            by,
-            turn: charge,
-        });
+        self.tables.loops.push(Loop { of, counter: slot, limit, by, turn: charge });
         let table = self.tables.loops.len() as u32 - 1;
         let (turn, next, end) = (self.label(), self.label(), self.label());
         // The value that was assigned, and not what evaluating the bounds may have made of it, is what both engines test.

@@ -56,21 +56,11 @@ impl Walk<'_> {
                 self.pass(place, power);
             }
             Kind::Transition(_) => {
-                let input = object
-                    .inputs
-                    .iter()
-                    .position(|pin| pin.name.as_str() == CONDITION);
+                let input = object.inputs.iter().position(|pin| pin.name.as_str() == CONDITION);
                 let power = self.power(place, input.unwrap_or(0));
                 let target = Name::at(wired(object), object.span.clone());
                 let targets = vec![(target, Modifier::default())];
-                self.step(
-                    place,
-                    Action::Write {
-                        targets,
-                        power,
-                        guard: None,
-                    },
-                );
+                self.step(place, Action::Write { targets, power, guard: None });
             }
             Kind::Jump(label) => self.jump(place, Some(label.clone()), diagnostics),
             Kind::Return => self.jump(place, None, diagnostics),
@@ -99,14 +89,7 @@ impl Walk<'_> {
             return;
         }
         self.powers[place] = Some(Power::Kept(place));
-        self.step(
-            place,
-            Action::Keep {
-                object: place,
-                power,
-                guard,
-            },
-        );
+        self.step(place, Action::Keep { object: place, power, guard });
     }
 
     fn step(&mut self, place: usize, action: Action) {
@@ -121,10 +104,7 @@ impl Walk<'_> {
 
     /// Coils that follow each other on the same wires are one step.
     fn coil(&mut self, place: usize, variable: &Name, modifier: Modifier) {
-        let sources = self.links.sources[place]
-            .first()
-            .cloned()
-            .unwrap_or_default();
+        let sources = self.links.sources[place].first().cloned().unwrap_or_default();
         if self.last_coils.as_ref() == Some(&sources)
             && let Some(step) = self.plan.steps.last_mut()
             && let Action::Write { targets, .. } = &mut step.action
@@ -135,14 +115,7 @@ impl Walk<'_> {
         }
         let power = self.power(place, 0);
         let targets = vec![(variable.clone(), modifier)];
-        self.step(
-            place,
-            Action::Write {
-                targets,
-                power,
-                guard: None,
-            },
-        );
+        self.step(place, Action::Write { targets, power, guard: None });
         self.last_coils = Some(sources);
     }
 
@@ -158,24 +131,14 @@ impl Walk<'_> {
             unconnected(object, "the variable", diagnostics);
             return;
         }
-        let sources = self.links.sources[place]
-            .first()
-            .cloned()
-            .unwrap_or_default();
+        let sources = self.links.sources[place].first().cloned().unwrap_or_default();
         let guard = match sources.as_slice() {
             [Source::Output(from, _)] => self.guards.get(from).cloned(),
             _ => None,
         };
         let power = self.power(place, 0);
         let targets = vec![(variable.clone(), modifier)];
-        self.step(
-            place,
-            Action::Write {
-                targets,
-                power,
-                guard,
-            },
-        );
+        self.step(place, Action::Write { targets, power, guard });
     }
 
     fn jump(&mut self, place: usize, label: Option<Name>, diagnostics: &mut Vec<Diagnostic>) {
@@ -226,11 +189,7 @@ impl Walk<'_> {
             .inputs(place)
             .into_iter()
             .map(|input| {
-                let power = if input.modifier.negated {
-                    input.power.not()
-                } else {
-                    input.power
-                };
+                let power = if input.modifier.negated { input.power.not() } else { input.power };
                 (input.pin, power)
             })
             .collect();
@@ -254,11 +213,7 @@ fn function(name: &Name, inputs: Vec<(Name, Power)>) -> Power {
 }
 
 pub(super) fn read(text: &Name, modifier: Modifier, object: usize) -> Power {
-    let read = Power::Read(Read {
-        text: text.clone(),
-        edge: modifier.edge,
-        object,
-    });
+    let read = Power::Read(Read { text: text.clone(), edge: modifier.edge, object });
     if modifier.negated { read.not() } else { read }
 }
 

@@ -31,17 +31,13 @@ impl Network<'_> {
                 if let Some(first) = places.insert(key, step.span.clone()) {
                     let message = format!("two labels are called `{name}`");
                     let error = Diagnostic::error("U1016", message, step.span.clone());
-                    self.diagnostics
-                        .push(error.with_related(first, "the first"));
+                    self.diagnostics.push(error.with_related(first, "the first"));
                 }
             }
         }
         let mut jumps = false;
         for step in &plan.steps {
-            if let Action::Jump {
-                label: Some(label), ..
-            } = &step.action
-            {
+            if let Action::Jump { label: Some(label), .. } = &step.action {
                 jumps = true;
                 if !labels.contains_key(&label.to_uppercase()) {
                     let message = format!("a jump goes to `{label}`, and no label is called so");
@@ -118,16 +114,10 @@ impl Network<'_> {
                 };
                 self.push(make::when(condition, body, span));
             }
-            Action::Write {
-                targets,
-                power,
-                guard,
-            } => self.write(targets, power, guard.as_ref(), span),
-            Action::Keep {
-                object,
-                power,
-                guard,
-            } => {
+            Action::Write { targets, power, guard } => {
+                self.write(targets, power, guard.as_ref(), span)
+            }
+            Action::Keep { object, power, guard } => {
                 let value = self.prepared(power, span);
                 let name = self.kept.get(object).cloned().unwrap_or_default();
                 let kept = make::assign(make::path(&name, None, span), value, span);
@@ -211,9 +201,8 @@ impl Network<'_> {
         let statement = match found.filter(|found| found.kind == UnitKind::Function) {
             Some(_) => self.function_call(call, inputs, span),
             None => {
-                let inputs = inputs
-                    .into_iter()
-                    .map(|(pin, value)| Argument::Given(make::name(&pin), value));
+                let inputs =
+                    inputs.into_iter().map(|(pin, value)| Argument::Given(make::name(&pin), value));
                 let inputs = inputs.collect();
                 let path = self.instance(&call.instance);
                 make::statement(StatementKind::Call(path, inputs), span)
@@ -284,10 +273,7 @@ impl Network<'_> {
         }
         let span = call.instance.span();
         let message = format!("the block `{}` is not declared", call.instance);
-        let help = format!(
-            "declare the variable `{}` of type {}",
-            call.instance, call.type_name
-        );
+        let help = format!("declare the variable `{}` of type {}", call.instance, call.type_name);
         let found = if self.lacks_instances {
             let message = format!("{message}; it is read as a separate {}", call.type_name);
             Diagnostic::warning("U1012", message, span)

@@ -20,12 +20,7 @@ pub(super) enum What {
     Contact(ContactKind, String, Vec<Source>),
     Coil(CoilKind, String, Vec<Source>),
     /// Type, instance, inputs and outputs.
-    Block(
-        &'static str,
-        Option<String>,
-        Vec<(&'static str, Vec<Source>)>,
-        Vec<&'static str>,
-    ),
+    Block(&'static str, Option<String>, Vec<(&'static str, Vec<Source>)>, Vec<&'static str>),
     InVariable(String),
     Comment(String),
 }
@@ -44,11 +39,8 @@ impl Object {
         let id = number.to_string();
         let width = self.place.width.to_string();
         let height = self.place.height.to_string();
-        let common = [
-            ("localId", id.as_str()),
-            ("height", height.as_str()),
-            ("width", width.as_str()),
-        ];
+        let common =
+            [("localId", id.as_str()), ("height", height.as_str()), ("width", width.as_str())];
         match &self.what {
             What::LeftRail => {
                 tree.open("leftPowerRail", &common);
@@ -62,8 +54,7 @@ impl Object {
                 tree.open("rightPowerRail", &common);
                 position(tree, "position", self.place.x, self.place.y);
                 for end in ends {
-                    self.place
-                        .input(tree, end.y - self.place.y, std::slice::from_ref(end));
+                    self.place.input(tree, end.y - self.place.y, std::slice::from_ref(end));
                 }
                 tree.close("rightPowerRail");
             }

@@ -80,10 +80,8 @@ impl Writer<'_> {
             return;
         };
         let of = self.type_of(&value);
-        let is_open = matches!(
-            value.kind,
-            ExpressionKind::Literal(Literal::Integer { of: None, .. })
-        );
+        let is_open =
+            matches!(value.kind, ExpressionKind::Literal(Literal::Integer { of: None, .. }));
         if of.is_none() && !is_open {
             let message =
                 format!("the type of the result that continues at `{label}` is not known");
@@ -115,19 +113,14 @@ impl Writer<'_> {
 
     /// Declares the variables that were needed.
     pub(super) fn declare_carried(&mut self) {
-        let mut variables: Vec<Variable> = std::mem::take(&mut self.carried)
-            .variables
-            .into_values()
-            .collect();
+        let mut variables: Vec<Variable> =
+            std::mem::take(&mut self.carried).variables.into_values().collect();
         variables.sort_by_key(|variable| variable.span.start);
         for variable in variables {
             let span = &variable.span;
-            let of = variable
-                .of
-                .unwrap_or_else(|| elementary(Elementary::Dint, span));
+            let of = variable.of.unwrap_or_else(|| elementary(Elementary::Dint, span));
             let class = Class::Temporary;
-            self.declarations
-                .push(declare(&variable.name, class, of, None, span));
+            self.declarations.push(declare(&variable.name, class, of, None, span));
         }
     }
 
@@ -144,9 +137,7 @@ impl Writer<'_> {
             ExpressionKind::Literal(Literal::Integer { of, .. }) => (*of).and_then(known),
             ExpressionKind::Not(inner) | ExpressionKind::Minus(inner) => self.type_of(inner),
             ExpressionKind::Chain(_, rest)
-                if rest
-                    .iter()
-                    .any(|(operator, _)| matches!(operator, Operator::Compare(_))) =>
+                if rest.iter().any(|(operator, _)| matches!(operator, Operator::Compare(_))) =>
             {
                 known(Elementary::Bool)
             }
@@ -160,9 +151,7 @@ impl Writer<'_> {
                 [Step::Field(part)] if part.is("ET") => known(Elementary::Time),
                 [Step::Field(part)] if part.is("CV") => known(Elementary::Int),
                 [Step::Field(part)]
-                    if ["Q", "Q1", "QU", "QD", "X"]
-                        .iter()
-                        .any(|known| part.is(known)) =>
+                    if ["Q", "Q1", "QU", "QD", "X"].iter().any(|known| part.is(known)) =>
                 {
                     known(Elementary::Bool)
                 }
@@ -172,10 +161,7 @@ impl Writer<'_> {
                 let key = function.root.key();
                 if let Some((_, to)) = key.split_once("_TO_") {
                     let kind = TypeKind::Named(Name::new(to, span.clone()));
-                    return Some(TypeName {
-                        kind,
-                        span: span.clone(),
-                    });
+                    return Some(TypeName { kind, span: span.clone() });
                 }
                 arguments.iter().find_map(|argument| match argument {
                     crate::syntax::Argument::Placed(value)
@@ -188,12 +174,7 @@ impl Writer<'_> {
     }
 
     fn declared(&self, name: &Name, span: &Span) -> Option<TypeName> {
-        let of = match name
-            .as_str()
-            .get(..3)
-            .map(str::to_ascii_uppercase)
-            .as_deref()
-        {
+        let of = match name.as_str().get(..3).map(str::to_ascii_uppercase).as_deref() {
             Some("%IB" | "%QB" | "%MB") => Elementary::Byte,
             Some("%IW" | "%QW" | "%MW") => Elementary::Word,
             Some("%ID" | "%QD" | "%MD") => Elementary::Dword,
