@@ -61,6 +61,16 @@ pub struct Mission {
     pub unreliability_simplex: Option<f64>,
     /// 1 - R of TMR.
     pub unreliability_tmr: Option<f64>,
+    /// Density of the first failure of the paper's model, `dP2/dt` of (17), per hour.
+    pub density_paper_per_hour: Option<f64>,
+    /// Density of the first failure of the cluster as it is built.
+    pub density_cluster_per_hour: Option<f64>,
+    /// Density of the first failure of the full duplex.
+    pub density_duplex_per_hour: Option<f64>,
+    /// Density of the first failure without a spare.
+    pub density_simplex_per_hour: Option<f64>,
+    /// Density of the first failure of TMR.
+    pub density_tmr_per_hour: Option<f64>,
     /// Probability that all stations of the paper's model work, (15).
     pub p0: Option<f64>,
     /// Some box of it is down, (16).
@@ -87,7 +97,8 @@ pub fn calculate(options: &Options) -> Result<Answer, Vec<ReliabilityError>> {
         Some(hours) => {
             let hours = hours.get();
             let at = |chain: &Chain| chain.transient(hours, AfterFailure::Final).map_err(one);
-            let (cluster, simplex) = (at(&cluster_chain)?, at(&simplex.chain()?)?);
+            let simplex_chain = simplex.chain()?;
+            let (cluster, simplex) = (at(&cluster_chain)?, at(&simplex_chain)?);
             let states = at(&paper_chain)?;
             // In its first state all stations work.
             let p0 = states.probabilities[0];
@@ -107,6 +118,11 @@ pub fn calculate(options: &Options) -> Result<Answer, Vec<ReliabilityError>> {
                 unreliability_duplex: stated(duplex.failed),
                 unreliability_simplex: stated(simplex.failed),
                 unreliability_tmr: stated(tmr.failed),
+                density_paper_per_hour: stated(paper_chain.failure_density(&states)),
+                density_cluster_per_hour: stated(cluster_chain.failure_density(&cluster)),
+                density_duplex_per_hour: stated(duplex.density),
+                density_simplex_per_hour: stated(simplex_chain.failure_density(&simplex)),
+                density_tmr_per_hour: stated(tmr.density),
                 p0: stated(p0),
                 p1: stated(p1),
                 p2: stated(states.failed),
@@ -146,45 +162,58 @@ impl Answer {
                 "no spare",
                 n,
                 self.mttf_simplex_hours,
-                mission.map(|at| (at.reliability_simplex, at.unreliability_simplex)),
+                mission.map(|at| {
+                    (at.reliability_simplex, at.unreliability_simplex, at.density_simplex_per_hour)
+                }),
             ),
             (
                 "paper's model",
                 n + 1,
                 self.mttf_paper_hours,
-                mission.map(|at| (at.reliability_paper, at.unreliability_paper)),
+                mission.map(|at| {
+                    (at.reliability_paper, at.unreliability_paper, at.density_paper_per_hour)
+                }),
             ),
             (
                 "this cluster",
                 self.boxes,
                 self.mttf_cluster_hours,
-                mission.map(|at| (at.reliability_cluster, at.unreliability_cluster)),
+                mission.map(|at| {
+                    (at.reliability_cluster, at.unreliability_cluster, at.density_cluster_per_hour)
+                }),
             ),
             (
                 "full duplex",
                 2 * n,
                 self.mttf_duplex_hours,
-                mission.map(|at| (at.reliability_duplex, at.unreliability_duplex)),
+                mission.map(|at| {
+                    (at.reliability_duplex, at.unreliability_duplex, at.density_duplex_per_hour)
+                }),
             ),
             (
                 "TMR",
                 3 * n,
                 self.mttf_tmr_hours,
-                mission.map(|at| (at.reliability_tmr, at.unreliability_tmr)),
+                mission
+                    .map(|at| (at.reliability_tmr, at.unreliability_tmr, at.density_tmr_per_hour)),
             ),
         ];
         let mut text = format!("{:<14} {:>6} {:>14}", "", "boxes", "MTTF in h");
         let works = mission.map(|at| format!("R({} h)", grouped(at.mission_hours)));
         let width = works.as_ref().map_or(0, String::len).max(12);
         if let Some(works) = works {
-            let _ = write!(text, "  {works:<width$}  1 - R");
+            let _ = write!(text, "  {works:<width$}  {:<12} density per h", "1 - R");
         }
         text.push('\n');
         for (name, boxes, mean, at_end) in rows {
             let _ = write!(text, "{name:<14} {boxes:>6} {:>14}", grouped(mean));
-            if let Some((works, failed)) = at_end {
+            if let Some((works, failed, density)) = at_end {
                 let (works, failed) = (probability(works, 9), probability(failed, 9));
-                let _ = write!(text, "  {works:<width$}  {failed}");
+                let density = match density {
+                    Some(density) => format!("{density:.6e}"),
+                    None => probability(None, 9),
+                };
+                let _ = write!(text, "  {works:<width$}  {failed:<12} {density}");
             }
             text.push('\n');
         }

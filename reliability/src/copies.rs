@@ -25,6 +25,8 @@ pub struct Survival {
     pub working: f64,
     /// Probability of a failure until then.
     pub failed: f64,
+    /// Density of the first failure at that time, per hour.
+    pub density: f64,
 }
 
 impl System {
@@ -48,22 +50,26 @@ impl System {
     ) -> Result<Survival, Vec<ReliabilityError>> {
         self.check()?;
         let (kinds, lethal) = (self.copied(), self.lethal_to_copies());
-        let at = |chain: Chain| {
-            let found = chain.transient(hours, AfterFailure::Final);
-            found.map_err(|error| vec![error])
+        let at = |chain: Chain| match chain.transient(hours, AfterFailure::Final) {
+            Ok(found) => Ok((chain.failure_density(&found), found)),
+            Err(error) => Err(vec![error]),
         };
         let independent = self.crews.is_none_or(|crews| crews >= self.controller_count());
         if !independent {
-            let found = at(self.chain_of_copies(&kinds, lethal, copies)?)?;
-            return Ok(Survival { working: found.working, failed: found.failed });
+            let (density, found) = at(self.chain_of_copies(&kinds, lethal, copies)?)?;
+            return Ok(Survival { working: found.working, failed: found.failed, density });
         }
         let mut logarithm = -lethal * hours;
+        let mut hazard = lethal;
         for kind in kinds {
             let units = f64::from(kind.units);
             let alone = self.chain_of_copies(&[Kind { units: 1, ..kind }], 0.0, copies)?;
-            logarithm += units * at(alone)?.log_working();
+            let (density, found) = at(alone)?;
+            logarithm += units * found.log_working();
+            hazard += units * density / found.working;
         }
-        Ok(Survival { working: logarithm.exp(), failed: -logarithm.exp_m1() })
+        let working = logarithm.exp();
+        Ok(Survival { working, failed: -logarithm.exp_m1(), density: working * hazard })
     }
 
     /// Controllers by kind; kinds that cannot be told apart are one.

@@ -144,20 +144,11 @@ pub fn report_data(
 fn curve(chain: &Chain, from: f64, to: f64) -> Result<Vec<(f64, f64, f64)>, ReliabilityError> {
     let factor = (to / from).powf(1.0 / (CURVE_POINTS - 1) as f64);
     let hours: Vec<f64> = (0..CURVE_POINTS).map(|point| from * factor.powi(point as i32)).collect();
-    let lethal: Vec<f64> = (0..chain.states())
-        .map(|state| {
-            if chain.is_failure(state) {
-                return 0.0;
-            }
-            let exits = chain.successors(state).filter(|(to, _)| chain.is_failure(*to));
-            exits.map(|(_, rate)| rate).sum()
-        })
-        .collect();
     let found = chain.transients(&hours, AfterFailure::Final)?;
-    let points = hours.iter().zip(found).map(|(hours, at)| {
-        let density: f64 = at.probabilities.iter().zip(&lethal).map(|(p, rate)| p * rate).sum();
-        (*hours, at.working, density / at.working)
-    });
+    let points = hours
+        .iter()
+        .zip(found)
+        .map(|(hours, at)| (*hours, at.working, chain.failure_density(&at) / at.working));
     Ok(points.filter(|(_, alive, _)| *alive > 1e-9).collect())
 }
 

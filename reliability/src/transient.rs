@@ -51,6 +51,17 @@ pub enum AfterFailure {
 }
 
 impl Chain {
+    /// Density of the first failure at the time of `at`, per hour: the rate at which the states that work enter a failure.
+    pub fn failure_density(&self, at: &Transient) -> f64 {
+        let working = (0..self.states()).filter(|state| !self.is_failure(*state));
+        let flows = working.map(|state| {
+            let exits = self.successors(state).filter(|(to, _)| self.is_failure(*to));
+            let rate: f64 = exits.map(|(_, rate)| rate).sum();
+            at.probabilities[state] * rate
+        });
+        flows.sum()
+    }
+
     /// R(t): the probability that no failure state was met by `hours`.
     ///
     /// # Errors

@@ -40,6 +40,60 @@ fn twenty_controllers() {
     check(mission.reliability_duplex, paper(1).powi(20), "(21): (18) at N = 1");
     check(mission.reliability_tmr, paper(2).powi(20), "TMR: (18) at N = 2");
     check(mission.reliability_simplex, (-2.0_f64).exp(), "no spare");
+    let p1 = mission.p1.expect("P1");
+    check(mission.density_paper_per_hour, 20.0 * 1e-4 * p1, "dP2/dt of (14): N lambda P1");
+    check(mission.density_simplex_per_hour, 2e-3 * (-2.0_f64).exp(), "no spare");
+}
+
+/// The density is the derivative of 1 - R: for each configuration, with everything that the model has, a central difference agrees.
+#[test]
+fn the_density_is_the_derivative_of_the_unreliability() {
+    let plain = options(7);
+    let loaded = Options {
+        spares: 2,
+        coverage: 0.97,
+        beta: 0.02,
+        crews: Some(3),
+        detection: Some(hours("10min")),
+        shared: vec![SharedPart { name: "power".into(), mtbf: hours("50000h") }],
+        ..options(7)
+    };
+    for options in [plain, loaded] {
+        let at = |time: f64| {
+            let mission = Some(hours(&format!("{time}h")));
+            let options = Options { mission, ..options.clone() };
+            calculate(&options).expect("an answer").mission.expect("a mission")
+        };
+        for time in [1.0, 100.0, 5_000.0] {
+            let step = time / 256.0;
+            let (before, now, after) = (at(time - step), at(time), at(time + step));
+            let rows = [
+                (now.density_paper_per_hour, before.unreliability_paper, after.unreliability_paper),
+                (
+                    now.density_cluster_per_hour,
+                    before.unreliability_cluster,
+                    after.unreliability_cluster,
+                ),
+                (
+                    now.density_duplex_per_hour,
+                    before.unreliability_duplex,
+                    after.unreliability_duplex,
+                ),
+                (
+                    now.density_simplex_per_hour,
+                    before.unreliability_simplex,
+                    after.unreliability_simplex,
+                ),
+                (now.density_tmr_per_hour, before.unreliability_tmr, after.unreliability_tmr),
+            ];
+            for (place, (density, before, after)) in rows.into_iter().enumerate() {
+                let slope = (after.expect("1 - R") - before.expect("1 - R")) / (2.0 * step);
+                let density = density.expect("a density");
+                let apart = (density / slope - 1.0).abs();
+                assert!(apart < 1e-3, "{place} at {time} h: {density} and {slope}");
+            }
+        }
+    }
 }
 
 #[test]
