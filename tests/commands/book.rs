@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::{Component, Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Output};
 
 use crate::{empty_folder, understudy};
 
@@ -151,18 +151,35 @@ fn commands(body: &str) -> String {
     kept.flat_map(|line| [line, "\n"]).collect()
 }
 
+/// An empty folder with the examples and the scenarios in it.
+pub(crate) fn folder_of_examples(name: &str) -> PathBuf {
+    let folder = empty_folder(name);
+    for shared in ["examples", "scenarios"] {
+        symlink(root().join(shared), folder.join(shared)).expect("a link");
+    }
+    folder
+}
+
+/// Runs a text of commands as a person types it, with the binary that was built.
+pub(crate) fn shell(folder: &Path, commands: &str) -> Output {
+    let programs = Path::new(env!("CARGO_BIN_EXE_understudy")).parent().expect("a folder");
+    let path = std::env::var("PATH").unwrap_or_default();
+    Command::new("timeout")
+        .args(["300", "sh", "-e", "-c", commands])
+        .current_dir(folder)
+        .env("PATH", format!("{}:{path}", programs.display()))
+        .env_remove("COLUMNS")
+        .output()
+        .expect("a shell")
+}
+
 /// Writes the named blocks of a page and runs its `sh` blocks, in their order; says in which folder. Blocks of a `console` take another
 /// machine, a reader or minutes, or end with another status.
 fn walk_through(page: &Path) -> PathBuf {
     let text = fs::read_to_string(page).expect("a page");
     let name = page.strip_prefix(root()).expect("a page of the project");
     let name = name.display().to_string().replace('/', "_");
-    let folder = empty_folder(&format!("book_{name}"));
-    for shared in ["examples", "scenarios"] {
-        symlink(root().join(shared), folder.join(shared)).expect("a link");
-    }
-    let programs = Path::new(env!("CARGO_BIN_EXE_understudy")).parent().expect("a folder");
-    let path = std::env::var("PATH").unwrap_or_default();
+    let folder = folder_of_examples(&format!("book_{name}"));
     let blocks = blocks(&text);
     for (words, body) in &blocks {
         if let Some((_, file)) = words.split_once(' ') {
@@ -172,12 +189,7 @@ fn walk_through(page: &Path) -> PathBuf {
         }
     }
     for (_, body) in blocks.iter().filter(|(words, _)| words == "sh") {
-        let output = Command::new("timeout")
-            .args(["300", "sh", "-e", "-c", &commands(body)])
-            .current_dir(&folder)
-            .env("PATH", format!("{}:{path}", programs.display()))
-            .output()
-            .expect("a shell");
+        let output = shell(&folder, &commands(body));
         let said: String = String::from_utf8_lossy(&output.stderr).chars().take(1000).collect();
         assert!(output.status.success(), "{}:\n{body}\n{said}", page.display());
     }

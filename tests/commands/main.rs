@@ -19,6 +19,7 @@ mod model_check;
 mod named_files;
 mod next;
 mod others;
+mod papers;
 mod petri;
 mod program_faults;
 mod reconfigure;
