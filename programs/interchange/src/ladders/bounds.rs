@@ -137,7 +137,15 @@ pub(super) fn bounds(program: &Resolved) -> (Vec<Interval>, Vec<Diagnostic>) {
     analysis.is_last = true;
     let mut end = start;
     analysis.steps(&program.steps, &mut end);
-    (analysis.seen, analysis.diagnostics)
+    let mut seen = analysis.seen;
+    // What is always 0 needs no bit, but where the world reads it.
+    for (cell, interval) in program.cells.iter().zip(&mut seen) {
+        let is_number = matches!(cell.kind, Kind::Number { .. });
+        if is_number && cell.is_seen && interval.width().0 == 0 {
+            *interval = Interval::new(0, 1);
+        }
+    }
+    (seen, analysis.diagnostics)
 }
 
 /// The intervals at one place of the program, of the cells that are numbers.

@@ -44,6 +44,8 @@ pub(super) struct Cell {
     pub(super) role: Role,
     /// 0 or 1 for a truth.
     pub(super) initial: i64,
+    /// The world reads it, so it takes at least one bit.
+    pub(super) is_seen: bool,
     /// Its declaration gives the initial value.
     pub(super) is_given: bool,
     pub(super) address: Option<Address>,

@@ -224,6 +224,7 @@ impl Placing {
             kind: Kind::Truth,
             role,
             initial: 0,
+            is_seen: false,
             is_given: false,
             address: None,
             description: None,

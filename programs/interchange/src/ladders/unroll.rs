@@ -210,6 +210,11 @@ impl<'a> Unrolling<'a> {
                 self.cell(address, of)?;
             }
         }
+        // Parts of structures are no variables, and points all the same.
+        let points = program.inputs.iter().chain(program.outputs.iter());
+        for point in points.filter(|point| point.slot != 0) {
+            self.cell(64 * u64::from(point.slot), point.of)?;
+        }
         Ok(())
     }
 
@@ -277,6 +282,7 @@ impl<'a> Unrolling<'a> {
             kind,
             role,
             initial,
+            is_seen: role == Role::Output || address_of.is_some(),
             is_given: false,
             address: address_of.and_then(|address| parse_address(address.trim_start_matches('%'))),
             description: whole.and_then(|variable| variable.description.clone()),
@@ -359,6 +365,7 @@ impl<'a> Unrolling<'a> {
             kind,
             role,
             initial: 0,
+            is_seen: false,
             is_given: false,
             address: None,
             description: None,

@@ -39,7 +39,7 @@ pub(crate) struct Drawn {
 pub(crate) fn draw(project: &Project, pou: &Pou, plan: &Plan, period: Duration) -> Drawn {
     let mut drawing = Drawing {
         project,
-        scope: Scope::new(pou, &project.globals),
+        scope: Scope::new(pou, project),
         plan,
         period,
         program: Program {
@@ -184,7 +184,9 @@ impl Drawing<'_> {
                     coils.push(Coil { kind, target });
                 }
                 Some(Binding::Other(_) | Binding::Time(_) | Binding::Number(_))
-                    if matches!(power, Power::Output(..)) && !self.is_read(target) =>
+                    if matches!(power, Power::Output(..))
+                        && self.scope.is_private(target)
+                        && !self.is_read(target) =>
                 {
                     let what = format!(
                         "`{target}`, which shows a number or time of a block and which nothing reads,"
@@ -237,6 +239,11 @@ impl Drawing<'_> {
     }
 
     fn finish(mut self) -> Drawn {
+        // An output is read by the world, whatever writes it.
+        for output in self.scope.outputs_of_numbers() {
+            let what = format!("the output `{}`, a {},", output.name, output.kind.text());
+            self.general(what, output.name.span());
+        }
         let (inputs, outputs, memory) =
             self.scope.signals(&mut self.ignored, &mut self.diagnostics);
         self.program.inputs = inputs;

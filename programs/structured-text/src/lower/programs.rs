@@ -315,8 +315,13 @@ impl<'a> Lowering<'a> {
                 }
                 Argument::Placed(_) => false,
             });
+            // At %I and %Q its address has made it one; an output at %M is one by its declaration.
+            let is_memory = member.class == Class::Output
+                && member.address.as_deref().is_some_and(|address| {
+                    address.get(..2).is_some_and(|area| area.eq_ignore_ascii_case("%M"))
+                });
             if !is_connected
-                && matches!(variable.root, Root::Own(_))
+                && (matches!(variable.root, Root::Own(_)) || is_memory)
                 && let Class::Input | Class::Output = member.class
             {
                 self.point(&shown, variable, slot, member.class == Class::Input);

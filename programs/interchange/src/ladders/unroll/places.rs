@@ -249,6 +249,7 @@ impl Unrolling<'_> {
                 self.push(Action::SetNumber(cell, number))?;
             }
             None => {
+                self.unlocated(address, of)?;
                 if let Value::Unknown(what) = &value {
                     self.unseen(address, of, what)?;
                 }
@@ -256,6 +257,16 @@ impl Unrolling<'_> {
         }
         self.set_known(address, known);
         Ok(())
+    }
+
+    /// Others read what is written to a located variable, also where it is always the same.
+    fn unlocated(&self, address: u64, of: Elementary) -> Found<()> {
+        let mut variables = self.program.variables.iter();
+        let found = variables.find(|variable| 64 * u64::from(variable.slot) == address);
+        match found.and_then(|found| Some((&found.name, found.address.as_ref()?))) {
+            Some((name, place)) => Err(self.refuse(format!("`{name}` at {place} is a {of}"))),
+            None => Ok(()),
+        }
     }
 
     /// A time that varies may stand in the memory of a chart or block; a variable that people see would be lost.

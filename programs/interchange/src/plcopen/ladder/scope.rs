@@ -8,7 +8,7 @@ use understudy_text::spelling;
 use understudy_ladder::{Address, Area, KEYWORDS, Name, Signal, legal_name, parse_address};
 use understudy_text::Diagnostic;
 
-use crate::plcopen::document::{Ignored, Pou, Section, Variable, VariableType};
+use crate::plcopen::document::{Ignored, Pou, Project, Section, Variable, VariableType};
 use crate::plcopen::literal::{boolean, integer, time};
 use crate::plcopen::standard::StandardBlock;
 
@@ -44,7 +44,8 @@ pub(super) struct Scope<'a> {
 }
 
 impl<'a> Scope<'a> {
-    pub(super) fn new(pou: &'a Pou, globals: &'a [Variable]) -> Self {
+    pub(super) fn new(pou: &'a Pou, project: &'a Project) -> Self {
+        let globals = &project.globals;
         let mut scope = Self {
             variables: Vec::new(),
             bindings: HashMap::new(),
@@ -62,7 +63,37 @@ impl<'a> Scope<'a> {
                 _ => scope.declare(variable),
             }
         }
+        // An output of the configuration that no unit names is one of each program.
+        let is_named = |global: &Variable| {
+            let mut variables = project.pous.iter().flat_map(|pou| &pou.variables);
+            variables.any(|known| {
+                known.section == Section::External && known.name.eq_ignore_ascii_case(&global.name)
+            })
+        };
+        for global in globals.iter().filter(|global| is_output(global) && !is_named(global)) {
+            scope.declare(global);
+        }
         scope
+    }
+
+    /// Whether only the program itself can read a variable that it declares.
+    pub(super) fn is_private(&self, name: &Name) -> bool {
+        let mut variables = self.variables.iter();
+        let found = variables.find(|variable| variable.name.eq_ignore_ascii_case(name));
+        found.is_some_and(|variable| {
+            matches!(variable.section, Section::Local | Section::Temporary)
+                && variable.address.is_none()
+        })
+    }
+
+    /// The declared outputs that are no bits.
+    pub(super) fn outputs_of_numbers(&self) -> Vec<&'a Variable> {
+        let is_bit = |variable: &&Variable| {
+            let binding = self.bindings.get(&variable.name.to_uppercase());
+            matches!(binding, Some(Binding::Bit(_)))
+        };
+        let outputs = self.variables.iter().copied();
+        outputs.filter(|variable| is_output(variable) && !is_bit(variable)).collect()
     }
 
     fn declare(&mut self, variable: &'a Variable) {
@@ -248,7 +279,7 @@ impl<'a> Scope<'a> {
                     }
                     inputs.push(signal);
                 }
-                (Some(Area::Output), _) | (None, Section::Output) => outputs.push(signal),
+                (Some(Area::Output), _) | (_, Section::Output) => outputs.push(signal),
                 _ => memory.push(signal),
             }
         }
@@ -273,6 +304,17 @@ fn is_given(variable: &Variable) -> bool {
     let located = variable.address.as_ref();
     matches!(variable.section, Section::Input | Section::InOut)
         || located.is_some_and(|address| address.to_ascii_uppercase().starts_with("%I"))
+}
+
+/// Whether the world reads it.
+fn is_output(variable: &Variable) -> bool {
+    let located = variable.address.as_ref();
+    let area = located.map(|address| address.trim().to_ascii_uppercase());
+    match area.as_deref().and_then(|area| area.get(..2)) {
+        Some("%Q") => true,
+        Some("%I") => false,
+        _ => variable.section == Section::Output,
+    }
 }
 
 /// `%IX0.3`, in any case.
