@@ -1,7 +1,10 @@
 //! The commands, in groups. The parser, the help, the manual and the completions are made from this table, and it runs the command.
 
+use std::str::FromStr;
+
 use clap::builder::Styles;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command};
+use understudy_bus::{LogFilter, LogFormat, LogSettings};
 
 use crate::answer::Answer;
 use crate::console::Console;
@@ -10,6 +13,8 @@ use crate::{deployment, inspect, programs, reliability, run, supervisors, tools}
 /// A command line without errors, ready to run.
 pub(crate) struct Call {
     pub(crate) json: bool,
+    /// Log on standard error.
+    pub(crate) log: LogSettings,
     /// Name of the command.
     pub(crate) name: &'static str,
     run: Box<dyn FnOnce(&mut Console) -> Answer>,
@@ -85,6 +90,10 @@ pub(crate) fn groups() -> [Group; 7] {
 pub(crate) fn parse(parser: Command, groups: &[Group]) -> Result<Call, clap::Error> {
     let matches = parser.try_get_matches()?;
     let json = matches.get_flag("json");
+    let log = LogSettings {
+        filter: matches.get_one("log").cloned(),
+        format: matches.get_one("log-format").copied(),
+    };
     let called = matches.subcommand();
     let found = called.and_then(|(name, matches)| {
         let mut entries = groups.iter().flat_map(|group| &group.entries);
@@ -93,7 +102,7 @@ pub(crate) fn parse(parser: Command, groups: &[Group]) -> Result<Call, clap::Err
     // The parser requires one of the commands.
     let (entry, matches) =
         found.ok_or_else(|| clap::Error::new(clap::error::ErrorKind::MissingSubcommand))?;
-    Ok(Call { json, name: entry.name, run: (entry.bind)(matches)? })
+    Ok(Call { json, log, name: entry.name, run: (entry.bind)(matches)? })
 }
 
 /// The exit statuses of all commands.
@@ -138,6 +147,18 @@ fn with_commands(
         .global(true)
         .action(ArgAction::SetTrue)
         .help("Print one JSON document on standard output (docs/reference/json.md)");
+    let log = Arg::new("log")
+        .long("log")
+        .global(true)
+        .value_name("FILTER")
+        .value_parser(LogFilter::from_str)
+        .help("Log on standard error, such as debug or understudy=trace; default: RUST_LOG");
+    let log_format = Arg::new("log-format")
+        .long("log-format")
+        .global(true)
+        .value_name("FORMAT")
+        .value_parser(LogFormat::from_str)
+        .help("Format of the log: text or json");
     let parser = Command::new(name)
         .version(env!("CARGO_PKG_VERSION"))
         .about(about)
@@ -152,7 +173,7 @@ Understudy is not a safety PLC."
         ))
         .subcommand_required(true)
         .arg_required_else_help(true)
-        .arg(json)
+        .args([json, log, log_format])
         .subcommands(groups.iter().flat_map(Group::parsers));
     flowing(parser)
 }

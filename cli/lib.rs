@@ -53,8 +53,18 @@ fn called(call: Result<Call, clap::Error>) -> ExitCode {
     };
     let mut console = Console::new(call.json);
     let name = call.name;
+    let log = call.log.clone().start();
+    let command = tracing::error_span!("command", command = name).entered();
+    tracing::debug!("begins");
     let answer = call.run(&mut console);
-    console.finish(name, answer)
+    let status = answer.status.code();
+    let exit = console.finish(name, answer);
+    tracing::debug!(status, "ends");
+    drop(command);
+    if let Some(log) = log {
+        log.finish();
+    }
+    exit
 }
 
 /// The answer to invalid arguments: a code like that of any other failure, and a document under `--json`. Help and the version are no

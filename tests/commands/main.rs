@@ -15,6 +15,7 @@ mod explain;
 mod gateway;
 mod help;
 mod init;
+mod log;
 mod model_check;
 mod named_files;
 mod next;

@@ -45,9 +45,10 @@ impl RunKeys {
 
 impl Drop for RunKeys {
     fn drop(&mut self) {
-        if let Some(folder) = &self.authority {
-            // What is left is of no use to anybody.
-            let _ = std::fs::remove_dir_all(folder);
+        if let Some(folder) = &self.authority
+            && let Err(error) = std::fs::remove_dir_all(folder)
+        {
+            tracing::warn!(folder = %folder.display(), %error, "the keys of the run are left behind");
         }
     }
 }

@@ -4,7 +4,7 @@
 //! however it ends (PR_SET_PDEATHSIG, which it sets for itself), and when this value is dropped.
 
 use std::collections::VecDeque;
-use std::io;
+use std::io::{self, Write};
 use std::process::{ExitStatus, Stdio};
 use std::time::Duration;
 
@@ -13,6 +13,7 @@ use nix::unistd::Pid;
 use tokio::io::{AsyncBufReadExt, AsyncRead, AsyncWriteExt, BufReader};
 use tokio::process::{Child, ChildStdin, Command};
 use tokio::sync::mpsc::Sender;
+use understudy_bus::log_environment;
 use understudy_wire::Member;
 
 /// A line that a process says, at most; longer ones are cut by the reader's patience, not by memory.
@@ -184,7 +185,12 @@ async fn last_lines(errors: Option<impl AsyncRead + Unpin>) -> Vec<String> {
         return Vec::new();
     };
     let mut lines = BufReader::new(errors).lines();
+    let is_shown = !log_environment().is_empty();
     while let Ok(Some(line)) = lines.next_line().await {
+        if is_shown {
+            // The log of a member goes where that of the laboratory goes; a closed standard error has no reader.
+            let _ = writeln!(io::stderr(), "{line}");
+        }
         if last.len() == ERROR_LINES {
             last.pop_front();
         }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use tokio::process::Command;
 use tokio::sync::mpsc::Receiver;
-use understudy_bus::{Cuts, HostEvent, ZENOH_RUNTIME};
+use understudy_bus::{Cuts, HostEvent, ZENOH_RUNTIME, log_environment};
 use understudy_journal::{Happening, Record, RunEvent, check_version};
 use understudy_scenarios::action_word;
 use understudy_simulator::{Action, Fault};
@@ -39,7 +39,8 @@ impl Laboratory<'_> {
             .arg("--in-laboratory")
             .args(self.keys.arguments(&name))
             .args(&self.settings.arguments)
-            .env(ZENOH_RUNTIME.0, ZENOH_RUNTIME.1);
+            .env(ZENOH_RUNTIME.0, ZENOH_RUNTIME.1)
+            .envs(log_environment().iter().map(|(name, value)| (name, value)));
         let life = self.lives.entry(member).and_modify(|life| *life += 1).or_insert(1);
         let start = || Process::start(member, *life, command, self.sender.clone());
         let process = self.site.at(member, start)?;
@@ -274,5 +275,7 @@ async fn cut(process: &mut Process, cuts: &Cuts) {
     // Two numbers are always writable as JSON.
     let cuts = serde_json::to_string(cuts).unwrap_or_default();
     // One that has ended meanwhile is told when it starts again.
-    let _ = process.command(&format!("cut {cuts}")).await;
+    if let Err(error) = process.command(&format!("cut {cuts}")).await {
+        tracing::debug!(%error, "a member was not told of its cut links");
+    }
 }

@@ -8,6 +8,7 @@ use std::process::ExitCode;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use serde_json::json;
+use understudy_bus::{LogFilter, LogFormat, LogSettings};
 use understudy_opcua_gateway::{Login, OpcuaError, Settings, Variable, serve, variables};
 use understudy_view::Run;
 
@@ -30,6 +31,12 @@ input is wrong and nothing was started."
 struct Arguments {
     #[command(subcommand)]
     command: Command,
+    /// Log on standard error, such as debug or understudy=trace; default: RUST_LOG
+    #[arg(long, global = true, value_name = "FILTER")]
+    log: Option<LogFilter>,
+    /// Format of the log: text or json
+    #[arg(long, global = true, value_name = "FORMAT")]
+    log_format: Option<LogFormat>,
 }
 
 #[derive(Debug, Subcommand)]
@@ -95,7 +102,17 @@ struct RunArgument {
 }
 
 fn main() -> ExitCode {
-    let done = match Arguments::parse().command {
+    let Arguments { command, log, log_format } = Arguments::parse();
+    let log = LogSettings { filter: log, format: log_format }.start();
+    let status = answered(command);
+    if let Some(log) = log {
+        log.finish();
+    }
+    status
+}
+
+fn answered(command: Command) -> ExitCode {
+    let done = match command {
         Command::Serve(arguments) => serve_run(&arguments),
         Command::Nodes { run, json } => nodes(&run, json),
         Command::Completions { shell } => {

@@ -64,7 +64,14 @@ async fn accept_all(
                     let handshake = tokio::time::timeout(HANDSHAKE_PATIENCE, tls.accept(stream));
                     match handshake.await {
                         Ok(Ok(stream)) => Connection::Tls(Box::new(stream)),
-                        Ok(Err(_)) | Err(_) => return,
+                        Ok(Err(error)) => {
+                            tracing::debug!(%peer, %error, "a TLS handshake failed");
+                            return;
+                        }
+                        Err(_) => {
+                            tracing::debug!(%peer, "a TLS handshake took too long");
+                            return;
+                        }
                     }
                 }
             };

@@ -87,7 +87,10 @@ impl Announcer {
                         .is_ok_and(|key| query.key_expr().intersects(&key));
                     if asked {
                         // Who asked is gone where this fails.
-                        let _ = query.reply(key, text).encoding(Encoding::APPLICATION_JSON).wait();
+                        let reply = query.reply(key, text);
+                        if let Err(error) = reply.encoding(Encoding::APPLICATION_JSON).wait() {
+                            tracing::debug!(%error, "an answer was not sent");
+                        }
                     }
                 }
             })
@@ -158,7 +161,9 @@ impl Announcer {
     fn put(&self, key: &str, text: &str) {
         // One that is not sent is replaced by the next.
         let put = self.session.put(key, text);
-        let _ = put.encoding(Encoding::APPLICATION_JSON).wait();
+        if let Err(error) = put.encoding(Encoding::APPLICATION_JSON).wait() {
+            tracing::warn!(%error, key, "a value was not published");
+        }
     }
 }
 

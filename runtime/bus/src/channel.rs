@@ -218,8 +218,10 @@ impl<E: Send + 'static> Channel<E> {
                 Ok(line) => {
                     let lines = self.gather(line);
                     if let Some(opened) = &opened {
-                        // What nobody takes is lost to those who follow, and is in the journal.
-                        let _ = opened.journal.put(lines).wait();
+                        // What is not sent is lost to those who follow, and is in the journal.
+                        if let Err(error) = opened.journal.put(lines).wait() {
+                            tracing::debug!(%error, "lines of the journal were not published");
+                        }
                     }
                 }
                 Err(RecvTimeoutError::Timeout) => {}

@@ -245,7 +245,9 @@ impl Listener {
     /// Closes a connection over which nothing was sent for `patience`.
     pub fn new(listener: TcpListener, connections: Connections, patience: Duration) -> Self {
         // Where it fails, fewer wait.
-        let _ = Backlog::new(WAITING).and_then(|waiting| listen(&listener, waiting));
+        if let Err(error) = Backlog::new(WAITING).and_then(|waiting| listen(&listener, waiting)) {
+            tracing::warn!(%error, "fewer connections wait for their place");
+        }
         Self { listener, connections, patience }
     }
 

@@ -10,6 +10,8 @@ use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, ppoll};
 use nix::sys::time::TimeSpec;
 use serde::{Deserialize, Serialize};
+use tracing::span::EnteredSpan;
+use tracing::{Span, debug, trace, trace_span};
 use understudy_cycle::{Input, Machine, Output, RemoteIoInput};
 use understudy_wire::{Body, Frame, Moment, Time, encode};
 
@@ -95,6 +97,8 @@ struct Round {
     received: Vec<u8>,
     encoded: Vec<u8>,
     moment: Moment,
+    /// Span of the cycle of `moment`.
+    cycle: Option<EnteredSpan>,
     wakeups_in_a_row: u32,
     field_lost: bool,
     refused: Refusals,
@@ -103,6 +107,35 @@ struct Round {
     unsendable: Unsendable,
     reported: Time,
     summary: Summary,
+}
+
+impl Round {
+    fn moves_on_to(&mut self, moment: Moment) {
+        if moment != std::mem::replace(&mut self.moment, moment) {
+            // Before the next one begins, which would be within it.
+            drop(self.cycle.take());
+            let (epoch, cycle) = (moment.epoch.0, moment.cycle.0);
+            self.cycle = Some(trace_span!("cycle", epoch, cycle).entered());
+        }
+    }
+}
+
+/// Span of a frame that is received or sent.
+fn frame_span(frame: &Frame) -> Span {
+    trace_span!("frame", kind = kind(&frame.body), sender = ?frame.header.sender)
+}
+
+/// Name of a kind of frame.
+fn kind(body: &Body) -> &'static str {
+    match body {
+        Body::Sync => "sync",
+        Body::Sample(_) => "sample",
+        Body::Turn(_) => "turn",
+        Body::Join(_) => "join",
+        Body::Transfer(_) => "transfer",
+        Body::Field(_) => "field",
+        Body::Actuation(_) => "actuation",
+    }
 }
 
 /// Until one of them is readable, or for so long.
@@ -176,6 +209,7 @@ impl<M: Machine> Host<'_, M> {
                 Order::Unforce(signal) => Input::RemoteIo(RemoteIoInput::Unforce(*signal)),
                 Order::Write(write) => Input::RemoteIo(RemoteIoInput::Write(write)),
             };
+            debug!(?order, "an order");
             let now = self.clock.now();
             self.machine.handle_input(now, input);
             self.drain(now, round);
@@ -235,8 +269,10 @@ impl<M: Machine> Host<'_, M> {
                     let moves_on = said.epoch == known.epoch && said > known;
                     if matches!(frame.body, Body::Sync) && (known == Moment::default() || moves_on)
                     {
-                        round.moment = said;
+                        round.moves_on_to(said);
                     }
+                    let _frame = frame_span(&frame).entered();
+                    trace!("received");
                     let input = match self.field.sense(&frame) {
                         Some(sensors) => Input::RemoteIo(RemoteIoInput::Field(sensors)),
                         None => Input::Frame(&frame),
@@ -246,6 +282,7 @@ impl<M: Machine> Host<'_, M> {
                 }
                 Err(refused) => {
                     round.summary.refused += 1;
+                    debug!(?refused, "a datagram was refused");
                     let now = self.clock.now();
                     if let Some(event) = round.duplicates.note(now, &refused) {
                         self.sink.record(now, Noted::Host(event));
@@ -261,7 +298,7 @@ impl<M: Machine> Host<'_, M> {
         while let Some(output) = self.machine.poll_output() {
             match output {
                 Output::Send(frame) => {
-                    round.moment = frame.header.moment;
+                    round.moves_on_to(frame.header.moment);
                     self.say(&frame, round);
                 }
                 Output::Drive(outputs) => {
@@ -285,6 +322,8 @@ impl<M: Machine> Host<'_, M> {
         match datagram {
             Ok(datagram) => {
                 round.summary.frames_said += 1;
+                let _frame = frame_span(frame).entered();
+                trace!(bytes = datagram.len(), "sent");
                 self.link.send(frame, datagram);
             }
             Err(reason) => {

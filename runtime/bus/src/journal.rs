@@ -22,6 +22,7 @@ use crate::host::Summary;
 use crate::link::LinkKind;
 use crate::refused_as::RefusedAs;
 use crate::rights::Rights;
+use crate::tally::Tally;
 
 /// Version of the journal: what its records are called and hold. Journals of version 1 do not say theirs; version 3 packs closed segments and records the wall clock.
 pub const JOURNAL_VERSION: u32 = 3;
@@ -306,25 +307,19 @@ fn write_all<'name, E: Serialize + 'name>(
     record: impl Fn((Time, Noted<E>)) -> Record<'name, E>,
     mut anchor: impl FnMut() -> Option<Record<'name, E>>,
 ) -> u64 {
-    let mut unwritten = 0;
+    let mut tally = Tally::default();
     while let Ok(first) = receiver.recv() {
         // Flushed when nothing waits: a reader sees each record at once, and a burst costs one write.
         let burst = std::iter::once(first).chain(receiver.try_iter());
         for noted in burst {
-            if write_line(output, &record(noted)).is_err() {
-                unwritten += 1;
-            }
+            tally.count(write_line(output, &record(noted)));
         }
-        if let Some(anchor) = anchor()
-            && write_line(output, &anchor).is_err()
-        {
-            unwritten += 1;
+        if let Some(anchor) = anchor() {
+            tally.count(write_line(output, &anchor));
         }
-        if output.flush().is_err() {
-            unwritten += 1;
-        }
+        tally.count(output.flush());
     }
-    unwritten
+    tally.unwritten
 }
 
 fn write_line<E: Serialize>(output: &mut impl Write, record: &Record<'_, E>) -> io::Result<()> {

@@ -21,6 +21,7 @@ mod host;
 mod interruption;
 mod journal;
 mod link;
+mod log;
 mod member;
 mod multicast;
 mod operator;
@@ -28,6 +29,7 @@ mod orders;
 mod ports;
 mod refused_as;
 mod rights;
+mod tally;
 mod trouble;
 mod udp;
 mod unreceived;
@@ -55,6 +57,7 @@ pub use journal::{
     EventSink, HostEvent, JOURNAL_RECORDS, JOURNAL_VERSION, Journal, JournalSender, Noted, Record,
 };
 pub use link::{Link, LinkCounters, LinkKind, NoSuchLink, Reopening, ZENOH_PORT_OFFSET};
+pub use log::{Line, Log, LogFilter, LogFormat, LogSettings, log_environment};
 pub use member::{MemberSettings, run_member};
 pub use multicast::loopback_groups;
 pub use operator::{Call, Request};

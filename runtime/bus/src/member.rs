@@ -81,6 +81,8 @@ where
     let finished = EventFd::from_flags(EfdFlags::EFD_CLOEXEC)
         .map_err(BusError::system("an eventfd for the end"))?;
     let own = endpoints.own().clone();
+    let span = tracing::error_span!("member", member = %own.name);
+    let _member = span.clone().entered();
     let (output, telemetry): (Box<dyn Write + Send>, _) = match channel {
         Some(settings) => {
             let (output, telemetry) = followed(output);
@@ -123,6 +125,7 @@ where
             .name("cycle".into())
             .spawn_scoped(scope, move || {
                 let _finished = Finished(finished_here);
+                let _member = span.entered();
                 keep_times(raises);
                 Host {
                     machine: &mut machine,
@@ -153,7 +156,10 @@ where
     if let Some(channel) = &channel {
         channel.stop();
     }
-    journal.finish();
+    let unwritten = journal.finish();
+    if unwritten > 0 {
+        tracing::error!(unwritten, "records are missing in the journal");
+    }
     summary
 }
 

@@ -120,7 +120,9 @@ pub fn keep_times(real_time: bool) {
 /// Without SCHED_FIFO the system may add 50 µs to every sleep so as to wake several threads at once.
 pub(crate) fn sleep_exactly() {
     // It can only fail on kernels that do not know it, and costs exactness there, nothing else.
-    let _ = set_timerslack(1);
+    if let Err(error) = set_timerslack(1) {
+        tracing::debug!(%error, "the system does not sleep exactly");
+    }
 }
 
 /// All that the process has, and all that it will have.

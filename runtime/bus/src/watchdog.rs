@@ -76,7 +76,9 @@ impl Watchdog {
 
     fn say(&self, text: &str) {
         // One that is not taken is missed like a cycle that did not run.
-        let _ = self.socket.send(text.as_bytes());
+        if let Err(error) = self.socket.send(text.as_bytes()) {
+            tracing::warn!(%error, "systemd was not told that the member is alive");
+        }
     }
 }
 

@@ -329,7 +329,9 @@ impl Keeper {
                     && !published.swap(false, Ordering::Relaxed)
                 {
                     // One that is not sent is missed like one that is lost.
-                    let _ = publisher.put([]).wait();
+                    if let Err(error) = publisher.put([]).wait() {
+                        tracing::debug!(%error, "a sign of life was not sent");
+                    }
                 }
             }
         }

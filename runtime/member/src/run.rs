@@ -174,7 +174,9 @@ pub fn restart_for_zenoh(link: LinkKind) {
     }
     if let Ok(program) = std::env::current_exe() {
         // It only comes back where it fails; then Zenoh has more threads than it needs, and works.
-        let _ = Command::new(program).args(std::env::args_os().skip(1)).env(variable, value).exec();
+        let arguments = std::env::args_os().skip(1);
+        let error = Command::new(program).args(arguments).env(variable, value).exec();
+        tracing::warn!(%error, "the program was not started again with fewer threads for Zenoh");
     }
 }
 
