@@ -77,6 +77,9 @@ pub fn read(text: &str, unit: Option<&str>) -> Reading {
     reading.diagnostics = found;
     if let Some(pou) = chosen(&project, unit, &mut reading.diagnostics) {
         translate(text, &project, pou, &mut reading);
+        if unit.is_none() && project.instances.len() > 1 {
+            errors_of_others(text, &mut reading.diagnostics);
+        }
     }
     for found in &mut reading.diagnostics {
         within(text, &mut found.span);
@@ -181,6 +184,20 @@ fn others(project: &Project, read: &Instance, diagnostics: &mut Vec<Diagnostic>)
             diagnostics.push(found.with_help(help));
         }
     }
+}
+
+/// The errors of everything that the tasks run: that one program is read hides none of another.
+fn errors_of_others(text: &str, diagnostics: &mut Vec<Diagnostic>) {
+    let is_error = |found: &Diagnostic| found.severity == Severity::Error;
+    let mut found = whole(text, typed::read_typed(text), None, None).diagnostics;
+    found.retain(|found| {
+        let mut known = diagnostics.iter().filter(|known| is_error(known));
+        let meets = |known: &Diagnostic| {
+            known.span.start <= found.span.end && found.span.start <= known.span.end
+        };
+        is_error(found) && !known.any(meets)
+    });
+    diagnostics.extend(found);
 }
 
 /// Says which actions and transitions of a unit its sequence does not name.

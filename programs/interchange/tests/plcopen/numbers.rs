@@ -368,6 +368,69 @@ fn all_programs_of_the_tasks_run() {
     ));
 }
 
+/// Bodies of which each has an error.
+const WRONG: [&str; 6] = [
+    "<ST><p>z := unknown;</p></ST>",
+    "<ST><p>z := ;</p></ST>",
+    "<IL><p>LD unknown ST z</p></IL>",
+    r#"<FBD><outVariable localId="1"><connectionPointIn><connection refLocalId="7"/></connectionPointIn><expression>z</expression></outVariable></FBD>"#,
+    r#"<FBD><inVariable localId="1"><connectionPointOut/><expression>unknown</expression></inVariable><outVariable localId="2"><connectionPointIn><connection refLocalId="1"/></connectionPointIn><expression>z</expression></outVariable></FBD>"#,
+    r#"<LD><leftPowerRail localId="1"><connectionPointOut/></leftPowerRail><coil localId="2"><connectionPointIn><connection refLocalId="1"/></connectionPointIn><connectionPointOut/><variable>unknown</variable></coil></LD>"#,
+];
+
+#[test]
+fn an_error_of_any_program_of_the_tasks_is_one_of_the_file() {
+    let unit = |name: &str, bit: u32, body: &str| {
+        let variables = variable("b", &format!("%IX0.{bit}"), "BOOL")
+            + &variable("z", &format!("%QX0.{bit}"), "BOOL");
+        format!(
+            r#"<pou name="{name}" pouType="program"><interface><localVars>{variables}</localVars></interface><body>{body}</body></pou>"#
+        )
+    };
+    let right = "<LD><leftPowerRail localId=\"1\"><connectionPointOut/></leftPowerRail><contact localId=\"2\"><connectionPointIn><connection refLocalId=\"1\"/></connectionPointIn><connectionPointOut/><variable>b</variable></contact><coil localId=\"3\"><connectionPointIn><connection refLocalId=\"2\"/></connectionPointIn><connectionPointOut/><variable>z</variable></coil></LD>";
+    let task = |name: &str, run: &str| {
+        format!(r#"<task name="{name}" priority="0" interval="T#20ms">{run}</task>"#)
+    };
+    let run = |of: &str| format!(r#"<pouInstance name="run_{of}" typeName="{of}"/>"#);
+    let tasks = [
+        task("t", &(run("first") + &run("second"))),
+        task("t", &run("first")) + &task("u", &run("second")),
+        task("t", &run("first")) + &run("second"),
+    ];
+    let file = |bodies: [&str; 2], tasks: &str| {
+        let units = unit("first", 0, bodies[0]) + &unit("second", 1, bodies[1]);
+        format!(
+            r#"<project xmlns="http://www.plcopen.org/xml/tc6_0201"><types><dataTypes/><pous>{units}</pous></types><instances><configurations><configuration name="c"><resource name="r">{tasks}</resource></configuration></configurations></instances></project>"#
+        )
+    };
+    let is_error = |found: &&Diagnostic| found.severity == Severity::Error;
+    for tasks in &tasks {
+        let text = file([right, right], tasks);
+        assert!(!read(&text, None).diagnostics.iter().any(|found| is_error(&found)), "{tasks}");
+        for wrong in WRONG {
+            for bodies in [[right, wrong], [wrong, right]] {
+                let text = file(bodies, tasks);
+                let place = text.find(wrong).expect("the body");
+                let within = place.saturating_sub(400)..place + wrong.len();
+                let whole =
+                    understudy_interchange::read_source("two.xml", &text, Default::default());
+                assert!(whole.source.is_none(), "{tasks} {bodies:?}");
+                let first = whole.diagnostics.iter().find(is_error).expect("an error");
+                assert!(within.contains(&first.span.start), "{first:?}");
+                // Also where a ladder is asked for, which is one program.
+                let one = read(&text, None);
+                assert!(one.program.is_none(), "{tasks} {bodies:?}");
+                // Whoever chooses the other program reads that one.
+                let chosen = if bodies[0] == wrong { "second" } else { "first" };
+                assert!(read(&text, Some(chosen)).program.is_some(), "{tasks} {bodies:?}");
+            }
+        }
+        let missing =
+            file([right, right], tasks).replace(r#"typeName="second""#, r#"typeName="third""#);
+        assert!(read(&missing, None).program.is_none(), "{missing}");
+    }
+}
+
 #[test]
 fn python_whose_answer_nothing_reads_has_no_effect() {
     let declared = r#"<variable name="poll"><type><derived name="python_poll"/></type></variable>"#;
