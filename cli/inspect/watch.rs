@@ -63,7 +63,7 @@ pub(crate) struct PageArguments {
     /// Allow the page to kill, stop, cut and force; every command is recorded in the journal
     #[arg(long)]
     allow_commands: bool,
-    /// File of users, one line `viewer|operator NAME TOKEN` each; created with one operator if missing
+    /// File of users, one line `viewer|operator|engineer NAME TOKEN` each; created with one engineer if missing
     #[arg(long, value_name = "FILE")]
     logins: Option<PathBuf>,
     /// Certificate chain of the page (PEM); default: self-signed
