@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
 use understudy_allocation::{
-    Added, AdditionError, Catalogue, Controller, Family, Figure, Kind, Mode, Quantity, Statement,
-    file,
+    Added, AdditionError, AllocationError, Catalogue, Controller, Family, Figure, Kind, Mode,
+    Quantity, Requirement, RequirementError, Statement, file, search,
 };
 use understudy_text::Report;
 
@@ -22,6 +22,7 @@ use crate::files;
 #[command(after_help = "\
 Example:
   understudy catalogue list --family S7-1200
+  understudy catalogue list --vendor Z-World --require \"data_memory>=256KiB\"
   understudy catalogue show \"CPU 1214C\"
   understudy catalogue add --catalogue ours.csv --vendor Works --model A1 --family A --kind plc --source \"data sheet of 2026\" digital_inputs=8
   understudy catalogue import prices.csv --catalogue ours.csv --update
@@ -44,6 +45,9 @@ enum What {
         /// Show only this family
         #[arg(long, value_name = "NAME")]
         family: Option<String>,
+        /// Show only controllers with this property, such as data_memory>=256KiB or kind=plc; repeatable
+        #[arg(long, value_name = "WHAT")]
+        require: Vec<String>,
         #[command(flatten)]
         file: FileArgument,
     },
@@ -61,6 +65,15 @@ enum What {
         entry: Box<Entry>,
         #[command(flatten)]
         file: WrittenFile,
+    },
+    /// Remove a controller
+    Remove {
+        /// Model, or vendor and model
+        #[arg(value_name = "MODEL")]
+        model: String,
+        /// Catalogue file
+        #[arg(long, value_name = "FILE")]
+        catalogue: PathBuf,
     },
     /// Import the controllers of a file
     Import {
@@ -134,9 +147,12 @@ fn kind(text: &str) -> Result<Kind, String> {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     match &arguments.what {
-        What::List { vendor, family, file } => list(file, vendor.as_deref(), family.as_deref()),
+        What::List { vendor, family, require, file } => {
+            list(file, vendor.as_deref(), family.as_deref(), require)
+        }
         What::Show { model, file } => show(file, model),
         What::Add { entry, file } => add(file, entry),
+        What::Remove { model, catalogue } => remove(catalogue, model),
         What::Import { from, update, empty, file } => import(file, from, *update, *empty),
         What::Export { output, file } => export(file, output.as_deref()),
     }
@@ -185,14 +201,36 @@ fn begins_as_sqlite(path: &Path) -> bool {
     read.is_ok() && first == *b"SQLite format 3\0"
 }
 
-fn list(file: &FileArgument, vendor: Option<&str>, family: Option<&str>) -> Result<Answer, Answer> {
+fn list(
+    file: &FileArgument,
+    vendor: Option<&str>,
+    family: Option<&str>,
+    require: &[String],
+) -> Result<Answer, Answer> {
     let (catalogue, about) = read(file.catalogue.as_deref())?;
-    let is =
-        |asked: Option<&str>, has: &str| asked.is_none_or(|asked| asked.eq_ignore_ascii_case(has));
-    let found: Vec<&Controller> = catalogue
-        .controllers()
-        .filter(|known| is(vendor, &known.vendor) && is(family, &known.family))
-        .collect();
+    let mut wrong = Vec::new();
+    let mut requirements = Vec::new();
+    for text in require {
+        match Requirement::parse(text) {
+            Ok(requirement) => requirements.push(requirement),
+            Err(error) => wrong.push(error),
+        }
+    }
+    let bad = |errors: &[RequirementError]| {
+        errors.iter().fold(Answer::done("", Value::Null), |answer, error| {
+            answer.and_failure(Status::BadInput, "U1130", message(error))
+        })
+    };
+    if !wrong.is_empty() {
+        return Err(bad(&wrong));
+    }
+    for (name, asked) in [("vendor", vendor), ("family", family)] {
+        let text = asked.map(|asked| format!("{name}={asked}"));
+        let requirement = text.map(|text| Requirement::parse(&text)).transpose();
+        requirements.extend(requirement.map_err(|error| bad(&[error]))?);
+    }
+    let searched = search(&catalogue, &requirements).map_err(|errors| bad(&errors))?;
+    let found = searched.controllers;
     let mut text = format!(
         "{:<44}{:<22}{:>5}{:>5}{:>12}{:>12}{:>8}\n",
         "controller", "family", "in", "out", "program B", "data B", "bit ns"
@@ -215,7 +253,41 @@ fn list(file: &FileArgument, vendor: Option<&str>, family: Option<&str>) -> Resu
         );
     }
     let _ = writeln!(text, "{} of {about}; ?: unknown", found.len());
-    Ok(Answer::done(text, json!({ "controllers": found })))
+    for lacking in searched.unknown.iter().take(MOST_UNKNOWN) {
+        let messages = lacking.messages.join(", ");
+        let _ = writeln!(text, "undecided: {}: {messages}", lacking.controller);
+    }
+    if searched.unknown.len() > MOST_UNKNOWN {
+        let more = searched.unknown.len() - MOST_UNKNOWN;
+        let _ = writeln!(text, "undecided: {more} more (--json has all)");
+    }
+    Ok(Answer::done(text, json!({ "controllers": found, "undecided": searched.unknown })))
+}
+
+/// Controllers with a missing figure that a list names.
+const MOST_UNKNOWN: usize = 5;
+
+fn remove(path: &Path, name: &str) -> Result<Answer, Answer> {
+    let (mut catalogue, report) = read_file(path)?;
+    let named: Vec<(String, String)> = catalogue
+        .named(name)
+        .into_iter()
+        .map(|found| (found.vendor.clone(), found.model.clone()))
+        .collect();
+    let [(vendor, model)] = &named[..] else {
+        let error = if named.is_empty() {
+            AllocationError::NoModel { name: name.to_owned(), like: catalogue.like(name) }
+        } else {
+            let vendors = named.into_iter().map(|(vendor, _)| vendor).collect();
+            AllocationError::Ambiguous { name: name.to_owned(), vendors }
+        };
+        return Err(Answer::failed(Status::BadInput, error.code(), error));
+    };
+    let removed = catalogue.remove(vendor, model);
+    files::replace(path, &file::write(&catalogue))?;
+    let text = format!("{}: {vendor} {model} removed", path.display());
+    let result = json!({ "catalogue": path.display().to_string(), "removed": removed });
+    Ok(Answer::done(text, result).with_reports(vec![report]))
 }
 
 fn show(file: &FileArgument, name: &str) -> Result<Answer, Answer> {

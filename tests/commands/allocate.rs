@@ -169,3 +169,61 @@ fn bad_catalogues_are_refused_and_nothing_is_written() {
     let answer = understudy(&["catalogue", "show", "CPU 1214"]);
     assert!(answer.errors.contains("CPU 1214C"), "{}", answer.errors);
 }
+
+/// Figure 15 of the paper on the deployment of controllers: at least 256 K of RAM.
+#[test]
+fn a_list_is_searched_by_any_figure() {
+    let models = |arguments: &[&str]| -> Vec<String> {
+        let answer = understudy(&[&["catalogue", "list", "--json"], arguments].concat());
+        assert_eq!(answer.status, 0, "{}", answer.shown());
+        let document = answer.json();
+        let found = document["result"]["controllers"].as_array().expect("controllers").iter();
+        found.map(|found| found["model"].as_str().expect("a model").to_owned()).collect()
+    };
+    let large = models(&["--vendor", "Z-World", "--require", "data_memory>=256KiB"]);
+    assert_eq!(large, ["BL2600 Wolf", "BL2610 Wolf"]);
+    assert_eq!(models(&["--vendor", "z-world"]).len(), 9);
+    assert_eq!(models(&["--require", "vendor=Z-World", "--require", "outputs>=16"]).len(), 4);
+    // An unknown figure decides nothing, and is named.
+    let answer = understudy(&["catalogue", "list", "--require", "clock_khz>=1000"]);
+    assert!(answer.output.contains("0 of the built-in catalogue"), "{}", answer.shown());
+    assert!(answer.output.contains("its clock_khz is unknown"), "{}", answer.shown());
+    for wrong in ["colour=red", "remote-io:inputs>=4", "scan_time<=1ms", "clock_khz>=fast"] {
+        let answer = understudy(&["catalogue", "list", "--require", wrong]);
+        assert_eq!(answer.status, 2, "{wrong}: {}", answer.shown());
+        assert!(answer.errors.contains("U1130"), "{wrong}: {}", answer.errors);
+    }
+}
+
+#[test]
+fn a_controller_is_removed_from_a_file_and_no_other_is() {
+    let folder = empty_folder("catalogue_remove");
+    let file = folder.join("ours.csv").to_str().expect("text").to_owned();
+    let add = |vendor: &str, model: &str| {
+        let named = ["--vendor", vendor, "--model", model, "--family", "A", "--source", "page 1"];
+        let figures = ["digital_inputs=4", "mtbf_hours=200000", "support=until 2035"];
+        let to = ["catalogue", "add", "--catalogue", &file];
+        let answer = understudy(&[&to[..], &named, &figures].concat());
+        assert_eq!(answer.status, 0, "{}", answer.shown());
+    };
+    for (vendor, model) in [("Works", "A1"), ("Works", "A2"), ("Other", "A1")] {
+        add(vendor, model);
+    }
+    let remove = |name: &str| understudy(&["catalogue", "remove", name, "--catalogue", &file]);
+    let before = std::fs::read(&file).expect("a file");
+    for (name, code) in [("A9", "U1131"), ("A1", "U1132")] {
+        let answer = remove(name);
+        assert_eq!(answer.status, 2, "{}", answer.shown());
+        assert!(answer.errors.contains(code), "{}", answer.shown());
+    }
+    assert_eq!(std::fs::read(&file).expect("a file"), before);
+    assert_eq!(remove("Works A1").status, 0);
+    let left =
+        understudy(&["catalogue", "list", "--require", "mtbf_hours>=1", "--catalogue", &file]);
+    assert!(
+        left.output.contains("Works A2") && left.output.contains("Other A1"),
+        "{}",
+        left.shown()
+    );
+    assert!(!left.output.contains("Works A1"), "{}", left.shown());
+}

@@ -181,6 +181,11 @@ impl Catalogue {
         }
     }
 
+    /// Takes a controller out; figures of its family stay.
+    pub fn remove(&mut self, vendor: &str, model: &str) -> Option<Controller> {
+        self.controllers.remove(&(vendor.to_owned(), model.to_owned()))
+    }
+
     /// Adds figures of a family.
     pub fn put_family(&mut self, name: &str, family: Family) {
         let old = self.families.entry(name.to_owned()).or_default();

@@ -28,6 +28,14 @@ words! {
         BoolInstructionNs = "bool_instruction_ns",
         /// Price in hundredths of its currency.
         Price = "price",
+        /// Clock of the processor.
+        ClockKhz = "clock_khz",
+        /// Width of the address bus.
+        AddressBusBits = "address_bus_bits",
+        /// Width of the data bus.
+        DataBusBits = "data_bus_bits",
+        /// Mean time between failures that the maker states.
+        MtbfHours = "mtbf_hours",
     }
 }
 
@@ -42,6 +50,9 @@ impl Quantity {
             Self::Timers | Self::Counters => 1_000_000,
             Self::BoolInstructionNs => 1_000_000_000,
             Self::Price => 10_000_000_000,
+            Self::ClockKhz => 100_000_000,
+            Self::AddressBusBits | Self::DataBusBits => 1024,
+            Self::MtbfHours => 1_000_000_000,
         }
     }
 
@@ -87,6 +98,12 @@ words! {
         Languages = "languages",
         /// Currency of the price.
         Currency = "currency",
+        /// How long the maker supplies and repairs it.
+        Support = "support",
+        /// Software that programs it.
+        SupportSoftware = "support_software",
+        /// Parts that a system of it needs.
+        Accessories = "accessories",
     }
 }
 

@@ -23,6 +23,7 @@ mod plant;
 mod report;
 mod requirement;
 mod resources;
+mod search;
 
 pub use additions::{Added, AdditionError, Mode};
 pub use allocate::{
@@ -38,3 +39,4 @@ pub use plant::{Group, Member, alone};
 pub use report::{Provenance, ReportError, csv, html, text};
 pub use requirement::{Asked, Bound, Requirement, RequirementError, Role};
 pub use resources::Resources;
+pub use search::{Found, Lacking, search};

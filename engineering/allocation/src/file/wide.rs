@@ -10,7 +10,7 @@ use crate::controller::Catalogue;
 use crate::figures::{Figure, Quantity, Statement};
 
 /// Columns; those of figures may be left out.
-pub(super) const HEADER: [&str; 20] = [
+pub(super) const HEADER: [&str; 27] = [
     "vendor",
     "model",
     "family",
@@ -29,6 +29,13 @@ pub(super) const HEADER: [&str; 20] = [
     "languages",
     "price",
     "currency",
+    "clock_khz",
+    "address_bus_bits",
+    "data_bus_bits",
+    "mtbf_hours",
+    "support",
+    "support_software",
+    "accessories",
     "source_url",
     "notes",
 ];
