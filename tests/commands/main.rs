@@ -25,6 +25,7 @@ mod petri;
 mod program_faults;
 mod reconfigure;
 mod reliability;
+mod requirements;
 mod scan;
 mod verdicts;
 mod verify;
