@@ -144,7 +144,8 @@ pub enum Comparison {
     GreaterOrEqual,
 }
 
-/// Operations on texts. Positions count from 1, lengths and positions are LINTs; one outside the text is cut to it, as IEC 61131-3 leaves open.
+/// Operations on texts. Positions count from 1, lengths and positions are LINTs. A length is cut to the text. A position that the text does
+/// not have leaves the text as it is, and gives an empty part; IEC 61131-3 leaves it open.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum TextOperation {
     /// `LEN`: a LINT.
@@ -157,7 +158,7 @@ pub enum TextOperation {
     Middle,
     /// `CONCAT(text, text, …)`
     Concatenate,
-    /// `INSERT(text, inserted, position)`: behind the character at the position.
+    /// `INSERT(text, inserted, position)`: behind the character at the position; at 0 in front of the text.
     Insert,
     /// `DELETE(text, length, position)`
     Delete,

@@ -303,7 +303,7 @@ fn operations_on_texts() {
         (O::Middle, &[T(b"valve"), N(2), N(9)], ""),
         (O::Concatenate, &[T(b"a"), T(b""), T(b"bc")], "abc"),
         (O::Insert, &[T(b"valve"), T(b"--"), N(2)], "va--lve"),
-        (O::Insert, &[T(b"valve"), T(b"--"), N(9)], "valve--"),
+        (O::Insert, &[T(b"valve"), T(b"--"), N(9)], "valve"),
         (O::Delete, &[T(b"valve"), N(2), N(4)], "val"),
         (O::Replace, &[T(b"valve"), T(b"X"), N(3), N(2)], "vXe"),
         (O::Select, &[N(1), T(b"no"), T(b"yes")], "yes"),
@@ -324,6 +324,55 @@ fn operations_on_texts() {
     assert_eq!(number(O::Byte, &[T(b"valve"), N(6)]), 0);
     assert_eq!(number(O::Compare(Comparison::Less), &[T(b"ab"), T(b"b")]), 1);
     assert_eq!(number(O::Compare(Comparison::Less), &[T(b"ab"), T(b"a")]), 0);
+}
+
+#[test]
+fn lengths_are_cut_to_a_text_and_positions_outside_leave_it_as_it_is() {
+    use TextOperand::{Number as N, Text as T};
+    use TextOperation as O;
+    for size in 0..=5 {
+        let whole = &b"abcde"[..size];
+        let shown = String::from_utf8_lossy(whole).into_owned();
+        for length in -2..=7_i64 {
+            for position in [i64::MIN, -1, 0, 1, 2, 3, 4, 5, 6, 7, i64::MAX] {
+                let (l, p) = (N(length as u64), N(position as u64));
+                let has_position = 1 <= position && position <= size as i64;
+                // Character by character: which stand at or behind the position, and which are taken.
+                let place = |at: usize| at as i64 + 1;
+                let taken = |at: &usize| {
+                    has_position && place(*at) >= position && place(*at) - position < length.max(0)
+                };
+                let part = |wanted: &dyn Fn(&usize) -> bool| -> String {
+                    (0..size).filter(wanted).map(|at| char::from(whole[at])).collect()
+                };
+                let before = part(&|at| place(*at) < position);
+                let rest = part(&|at| place(*at) >= position && !taken(at));
+                let at = format!("`{shown}`, {length}, {position}");
+                assert_eq!(text(O::Middle, &[T(whole), l, p]), part(&taken), "MID {at}");
+                assert_eq!(
+                    text(O::Delete, &[T(whole), l, p]),
+                    part(&|at| !taken(at)),
+                    "DELETE {at}"
+                );
+                let replaced = match has_position {
+                    true => format!("{before}XY{rest}"),
+                    false => shown.clone(),
+                };
+                assert_eq!(text(O::Replace, &[T(whole), T(b"XY"), l, p]), replaced, "REPLACE {at}");
+                let behind = part(&|at| place(*at) <= position);
+                let ahead = part(&|at| place(*at) > position);
+                let inserted = match has_position || position == 0 {
+                    true => format!("{behind}XY{ahead}"),
+                    false => shown.clone(),
+                };
+                assert_eq!(text(O::Insert, &[T(whole), T(b"XY"), p]), inserted, "INSERT {at}");
+                let first = part(&|at| (*at as i64) < length);
+                assert_eq!(text(O::Left, &[T(whole), l]), first, "LEFT {at}");
+                let last = part(&|at| (size - at) as i64 <= length);
+                assert_eq!(text(O::Right, &[T(whole), l]), last, "RIGHT {at}");
+            }
+        }
+    }
 }
 
 #[test]

@@ -35,15 +35,16 @@ impl TextOperation {
     /// If there are fewer operands than [`crate::Operation::signature`] wants.
     pub fn apply(self, operands: &[TextOperand<'_>], result: &mut Vec<u8>) -> u64 {
         let text = |index: usize| operands[index].text();
-        // A length or a number of characters before a position, cut to a text.
+        // A length, cut to a text.
         let cut = |index: usize, text: &[u8]| {
             let number = (operands[index].number() as i64).max(0) as u64;
             number.min(text.len() as u64) as usize
         };
-        // Characters before a position, which counts from 1.
-        let before = |index: usize, text: &[u8]| {
-            let number = (operands[index].number() as i64).max(1) as u64 - 1;
-            number.min(text.len() as u64) as usize
+        // The text before a position and the text from there, where the text has the position.
+        let split = |index: usize| {
+            let position = usize::try_from(operands[index].number() as i64).ok()?;
+            let before = position.checked_sub(1).filter(|before| *before < text(0).len())?;
+            Some(text(0).split_at(before))
         };
         match self {
             Self::Length => return text(0).len() as u64,
@@ -53,7 +54,7 @@ impl TextOperation {
                 result.extend_from_slice(&text[text.len() - cut(1, text)..]);
             }
             Self::Middle => {
-                let rest = &text(0)[before(2, text(0))..];
+                let rest = split(2).map_or(&[][..], |(_, rest)| rest);
                 result.extend_from_slice(&rest[..cut(1, rest)]);
             }
             Self::Concatenate => {
@@ -62,19 +63,24 @@ impl TextOperation {
                 }
             }
             Self::Insert => {
-                let (first, rest) = text(0).split_at(cut(2, text(0)));
-                for part in [first, text(1), rest] {
+                let position = usize::try_from(operands[2].number() as i64).ok();
+                let parts = position.and_then(|position| text(0).split_at_checked(position));
+                let (first, rest) = parts.unwrap_or((text(0), &[]));
+                let inserted = if parts.is_some() { text(1) } else { &[] };
+                for part in [first, inserted, rest] {
                     result.extend_from_slice(part);
                 }
             }
             Self::Delete => {
-                let (first, rest) = text(0).split_at(before(2, text(0)));
+                let (first, rest) = split(2).unwrap_or((text(0), &[]));
                 result.extend_from_slice(first);
                 result.extend_from_slice(&rest[cut(1, rest)..]);
             }
             Self::Replace => {
-                let (first, rest) = text(0).split_at(before(3, text(0)));
-                for part in [first, text(1), &rest[cut(2, rest)..]] {
+                let parts = split(3);
+                let (first, rest) = parts.unwrap_or((text(0), &[]));
+                let by = if parts.is_some() { text(1) } else { &[] };
+                for part in [first, by, &rest[cut(2, rest)..]] {
                     result.extend_from_slice(part);
                 }
             }
