@@ -92,6 +92,7 @@ impl Made<'_> {
         self.expression(ExpressionKind::Literal(Literal::Integer {
             value: value as i128,
             of: None,
+            based: false,
         }))
     }
 

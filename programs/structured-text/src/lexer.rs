@@ -87,8 +87,14 @@ const MAXIMUM_LEXEMES: usize = 4 << 20;
 
 /// All lexemes of `text`, and what was wrong.
 pub(crate) fn lex(text: &str) -> Lexemes<'_> {
-    let mut lexer =
-        Lexer { text, place: 0, nests: true, has_local_marks: false, diagnostics: Vec::new() };
+    let mut lexer = Lexer {
+        text,
+        place: 0,
+        debugger: debugger_lines(text),
+        nests: true,
+        has_local_marks: false,
+        diagnostics: Vec::new(),
+    };
     let mut placed: Vec<Placed> = Vec::new();
     let mut above = Vec::new();
     let mut line_broken = true;
@@ -106,6 +112,8 @@ pub(crate) fn lex(text: &str) -> Lexemes<'_> {
         if character.is_whitespace() || character == '\u{feff}' {
             line_broken |= character == '\n';
             lexer.place += character.len_utf8();
+        } else if let Some(length) = debugger_line(&text[..lexer.place], lexer.rest()) {
+            lexer.place += length;
         } else if let Some(name) = lexer.current_time() {
             let start = lexer.place - name.within.len();
             let words = [Lexeme::Word(name.variable), Lexeme::Sign(":="), Lexeme::Word("TIME")];
@@ -162,6 +170,24 @@ pub(crate) fn lex(text: &str) -> Lexemes<'_> {
     Lexemes { placed, has_local_marks: lexer.has_local_marks, diagnostics: lexer.diagnostics }
 }
 
+/// The start of each line that OpenPLC Editor writes for its debugger: C code, which is not a comment of the standard where it has
+/// the end of one in it. OpenPLC takes these lines out before it compiles, whatever is around them.
+const DEBUGGER: &str = "(*DBG:";
+
+/// The length of a line for the debugger that begins here: it ends with the end of a comment.
+fn debugger_line(before: &str, rest: &str) -> Option<usize> {
+    if !rest.starts_with(DEBUGGER) || !(before.is_empty() || before.ends_with('\n')) {
+        return None;
+    }
+    let line = rest.split('\n').next().unwrap_or(rest);
+    line.trim_end().ends_with("*)").then_some(line.len())
+}
+
+fn debugger_lines(text: &str) -> Vec<usize> {
+    let starts = text.match_indices(DEBUGGER).map(|(start, _)| start);
+    starts.filter(|start| debugger_line(&text[..*start], &text[*start..]).is_some()).collect()
+}
+
 /// The pragma by which the standard blocks of matiec read the time.
 struct CurrentTime<'a> {
     within: &'a str,
@@ -175,6 +201,8 @@ fn boxed(above: &mut Vec<String>) -> Option<Box<Comments>> {
 struct Lexer<'a> {
     text: &'a str,
     place: usize,
+    /// Where lines of a debugger begin.
+    debugger: Vec<usize>,
     /// Whether comments in comments are closed, as far as is known.
     nests: bool,
     has_local_marks: bool,
@@ -231,7 +259,11 @@ impl<'a> Lexer<'a> {
                 .find(|(opening, _)| rest.starts_with(opening))?;
         let start = self.place;
         let content = &rest[opening.len()..];
-        let length = match self.comment_length(content, opening, closing) {
+        let next = self.debugger.partition_point(|line| *line < start + opening.len());
+        let end = self.debugger.get(next).copied().unwrap_or(self.text.len());
+        let own = &content[..end - start - opening.len()];
+        let length = self.comment_length(own, opening, closing);
+        let length = match length.or_else(|| self.comment_length(content, opening, closing)) {
             Some(length) => length,
             None if closing == "\n" => content.len(),
             None => {

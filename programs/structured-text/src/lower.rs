@@ -23,8 +23,11 @@ mod names;
 mod numbers;
 mod places;
 mod programs;
+mod promotion;
+mod ranges;
 mod routines;
 mod standard;
+mod standard_blocks;
 mod statements;
 mod times;
 mod types;
@@ -154,6 +157,10 @@ struct Lowering<'a> {
     scope: Scope,
     /// How often something was reported, or found that was reported before.
     blamed: usize,
+    /// Calls of blocks of the standard that are not given the time between two calls.
+    without_cycle: Vec<(usize, Range<usize>)>,
+    /// A statement or an initial value gives one to some block.
+    sets_cycle: bool,
     /// The file has no PROGRAM.
     is_library: bool,
     nesting: u32,
@@ -204,6 +211,8 @@ impl<'a> Lowering<'a> {
             calls: Vec::new(),
             scope: Scope::default(),
             blamed: 0,
+            without_cycle: Vec::new(),
+            sets_cycle: false,
             is_library: false,
             nesting: 0,
             length: 0,
@@ -212,6 +221,7 @@ impl<'a> Lowering<'a> {
     }
 
     fn finish(mut self, checked: Vec<String>) -> Lowered {
+        self.calls_without_cycle();
         self.diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
         self.diagnostics.dedup();
         if self.diagnostics.len() > MAXIMUM_FINDINGS {

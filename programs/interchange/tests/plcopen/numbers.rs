@@ -109,6 +109,18 @@ fn a_sum_that_feeds_itself_is_what_it_was_in_the_last_scan() {
 }
 
 #[test]
+fn boxes_compute_in_the_type_of_their_inputs() {
+    let variables = |of: &str| variable("a", "%IW0", of) + &variable("y", "%QW0", of);
+    let body = given(1, "a") + &given(2, "100") + &given(3, "4095");
+    let body = body + &function(4, "MUL", &[1, 2]) + &function(5, "DIV", &[4, 3]);
+    let body = body + &taken(6, 5, "y");
+    for (of, expected) in [("INT", 3), ("DINT", 100)] {
+        let text = document(&variables(of), &format!("<FBD>{body}</FBD>"));
+        assert_eq!(run(&text, &[&[4095]]), [vec![expected]], "{of}");
+    }
+}
+
+#[test]
 fn a_jump_back_repeats_and_a_jump_on_skips() {
     let variables = variable("n", "%IW0", "INT") + &variable("y", "%QW0", "INT");
     let order = |text: String, order: u32| {

@@ -117,7 +117,7 @@ impl<'a> Lexer<'a> {
             let message = format!("`{text}` is not in the range of {of}: {least} to {most}");
             return self.error("U1032", message, start);
         }
-        literal(Literal::Integer { value, of: Some(of) })
+        literal(Literal::Integer { value, of: Some(of), based })
     }
 
     /// A number without a type.
@@ -127,8 +127,8 @@ impl<'a> Lexer<'a> {
             return self.no_tail(start).unwrap_or(real);
         }
         match self.whole() {
-            Some((value, _)) => {
-                let whole = literal(Literal::Integer { value, of: None });
+            Some((value, based)) => {
+                let whole = literal(Literal::Integer { value, of: None, based });
                 self.no_tail(start).unwrap_or(whole)
             }
             None => self.no_whole_number(start),

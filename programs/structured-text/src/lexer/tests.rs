@@ -39,9 +39,43 @@ fn a_comment_that_does_not_nest_ends_at_the_first_end() {
 }
 
 #[test]
+fn lines_of_a_debugger_are_no_part_of_the_text() {
+    let program = "(* a (* b *) x;\n";
+    let debugger = [
+        "(*DBG:char sum[] = \"0123\";*)",
+        "(*DBG:/**)",
+        "(*DBG: * text *)",
+        "(*DBG: */*)",
+        "(*DBG:void *place(int i)*)",
+        "(*DBG:    return (void *)&((cell_t *) ptr)->value;*)",
+        "(*DBG:*)",
+    ];
+    let words = |text: &str| {
+        let lexemes = lex(text);
+        assert!(lexemes.diagnostics.is_empty(), "{text}: {:?}", lexemes.diagnostics);
+        let placed = lexemes.placed.iter().filter(|placed| !placed.span.is_empty());
+        placed.map(|placed| text[placed.span.clone()].to_owned()).collect::<Vec<_>>()
+    };
+    for end in ["\n", "\r\n"] {
+        for first in 0..debugger.len() {
+            let lines = debugger[first..].join(end);
+            assert_eq!(words(&format!("{program}{lines}")), ["x", ";"]);
+            assert_eq!(
+                words(&format!("{lines}{end}{program}{lines}{end}y;")),
+                ["x", ";", "y", ";"]
+            );
+        }
+    }
+    // Such words in a line, or without an end in their line, are a comment like others.
+    assert_eq!(words("x (*DBG: a *) ; (*DBG:*)"), ["x", ";"]);
+    assert_eq!(words("(*DBG: a\n b *) x ;"), ["x", ";"]);
+}
+
+#[test]
 fn whole_numbers() {
-    let check = |text, expected, kind| {
-        let expected = Literal::Integer { value: expected, of: kind };
+    let check = |text: &str, expected, kind| {
+        let based = text.split('#').any(|part| matches!(part, "2" | "8" | "16"));
+        let expected = Literal::Integer { value: expected, of: kind, based };
         assert_eq!(literal(text), expected, "{text}");
     };
     check("1_000", 1000, None);

@@ -35,7 +35,7 @@ impl Lowering<'_> {
             }
             Callee::Standard(key) => {
                 let value = self.standard(&key, arguments, None, span);
-                let value = self.settle(value, None);
+                let value = self.settle(value, None, span);
                 if value.is_some() {
                     let message = format!("the result of {key} is not used");
                     self.warn(
@@ -112,6 +112,29 @@ impl Lowering<'_> {
     }
 
     fn invoke<'s>(
+        &mut self,
+        instance: Target,
+        unit: usize,
+        arguments: &'s [Argument],
+        span: &Span,
+        line: u32,
+        body: &mut Vec<Statement>,
+    ) -> Option<(Option<&'s syntax::Expression>, Option<&'s Path>)> {
+        let before = self.diagnostics.len();
+        let found = self.invoked(instance, unit, arguments, span, line, body);
+        if let Some(other) = self.counterpart(unit) {
+            for found in self.diagnostics.iter_mut().skip(before) {
+                if matches!(found.code, "U1043" | "U1049") {
+                    let help = found.help.take().map(|help| format!("{help}; "));
+                    found.help = Some(help.unwrap_or_default() + &other);
+                }
+            }
+            self.needs_cycle(unit, arguments, span);
+        }
+        found
+    }
+
+    fn invoked<'s>(
         &mut self,
         instance: Target,
         unit: usize,
@@ -279,7 +302,13 @@ impl Lowering<'_> {
             return Operand::Faulty;
         };
         if let Callee::Standard(key) = callee {
-            return self.standard(&key, arguments, hint, span);
+            if !self.has_room(1, span) {
+                return Operand::Faulty;
+            }
+            self.length += 1;
+            let found = self.standard(&key, arguments, hint, span);
+            self.length -= 1;
+            return found;
         }
         if let Some(key) = self.overloaded(&callee, path, arguments, span) {
             return self.standard(&key, arguments, hint, span);

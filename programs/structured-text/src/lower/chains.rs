@@ -9,6 +9,7 @@ use super::convert::{as_bits, as_integer, common, comparable, is_number, is_whol
 use super::fold::{apply, boolean, choose, convert, reinterpret, text};
 use super::names::number;
 use super::numbers::{Number, Operand};
+use super::promotion::{Valued, WIDE, is_narrow, wide_bits};
 
 /// Operators around and beside each other that an expression may have.
 const MAXIMUM_LENGTH: usize = 400;
@@ -29,10 +30,7 @@ impl Lowering<'_> {
             && matches!(rest[0].0, Operator::And | Operator::Or | Operator::Xor);
         let length = if is_flat { LONG } else { rest.len() };
         let outside = self.length;
-        if outside + length > MAXIMUM_LENGTH {
-            let message = format!("an expression of more than {MAXIMUM_LENGTH} operators");
-            let help = "assign parts of it to variables";
-            self.error_with("U1033", message, span.clone(), help);
+        if !self.has_room(length, span) {
             return Operand::Faulty;
         }
         self.length += length;
@@ -43,6 +41,17 @@ impl Lowering<'_> {
         };
         self.length = outside;
         found
+    }
+
+    /// Whether so many operators or functions may still be in the expression.
+    pub(super) fn has_room(&mut self, more: usize, span: &Span) -> bool {
+        let fits = self.length + more <= MAXIMUM_LENGTH;
+        if !fits {
+            let message = format!("an expression of more than {MAXIMUM_LENGTH} operators");
+            let help = "assign parts of it to variables";
+            self.error_with("U1033", message, span.clone(), help);
+        }
+        fits
     }
 
     fn left_chain(
@@ -57,8 +66,8 @@ impl Lowering<'_> {
         let mut left = self.operand(first, outer);
         for (operator, right) in rest {
             let right_hint = match &left {
-                Operand::Typed(value) => Some(value.of.clone()),
-                _ => outer.cloned(),
+                Operand::Number(_) | Operand::Faulty => outer.cloned(),
+                typed => typed.own_type(),
             };
             let value = self.operand(right, right_hint.as_ref());
             left = self.binary(*operator, (left, &whole), (value, &right.span), outer);
@@ -121,41 +130,40 @@ impl Lowering<'_> {
             (Operand::Number(left), Operand::Number(right)) => {
                 return self.literals(operator, left, right, &span);
             }
-            (Operand::Typed(left), Operand::Typed(right)) => (left, right),
-            (Operand::Typed(left), Operand::Number(right)) => {
-                match self.beside(&left, right, operator, hint) {
-                    Some(right) => (left, right),
-                    None => return Operand::Faulty,
-                }
+            (left, Operand::Number(right)) => {
+                let value = self.beside(left.own_type(), right, operator, hint);
+                (left, value.map_or(Operand::Faulty, Operand::Typed))
             }
-            (Operand::Number(left), Operand::Typed(right)) => {
-                match self.beside(&right, left, operator, hint) {
-                    Some(left) => (left, right),
-                    None => return Operand::Faulty,
-                }
+            (Operand::Number(left), right) => {
+                let value = self.beside(right.own_type(), left, operator, hint);
+                (value.map_or(Operand::Faulty, Operand::Typed), right)
             }
+            typed => typed,
+        };
+        if let Operator::AndThen | Operator::OrElse = operator {
+            let of = Type::Elementary(Elementary::Bool);
+            let left = self.coerce(left, &of, left_span);
+            let right = self.coerce(right, &of, right_span);
+            return match (left, right) {
+                (Some(left), Some(right)) if operator == Operator::AndThen => {
+                    Operand::Typed(choose(left, right, boolean(false)))
+                }
+                (Some(left), Some(right)) => Operand::Typed(choose(left, boolean(true), right)),
+                _ => Operand::Faulty,
+            };
+        }
+        let (Some(left), Some(right)) = (Valued::of(left), Valued::of(right)) else {
+            return Operand::Faulty;
         };
         let found = match operator {
             Operator::Compare(comparison) => self.comparison(comparison, left, right, &span),
             Operator::And | Operator::Or | Operator::Xor => {
                 self.bitwise(operator, left, right, &span)
             }
-            Operator::AndThen | Operator::OrElse => {
-                let of = Type::Elementary(Elementary::Bool);
-                let left = self.coerce(Operand::Typed(left), &of, left_span);
-                let right = self.coerce(Operand::Typed(right), &of, right_span);
-                match (left, right) {
-                    (Some(left), Some(right)) if operator == Operator::AndThen => {
-                        Some(choose(left, right, boolean(false)))
-                    }
-                    (Some(left), Some(right)) => Some(choose(left, boolean(true), right)),
-                    _ => None,
-                }
-            }
             Operator::Power => self.power(left, right, hint, &span),
             _ => self.arithmetic(operator, left, right, &span),
         };
-        found.map_or(Operand::Faulty, Operand::Typed)
+        found.map_or(Operand::Faulty, Valued::operand)
     }
 
     fn literals(
@@ -200,14 +208,14 @@ impl Lowering<'_> {
     /// A literal as it is beside a typed value.
     fn beside(
         &mut self,
-        typed: &Expression,
+        typed: Option<Type>,
         literal: Number,
         operator: Operator,
         hint: Option<&Type>,
     ) -> Option<Expression> {
         let settled = literal.default_type();
-        let Some(of) = typed.of.elementary() else {
-            return self.settle(Operand::Number(literal), None);
+        let Some(of) = typed.as_ref().and_then(Type::elementary) else {
+            return self.settle(Operand::Number(literal), None, &(0..0));
         };
         let target = match literal {
             Number::Real(..) if of.is_real() => of,
@@ -241,38 +249,42 @@ impl Lowering<'_> {
     fn comparison(
         &mut self,
         comparison: Comparison,
-        left: Expression,
-        right: Expression,
+        left: Valued,
+        right: Valued,
         span: &Span,
-    ) -> Option<Expression> {
+    ) -> Option<Valued> {
         let of = Type::Elementary(Elementary::Bool);
-        if let (Type::Text(_), Type::Text(_)) = (&left.of, &right.of) {
-            return Some(text(TextOperation::Compare(comparison), vec![left, right], of));
+        if let (Type::Text(_), Type::Text(_)) = (&left.own, &right.own) {
+            let operands = vec![left.value, right.value];
+            return Some(Valued::typed(text(TextOperation::Compare(comparison), operands, of)));
         }
         let are_enumerations =
-            matches!((&left.of, &right.of), (Type::Enumeration(..), Type::Enumeration(..)));
-        let kinds = left.of.elementary().zip(right.of.elementary());
+            matches!((&left.own, &right.own), (Type::Enumeration(..), Type::Enumeration(..)));
+        let kinds = left.value.of.elementary().zip(right.value.of.elementary());
         let common = match kinds {
-            Some(_) if are_enumerations && left.of != right.of => None,
+            Some(_) if are_enumerations && left.own != right.own => None,
             Some((left, right)) if left == right => Some(left),
             Some((left, right)) => comparable(left, right),
             None => None,
         };
         let Some(common) = common else {
-            return self.do_not_fit("compared", &left, &right, span);
+            return self.do_not_fit("compared", &left.own, &right.own, span);
         };
-        let operands = vec![convert(left, common), convert(right, common)];
-        Some(apply(Operation::Compare(comparison, common), operands, of))
+        self.seen(&left, common, span);
+        self.seen(&right, common, span);
+        let operands = vec![convert(left.value, common), convert(right.value, common)];
+        Some(Valued::typed(apply(Operation::Compare(comparison, common), operands, of)))
     }
 
-    fn do_not_fit<T>(
-        &mut self,
-        what: &str,
-        left: &Expression,
-        right: &Expression,
-        span: &Span,
-    ) -> Option<T> {
-        let (left, right) = (self.describe(&left.of), self.describe(&right.of));
+    /// Warns where the bits above those of a type are seen.
+    fn seen(&mut self, operand: &Valued, of: Elementary, span: &Span) {
+        if let Some(own) = operand.own.elementary().filter(|_| operand.is_wide()) {
+            self.inverted(&operand.value, own, of.bits(), span);
+        }
+    }
+
+    fn do_not_fit<T>(&mut self, what: &str, left: &Type, right: &Type, span: &Span) -> Option<T> {
+        let (left, right) = (self.describe(left), self.describe(right));
         let message = format!("{left} and {right} cannot be {what}");
         let is_elementary = |name: &str| Elementary::ALL.iter().any(|of| of.name() == name);
         let help = if is_elementary(&left) && is_elementary(&right) {
@@ -287,11 +299,11 @@ impl Lowering<'_> {
     fn bitwise(
         &mut self,
         operator: Operator,
-        left: Expression,
-        right: Expression,
+        left: Valued,
+        right: Valued,
         span: &Span,
-    ) -> Option<Expression> {
-        let kinds = left.of.elementary().zip(right.of.elementary());
+    ) -> Option<Valued> {
+        let kinds = left.own.elementary().zip(right.own.elementary());
         let result = match kinds {
             Some((Elementary::Bool, Elementary::Bool)) => Some(Elementary::Bool),
             Some((left, right)) if is_whole(left) && is_whole(right) => {
@@ -304,35 +316,45 @@ impl Lowering<'_> {
             _ => None,
         };
         let Some(result) = result else {
-            return self.do_not_fit("combined bit by bit", &left, &right, span);
+            return self.do_not_fit("combined bit by bit", &left.own, &right.own, span);
         };
-        let bits = as_bits(result);
         let operation = match operator {
-            Operator::And => Operation::And(bits),
-            Operator::Or => Operation::Or(bits),
-            _ => Operation::Xor(bits),
+            Operator::And => Operation::And,
+            Operator::Or => Operation::Or,
+            _ => Operation::Xor,
         };
-        let operands = [left, right].map(|value| reinterpret(convert(value, result), bits));
-        let value = apply(operation, operands.into(), Type::Elementary(bits));
-        Some(reinterpret(value, result))
+        // Where both have no sign, or one type, the bits above are those that their result is extended with.
+        let are_plain = !left.is_wide() && !right.is_wide();
+        let are_alike = kinds
+            .is_some_and(|(left, right)| left == right || !left.is_signed() && !right.is_signed());
+        if is_narrow(result) && !(are_plain && are_alike) {
+            let values = vec![left.widened(), right.widened()];
+            let own = Type::Elementary(result);
+            return Some(Valued { value: wide_bits(operation, values), own });
+        }
+        self.seen(&left, result, span);
+        self.seen(&right, result, span);
+        let bits = as_bits(result);
+        let operands =
+            [left, right].map(|operand| reinterpret(convert(operand.value, result), bits));
+        let value = apply(operation(bits), operands.into(), Type::Elementary(bits));
+        Some(Valued::typed(reinterpret(value, result)))
     }
 
     fn arithmetic(
         &mut self,
         operator: Operator,
-        left: Expression,
-        right: Expression,
+        left: Valued,
+        right: Valued,
         span: &Span,
-    ) -> Option<Expression> {
-        let kinds = left.of.elementary().zip(right.of.elementary());
+    ) -> Option<Valued> {
+        let kinds = left.own.elementary().zip(right.own.elementary());
         if let Some((from, to)) = kinds
             && (from.is_time() || to.is_time())
         {
-            return match self.time_arithmetic(operator, left, right) {
-                Ok(value) => Some(value),
-                Err(operands) => {
-                    self.do_not_fit("calculated with so", &operands.0, &operands.1, span)
-                }
+            return match self.time_arithmetic(operator, left.value, right.value) {
+                Some(value) => Some(Valued::typed(value)),
+                None => self.do_not_fit("calculated with so", &left.own, &right.own, span),
             };
         }
         let found = kinds.and_then(|(left, right)| {
@@ -340,9 +362,9 @@ impl Lowering<'_> {
             common(left, right).filter(|_| known)
         });
         let Some(result) = found else {
-            return self.do_not_fit("calculated with", &left, &right, span);
+            return self.do_not_fit("calculated with", &left.own, &right.own, span);
         };
-        let of = as_integer(result);
+        let of = if is_narrow(result) { WIDE } else { as_integer(result) };
         if let Some((left, right)) = kinds
             && matches!(operator, Operator::Divide | Operator::Modulo)
             && !of.is_real()
@@ -370,28 +392,33 @@ impl Lowering<'_> {
             _ => Operation::Modulo(of),
         };
         let divides = matches!(operator, Operator::Divide | Operator::Modulo) && !of.is_real();
-        let is_zero = matches!(right.kind, understudy_typed::ExpressionKind::Constant(0));
+        let is_zero = matches!(right.value.kind, understudy_typed::ExpressionKind::Constant(0));
         if divides && is_zero {
             self.error("U1046", "division of a whole number by 0", span.clone());
             return None;
         }
-        let operands = vec![convert(left, of), convert(right, of)];
+        self.seen(&left, of, span);
+        self.seen(&right, of, span);
+        let operands = vec![convert(left.value, of), convert(right.value, of)];
         let value = apply(operation, operands, Type::Elementary(of));
-        Some(reinterpret(value, result))
+        Some(match is_narrow(result) {
+            true => Valued { value, own: Type::Elementary(result) },
+            false => Valued::typed(reinterpret(value, result)),
+        })
     }
 
     fn power(
         &mut self,
-        left: Expression,
-        right: Expression,
+        left: Valued,
+        right: Valued,
         hint: Option<&Type>,
         span: &Span,
-    ) -> Option<Expression> {
-        let kinds = left.of.elementary().zip(right.of.elementary());
+    ) -> Option<Valued> {
+        let kinds = left.own.elementary().zip(right.own.elementary());
         let Some((base, exponent)) =
             kinds.filter(|(left, right)| is_number(*left) && is_number(*right))
         else {
-            return self.do_not_fit("raised to a power", &left, &right, span);
+            return self.do_not_fit("raised to a power", &left.own, &right.own, span);
         };
         let hinted = hint.and_then(Type::elementary).filter(|of| of.is_real());
         let of = match (base.is_real(), exponent.is_real()) {
@@ -399,7 +426,7 @@ impl Lowering<'_> {
             (false, true) => exponent,
             (false, false) => hinted.unwrap_or(Elementary::Lreal),
         };
-        let operands = vec![convert(left, of), convert(right, of)];
-        Some(apply(Operation::Power(of), operands, Type::Elementary(of)))
+        let operands = vec![convert(left.value, of), convert(right.value, of)];
+        Some(Valued::typed(apply(Operation::Power(of), operands, Type::Elementary(of))))
     }
 }

@@ -73,7 +73,7 @@ impl Lowering<'_> {
         match self.constant_operand(expression, None) {
             Operand::Faulty => None,
             Operand::Number(Number::Integer(value)) => Some(value),
-            Operand::Typed(typed) => {
+            Operand::Typed(typed) | Operand::Wide(typed, _) => {
                 let elementary = typed.of.elementary();
                 match (elementary, &typed.kind) {
                     (Some(elementary), ExpressionKind::Constant(value))
@@ -99,7 +99,7 @@ impl Lowering<'_> {
                 ExpressionKind::Text(bytes) => Some(bytes.to_vec()),
                 _ => self.not_constant(expression),
             },
-            Operand::Number(_) => self.not_constant(expression),
+            Operand::Number(_) | Operand::Wide(..) => self.not_constant(expression),
         }
     }
 
@@ -140,7 +140,10 @@ impl Lowering<'_> {
         let mut scope = self.scope.clone();
         scope.symbols = None;
         let outside = std::mem::replace(&mut self.scope, scope);
-        let operand = self.operand(expression, hint);
+        let operand = match hint {
+            Some(of) => self.operand_for(expression, of),
+            None => self.operand(expression, None),
+        };
         self.scope = outside;
         operand
     }

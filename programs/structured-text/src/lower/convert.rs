@@ -8,6 +8,7 @@ use super::Lowering;
 use super::fold;
 use super::names::number;
 use super::numbers::{Number, Operand};
+use super::ranges::ranges;
 
 /// The least and the greatest number of an integer, a bit string or a time.
 pub(super) fn limits(of: Elementary) -> (i128, i128) {
@@ -139,6 +140,7 @@ impl Lowering<'_> {
             Operand::Faulty => return None,
             Operand::Number(number) => self.coerce_number(number, to, span),
             Operand::Typed(value) => self.coerce_typed(value, to, span),
+            Operand::Wide(value, own) => self.coerce_wide(value, own, to, span),
         };
         self.accounted(before, found, span)
     }
@@ -209,6 +211,30 @@ impl Lowering<'_> {
         Some(value.in_real(of))
     }
 
+    fn coerce_wide(
+        &mut self,
+        value: Expression,
+        own: Elementary,
+        to: &Type,
+        span: &Span,
+    ) -> Option<Expression> {
+        match to {
+            Type::Elementary(to) if is_whole(*to) => Some(self.stored_as(value, own, *to, span)),
+            Type::Elementary(to) if to.is_real() => {
+                let exact = (-(1 << 24), 1 << 24);
+                if *to == Elementary::Real && !ranges(&value).likely.is_within(exact) {
+                    self.rounded_to((own.name(), own), *to, span);
+                }
+                self.inverted(&value, own, to.bits(), span);
+                Some(fold::convert(value, *to))
+            }
+            _ => {
+                let value = self.stored_as(value, own, own, span);
+                self.coerce_typed(value, to, span)
+            }
+        }
+    }
+
     fn coerce_typed(&mut self, value: Expression, to: &Type, span: &Span) -> Option<Expression> {
         if value.of == *to {
             return Some(value);
@@ -245,28 +271,39 @@ impl Lowering<'_> {
             fit => fit,
         };
         match fit {
-            Fit::Whole => {}
-            Fit::Sign => {
-                let message =
-                    format!("{found} becomes {target}: the bits stay, the number may change");
-                let help = format!("write {from}_TO_{target}(…) if that is meant");
-                self.warn("U1080", message, span.clone(), help);
-            }
-            Fit::Rounded => {
-                let message = format!("{found} becomes {target}, which has fewer digits");
-                let help = format!("write {from}_TO_{target}(…) if that is meant");
-                self.warn("U1080", message, span.clone(), help);
-            }
-            // Other compilers warn, and keep the low bits.
+            Fit::Whole | Fit::Sign => self.converted((&found, from), target, span),
+            Fit::Rounded => self.rounded_to((&found, from), target, span),
             Fit::No if is_whole(from) && is_whole(target) && !is_constant => {
-                let message =
-                    format!("{found} becomes {target}, which is narrower: its low bits are kept");
-                let help = format!("write {from}_TO_{target}(…) if that is meant");
-                self.warn("U1080", message, span.clone(), help);
+                self.converted((&found, from), target, span);
             }
             Fit::No => return self.mismatch(&found, to, span),
         }
         Some(fold::convert(value, target))
+    }
+
+    /// Warns where a whole number becomes one of a type that does not have all numbers of its own.
+    pub(super) fn converted(
+        &mut self,
+        (found, from): (&str, Elementary),
+        to: Elementary,
+        span: &Span,
+    ) {
+        let what = match fit(from, to) {
+            Fit::Sign => ": the bits stay, the number may change",
+            // Other compilers warn, and keep the low bits.
+            Fit::No => ", which is narrower: its low bits are kept",
+            Fit::Whole | Fit::Rounded => return,
+        };
+        let message = format!("{found} becomes {to}{what}");
+        let help = format!("write {from}_TO_{to}(…) if that is meant");
+        self.warn("U1080", message, span.clone(), help);
+    }
+
+    /// Warns where digits may be lost.
+    fn rounded_to(&mut self, (found, from): (&str, Elementary), to: Elementary, span: &Span) {
+        let message = format!("{found} becomes {to}, which has fewer digits");
+        let help = format!("write {from}_TO_{to}(…) if that is meant");
+        self.warn("U1080", message, span.clone(), help);
     }
 
     /// Reports a value of another type than the one wanted.
@@ -295,10 +332,16 @@ impl Lowering<'_> {
     }
 
     /// A value of the type that it has by itself, or of the one that its surroundings suggest.
-    pub(super) fn settle(&mut self, operand: Operand, hint: Option<&Type>) -> Option<Expression> {
+    pub(super) fn settle(
+        &mut self,
+        operand: Operand,
+        hint: Option<&Type>,
+        span: &Span,
+    ) -> Option<Expression> {
         match operand {
             Operand::Faulty => None,
             Operand::Typed(value) => Some(value),
+            Operand::Wide(value, own) => Some(self.stored_as(value, own, own, span)),
             Operand::Number(value) => {
                 let hinted = hint.and_then(Type::elementary).filter(|of| match value {
                     Number::Real(..) => of.is_real(),

@@ -7,10 +7,11 @@ use understudy_typed::{Elementary, Expression, Operation, Type};
 use crate::syntax::{self, ExpressionKind, Literal, Span};
 
 use super::Lowering;
-use super::convert::{as_bits, as_integer, is_number};
-use super::fold::{apply, boolean, not, reinterpret};
+use super::convert::{as_bits, as_integer, is_number, is_whole, limits};
+use super::fold::{apply, boolean, convert, not, reinterpret};
 use super::names::number;
 use super::numbers::{Number, Operand};
+use super::promotion::{WIDE, is_narrow, wide_bits};
 
 impl Lowering<'_> {
     /// An expression whose value is wanted as a type; `None` where an error is reported.
@@ -19,8 +20,23 @@ impl Lowering<'_> {
         expression: &syntax::Expression,
         of: &Type,
     ) -> Option<Expression> {
-        let operand = self.operand(expression, Some(of));
+        let operand = self.operand_for(expression, of);
         self.coerce(operand, of, &expression.span)
+    }
+
+    /// An operand that is stored as a type. The digits of a number of base 2, 8 or 16 may be the bits of a negative one.
+    pub(super) fn operand_for(&mut self, expression: &syntax::Expression, of: &Type) -> Operand {
+        if let ExpressionKind::Literal(Literal::Integer { value, of: None, based: true }) =
+            expression.kind
+            && let Type::Elementary(of) = *of
+            && of.is_integer()
+            && of.is_signed()
+            && value > limits(of).1
+            && value <= i128::from(of.mask())
+        {
+            return Operand::Typed(number(Type::Elementary(of), value as u64));
+        }
+        self.operand(expression, Some(of))
     }
 
     /// A condition.
@@ -35,7 +51,19 @@ impl Lowering<'_> {
         hint: Option<&Type>,
     ) -> Option<Expression> {
         let operand = self.operand(expression, hint);
-        self.settle(operand, hint)
+        self.settle(operand, hint, &expression.span)
+    }
+
+    /// The same, where a number is used at once and not stored: an operator's result of fewer than 32 bits is a DINT.
+    pub(super) fn used(
+        &mut self,
+        expression: &syntax::Expression,
+        hint: Option<&Type>,
+    ) -> Option<Expression> {
+        match self.operand(expression, hint) {
+            Operand::Wide(value, _) => Some(value),
+            operand => self.settle(operand, hint, &expression.span),
+        }
     }
 
     pub(super) fn operand(
@@ -58,7 +86,7 @@ impl Lowering<'_> {
             ExpressionKind::Literal(literal) => return self.literal(literal, span),
             ExpressionKind::Variable(path) => self.variable(path, hint),
             ExpressionKind::Qualified(of, value) => self.qualified(of, value),
-            ExpressionKind::Not(inner) => self.not(inner, hint),
+            ExpressionKind::Not(inner) => return self.not(inner, hint),
             ExpressionKind::Minus(inner) => return self.minus(inner, hint, span),
             ExpressionKind::Chain(first, rest) => return self.chain(first, rest, hint, span),
             ExpressionKind::Call(path, arguments) => {
@@ -75,10 +103,10 @@ impl Lowering<'_> {
     fn literal(&mut self, literal: &Literal, span: &Span) -> Operand {
         Operand::Typed(match literal {
             Literal::Boolean(value) => boolean(*value),
-            Literal::Integer { value, of: None } => {
+            Literal::Integer { value, of: None, .. } => {
                 return Operand::Number(Number::Integer(*value));
             }
-            Literal::Integer { value, of: Some(of) } => {
+            Literal::Integer { value, of: Some(of), .. } => {
                 let value = Operand::Number(Number::Integer(*value));
                 match self.coerce(value, &Type::Elementary(*of), span) {
                     Some(value) => value,
@@ -114,27 +142,40 @@ impl Lowering<'_> {
         })
     }
 
-    fn not(&mut self, inner: &syntax::Expression, hint: Option<&Type>) -> Option<Expression> {
+    fn not(&mut self, inner: &syntax::Expression, hint: Option<&Type>) -> Operand {
         let operand = self.operand(inner, hint);
         if let Operand::Number(_) = operand
             && hint.and_then(Type::elementary) == Some(Elementary::Bool)
         {
             let of = Type::Elementary(Elementary::Bool);
-            return self.coerce(operand, &of, &inner.span).map(not);
+            let value = self.coerce(operand, &of, &inner.span).map(not);
+            return value.map_or(Operand::Faulty, Operand::Typed);
         }
-        let value = self.settle(operand, hint)?;
-        match value.of.elementary() {
-            Some(of) if of.is_bit_string() || of.is_integer() => {
-                let bits = as_bits(of);
-                let value = reinterpret(value, bits);
-                let value = apply(Operation::Not(bits), vec![value], Type::Elementary(bits));
-                Some(reinterpret(value, of))
+        let (value, own) = match operand {
+            Operand::Wide(value, own) => (value, own),
+            operand => {
+                let Some(value) = self.settle(operand, hint, &inner.span) else {
+                    return Operand::Faulty;
+                };
+                let Some(of) =
+                    value.of.elementary().filter(|of| of.is_bit_string() || is_whole(*of))
+                else {
+                    let found = self.describe(&value.of);
+                    let wanted = Type::Elementary(Elementary::Bool);
+                    let _: Option<()> = self.mismatch(&found, &wanted, &inner.span);
+                    return Operand::Faulty;
+                };
+                if !is_narrow(of) || of.is_signed() {
+                    let bits = as_bits(of);
+                    let value = reinterpret(value, bits);
+                    let value = apply(Operation::Not(bits), vec![value], Type::Elementary(bits));
+                    return Operand::Typed(reinterpret(value, of));
+                }
+                (value, of)
             }
-            _ => {
-                let found = self.describe(&value.of);
-                self.mismatch(&found, &Type::Elementary(Elementary::Bool), &inner.span)
-            }
-        }
+        };
+        let value = convert(value, WIDE);
+        Operand::Wide(wide_bits(Operation::Not, vec![value]), own)
     }
 
     fn minus(&mut self, inner: &syntax::Expression, hint: Option<&Type>, span: &Span) -> Operand {
@@ -144,7 +185,16 @@ impl Lowering<'_> {
                 Some(value) => Operand::Number(value),
                 None => self.no_result(span),
             },
+            Operand::Wide(value, own) => {
+                let value = apply(Operation::Negate(WIDE), vec![value], Type::Elementary(WIDE));
+                Operand::Wide(value, as_integer(own))
+            }
             Operand::Typed(value) => match value.of.elementary() {
+                Some(of) if is_narrow(of) => {
+                    let value = vec![convert(value, WIDE)];
+                    let value = apply(Operation::Negate(WIDE), value, Type::Elementary(WIDE));
+                    Operand::Wide(value, as_integer(of))
+                }
                 Some(of) if is_number(of) || of == Elementary::Time => {
                     let of = as_integer(of);
                     let value = reinterpret(value, of);

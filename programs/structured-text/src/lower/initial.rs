@@ -7,6 +7,7 @@ use crate::syntax::{Expression, Initializer, Name, Span};
 use super::Lowering;
 use super::images::{Builder, Image};
 use super::names::Constant;
+use super::standard_blocks::CYCLE;
 use super::types::Resolved;
 
 impl Lowering<'_> {
@@ -63,6 +64,7 @@ impl Lowering<'_> {
                         self.no_such_part(name, of);
                         return None;
                     };
+                    self.sets_cycle |= name.is(CYCLE);
                     let field = self.program.structures[id.0 as usize].fields[field].clone();
                     if field.is_reference {
                         let message = format!("`{name}` is a VAR_IN_OUT and has no initial value");
@@ -187,6 +189,11 @@ impl Lowering<'_> {
                 name.as_str(),
                 shown.filter(|name| !name.contains('.')),
             );
+            if let Some(other) =
+                self.structures[id.0 as usize].unit.and_then(|unit| self.counterpart(unit))
+            {
+                help = format!("{help}; {other}");
+            }
         }
         let whole = self.describe(of);
         let message = format!("{whole} has no part `{name}`");

@@ -10,10 +10,23 @@ use super::names::number;
 /// An expression whose type may still be open.
 pub(super) enum Operand {
     Typed(Expression),
+    /// What an operator makes of numbers of fewer than 32 bits: a DINT, which is of this type where it is stored.
+    Wide(Expression, Elementary),
     /// Made of untyped literals only.
     Number(Number),
     /// An error is reported.
     Faulty,
+}
+
+impl Operand {
+    /// The type that it has where it is stored; nothing where that is open.
+    pub(super) fn own_type(&self) -> Option<Type> {
+        match self {
+            Self::Typed(value) => Some(value.of.clone()),
+            Self::Wide(_, own) => Some(Type::Elementary(*own)),
+            Self::Number(_) | Self::Faulty => None,
+        }
+    }
 }
 
 /// An untyped number.

@@ -305,7 +305,7 @@ impl Lowering<'_> {
         let mut bits = u64::from(target.place.bit);
         for ((index, stride), (low, high)) in indices.iter().zip(strides).zip(&array.ranges) {
             let long = Type::Elementary(Elementary::Lint);
-            let value = self.typed(index, Some(&long))?;
+            let value = self.used(index, Some(&long))?;
             let Some(of) = value.of.elementary().filter(|of| is_whole(*of)) else {
                 let found = self.describe(&value.of);
                 let message = format!("an index is a whole number, and this is {found}");

@@ -22,6 +22,7 @@ use super::expand::{POINTED, STORED};
 use super::fold::{apply, boolean, choose, convert, reinterpret};
 use super::names::number;
 use super::numbers::{Number, Operand};
+use super::promotion::cut;
 
 /// The names that are known here, for suggestions; conversions come on top.
 pub(super) const NAMES: [&str; 92] = [
@@ -200,7 +201,7 @@ impl Lowering<'_> {
         if values.enable.is_none() {
             return operand;
         }
-        match self.settle(operand, hint) {
+        match self.settle(operand, hint, span) {
             Some(value) => self.permitted(value, values.enable),
             None => Operand::Faulty,
         }
@@ -228,7 +229,7 @@ impl Lowering<'_> {
             self.conversion(&conversion, values[0], hint)
         } else {
             match key {
-                "MOVE" => return self.operand(values[0], hint),
+                "MOVE" => return self.stored(values[0], hint),
                 "ABS" => self.absolute(values[0], hint),
                 "NOT" => self.not_call(values[0], hint),
                 "SHL" | "SHR" | "ROL" | "ROR" => self.shift(key, values, hint),
@@ -261,18 +262,28 @@ impl Lowering<'_> {
         values: &[&syntax::Expression],
         hint: Option<&Type>,
     ) -> Operand {
-        let mut left = self.operand(values[0], hint);
+        let mut left = self.stored(values[0], hint);
         let mut whole = values[0].span.clone();
         for right in &values[1..] {
-            let own = match &left {
-                Operand::Typed(value) => Some(value.of.clone()),
-                _ => hint.cloned(),
+            let own = left.own_type().or_else(|| hint.cloned());
+            let value = self.stored(right, own.as_ref());
+            left = match self.binary(operator, (left, &whole), (value, &right.span), hint) {
+                Operand::Wide(value, own) => Operand::Typed(cut(value, own)),
+                found => found,
             };
-            let value = self.operand(right, own.as_ref());
-            left = self.binary(operator, (left, &whole), (value, &right.span), hint);
             whole.end = right.span.end;
         }
         left
+    }
+
+    /// An input of a function, which has a type: what operators have computed as a DINT is cut to it.
+    pub(super) fn stored(&mut self, value: &syntax::Expression, hint: Option<&Type>) -> Operand {
+        match self.operand(value, hint) {
+            Operand::Wide(found, own) => {
+                Operand::Typed(self.stored_as(found, own, own, &value.span))
+            }
+            found => found,
+        }
     }
 
     fn comparison_call(
@@ -282,15 +293,11 @@ impl Lowering<'_> {
     ) -> Option<Expression> {
         let mut all: Option<Expression> = None;
         for pair in values.windows(2) {
-            let left = self.operand(pair[0], None);
-            let hint = match &left {
-                Operand::Typed(value) => Some(value.of.clone()),
-                _ => None,
-            };
-            let right = self.operand(pair[1], hint.as_ref());
+            let left = self.stored(pair[0], None);
+            let right = self.stored(pair[1], left.own_type().as_ref());
             let operator = Operator::Compare(comparison);
             let one = self.binary(operator, (left, &pair[0].span), (right, &pair[1].span), None);
-            let one = self.settle(one, None)?;
+            let one = self.settle(one, None, &pair[0].span)?;
             all = Some(match all {
                 Some(before) => choose(before, one, boolean(false)),
                 None => one,

@@ -16,6 +16,7 @@ use super::fold::{apply, convert, reinterpret};
 use super::names::number;
 use super::numbers::{Number, Operand};
 use super::places::{Target, insert, load};
+use super::standard_blocks::CYCLE;
 
 /// Labels of a CASE: the last value and the place by the first value.
 type Labels = BTreeMap<i64, (i64, Span)>;
@@ -121,13 +122,19 @@ impl Lowering<'_> {
         path: &syntax::Path,
         value: &syntax::Expression,
     ) -> Option<StatementKind> {
+        if let Some(syntax::Step::Field(name)) = path.steps.last() {
+            self.sets_cycle |= name.is(CYCLE);
+        }
         let target = self.target(path);
         let writable = match &target {
             Some(target) => self.writable(target, path),
             None => None,
         };
         let hint = target.as_ref().map(Target::of);
-        let operand = self.operand(value, hint.as_ref());
+        let operand = match &hint {
+            Some(of) => self.operand_for(value, of),
+            None => self.operand(value, None),
+        };
         let value = self.coerce(operand, &hint?, &value.span)?;
         writable?;
         self.has_no_references(&value.of, &path.span)?;
@@ -251,12 +258,16 @@ impl Lowering<'_> {
             Operand::Faulty => return None,
             Operand::Number(Number::Integer(value)) => return Some(value),
             Operand::Number(_) => None,
-            Operand::Typed(value) => match (&value.kind, value.of.elementary()) {
-                (understudy_typed::ExpressionKind::Constant(stored), Some(of)) if is_whole(of) => {
-                    Some(of.signed(*stored))
+            Operand::Typed(value) | Operand::Wide(value, _) => {
+                match (&value.kind, value.of.elementary()) {
+                    (understudy_typed::ExpressionKind::Constant(stored), Some(of))
+                        if is_whole(of) =>
+                    {
+                        Some(of.signed(*stored))
+                    }
+                    _ => None,
                 }
-                _ => None,
-            },
+            }
         };
         if found.is_none() {
             let message =
@@ -315,12 +326,13 @@ impl Lowering<'_> {
     fn bound(&mut self, written: &syntax::Expression, counter: Elementary) -> Option<Expression> {
         let wanted = Type::Elementary(counter);
         let operand = self.operand(written, Some(&wanted));
-        let Operand::Typed(value) = &operand else {
-            return self.coerce(operand, &wanted, &written.span);
+        let from = match &operand {
+            Operand::Typed(value) | Operand::Wide(value, _) => value.of.elementary(),
+            Operand::Number(_) | Operand::Faulty => None,
         };
-        let from = value.of.elementary().filter(|of| is_whole(*of)).map(as_integer);
+        let from = from.filter(|of| is_whole(*of)).map(as_integer);
         match (from, operand) {
-            (Some(from), Operand::Typed(value)) => {
+            (Some(from), Operand::Typed(value) | Operand::Wide(value, _)) => {
                 let ((least, most), (low, high)) = (limits(counter), limits(from));
                 let mut value = reinterpret(value, from);
                 let constant =

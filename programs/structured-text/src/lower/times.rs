@@ -9,20 +9,19 @@ use super::convert::is_number;
 use super::fold::{apply, convert, reinterpret};
 
 impl Lowering<'_> {
+    /// The operator between a time and another time or a number; nothing where they have none.
     pub(super) fn time_arithmetic(
         &mut self,
         operator: Operator,
         left: Expression,
         right: Expression,
-    ) -> Result<Expression, (Expression, Expression)> {
+    ) -> Option<Expression> {
         use Elementary::{Lint, Lreal, Time};
-        let (Some(from), Some(to)) = (left.of.elementary(), right.of.elementary()) else {
-            return Err((left, right));
-        };
+        let (from, to) = left.of.elementary().zip(right.of.elementary())?;
         let plain = |operation: fn(Elementary) -> Operation, left, right, result| {
             let operands = vec![reinterpret(left, Lint), reinterpret(right, Lint)];
             let value = apply(operation(Lint), operands, Type::Elementary(Lint));
-            Ok(reinterpret(value, result))
+            Some(reinterpret(value, result))
         };
         match operator {
             Operator::Add if to == Time && from.is_time() => {
@@ -47,11 +46,11 @@ impl Lowering<'_> {
                 if to.is_real() {
                     let operands = vec![convert(left, Lreal), convert(right, Lreal)];
                     let value = apply(operation(Lreal), operands, Type::Elementary(Lreal));
-                    return Ok(convert(value, Time));
+                    return Some(convert(value, Time));
                 }
                 plain(operation, left, convert(right, Lint), Time)
             }
-            _ => Err((left, right)),
+            _ => None,
         }
     }
 }

@@ -271,7 +271,7 @@ impl Parser<'_> {
         let span = self.span();
         match self.peek() {
             Lexeme::Literal(literal) => {
-                if let Literal::Integer { value, of: None } = **literal
+                if let Literal::Integer { value, of: None, .. } = **literal
                     && let Ok(number) = u32::try_from(value)
                 {
                     self.skip();

@@ -131,9 +131,9 @@ pub(super) fn literal(of: &Literal) -> String {
     match of {
         Literal::Boolean(true) => "TRUE".into(),
         Literal::Boolean(false) => "FALSE".into(),
-        Literal::Integer { value, of } => {
-            let is_bits = of.is_some_and(|of| of.is_bit_string() && of != Elementary::Bool);
-            match is_bits && *value > 9 {
+        Literal::Integer { value, of, based } => {
+            let is_bits = of.map_or(*based, |of| of.is_bit_string() && of != Elementary::Bool);
+            match is_bits && (*value > 9 || of.is_none()) {
                 true => typed(of, format!("16#{value:X}")),
                 false => typed(of, value.to_string()),
             }

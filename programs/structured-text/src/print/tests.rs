@@ -33,11 +33,21 @@ fn expression_of(kind: ExpressionKind) -> Expression {
 }
 
 fn literal() -> impl Strategy<Value = Literal> {
-    let integer = (0..i128::from(u64::MAX)).prop_map(|value| Literal::Integer { value, of: None });
-    let typed =
-        (-128..128_i128).prop_map(|value| Literal::Integer { value, of: Some(Elementary::Sint) });
-    let bits =
-        (0..65_536_i128).prop_map(|value| Literal::Integer { value, of: Some(Elementary::Word) });
+    let integer = (0..i128::from(u64::MAX)).prop_map(|value| Literal::Integer {
+        value,
+        of: None,
+        based: value % 3 == 0,
+    });
+    let typed = (-128..128_i128).prop_map(|value| Literal::Integer {
+        value,
+        of: Some(Elementary::Sint),
+        based: false,
+    });
+    let bits = (0..65_536_i128).prop_map(|value| Literal::Integer {
+        value,
+        of: Some(Elementary::Word),
+        based: true,
+    });
     let real = (0..1000_u32, 0..1000_u32, -30..30_i32).prop_map(|(whole, part, exponent)| {
         Literal::Real { text: format!("{whole}.{part}E{exponent}"), of: None }
     });
@@ -159,7 +169,11 @@ fn any_statement() -> impl Strategy<Value = Statement> {
         let body = prop::collection::vec(inner, 0..3).boxed();
         let label = (0..9_i128, prop::option::of(10..19_i128)).prop_map(|(first, last)| {
             let number = |value| {
-                expression_of(ExpressionKind::Literal(Literal::Integer { value, of: None }))
+                expression_of(ExpressionKind::Literal(Literal::Integer {
+                    value,
+                    of: None,
+                    based: false,
+                }))
             };
             Label { first: number(first), last: last.map(number) }
         });

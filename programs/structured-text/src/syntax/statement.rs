@@ -158,6 +158,8 @@ pub enum Literal {
         value: i128,
         /// Its type.
         of: Option<Elementary>,
+        /// Its digits are of base 2, 8 or 16: its bits may be meant.
+        based: bool,
     },
     /// `1.5`, `REAL#1.5E3`: as written, without `_`, so that it is rounded once, in the type that it gets.
     Real {

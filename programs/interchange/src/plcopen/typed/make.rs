@@ -35,7 +35,7 @@ pub(crate) fn boolean(value: bool, span: &Span) -> Expression {
 
 pub(crate) fn integer(value: i128, span: &Span) -> Expression {
     Expression {
-        kind: ExpressionKind::Literal(Literal::Integer { value, of: None }),
+        kind: ExpressionKind::Literal(Literal::Integer { value, of: None, based: false }),
         span: span.clone(),
     }
 }

@@ -10,7 +10,7 @@ use understudy_structured_text::in_parts;
 use understudy_structured_text::parser::parse_expression_at;
 use understudy_structured_text::syntax::{
     Argument, Class, Declaration, Expression, ExpressionKind, File, Name, Operator, Path,
-    Statement, StatementKind, UnitKind,
+    Statement, StatementKind, TypeKind, UnitKind,
 };
 use understudy_text::Diagnostic;
 use understudy_typed::Comparison;
@@ -245,8 +245,12 @@ impl<'a> Network<'a> {
         if let Some(operator) = operator
             && (inputs.len() == 2 || !matches!(operator, Operator::Compare(_)))
         {
-            let values = inputs.into_iter().map(|(_, value)| value).collect();
-            return make::chain(values, operator, span);
+            let values: Vec<Expression> = inputs.iter().map(|(_, value)| value.clone()).collect();
+            let chain = make::chain(values, operator, span);
+            // A box computes in its type; an operator computes in 32 bits at least.
+            if !is_arithmetic(operator) || self.is_wide(&chain) {
+                return chain;
+            }
         }
         if !own
             && inputs.len() == 1
@@ -263,6 +267,17 @@ impl<'a> Network<'a> {
     fn type_of(&self, value: &Expression) -> understudy_structured_text::syntax::TypeName {
         let values = Values { file: self.file, declarations: self.declarations, made: &self.made };
         values.of(value)
+    }
+
+    /// Whether a value is certainly no number of fewer than 32 bits.
+    fn is_wide(&self, value: &Expression) -> bool {
+        let narrow = ["SINT", "INT", "USINT", "UINT", "BYTE", "WORD"];
+        match self.certain_type_of(value).map(|of| of.kind) {
+            Some(TypeKind::Named(name)) => {
+                !narrow.iter().any(|known| name.is(known)) && name.key() != "BOOL"
+            }
+            _ => false,
+        }
     }
 
     fn certain_type_of(
@@ -357,6 +372,11 @@ fn arguments(inputs: Vec<(Written, Expression)>, own: bool) -> Vec<Argument> {
         }
     };
     inputs.into_iter().map(given).collect()
+}
+
+fn is_arithmetic(operator: Operator) -> bool {
+    use Operator::{Add, Divide, Modulo, Multiply, Subtract};
+    matches!(operator, Add | Subtract | Multiply | Divide | Modulo)
 }
 
 fn operator(name: &str) -> Option<Operator> {

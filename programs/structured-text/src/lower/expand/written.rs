@@ -37,15 +37,41 @@ pub(super) fn boolean(value: bool, span: &Span) -> Expression {
 }
 
 pub(super) fn integer(value: i128, span: &Span) -> Expression {
-    literal(Literal::Integer { value, of: None }, span)
+    literal(Literal::Integer { value, of: None, based: false }, span)
 }
 
 pub(super) fn not(value: Expression) -> Expression {
     Expression { span: value.span.clone(), kind: ExpressionKind::Not(Box::new(value)) }
 }
 
+/// An operator of an instruction list. Its result has the type of its operands, so arithmetic is that of the function in the place of the
+/// operator.
 pub(super) fn join(left: Expression, operator: Operator, right: Expression) -> Expression {
     let span = left.span.clone();
+    let function = match operator {
+        Operator::Add => Some("ADD"),
+        Operator::Subtract => Some("SUB"),
+        Operator::Multiply => Some("MUL"),
+        Operator::Divide => Some("DIV"),
+        Operator::Modulo => Some("MOD"),
+        _ => None,
+    };
+    if let Some(function) = function {
+        let name = path(function, None, &span);
+        let arguments = match left.kind {
+            ExpressionKind::Call(found, mut arguments)
+                if is_chained(operator) && found.root.is(function) =>
+            {
+                arguments.push(Argument::Placed(right));
+                arguments
+            }
+            kind => {
+                let left = Expression { kind, span: span.clone() };
+                vec![Argument::Placed(left), Argument::Placed(right)]
+            }
+        };
+        return Expression { kind: ExpressionKind::Call(name, arguments), span };
+    }
     match left.kind {
         // Operators of one kind stand in one chain, so the tree stays flat.
         ExpressionKind::Chain(first, mut rest)

@@ -20,7 +20,7 @@ impl Lowering<'_> {
         let mut of: Option<Type> = None;
         let mut is_whole_call = true;
         for value in values {
-            let operand = self.operand(value, hint.as_ref());
+            let operand = self.stored(value, hint.as_ref());
             match &operand {
                 Operand::Faulty => is_whole_call = false,
                 Operand::Typed(found) => {
@@ -38,7 +38,7 @@ impl Lowering<'_> {
                         hint = of.clone();
                     }
                 }
-                Operand::Number(_) => {}
+                Operand::Number(_) | Operand::Wide(..) => {}
             }
             operands.push(operand);
         }

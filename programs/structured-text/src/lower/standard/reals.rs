@@ -22,7 +22,7 @@ impl Lowering<'_> {
             let of = hinted.unwrap_or(Elementary::Lreal);
             return Some((value.in_real(of), of));
         }
-        let found = self.settle(operand, hint)?;
+        let found = self.settle(operand, hint, &value.span)?;
         match found.of.elementary() {
             Some(of) if of.is_real() => Some((found, of)),
             Some(of) if is_number(of) => {
