@@ -15,6 +15,9 @@ use super::names::{Owner, number};
 use super::numbers::Operand;
 use super::places::{Target, load, place, shown};
 
+/// A call of a function counts as so many operators around each other.
+const CALL: usize = 4;
+
 impl Lowering<'_> {
     /// A call as a statement.
     pub(super) fn call_statement(
@@ -302,12 +305,12 @@ impl Lowering<'_> {
             return Operand::Faulty;
         };
         if let Callee::Standard(key) = callee {
-            if !self.has_room(1, span) {
+            if !self.has_room(CALL, span) {
                 return Operand::Faulty;
             }
-            self.length += 1;
+            self.length += CALL;
             let found = self.standard(&key, arguments, hint, span);
-            self.length -= 1;
+            self.length -= CALL;
             return found;
         }
         if let Some(key) = self.overloaded(&callee, path, arguments, span) {

@@ -28,8 +28,12 @@ use crate::jumps::in_parts;
 use carried::Carried;
 
 use super::written::{
-    assign, boolean, declare, elementary, integer, join, not, path, statement, variable, when,
+    assign, boolean, declare, elementary, integer, is_chained, join, not, path, statement,
+    variable, when,
 };
+
+/// Operators around each other in one result.
+const MAXIMUM_DEPTH: usize = 80;
 
 /// Brackets that may be open at once.
 const MAXIMUM_OPEN: usize = 32;
@@ -57,6 +61,9 @@ struct Writer<'a> {
     /// Where the result was made that nothing has taken yet.
     idle: Option<Span>,
     open: Vec<Open>,
+    /// How many operators and functions are around each other in the result, and the last one.
+    depth: usize,
+    last: Option<Operator>,
     carried: Carried,
     /// The instruction before is a jump that is always taken.
     is_over: bool,
@@ -77,6 +84,8 @@ pub(super) fn statements(
         result: None,
         idle: None,
         open: Vec::new(),
+        depth: 0,
+        last: None,
         carried: Carried::of(list),
         is_over: false,
         diagnostics,
@@ -211,7 +220,12 @@ impl Writer<'_> {
         match word {
             "" => {}
             ")" => self.close(span),
-            "NOT" => self.result = self.taken(span).map(not),
+            "NOT" => {
+                self.last = None;
+                if self.deeper(span) {
+                    self.result = self.taken(span).map(not);
+                }
+            }
             "CAL" | "CALC" | "CALCN" | "CALN" => self.call(word, instruction),
             "RET" | "RETC" | "RETCN" | "RETN" => {
                 let condition = self.condition(word, "RET", span);
@@ -240,6 +254,9 @@ impl Writer<'_> {
             "LD" | "LDN" => {
                 self.lost();
                 self.idle = Some(span.clone());
+                if self.open.is_empty() {
+                    (self.depth, self.last) = (0, None);
+                }
                 self.result = Some(if word == "LDN" { not(first) } else { first });
             }
             "ST" | "STN" => {
@@ -313,9 +330,28 @@ impl Writer<'_> {
         }
         if let Some(first) = first {
             let right = if negated { not(first) } else { first };
-            self.result = Some(join(before, operator, right));
+            let is_flat = self.last == Some(operator) && is_chained(operator);
+            self.last = Some(operator);
+            if is_flat || self.deeper(span) {
+                self.result = Some(join(before, operator, right));
+            }
             self.idle = Some(span.clone());
         }
+    }
+
+    /// Goes one operator deeper. Past the bound the result is faulty, and what follows has none of it.
+    fn deeper(&mut self, span: &Span) -> bool {
+        self.depth += 1;
+        let fits = self.depth <= MAXIMUM_DEPTH;
+        if !fits {
+            let message = format!("a result of more than {MAXIMUM_DEPTH} operators");
+            let found = Diagnostic::error("U1033", message, span.clone());
+            let help = "store it with ST, and load it with LD";
+            self.diagnostics.push(found.with_help(help));
+            self.result = Some(Expression { kind: ExpressionKind::Faulty, span: span.clone() });
+            (self.depth, self.last) = (0, None);
+        }
+        fits
     }
 
     fn close(&mut self, span: &Span) {
@@ -327,7 +363,10 @@ impl Writer<'_> {
         let value = self.taken(span);
         if let (Some(before), Some(value)) = (open.before, value) {
             let value = if open.negated { not(value) } else { value };
-            self.result = Some(join(before, open.operator, value));
+            self.last = None;
+            if self.deeper(span) {
+                self.result = Some(join(before, open.operator, value));
+            }
         }
     }
 
@@ -400,7 +439,10 @@ impl Writer<'_> {
         arguments.extend(instruction.operands.iter().cloned());
         let name = path(&instruction.operator, None, span);
         let value = Expression { kind: ExpressionKind::Call(name, arguments), span: span.clone() };
-        self.result = Some(value);
+        self.last = None;
+        if self.deeper(span) {
+            self.result = Some(value);
+        }
         self.idle = Some(span.clone());
     }
 }

@@ -90,7 +90,8 @@ pub(super) fn join(left: Expression, operator: Operator, right: Expression) -> E
     }
 }
 
-fn is_chained(operator: Operator) -> bool {
+/// Whether operators of this kind, one behind the other, are one.
+pub(super) fn is_chained(operator: Operator) -> bool {
     matches!(operator, Operator::And | Operator::Or | Operator::AndThen | Operator::Add)
 }
 
