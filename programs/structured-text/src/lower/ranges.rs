@@ -154,8 +154,10 @@ fn found(value: &Expression) -> (Range, Interval) {
             };
             let possible = joined(left.possible, right.possible);
             let likely = joined(left.likely, right.likely);
+            let of_types =
+                left.likely.is_within(types.ends()) && right.likely.is_within(types.ends());
             let likely = match operation {
-                O::Add(_) | O::Subtract(_) => likely.meet(types),
+                O::Add(_) | O::Subtract(_) if of_types => likely.meet(types),
                 _ => likely,
             };
             (Range { possible, likely }, types)
