@@ -195,7 +195,9 @@ fn errors_of_others(text: &str, diagnostics: &mut Vec<Diagnostic>) {
         let meets = |known: &Diagnostic| {
             known.span.start <= found.span.end && found.span.start <= known.span.end
         };
-        is_error(found) && !known.any(meets)
+        // The interval that is no time is said where it is written.
+        let is_interval = |known: &Diagnostic| known.code == "U1011" && found.code == "U1084";
+        is_error(found) && !known.any(|known| meets(known) || is_interval(known))
     });
     diagnostics.extend(found);
 }

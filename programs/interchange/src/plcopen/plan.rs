@@ -1,7 +1,7 @@
 //! In which order the objects of a graph act, and on what: the graph as a list of steps.
 //!
-//! Coils, written variables and blocks act in the order of `executionOrderId` where they have one, and else as a person reads: by y, then by x
-//! (as xml2st and Beremiz do). Before something acts, the blocks that feed it act. Power is what it is at the moment when
+//! Coils, written variables, blocks and functions act in the order of `executionOrderId` where they have one, and else as a person reads: by y,
+//! then by x (as xml2st does). Before something acts, the blocks that feed it act. Power is what it is at the moment when
 //! it is first asked for, and stays so: what an object has let through is not asked again when a coil has changed the
 //! variable meanwhile. Where that matters, the power is *kept* in a bit of its own.
 
@@ -19,6 +19,7 @@ use self::links::{Links, Source};
 use self::walk::{Trace, Walk};
 use super::document::{Graph, Kind, Language, Modifier};
 use super::power::Power;
+use super::standard::StandardBlock;
 
 /// Distances between comments and rungs that are measured; with more, comments stand at the end.
 const MAXIMUM_DISTANCES: usize = 10_000_000;
@@ -115,8 +116,8 @@ pub(crate) fn plan(
     plan
 }
 
-/// Plans a graph whose values may be numbers: what goes round in a circle is what it was in the last scan, jumps go anywhere,
-/// and a function with an `executionOrderId` has its turn.
+/// Plans a graph whose values may be numbers: what goes round in a circle is what it was in the last scan, and jumps go
+/// anywhere.
 pub(crate) fn plan_numbers(
     graph: &Graph,
     is_block: &dyn Fn(&str) -> bool,
@@ -174,6 +175,7 @@ fn stale(graph: &Graph, links: &Links, plan: &Plan, trace: &Trace) -> HashSet<us
         }
     }
     let mut writes: HashMap<String, Vec<usize>> = HashMap::new();
+    let mut calls = Vec::new();
     for (place, step) in plan.steps.iter().enumerate() {
         match &step.action {
             Action::Write { targets, .. } => {
@@ -184,16 +186,20 @@ fn stale(graph: &Graph, links: &Links, plan: &Plan, trace: &Trace) -> HashSet<us
             Action::Call(call) => {
                 let key = format!("{}.", call.instance.to_uppercase());
                 writes.entry(key).or_default().push(place);
+                // A unit of the file may write global variables, and those at its in-out pins.
+                if StandardBlock::of(&call.type_name).is_none() {
+                    calls.push(place);
+                }
             }
             Action::Keep { .. } | Action::Jump { .. } | Action::Label(_) => {}
         }
     }
+    let is_between = |places: &[usize], first: usize, last: usize| {
+        let next = places.partition_point(|&place| place < first);
+        places.get(next).is_some_and(|&place| place < last)
+    };
     let changed = |text: &str, first: usize, last: usize| {
-        let places = writes.get(text);
-        places.is_some_and(|places| {
-            let next = places.partition_point(|&place| place < first);
-            places.get(next).is_some_and(|&place| place < last)
-        })
+        writes.get(text).is_some_and(|places| is_between(places, first, last))
     };
     let mut stale = HashSet::new();
     for &place in &trace.finished {
@@ -204,7 +210,9 @@ fn stale(graph: &Graph, links: &Links, plan: &Plan, trace: &Trace) -> HashSet<us
         };
         let instance = text.split_once('.').map(|(instance, _)| format!("{instance}."));
         let asked = (trace.first[place], last[place]);
+        let is_named = text.starts_with(|first: char| first.is_alphabetic() || first == '_');
         if changed(&text, asked.0, asked.1)
+            || is_named && !text.contains('#') && is_between(&calls, asked.0, asked.1)
             || instance.is_some_and(|instance| changed(&instance, asked.0, asked.1))
         {
             stale.insert(place);

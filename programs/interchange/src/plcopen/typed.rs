@@ -25,7 +25,6 @@ use super::document::{self, Body as Drawn, Language, Part, Pou, PouKind};
 use super::xml::{self, attribute, child, elements, start_tag};
 use super::{NAMESPACES, within};
 use network::Network;
-pub(in crate::plcopen) use network::is_call;
 
 /// The namespace of the first edition, whose elements are the same as far as they are read.
 const FIRST_EDITION: &str = "http://www.plcopen.org/xml/tc6.xsd";

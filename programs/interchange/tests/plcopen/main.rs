@@ -7,6 +7,7 @@ mod instruction_lists;
 mod jumps;
 mod meaning;
 mod numbers;
+mod order;
 mod public_ladders;
 #[path = "../shared/reading.rs"]
 mod reading;

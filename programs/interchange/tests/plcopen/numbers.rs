@@ -13,7 +13,7 @@ use understudy_typed::{Elementary, Machine, Program, Scratch};
 use crate::support::{PERIOD, data};
 
 /// The program of a document, or its errors.
-fn typed(text: &str, period: Duration) -> Result<Program, Vec<Diagnostic>> {
+pub(crate) fn typed(text: &str, period: Duration) -> Result<Program, Vec<Diagnostic>> {
     let (file, mut found) = read_typed(text);
     let options = Options { text, program: None, period: i64::try_from(period.as_nanos()).ok() };
     let lowered = lower(&file, &options);
@@ -25,7 +25,7 @@ fn typed(text: &str, period: Duration) -> Result<Program, Vec<Diagnostic>> {
     }
 }
 
-struct Scans {
+pub(crate) struct Scans {
     program: Program,
     machine: Machine,
     state: Vec<u64>,
@@ -33,13 +33,13 @@ struct Scans {
 }
 
 impl Scans {
-    fn new(program: Program) -> Self {
+    pub(crate) fn new(program: Program) -> Self {
         program.validate().expect("a sound program");
         let machine = Machine::new(&program);
         Self { state: machine.initial().to_vec(), scratch: Scratch::default(), machine, program }
     }
 
-    fn scan(&mut self, values: &[u64]) -> Vec<u64> {
+    pub(crate) fn scan(&mut self, values: &[u64]) -> Vec<u64> {
         let mut inputs = vec![0; self.machine.input_count().div_ceil(64)];
         let mut outputs = vec![0; self.machine.output_count().div_ceil(64)];
         let points = self.program.inputs.iter().filter(|point| point.slot != 0);

@@ -80,6 +80,7 @@ impl<'a> Walk<'a> {
     pub(super) fn run(mut self, diagnostics: &mut Vec<Diagnostic>) -> (Plan, Trace) {
         let objects = &self.graph.objects;
         let mut acting: Vec<usize> = (0..objects.len()).filter(|&place| self.acts(place)).collect();
+        acting.extend(self.functions_behind(&acting));
         acting.sort_by_cached_key(|&place| {
             let object = &objects[place];
             (self.order(object), object.position.1, object.position.0)
@@ -155,6 +156,27 @@ impl<'a> Walk<'a> {
         }
     }
 
+    /// The functions that feed something that acts. They have their place in the order too: what they read may be written
+    /// between there and where their result is used.
+    fn functions_behind(&self, acting: &[usize]) -> Vec<usize> {
+        let mut is_behind = vec![false; self.graph.objects.len()];
+        let mut waiting = acting.to_vec();
+        while let Some(place) = waiting.pop() {
+            for source in self.links.sources[place].iter().flatten() {
+                if let Source::Output(from, _) = source
+                    && !std::mem::replace(&mut is_behind[*from], true)
+                {
+                    waiting.push(*from);
+                }
+            }
+        }
+        let is_function = |&place: &usize| {
+            matches!(self.graph.objects[place].kind, Kind::Block(_)) && !self.links.is_block[place]
+        };
+        let objects = 0..self.graph.objects.len();
+        objects.filter(|&place| is_behind[place]).filter(is_function).collect()
+    }
+
     /// Coils, written variables, function blocks and jumps act of themselves.
     fn acts(&self, place: usize) -> bool {
         match &self.graph.objects[place].kind {
@@ -164,10 +186,7 @@ impl<'a> Walk<'a> {
             | Kind::Label(_)
             | Kind::Return => true,
             Kind::InOutVariable(..) => !self.graph.objects[place].inputs.is_empty(),
-            Kind::Block(_) => {
-                let has_turn = self.rules == Rules::Numbers && self.graph.objects[place].order != 0;
-                self.links.is_block[place] || has_turn
-            }
+            Kind::Block(_) => self.links.is_block[place],
             Kind::Transition(transition) => matches!(transition.condition, Condition::Wired),
             _ => false,
         }

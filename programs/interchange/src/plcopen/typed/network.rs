@@ -348,7 +348,7 @@ impl<'a> Network<'a> {
 }
 
 /// Whether a block acts of itself: one that keeps something, or a function that does more than answer.
-pub(in crate::plcopen) fn is_call(file: &File, name: &str) -> bool {
+pub(super) fn is_call(file: &File, name: &str) -> bool {
     if let Some(found) = unit(file, name) {
         let does_more = |found: &Declaration| {
             matches!(found.class, Class::Output | Class::InOut | Class::External)

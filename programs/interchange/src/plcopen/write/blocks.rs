@@ -1,6 +1,7 @@
 //! Networks of function blocks as a body in FBD, and those of a ladder as one in LD, placed as they are drawn.
 //!
-//! Blocks and variables have an `executionOrderId`, so every tool executes the body in the order of its statements.
+//! In FBD blocks, functions and variables have an `executionOrderId`, so every tool executes the body in the order of its statements. In LD
+//! nothing has one: OpenPLC and Beremiz know none of a coil, and execute what has one before all that has none. There the order is by y.
 
 use understudy_diagram::blocks::{
     BRANCH, BlockPlan, CONTACT_HEAD, CONTACT_ROW, Coil, Contacts, Input, Kind, Network, lay_out,
@@ -11,7 +12,6 @@ use understudy_structured_text::syntax::{Class, File};
 use super::sheet::position;
 use super::tree::Tree;
 use crate::diagrams::Style;
-use crate::plcopen::typed::is_call;
 use crate::plcopen::typed::values::unit;
 
 /// Between two networks.
@@ -39,8 +39,9 @@ pub(super) fn write(tree: &mut Tree, file: &File, networks: &[Network], style: S
         Style::Ladder => "LD",
     };
     tree.open(body, &[]);
+    let order = (style == Style::Blocks).then_some(0);
     let mut sheet =
-        Sheet { tree, file, next: 1, order: 0, rail: None, ends: Vec::new(), coils: Vec::new() };
+        Sheet { tree, file, next: 1, order, rail: None, ends: Vec::new(), coils: Vec::new() };
     if style == Style::Ladder {
         sheet.left_rail(top);
     }
@@ -69,7 +70,8 @@ struct Sheet<'a> {
     file: &'a File,
     /// The next localId.
     next: usize,
-    order: usize,
+    /// The last `executionOrderId`; nothing in a ladder.
+    order: Option<usize>,
     /// The rail on the left.
     rail: Option<usize>,
     /// Of each object of this network and each of its outputs.
@@ -157,7 +159,8 @@ impl Sheet<'_> {
             }
             Kind::Target(text) => {
                 let order = self.turn();
-                let more = [("executionOrderId", order.as_str()), ("negated", "false")];
+                let mut more = vec![("negated", "false")];
+                more.extend(in_order(order.as_deref()));
                 self.open("outVariable", id, place, &more);
                 self.input(plan, (at, 0));
                 self.tree.text("expression", text);
@@ -166,7 +169,8 @@ impl Sheet<'_> {
             Kind::Coil(text, kind) => {
                 let order = self.turn();
                 let negated = (*kind == Coil::Negated).to_string();
-                let mut more = vec![("executionOrderId", order.as_str()), ("negated", &negated)];
+                let mut more = vec![("negated", negated.as_str())];
+                more.extend(in_order(order.as_deref()));
                 more.extend(match kind {
                     Coil::Plain | Coil::Negated => None,
                     Coil::Set => Some(("storage", "set")),
@@ -182,11 +186,11 @@ impl Sheet<'_> {
                 self.coils.push(End { id, pin: None, at });
             }
             Kind::Block { of, instance } => {
-                let acts = instance.is_some() || is_call(self.file, of);
-                let order = acts.then(|| self.turn());
+                // Functions too: elsewhere what has no turn comes after all that has one.
+                let order = self.turn();
                 let mut more = vec![("typeName", of.as_str())];
                 more.extend(instance.as_deref().map(|name| ("instanceName", name)));
-                more.extend(order.as_deref().map(|order| ("executionOrderId", order)));
+                more.extend(in_order(order.as_deref()));
                 self.open("block", id, place, &more);
                 self.pins(network, plan, at, of);
                 self.tree.close("block");
@@ -252,9 +256,12 @@ impl Sheet<'_> {
         }
     }
 
-    fn turn(&mut self) -> String {
-        self.order += 1;
-        self.order.to_string()
+    /// The next place in the order, where the body has one.
+    fn turn(&mut self) -> Option<String> {
+        self.order.as_mut().map(|order| {
+            *order += 1;
+            order.to_string()
+        })
     }
 
     /// The inputs and outputs of a block. What is both is written once.
@@ -339,6 +346,10 @@ impl Sheet<'_> {
         position(self.tree, "relPosition", place.width, row);
         self.tree.close("connectionPointOut");
     }
+}
+
+fn in_order(order: Option<&str>) -> Option<(&str, &str)> {
+    order.map(|order| ("executionOrderId", order))
 }
 
 /// The corners of a wire from its end `to` back to its beginning.
