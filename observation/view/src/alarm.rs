@@ -80,7 +80,7 @@ pub struct Alarm {
     pub since_before: bool,
     /// The cycle in which an alarm on a signal was raised again before it was acknowledged: the newer one counts.
     pub repeated_in: Option<i64>,
-    /// Priority of an alarm on a signal.
+    /// Priority of an alarm on a signal, and of an alarm that requires an immediate response.
     pub priority: Option<Priority>,
     /// What the operator should do.
     pub action: Option<String>,
@@ -149,6 +149,11 @@ impl Alarms {
     /// Raises an alarm that lasts; one that lasts already is not raised again.
     pub(crate) fn raise(&mut self, subject: Subject, cycle: i64, text: String) {
         self.raise_alarm(subject, cycle, text, |_| {});
+    }
+
+    /// Raises an alarm that lasts and requires an immediate response.
+    pub(crate) fn raise_critical(&mut self, subject: Subject, cycle: i64, text: String) {
+        self.raise_alarm(subject, cycle, text, |alarm| alarm.priority = Some(Priority::Critical));
     }
 
     /// Raises an alarm on a signal; `since_before` where it may have been active before.

@@ -4,11 +4,13 @@ mod asked;
 mod changes;
 mod counters;
 mod cycle;
+mod driving;
 mod members;
 mod past;
 mod process_alarms;
 mod programs;
 mod protection;
+mod reports;
 mod run_events;
 mod standing;
 mod turns;
@@ -35,6 +37,7 @@ use changes::Changes;
 pub use counters::{Counters, MemberCounters, ProgramCounters};
 use cycle::{LastMargin, Received};
 use programs::ProgramTrack;
+use reports::Reports;
 pub(crate) use standing::Standing;
 pub use turns::SentTurn;
 use turns::Turns;
@@ -59,6 +62,17 @@ impl Default for Bounds {
     }
 }
 
+impl Bounds {
+    /// Bounds that hold some cycles that are not complete, too.
+    fn holding(self, incomplete: usize) -> Self {
+        let least = incomplete.saturating_add(LEAST_CYCLES);
+        Self { cycles: self.cycles.max(least), changes: self.changes.max(least), ..self }
+    }
+}
+
+/// Complete cycles that are remembered at least.
+const LEAST_CYCLES: usize = 16;
+
 /// The state of a run, folded from its records.
 #[derive(Debug, Clone)]
 pub struct Model {
@@ -68,6 +82,7 @@ pub struct Model {
     cycles: Cycles,
     changes: Changes,
     received: Received,
+    reports: Reports,
     programs: Vec<ProgramTrack>,
     counters: Counters,
     histories: Vec<History>,
@@ -99,6 +114,8 @@ impl Model {
     pub fn new(cluster: Arc<Cluster>, bounds: Bounds) -> Self {
         let schedule = &cluster.agreement().schedule;
         let programs = cluster.controllers().len();
+        let incomplete = Reports::most_behind(schedule);
+        let bounds = bounds.holding(incomplete);
         let histories = (0..programs as u8)
             .filter_map(|program| History::new(&cluster, ProgramId(program), bounds.cycles));
         Self {
@@ -106,7 +123,8 @@ impl Model {
             writes: Writes::default(),
             cycles: Cycles::default(),
             changes: Changes::new(schedule.stations(), programs),
-            received: Received::default(),
+            received: Received::new(incomplete),
+            reports: Reports::new(schedule, programs),
             programs: vec![ProgramTrack::new(bounds.changes); programs],
             counters: Counters::new(schedule.stations(), programs),
             histories: histories.collect(),
@@ -216,6 +234,7 @@ impl Model {
     fn shift(&mut self, by: i64) {
         self.changes.shift(by);
         self.received.shift(by);
+        self.reports.shift(by);
         self.programs.iter_mut().for_each(|track| track.shift(by));
         self.histories.iter_mut().for_each(|history| history.shift(by));
         self.series.shift(by);

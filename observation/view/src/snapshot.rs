@@ -48,9 +48,11 @@ pub struct Snapshot {
     pub cluster: String,
     /// Progress of the run.
     pub run: RunState,
-    /// The cycle, from the origin; nothing before the first deadline. The newest is the newest one of which every living remote I/O
-    /// has reported.
+    /// The cycle, from the origin; nothing before the first deadline. The newest is the newest complete one: every member that reports
+    /// has reported it.
     pub cycle: Option<i64>,
+    /// Cycles after it that only some members have reported.
+    pub behind: u64,
     /// Whether cycles are counted from the origin of the run; otherwise as the cluster counts them.
     pub from_origin: bool,
     /// `full` or `paper`.
@@ -164,11 +166,13 @@ pub enum RemoteIoState {
     Killed,
     /// Its process ended unexpectedly.
     Ended,
+    /// It has reported nothing for a while: it is down or suspended, or its journal is not received.
+    NotReporting,
 }
 
 impl RemoteIoState {
     /// Every state.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Serving,
         Self::Listening,
         Self::AwaitsRelease,
@@ -176,6 +180,7 @@ impl RemoteIoState {
         Self::Suspended,
         Self::Killed,
         Self::Ended,
+        Self::NotReporting,
     ];
 
     /// The state as JSON and the page write it.
@@ -188,6 +193,7 @@ impl RemoteIoState {
             Self::Suspended => "suspended",
             Self::Killed => "killed",
             Self::Ended => "ended",
+            Self::NotReporting => "not-reporting",
         }
     }
 }

@@ -20,6 +20,7 @@ export const STATES = {
   "awaits-release": { sign: "⚠", words: "awaits release" },
   serving: { sign: "●", words: "serving" },
   listening: { sign: "◌", words: "listening" },
+  "not-reporting": { sign: "✕", words: "not reporting" },
   moving: { sign: "●", words: "moving" },
 };
 

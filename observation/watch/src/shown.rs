@@ -27,7 +27,7 @@ const LISTED_ALARMS: usize = 100;
 /// One cycle.
 #[derive(Debug, Serialize)]
 pub(crate) struct State {
-    /// Of the newest record, in milliseconds, when this was written.
+    /// Of the shown cycle, in milliseconds, when this was written.
     age_ms: u64,
     cycle: i64,
     oldest: i64,
@@ -182,7 +182,11 @@ pub(crate) fn newest_state(model: &Model) -> String {
         model.known().and_then(|known| state(&known.run, known.run.newest()?, known.has_ended()));
     if let (Some(state), Some(known)) = (&mut state, model.known()) {
         state.past_is(known);
+        // The shown cycle is older than the newest record.
+        let period = known.run.cluster().agreement().schedule.period();
+        let behind = u32::try_from(known.run.behind()).unwrap_or(u32::MAX);
         let age = model.progress.age(Instant::now()).unwrap_or_default();
+        let age = age.saturating_add(period.saturating_mul(behind));
         state.age_ms = u64::try_from(age.as_millis()).unwrap_or(u64::MAX);
     }
     serde_json::to_string(&state).unwrap_or_else(|_| NOTHING.to_owned())

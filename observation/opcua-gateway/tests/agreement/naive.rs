@@ -45,6 +45,8 @@ pub(crate) struct Naive<'e> {
     entries: &'e [Entry],
     origin: i64,
     deadlines: Vec<Deadline>,
+    /// The newest cycle that was shown when each entry was read.
+    shown: Vec<Option<i64>>,
     pub(crate) oldest: i64,
     pub(crate) newest: Option<i64>,
 }
@@ -59,18 +61,16 @@ impl<'e> Naive<'e> {
         let deadlines: Vec<Deadline> =
             entries.iter().filter_map(|entry| deadline(entry, origin)).collect();
         let mut first: BTreeMap<ProgramId, i64> = BTreeMap::new();
-        let mut last: BTreeMap<ProgramId, i64> = BTreeMap::new();
         for deadline in &deadlines {
             first.entry(deadline.program).or_insert(deadline.cycle);
-            last.insert(deadline.program, deadline.cycle);
         }
-        let latest = last.values().max();
-        let newest = latest.map(|latest| *last.values().min().expect("one").max(&(latest - 3)));
+        let shown = shown(entries, origin);
         Self {
             entries,
             origin,
             oldest: first.values().copied().max().unwrap_or(0).max(0),
-            newest,
+            newest: shown.last().copied().flatten(),
+            shown,
             deadlines,
         }
     }
@@ -195,12 +195,13 @@ impl<'e> Naive<'e> {
         }
     }
 
-    /// Every record that takes effect up to a cycle, in the order of cycles; of the newest all records.
+    /// Every record that takes effect up to a cycle, in the order of cycles; in the newest all that was done to the members.
     fn now(&self, cycle: i64) -> Now {
         let mut begun: BTreeMap<Member, i64> = BTreeMap::new();
         let mut stamped: Vec<(i64, &Entry)> = Vec::new();
-        for entry in self.entries {
-            let mut at = entry.at - self.origin;
+        let before = std::iter::once(&None).chain(&self.shown);
+        for (entry, shown) in self.entries.iter().zip(before) {
+            let mut at = (entry.at - self.origin).max(shown.map_or(i64::MIN, |shown| shown + 1));
             if let Some((member, _)) = process(entry) {
                 begun.insert(member, at);
             } else if let Some(member) = entry.record.member
@@ -214,11 +215,89 @@ impl<'e> Naive<'e> {
         let mut now = Now::default();
         let is_present = self.newest == Some(cycle);
         for (at, entry) in stamped {
-            if is_present || at <= cycle {
+            if at <= cycle || is_present && entry.record.member.is_none() {
                 now.take(entry);
             }
         }
         now
+    }
+}
+
+/// What was reported of which cycles.
+#[derive(Default)]
+struct Reported {
+    /// By member that is not away: its first and its newest cycle, and the count of cycles then.
+    members: BTreeMap<Member, (i64, i64, u64)>,
+    away: BTreeSet<Member>,
+    heard: BTreeMap<i64, StationSet>,
+    furthest: Option<i64>,
+    count: u64,
+}
+
+/// The newest complete cycle after each entry: it has the deadlines of all remote I/Os and the turns of all stations that were received, but for
+/// those that are away. No member is silent for long in these journals.
+fn shown(entries: &[Entry], origin: i64) -> Vec<Option<i64>> {
+    let mut reported = Reported::default();
+    let mut shown: Option<i64> = None;
+    let shown_after = |entry: &Entry| {
+        reported.take(entry, entry.at - origin);
+        shown = shown.max(reported.complete());
+        shown
+    };
+    entries.iter().map(shown_after).collect()
+}
+
+impl Reported {
+    fn take(&mut self, entry: &Entry, at: i64) {
+        if let Some((member, word)) = process(entry)
+            && word != "running"
+        {
+            self.away.insert(member);
+            self.members.remove(&member);
+        }
+        let Some(member) = entry.record.member else {
+            return;
+        };
+        match &entry.record.event {
+            Happening::RemoteIo(RemoteIoEvent::Applied { heard, .. }) => {
+                let before = self.heard.entry(at).or_insert(StationSet::EMPTY);
+                *before = before.or(*heard);
+            }
+            Happening::Station(StationEvent::Published { .. }) => {}
+            _ => return,
+        }
+        if self.furthest < Some(at) {
+            (self.furthest, self.count) = (Some(at), self.count + 1);
+        }
+        self.away.remove(&member);
+        let (_, newest, count) = self.members.entry(member).or_insert((at, at, 0));
+        (*newest, *count) = (at.max(*newest), self.count);
+    }
+
+    fn complete(&self) -> Option<i64> {
+        let furthest = self.furthest?;
+        let begun = self.members.values().map(|(first, ..)| *first).max();
+        let from = begun.unwrap_or(furthest);
+        (from..=furthest).rev().find(|cycle| self.is_complete(*cycle))
+    }
+
+    fn is_complete(&self, cycle: i64) -> bool {
+        let remote_ios = [ProgramId(0), ProgramId(1)].map(Member::RemoteIo);
+        let newest = |member| self.members.get(member).map(|(_, newest, _)| *newest);
+        let mut awaited = remote_ios.iter().filter(|member| !self.away.contains(member));
+        let mut stations = (0..3).map(StationId);
+        awaited.all(|member| newest(member) >= Some(cycle))
+            && stations.all(|station| {
+                let member = Member::Station(station);
+                let own = self.members.get(&member);
+                let unread = own.map_or(i64::MIN, |(_, newest, _)| newest.saturating_add(1));
+                let mut unread = self.heard.range(unread..).filter(|(of, _)| **of <= cycle);
+                let is_read = !unread.any(|(_, heard)| heard.contains(station));
+                let is_past = |(_, newest, count): &(i64, i64, u64)| {
+                    *newest >= cycle || self.count - count > 20
+                };
+                self.away.contains(&member) || is_read && own.is_none_or(is_past)
+            })
     }
 }
 

@@ -18,6 +18,8 @@ pub(super) struct Changes {
     first: Standing,
     later: VecDeque<(i64, Change)>,
     now: Standing,
+    /// The newest cycle that was shown: no change is of it or of an earlier one any more.
+    shown: Option<i64>,
     /// The cycle in which the process of a member last began or ended.
     begun: BTreeMap<Member, i64>,
 }
@@ -29,6 +31,7 @@ impl Changes {
             first: nothing.clone(),
             later: VecDeque::new(),
             now: nothing,
+            shown: None,
             begun: BTreeMap::new(),
         }
     }
@@ -50,8 +53,28 @@ impl Changes {
         Cow::Owned(standing)
     }
 
+    /// The standing in the newest cycle, with the later changes that are no reports of members.
+    pub(super) fn present(&self, cycle: i64) -> Cow<'_, Standing> {
+        let mut later = self.later.iter().rev().take_while(|(at, _)| *at > cycle);
+        if later.all(|(_, change)| !change.is_report()) {
+            return Cow::Borrowed(&self.now);
+        }
+        let mut standing = self.first.clone();
+        let present = self.later.iter();
+        for (at, change) in present.filter(|(at, change)| *at <= cycle || !change.is_report()) {
+            standing.apply(change, *at);
+        }
+        Cow::Owned(standing)
+    }
+
+    /// Cycles up to this one are shown: a change that is read later takes effect in the next one.
+    pub(super) fn shown(&mut self, cycle: Option<i64>) {
+        self.shown = cycle;
+    }
+
     /// What was done to a process is so from `cycle` on.
     pub(super) fn process(&mut self, member: Member, cycle: i64, change: Change) {
+        let cycle = self.unshown(cycle);
         self.begun.insert(member, cycle);
         self.push(cycle, change);
     }
@@ -65,7 +88,12 @@ impl Changes {
         }
     }
 
+    fn unshown(&self, cycle: i64) -> i64 {
+        self.shown.map_or(cycle, |shown| cycle.max(shown.saturating_add(1)))
+    }
+
     pub(super) fn push(&mut self, cycle: i64, change: Change) {
+        let cycle = self.unshown(cycle);
         let place = self.later.partition_point(|(at, _)| *at <= cycle);
         if place == self.later.len() {
             self.now.apply(&change, cycle);
@@ -93,6 +121,7 @@ impl Changes {
                 change.shift(by);
             }
         }
+        self.shown = self.shown.map(|shown| shown.saturating_add(by));
         for cycle in self.begun.values_mut() {
             *cycle = cycle.saturating_add(by);
         }
@@ -104,7 +133,9 @@ mod tests {
     use understudy_journal::Process;
     use understudy_wire::{ProgramId, StationId};
 
+    use super::super::standing::StationChange;
     use super::*;
+    use crate::station::StationStanding;
 
     const MEMBER: Member = Member::Station(StationId(0));
 
@@ -133,6 +164,23 @@ mod tests {
         let cut_from = |cycle| -> Vec<Member> { changes.at(cycle).cut_from(MEMBER).collect() };
         assert_eq!(cut_from(11), []);
         assert_eq!(cut_from(12), [other]);
+    }
+
+    #[test]
+    fn a_shown_cycle_stays_as_it_was_shown() {
+        let mut changes = Changes::new(2, 2);
+        let is_flagged = |standing: &Standing| {
+            standing.station(StationId(0)).is_some_and(StationStanding::is_flagged)
+        };
+        let flagged = || Change::Station(StationId(0), StationChange::Flagged(ProgramId(1)));
+        changes.shown(Some(7));
+        changes.reported(Member::RemoteIo(ProgramId(1)), 5, flagged());
+        assert!(!is_flagged(&changes.at(7)));
+        assert!(!is_flagged(&changes.present(7)), "a report of the next cycle");
+        changes.process(MEMBER, 9, killed());
+        assert_eq!(changes.present(7).process(MEMBER), Some(Process::Killed));
+        assert!(!is_flagged(&changes.present(7)));
+        assert!(is_flagged(&changes.present(8)) && is_flagged(&changes.at(8)));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! What the model knows of one cycle: who published for what, which station was received by whom, and what followed from it.
 //!
-//! The newest cycle is the present: it is shown with every change that was read, also with those that take effect in the next cycle.
+//! The newest complete cycle is the present. It is shown with what was done to the processes and links of members since, and with no later report of a
+//! member: what is shown of a cycle stays true when the lines of all members are there.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -16,34 +17,46 @@ use crate::history::Step;
 use crate::margin::{Holders, Margin};
 use crate::station::StationState;
 
-/// Cycles by which a living remote I/O may be behind the newest deadline.
-const LAG_CYCLES: i64 = 3;
-
-/// Cycles of which the received stations are kept next to the histories.
+/// Cycles of which the received stations are kept next to the histories, besides those that may not be complete.
 const RECENT: usize = 64;
 
 /// The stations that were received in the newest cycles, by any remote I/O.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Received(BTreeMap<i64, StationSet>);
+#[derive(Debug, Clone)]
+pub(super) struct Received {
+    cycles: BTreeMap<i64, StationSet>,
+    most: usize,
+}
 
 impl Received {
+    /// Of so many cycles that may not be complete.
+    pub(super) fn new(incomplete: usize) -> Self {
+        Self { cycles: BTreeMap::new(), most: incomplete.saturating_add(RECENT) }
+    }
+
+    /// The first cycle from `from` on in which a station was received.
+    pub(super) fn first_of(&self, station: StationId, from: i64) -> Option<i64> {
+        let mut cycles = self.cycles.range(from..);
+        cycles.find(|(_, received)| received.contains(station)).map(|(cycle, _)| *cycle)
+    }
+
     pub(super) fn note(&mut self, cycle: i64, heard: StationSet) {
-        let received = self.0.entry(cycle).or_insert(StationSet::EMPTY);
+        let received = self.cycles.entry(cycle).or_insert(StationSet::EMPTY);
         *received = received.or(heard);
-        if self.0.len() > RECENT {
-            self.0.pop_first();
+        if self.cycles.len() > self.most {
+            self.cycles.pop_first();
         }
     }
 
     fn at(&self, cycle: i64) -> Option<StationSet> {
-        let oldest = *self.0.first_key_value()?.0;
-        let received = self.0.get(&cycle).copied();
+        let oldest = *self.cycles.first_key_value()?.0;
+        let received = self.cycles.get(&cycle).copied();
         received.or((oldest <= cycle).then_some(StationSet::EMPTY))
     }
 
     pub(super) fn shift(&mut self, by: i64) {
-        let cycles = std::mem::take(&mut self.0).into_iter();
-        self.0 = cycles.map(|(cycle, received)| (cycle.saturating_add(by), received)).collect();
+        let cycles = std::mem::take(&mut self.cycles).into_iter();
+        self.cycles =
+            cycles.map(|(cycle, received)| (cycle.saturating_add(by), received)).collect();
     }
 }
 
@@ -82,11 +95,15 @@ impl Model {
         (0..self.cluster.agreement().schedule.stations()).map(|rank| StationId(rank as u8))
     }
 
-    /// The newest cycle of whose deadline every living remote I/O has reported.
+    /// The newest complete cycle: every member that reports has reported it.
     pub fn newest(&self) -> Option<i64> {
-        let latest = self.cycles.latest()?;
-        let reported = self.programs.iter().filter_map(|program| program.reported);
-        Some(reported.min().unwrap_or(latest).max(latest.saturating_sub(LAG_CYCLES)))
+        self.reports.complete()
+    }
+
+    /// Cycles after the newest complete one of which a part is known already.
+    pub fn behind(&self) -> u64 {
+        let ahead = self.reports.furthest().zip(self.newest());
+        ahead.map_or(0, |(furthest, newest)| u64::try_from(furthest - newest).unwrap_or(0))
     }
 
     /// The oldest cycle that is remembered; cycles before the origin are not shown.
@@ -96,12 +113,12 @@ impl Model {
         Some(oldest.max()?.max(0))
     }
 
-    /// The standing in a cycle, the present one for the newest.
+    /// The standing in a cycle, for the newest with what was done to the members since.
     pub(crate) fn standing(&self, cycle: i64) -> Cow<'_, Standing> {
-        if self.newest().is_none_or(|newest| newest <= cycle) {
-            Cow::Borrowed(self.changes.now())
-        } else {
-            self.changes.at(cycle)
+        match self.newest() {
+            Some(newest) if cycle < newest => self.changes.at(cycle),
+            Some(newest) if !self.finished => self.changes.present(newest),
+            _ => Cow::Borrowed(self.changes.now()),
         }
     }
 

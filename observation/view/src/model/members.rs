@@ -3,7 +3,7 @@
 use understudy_bus::HostEvent;
 use understudy_journal::{Process, Record, moment};
 use understudy_node::Event as StationEvent;
-use understudy_wire::{Member, ProgramId, StationId, StationSet};
+use understudy_wire::{Member, ProgramId, ProgramSet, StationId, StationSet};
 
 use super::Model;
 use super::standing::{Change, ProgramChange, StationChange};
@@ -18,6 +18,11 @@ impl Model {
         match event {
             StationEvent::Published { moment, words } => {
                 self.published(station, cycle);
+                if let Some(cycle) = self.cycles.of_known(*moment) {
+                    let programs = words.iter().map(|word| word.mask);
+                    let programs = programs.fold(ProgramSet::EMPTY, ProgramSet::or);
+                    self.reported(record, Member::Station(station), cycle, programs);
+                }
                 self.timings.published(*moment, record.at_ns);
                 self.turns.published(*moment, station, words);
                 self.check_words(*moment);

@@ -80,7 +80,7 @@ impl Model {
             track.inputs.clone_from(inputs);
             let before = deadlines.before;
             track.tally.continues(deadlines);
-            track.reported = Some(deadlines.until.saturating_sub(1));
+            self.reports.goes_on(program, deadlines.until.saturating_sub(1));
             track.served =
                 is_provable(deadlines.source) || before.direct > 0 || before.reconstructed > 0;
             if deadlines.source == Source::FailSafe && track.served {
@@ -90,6 +90,7 @@ impl Model {
                 self.alarms.raise((remote_io.to_owned(), FAIL_SAFE), deadlines.since, text);
             }
         }
+        self.reports.find_complete(&self.received);
     }
 
     /// Takes a record of before: it changes the standing and is no event.

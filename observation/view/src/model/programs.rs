@@ -3,7 +3,9 @@
 use understudy_journal::{Record, Tally, moment};
 use understudy_plant::Event as PlantEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
-use understudy_wire::{Image, Member, Moment, ProgramId, Source, StationId, StationSet};
+use understudy_wire::{
+    Image, Member, Moment, ProgramId, ProgramSet, Source, StationId, StationSet,
+};
 
 use super::Model;
 use super::standing::{Change, ProgramChange, StationChange};
@@ -26,8 +28,6 @@ pub(super) struct ProgramTrack {
     pub(super) tally: Tally,
     /// The stations that it received at the last two deadlines: a single frame may be lost.
     heard: [StationSet; 2],
-    /// The newest cycle whose deadline was reported.
-    pub(super) reported: Option<i64>,
     /// Whether its outputs were provable in any cycle.
     pub(super) served: bool,
     stop: Stop,
@@ -40,7 +40,6 @@ impl ProgramTrack {
             source: None,
             tally: Tally::new(most),
             heard: [StationSet::EMPTY; 2],
-            reported: None,
             served: false,
             stop: Stop::default(),
         }
@@ -51,7 +50,6 @@ impl ProgramTrack {
     }
 
     pub(super) fn shift(&mut self, by: i64) {
-        self.reported = self.reported.map(|cycle| cycle.saturating_add(by));
         self.tally.shift(by);
     }
 }
@@ -195,7 +193,6 @@ impl Model {
         let track = &mut self.programs[program.index()];
         track.tally.push(cycle, *source, record.at_ns);
         track.heard = [*heard, track.heard[0]];
-        track.reported = track.reported.max(Some(cycle));
         if let Some(inputs) = sampled {
             track.inputs = Some(inputs.clone());
         }
@@ -213,6 +210,7 @@ impl Model {
             self.alarms.now_ns = at_ns;
             self.source_changed(record, program, cycle, event);
         }
+        self.reported(record, Member::RemoteIo(program), cycle, ProgramSet::only(program));
         self.close();
     }
 
@@ -338,7 +336,13 @@ impl Model {
     }
 
     /// An event that is an alarm too.
-    fn alarmed(&mut self, record: &Record, cycle: i64, event: &'static str, text: String) {
+    pub(super) fn alarmed(
+        &mut self,
+        record: &Record,
+        cycle: i64,
+        event: &'static str,
+        text: String,
+    ) {
         let subject = (record.name.clone(), event);
         self.alarms.raise(subject, cycle, text.clone());
         self.events.push(Event {

@@ -32,7 +32,10 @@ impl Model {
                 let text = format!("{name} ended unexpectedly: {how}");
                 self.process_is(*member, Process::Ended, cycle);
                 self.done(*member, text.clone(), cycle);
-                self.alarms.raise((name, "ended"), cycle, text);
+                match member {
+                    Member::RemoteIo(program) => drop(self.not_driven(*program, cycle, &text)),
+                    _ => self.alarms.raise((name, "ended"), cycle, text),
+                }
             }
             RunEvent::Origin { moment, cycle } => {
                 let cycle = i64::try_from(*cycle).unwrap_or(i64::MAX / 2);
@@ -86,12 +89,25 @@ impl Model {
             (Action::Heal { to }, _) => self.changes.push(cycle, Change::Healed(member, to)),
             _ => {}
         }
+        let what = match Process::after(action) {
+            Some(Process::Killed) => Some("is killed"),
+            Some(Process::Suspended) => Some("is suspended"),
+            _ => None,
+        };
+        if let (Member::RemoteIo(program), Some(what)) = (member, what) {
+            let reason = format!("{} {what}", self.members.name(member));
+            self.not_driven(program, cycle, &reason);
+        }
         self.done(member, fault_text(action, member, &self.members), cycle);
     }
 
     fn process_is(&mut self, member: Member, process: Process, cycle: i64) {
         let change = Change::Process(member, process);
         self.changes.process(member, cycle, change);
+        if !process.is_running() {
+            self.reports.down(member);
+            self.find_complete();
+        }
         if let (Member::RemoteIo(program), false) = (member, process == Process::Suspended) {
             self.remote_io_is_new(program);
         }

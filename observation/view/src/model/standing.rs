@@ -32,6 +32,8 @@ pub(crate) struct Standing {
     cycle_masters: BTreeSet<StationId>,
     /// Members of a cluster elsewhere whose journal is not received here.
     detached: BTreeSet<Member>,
+    /// Members that have reported nothing for a while, whatever their processes do.
+    silent: BTreeSet<Member>,
     stations: Vec<StationStanding>,
     programs: Vec<ProgramStanding>,
     /// What the scenario came to, where it is over and the cluster stays up.
@@ -73,6 +75,11 @@ impl Standing {
         self.detached.contains(&member)
     }
 
+    /// Whether a member has ceased to report.
+    pub(crate) fn is_silent(&self, member: Member) -> bool {
+        self.silent.contains(&member)
+    }
+
     pub(crate) fn station(&self, station: StationId) -> Option<&StationStanding> {
         self.stations.get(station.index())
     }
@@ -111,6 +118,12 @@ impl Standing {
             Change::Detached(member) => {
                 self.detached.insert(*member);
             }
+            Change::Silent(member) => {
+                self.silent.insert(*member);
+            }
+            Change::Reports(member) => {
+                self.silent.remove(member);
+            }
             Change::BecameCycleMaster(station) => {
                 self.cycle_masters.insert(*station);
             }
@@ -131,6 +144,7 @@ impl Standing {
     /// The process of a member begins or ends: its reports and the commands to it are void.
     fn process_changed(&mut self, member: Member, process: Process) {
         self.processes.insert(member, process);
+        self.silent.remove(&member);
         match member {
             Member::Station(station) => {
                 self.cycle_masters.remove(&station);
@@ -184,10 +198,35 @@ pub(super) enum Change {
     Healed(Member, Member),
     Attached(Member),
     Detached(Member),
+    /// It has reported nothing for a while.
+    Silent(Member),
+    /// It reports again.
+    Reports(Member),
     BecameCycleMaster(StationId),
     ScenarioOver(String),
     Station(StationId, StationChange),
     Program(ProgramId, ProgramChange),
+}
+
+impl Change {
+    /// Whether a member has reported it; otherwise it was done to a member, or is known here only.
+    pub(super) fn is_report(&self) -> bool {
+        match self {
+            Self::Process(..)
+            | Self::Resumed(_)
+            | Self::Cut(..)
+            | Self::Healed(..)
+            | Self::Attached(_)
+            | Self::Detached(_)
+            | Self::Silent(_)
+            | Self::Reports(_)
+            | Self::ScenarioOver(_)
+            | Self::Station(_, StationChange::Done(_)) => false,
+            Self::Alive(_) | Self::BecameCycleMaster(_) | Self::Station(..) | Self::Program(..) => {
+                true
+            }
+        }
+    }
 }
 
 /// A change of a station.

@@ -24,7 +24,7 @@ use crate::station::StationState;
 use crate::value::{forced_point, forced_value, named};
 
 impl Model {
-    /// The present: the newest cycle of which every living remote I/O has reported, with every change that was read since.
+    /// The present: the newest cycle that every member that reports has reported.
     pub fn snapshot(&self) -> Snapshot {
         let cycle = self.newest();
         let standing = self.standing(cycle.unwrap_or(i64::MAX));
@@ -102,6 +102,7 @@ impl Picture<'_> {
             cluster: model.cluster().name().to_owned(),
             run: self.run(),
             cycle: self.cycle,
+            behind: if self.cycle == model.newest() { model.behind() } else { 0 },
             from_origin: model.has_origin(),
             mode: match agreement.mode {
                 Mode::Full => "full",
@@ -160,13 +161,29 @@ impl Picture<'_> {
         names.collect()
     }
 
+    /// Whether a member lives, as others report, and its own journal is not received. A station that no remote I/O receives is shown as that.
+    fn is_unreported(&self, member: Member) -> bool {
+        let is_received = |station| {
+            let cycle = self.cycle.into_iter();
+            cycle.into_iter().any(|cycle| self.model.received(cycle).contains(station))
+        };
+        let process = self.standing.process(member);
+        self.standing.is_silent(member)
+            && process.is_none_or(Process::is_running)
+            && match member {
+                Member::Station(station) => is_received(station),
+                Member::RemoteIo(_) => true,
+                Member::Plant(_) => false,
+            }
+    }
+
     fn link(&self, member: Member) -> LinkSnapshot {
         let cut_from = self.standing.cut_from(member);
         let cut_from: Vec<String> = cut_from.map(|other| self.name(other)).collect();
         LinkSnapshot {
             isolated: !cut_from.is_empty() && self.model.is_isolated(self.standing, member),
             cut_from,
-            detached: self.standing.is_detached(member),
+            detached: self.standing.is_detached(member) || self.is_unreported(member),
         }
     }
 
@@ -296,6 +313,7 @@ impl Picture<'_> {
             (_, Some(Missing::NotReleased)) => RemoteIoState::AwaitsRelease,
             (_, Some(Missing::StateLost)) => RemoteIoState::StateLost,
             (_, Some(Missing::NoHistory)) => RemoteIoState::Listening,
+            _ if driven.is_none() && self.standing.is_silent(member) => RemoteIoState::NotReporting,
             _ if driven.is_none() => RemoteIoState::Listening,
             _ => RemoteIoState::Serving,
         };

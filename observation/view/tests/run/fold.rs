@@ -1,11 +1,12 @@
 //! States, sources, events and alarms as they stand in the scenario.
 
-use understudy_journal::{Record, RunEvent};
+use understudy_journal::{Happening, Record, RunEvent};
+use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_scenarios::Scenario;
 use understudy_view::{Model, RunState, Snapshot, StationState};
 use understudy_wire::{Member, ProgramId, Source, StationId};
 
-use crate::support::{KILL_EACH, cell, model, scenario};
+use crate::support::{KILL_EACH, cell, model, records, scenario};
 
 /// What the trends say of a station or a source, cycle ranges and words.
 fn spans<T: std::fmt::Debug>(spans: impl Iterator<Item = understudy_view::Span<T>>) -> String {
@@ -99,9 +100,15 @@ fn a_loss_is_an_alarm_with_its_cause() {
 fn an_unexpected_end_is_an_alarm_until_the_member_is_started_again() {
     let cell = cell();
     let text = "title = \"quiet\"\ncycles = 60\n";
-    let mut model = model(&cell, &scenario(&cell, text), 1);
+    let scenario = scenario(&cell, text);
+    let mut model = model(&cell, &scenario, 1);
     let robot = Member::Station(StationId(0));
     let press_io = Member::RemoteIo(ProgramId(1));
+    let is_deadline = |record: &Record| {
+        let is_applied = matches!(record.event, Happening::RemoteIo(RemoteIoEvent::Applied { .. }));
+        record.member == Some(press_io) && is_applied
+    };
+    let deadline = records(&cell, &scenario, 1).into_iter().rfind(is_deadline);
     for member in [robot, press_io] {
         let event = RunEvent::Ended {
             member,
@@ -119,12 +126,16 @@ fn an_unexpected_end_is_an_alarm_until_the_member_is_started_again() {
         open(&model),
         [
             "robot ended unexpectedly: signal: 9 (SIGKILL)",
-            "press-io ended unexpectedly: signal: 9 (SIGKILL)"
+            "no remote I/O drives the outputs of press: press-io ended unexpectedly: signal: 9 (SIGKILL)"
         ]
     );
     for member in [robot, press_io] {
         model.note(&Record::of_run(0, RunEvent::Started { member }));
     }
+    // A remote I/O that is started drives nothing until its first deadline.
+    assert_eq!(open(&model).len(), 1);
+    let deadline = deadline.expect("a deadline of press-io");
+    model.note(&deadline);
     assert_eq!(open(&model), [""; 0]);
     assert_ne!(model.snapshot().stations[0].state, StationState::Ended);
 }

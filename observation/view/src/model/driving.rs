@@ -1,0 +1,87 @@
+//! Who reports, and whether each remote I/O gives a sign: without it the outputs of its program are driven by no member.
+
+use understudy_journal::Record;
+use understudy_wire::{Member, ProgramId, ProgramSet};
+
+use super::Model;
+use super::standing::Change;
+use crate::describe::program_name;
+use crate::event::{Event, Level};
+
+/// The alarm of a remote I/O that drives nothing.
+const NOT_DRIVEN: &str = "not-driven";
+
+impl Model {
+    /// A member has reported a cycle, and has samples of some programs in it.
+    pub(super) fn reported(
+        &mut self,
+        record: &Record,
+        member: Member,
+        cycle: i64,
+        samples: ProgramSet,
+    ) {
+        let reported = self.reports.note(member, cycle, samples);
+        if reported.is_back {
+            self.changes.push(cycle, Change::Reports(member));
+        }
+        for member in reported.silent {
+            let process = self.changes.now().process(member);
+            if process.is_none_or(|process| process.is_running()) {
+                self.changes.push(cycle, Change::Silent(member));
+            }
+        }
+        for program in samples.iter() {
+            let process = self.changes.now().process(Member::RemoteIo(program));
+            if process.is_none_or(|process| process.is_running()) {
+                let name = self.members.name(Member::RemoteIo(program)).to_owned();
+                // One that was suspended passes the deadline first that it missed.
+                let now = self.cycles.latest().map_or(cycle, |latest| latest.max(cycle));
+                self.alarms.over(&(name, NOT_DRIVEN), now);
+            }
+        }
+        // Before the origin some members may not have been started yet.
+        if self.cycles.has_origin() {
+            for program in reported.without_sign {
+                self.gives_no_sign(record, program, cycle);
+            }
+        }
+        self.find_complete();
+    }
+
+    pub(super) fn find_complete(&mut self) {
+        self.reports.find_complete(&self.received);
+        // Records in effect are of cycles that nothing was shown of.
+        if !self.cycles.is_fixed() {
+            self.changes.shown(self.reports.complete());
+        }
+    }
+
+    /// A remote I/O whose process does not execute drives nothing.
+    pub(super) fn not_driven(&mut self, program: ProgramId, cycle: i64, reason: &str) -> String {
+        let of = program_name(program, &self.members);
+        let text = format!("no remote I/O drives the outputs of {of}: {reason}");
+        let name = self.members.name(Member::RemoteIo(program)).to_owned();
+        self.alarms.raise_critical((name, NOT_DRIVEN), cycle, text.clone());
+        text
+    }
+
+    fn gives_no_sign(&mut self, record: &Record, program: ProgramId, cycle: i64) {
+        let name = self.members.name(Member::RemoteIo(program)).to_owned();
+        let process = self.changes.now().process(Member::RemoteIo(program));
+        if process.is_some_and(|process| !process.is_running()) {
+            return;
+        }
+        let reason = format!("{name} reports nothing, and no station receives its samples");
+        let text = self.not_driven(program, cycle, &reason);
+        self.events.push(Event {
+            number: 0,
+            cycle,
+            at_ns: record.at_ns,
+            name,
+            event: NOT_DRIVEN,
+            level: Level::Alarm,
+            text,
+            cause: None,
+        });
+    }
+}
