@@ -45,8 +45,12 @@ pub(crate) fn time(text: &str) -> Option<Duration> {
     (rest.len() < text.len()).then(|| duration(rest))?
 }
 
-/// `00:00:00.02`, as PLCopen XML 1.0 writes the interval of a task; more than 0.
+/// `00:00:00.02`, as PLCopen XML 1.0 writes the interval of a task, or `PT0.02S`, as CODESYS does; more than 0.
 pub(crate) fn clock(text: &str) -> Option<Duration> {
+    if let Some(seconds) = text.strip_prefix("PT").and_then(|rest| rest.strip_suffix('S')) {
+        let found = Duration::try_from_secs_f64(seconds.parse().ok()?).ok()?;
+        return (!found.is_zero()).then_some(found);
+    }
     let parts: Vec<&str> = text.split(':').collect();
     let [hours, minutes, seconds] = parts[..] else {
         return None;

@@ -134,6 +134,9 @@ impl Typed {
                 self.data_types(list);
             }
         }
+        for list in xml::parts_of_tools(root, "datatype") {
+            self.data_types(list);
+        }
         let mut nodes: HashMap<String, Node<'_, '_>> = HashMap::new();
         for node in root.descendants().filter(|node| node.tag_name().name() == "pou") {
             if let Some(name) = attribute(node, "name") {
@@ -147,6 +150,12 @@ impl Typed {
         }
         for instances in elements(root).filter(|part| part.tag_name().name() == "instances") {
             self.instances(instances);
+        }
+        for resource in xml::applications(root) {
+            self.resource(resource);
+        }
+        for list in xml::parts_of_tools(root, "globalvars") {
+            self.globals(list);
         }
         self.surroundings();
         for (at, pou) in project.pous.iter().enumerate() {

@@ -116,10 +116,48 @@ pub(crate) fn attribute(node: Node<'_, '_>, name: &str) -> Option<Name> {
     Some(Name::at(attribute.value().trim(), attribute.range_value()))
 }
 
-/// The program that an instance is of: `typeName`, or `type` as 1.0 has it.
+/// The program that an instance is of: `typeName`, or `type` as 1.0 has it. CODESYS and TwinCAT leave it empty, and the instance has the name
+/// of its program.
 pub(crate) fn program_type(instance: Node<'_, '_>) -> Option<Name> {
-    let mut written = ["typeName", "type"].into_iter();
-    written.find_map(|name| attribute(instance, name).filter(|of| !of.is_empty()))
+    let is_empty = attribute(instance, "typeName").is_some_and(|of| of.is_empty());
+    let named = ["typeName", "type", if is_empty { "name" } else { "type" }];
+    named.into_iter().find_map(|name| attribute(instance, name).filter(|of| !of.is_empty()))
+}
+
+/// The last word of the name of additional data: what it holds.
+pub(crate) fn held<'a>(data: Node<'a, '_>) -> &'a str {
+    let name = data.attribute("name").unwrap_or_default();
+    name.rsplit('/').next().unwrap_or_default()
+}
+
+/// The additional data of an element that hold what `word` says.
+fn additional<'a, 'i>(
+    node: Node<'a, 'i>,
+    word: &'static str,
+) -> impl Iterator<Item = Node<'a, 'i>> {
+    let data = children(node, "addData").flat_map(elements);
+    data.filter(move |data| held(*data).eq_ignore_ascii_case(word))
+}
+
+/// The resources of the applications in the additional data of a project: CODESYS and TwinCAT export them there.
+pub(crate) fn applications<'a, 'i>(root: Node<'a, 'i>) -> impl Iterator<Item = Node<'a, 'i>> {
+    let applications = additional(root, "application");
+    let within = applications
+        .flat_map(|data| children(data, "configuration").flat_map(elements).chain(elements(data)));
+    within.filter(|part| part.tag_name().name() == "resource")
+}
+
+/// What holds the parts of a program that stand in additional data: units (`pou`), types (`datatype`) or variables (`globalvars`).
+pub(crate) fn parts_of_tools<'a, 'i>(
+    root: Node<'a, 'i>,
+    word: &'static str,
+) -> impl Iterator<Item = Node<'a, 'i>> {
+    let configurations = children(root, "instances").flat_map(elements);
+    let resources = configurations
+        .flat_map(|list| children(list, "configuration"))
+        .flat_map(|configuration| children(configuration, "resource"));
+    let holders = [root].into_iter().chain(applications(root)).chain(resources);
+    holders.flat_map(move |holder| additional(holder, word))
 }
 
 /// The text of an element and of those in it.

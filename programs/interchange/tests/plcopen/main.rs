@@ -1,6 +1,7 @@
 //! PLCopen XML, from outside.
 
 mod ablation;
+mod applications;
 mod bad_input;
 mod drawings;
 mod instruction_lists;

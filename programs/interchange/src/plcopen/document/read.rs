@@ -13,7 +13,8 @@ use super::{
 };
 use crate::plcopen::literal::{clock, time};
 use crate::plcopen::xml::{
-    attribute, child, children, elements, program_type, start_tag, text, word,
+    applications, attribute, child, children, elements, parts_of_tools, program_type, start_tag,
+    text, word,
 };
 
 /// The elementary types whose elements stand for themselves.
@@ -57,6 +58,21 @@ fn read_parts(root: Node<'_, '_>, has_variables: bool) -> (Project, Vec<Diagnost
             "instances" if has_variables => reader.instances(part),
             "addData" => reader.ignore("additional data of a tool", part),
             _ => {}
+        }
+    }
+    for list in parts_of_tools(root, "pou") {
+        reader.pous(list);
+    }
+    if has_variables {
+        for resource in applications(root) {
+            reader.instances(resource);
+        }
+        for list in parts_of_tools(root, "globalvars") {
+            // Those of a resource have been read with it.
+            let holder = list.ancestors().nth(2);
+            if holder == Some(root) {
+                reader.instances(list);
+            }
         }
     }
     reader.unique(&reader.project.globals.clone());

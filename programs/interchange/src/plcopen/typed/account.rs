@@ -3,7 +3,7 @@
 use roxmltree::Node;
 use understudy_text::{Diagnostic, MAXIMUM_FINDINGS};
 
-use crate::plcopen::xml::start_tag;
+use crate::plcopen::xml::{held, start_tag};
 
 /// Elements with the attributes that they may have. Those in front of `|` are understood; behind it, they change nothing.
 const KNOWN: [(&str, &str); 97] = [
@@ -157,17 +157,22 @@ const WHOLE: [&str; 7] =
     ["fileHeader", "contentHeader", "documentation", "content", "ST", "IL", "expression"];
 
 /// Additional data of tools that holds parts of the program.
-const PROGRAM_DATA: [&str; 9] = [
+const PROGRAM_DATA: [&str; 11] = [
     "method",
     "property",
     "interface",
     "action",
     "transition",
+    "application",
     "pou",
     "datatype",
     "globalvars",
+    "mixedattrsvarlist",
     "union",
 ];
+
+/// Those that are read, in a project or a resource.
+const READ_DATA: [&str; 4] = ["application", "pou", "datatype", "globalvars"];
 
 /// Reports every element and attribute that nothing here understands.
 pub(super) fn check(root: Node<'_, '_>, diagnostics: &mut Vec<Diagnostic>) {
@@ -178,7 +183,7 @@ pub(super) fn check(root: Node<'_, '_>, diagnostics: &mut Vec<Diagnostic>) {
         }
         let name = node.tag_name().name();
         if name == "addData" {
-            data(node, diagnostics);
+            waiting.extend(data(node, diagnostics));
             continue;
         }
         let known = KNOWN.iter().find(|(known, _)| *known == name);
@@ -211,17 +216,28 @@ pub(super) fn check(root: Node<'_, '_>, diagnostics: &mut Vec<Diagnostic>) {
     }
 }
 
-/// Additional data of a tool is read past, unless it holds a part of the program.
-fn data(node: Node<'_, '_>, diagnostics: &mut Vec<Diagnostic>) {
+/// Additional data of a tool is read past, unless it holds a part of the program; what of it is read.
+fn data<'a, 'i>(node: Node<'a, 'i>, diagnostics: &mut Vec<Diagnostic>) -> Vec<Node<'a, 'i>> {
+    let parent = node.parent_element().map(|parent| parent.tag_name().name());
+    let is_read = |word: &&str| match parent {
+        Some("project") => true,
+        Some("resource") => **word != *"application",
+        _ => false,
+    };
+    let mut read = Vec::new();
     for data in node.children().filter(Node::is_element) {
-        let name = data.attribute("name").unwrap_or_default();
-        let last = name.rsplit('/').next().unwrap_or_default();
-        if PROGRAM_DATA.iter().any(|word| last.eq_ignore_ascii_case(word)) {
-            let message =
-                format!("the additional data `{last}` of a tool holds a part of the program");
+        let holds = |word: &&&str| held(data).eq_ignore_ascii_case(word);
+        if READ_DATA.iter().filter(|word| is_read(word)).any(|word| holds(&word)) {
+            read.extend(data.children().filter(Node::is_element));
+        } else if PROGRAM_DATA.iter().any(|word| holds(&word)) {
+            let message = format!(
+                "the additional data `{}` of a tool holds a part of the program",
+                held(data)
+            );
             let found = Diagnostic::error("U1010", message, start_tag(data));
             diagnostics
                 .push(found.with_help("export the project without additional data of the tool"));
         }
     }
+    read
 }

@@ -15,17 +15,21 @@ impl Typed {
             for configuration in children(list, "configuration") {
                 self.globals(configuration);
                 for resource in children(configuration, "resource") {
-                    self.globals(resource);
-                    self.runs(resource);
-                    for task in children(resource, "task") {
-                        self.task(task);
-                    }
+                    self.resource(resource);
                 }
             }
         }
     }
 
-    fn globals(&mut self, node: Node<'_, '_>) {
+    pub(super) fn resource(&mut self, resource: Node<'_, '_>) {
+        self.globals(resource);
+        self.runs(resource);
+        for task in children(resource, "task") {
+            self.task(task);
+        }
+    }
+
+    pub(super) fn globals(&mut self, node: Node<'_, '_>) {
         for list in children(node, "globalVars") {
             let mut globals = Vec::new();
             self.variables(list, Class::Global, &mut globals);
@@ -90,13 +94,10 @@ impl Typed {
     }
 }
 
-/// `T#20ms`, or as 2.01 has it, `PT0.02S`, or as 1.0 has it, `00:00:00.02`; also plain seconds.
+/// `T#20ms`, or as a clock; also plain seconds.
 fn nanoseconds(text: &str) -> Option<i64> {
     if let Some(found) = clock(text) {
         return i64::try_from(found.as_nanos()).ok();
-    }
-    if let Some(seconds) = text.strip_prefix("PT").and_then(|rest| rest.strip_suffix('S')) {
-        return seconds_of(seconds);
     }
     let (value, found) = parse_expression_at(text, &|span| span);
     match value.kind {
