@@ -62,8 +62,8 @@ enum Remembered {
     Nothing,
     /// None of its own; what another station remembers.
     Relayed(Recalled),
-    /// The sample that this station received in that cycle.
-    Received(Moment, Recalled),
+    /// The sample that this station received last.
+    Received(Recalled),
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -188,27 +188,30 @@ impl Replica {
             return;
         };
         if inputs.width() == program.executable.input_count() {
-            if let Remembered::Received(received, known) = &mut self.remembered {
-                known.witnessed |= *received < moment;
+            if let Remembered::Received(known) = &mut self.remembered {
+                known.witnessed |= known.sampled < moment;
+                known.sampled = moment;
                 known.applied = sample.applied;
                 known.excluded = sample.excluded;
                 known.accounted_for = sample.gone;
                 known.writes.clone_from(&sample.writes);
+                known.pulses.clone_from(&sample.pulses);
                 known.inputs.clone_from(inputs);
-                *received = moment;
                 return;
             }
             let recalled = Recalled {
                 program: self.id,
+                sampled: moment,
                 // Outputs of the first sample may have been proved in this station's earlier life.
                 witnessed: false,
                 applied: sample.applied,
                 excluded: sample.excluded,
                 accounted_for: sample.gone,
                 writes: sample.writes.clone(),
+                pulses: sample.pulses.clone(),
                 inputs: inputs.clone(),
             };
-            self.remembered = Remembered::Received(moment, recalled);
+            self.remembered = Remembered::Received(recalled);
         }
     }
 
@@ -223,14 +226,14 @@ impl Replica {
         (now, silent_after): (Moment, u32),
     ) {
         let gives_to = self.gives_to(station);
-        let Remembered::Received(received, recalled) = &mut self.remembered else {
+        let Remembered::Received(recalled) = &mut self.remembered else {
             return;
         };
         let theirs = theirs.filter(|theirs| theirs.witnessed);
-        if stepped > *received {
+        if stepped > recalled.sampled {
             recalled.accounted_for.remove(station);
         } else if let Some(theirs) = theirs
-            && now >= received.plus(u64::from(silent_after))
+            && now >= recalled.sampled.plus(u64::from(silent_after))
             && !gives_to
         {
             recalled.accounted_for.insert(station);
@@ -253,7 +256,7 @@ impl Replica {
         match &self.remembered {
             Remembered::Nothing => None,
             Remembered::Relayed(recalled) => Some(recalled),
-            Remembered::Received(received, recalled) => (*received != moment).then_some(recalled),
+            Remembered::Received(recalled) => (recalled.sampled != moment).then_some(recalled),
         }
     }
 

@@ -2,8 +2,10 @@
 //!
 //! A station is living if a turn or a join of it was received in the last few cycles.
 
+use std::cmp::Reverse;
+
 use understudy_cycle::Agreement;
-use understudy_wire::{Holding, Image, ProgramId, Recalled, StationId, StationSet, WriteId};
+use understudy_wire::{Holding, Moment, ProgramId, Recalled, StationId, StationSet};
 
 /// One entry for each station that can hold the program's state.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -169,18 +171,18 @@ impl Holders {
         recalled.fold(StationSet::EMPTY, |all, one| all.or(one.excluded))
     }
 
-    /// u(i) of the last sample, as `station` recalls it.
-    pub(crate) fn inputs(&self, station: StationId) -> Option<&Image> {
-        let entry = self.entries.iter().find(|entry| entry.station == station)?;
-        entry.recalled.as_ref().map(|recalled| &recalled.inputs)
-    }
-
-    /// The newest write of each session, as `station` recalls it.
-    pub(crate) fn writes(&self, station: StationId) -> impl Iterator<Item = WriteId> + '_ {
-        let mut entries = self.entries.iter();
-        let entry = entries.find(|entry| entry.station == station);
-        let recalled = entry.and_then(|entry| entry.recalled.as_ref());
-        recalled.into_iter().flat_map(|recalled| recalled.writes.iter().copied())
+    /// What living stations recall of the sample of `stepped`, which the state of `from` includes: of that sample, or of
+    /// the first one after it, or else of the last one before it.
+    pub(crate) fn recalled_at(&self, from: StationId, stepped: Moment) -> Option<&Recalled> {
+        let living = self.entries.iter().filter(|entry| self.lives(entry));
+        let recalled =
+            living.filter_map(|entry| Some((entry.recalled.as_ref()?, entry.station == from)));
+        let (recalled, _) = recalled.min_by_key(|(recalled, is_holder)| {
+            let sampled = recalled.sampled;
+            let is_before = sampled < stepped;
+            (is_before, if is_before { Err(Reverse(sampled)) } else { Ok(sampled) }, !is_holder)
+        })?;
+        Some(recalled)
     }
 
     /// States that living stations hold.

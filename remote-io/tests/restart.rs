@@ -79,11 +79,13 @@ fn run(held: [Held; 3], release: Release, released_at: u64, cycles: u64) -> Vec<
                     holdings: holdings.into_iter().collect(),
                     recalled: vec![Recalled {
                         program: ProgramId(0),
+                        sampled: moment(50),
                         witnessed: true,
                         applied: None,
                         excluded: StationSet::EMPTY,
                         accounted_for: StationSet::EMPTY,
                         writes: Default::default(),
+                        pulses: Default::default(),
                         inputs: Image::zero(1),
                     }],
                     lacks: ProgramSet::EMPTY,

@@ -84,6 +84,7 @@ impl Module {
                 gone: StationSet::EMPTY,
                 drives: true,
                 writes: Default::default(),
+                pulses: Default::default(),
             }),
         });
         self.copies.sent(now, &frame, &self.agreement.schedule);

@@ -189,6 +189,10 @@ impl Bench {
     }
 }
 
+fn is_in_effect(outcome: WriteOutcome) -> bool {
+    matches!(outcome, WriteOutcome::InEffect { .. })
+}
+
 #[test]
 fn a_write_is_in_effect_and_read_by_another_program() {
     let mut bench = Bench::new(Network::default(), 1);
@@ -276,20 +280,37 @@ fn what_is_wrong_is_refused_and_has_no_effect() {
 }
 
 #[test]
-fn a_flood_of_sessions_is_bounded() {
+fn a_person_who_opens_many_sessions_locks_out_no_other_person() {
     let mut bench = Bench::new(Network::default(), 1);
-    for session in 0..100 {
-        bench.write(&write(session, 1, VALUE, real(session as f32)));
+    let of = |owner: &str, session| Write {
+        owner: owner.to_owned(),
+        ..write(session, 1, VALUE, real(session as f32))
+    };
+    let mut taken = 0;
+    for session in 0..600 {
+        bench.write(&of("anna", session));
         bench.pass(1);
+        taken += u32::from(bench.outcome(&of("anna", session)).is_none_or(is_in_effect));
+        // The first write, asked for again, has no second effect.
+        if session % 100 == 50 {
+            bench.write(&of("anna", 0));
+            assert!(bench.outcome(&of("anna", 0)).is_some_and(is_in_effect));
+            bench.pass(1);
+            assert_eq!(bench.echo(), session.min(511) as f32);
+        }
     }
-    let outcomes = bench.seen.outcomes.values();
-    let taken = outcomes.filter(|outcome| matches!(outcome, WriteOutcome::InEffect { .. }));
-    assert_eq!(taken.count(), understudy_wire::MAXIMUM_SESSIONS);
-    // Ten seconds later there is room again.
-    bench.pass(1000);
-    bench.write(&write(1000, 1, VALUE, real(99.0)));
-    bench.pass(2);
-    assert_eq!(bench.echo(), 99.0);
+    assert_eq!(taken, 512, "half of the sessions that are remembered");
+    let check = |bench: &mut Bench, write: &Write| {
+        bench.write(write);
+        bench.pass(2);
+        assert!(bench.outcome(write).is_some_and(is_in_effect), "{:?}", bench.outcome(write));
+    };
+    check(&mut bench, &of("ben", 10_000));
+    assert_eq!(bench.echo(), 10_000.0);
+    // Known sessions continue, and a minute later anna opens others again.
+    check(&mut bench, &write(1, 2, PRESS, true.into()));
+    bench.pass(6_000);
+    check(&mut bench, &of("anna", 20_000));
 }
 
 /// A fault and its repair, with the cycles between.

@@ -106,6 +106,7 @@ impl Truth {
                 gone: StationSet::EMPTY,
                 drives: true,
                 writes: Default::default(),
+                pulses: Default::default(),
             }),
         })
     }

@@ -83,8 +83,7 @@ impl Replica {
         let Some(held) = self.held.as_ref().filter(|_| self.standing == Standing::Proven) else {
             return Vec::new();
         };
-        if let Remembered::Relayed(recalled) | Remembered::Received(_, recalled) =
-            &mut self.remembered
+        if let Remembered::Relayed(recalled) | Remembered::Received(recalled) = &mut self.remembered
         {
             recalled.accounted_for.remove(to);
         }

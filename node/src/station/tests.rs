@@ -118,6 +118,7 @@ fn sent(what: Sent, cycle: u64, to: u8) -> Option<(Member, Body)> {
                 gone: StationSet::EMPTY,
                 drives: true,
                 writes: Default::default(),
+                pulses: Default::default(),
             };
             (Member::RemoteIo(ProgramId(program)), Body::Sample(sample))
         }

@@ -3,7 +3,7 @@
 //! ```text
 //! offset  size  what
 //!      0     4  magic "UNDR"
-//!      4     1  version of this layout, 6
+//!      4     1  version of this layout, 7
 //!      5     n  header and body, bincode 2 "standard": little-endian, integers as varints, enums by their index
 //!    5+n     4  CRC-32 (IEEE) of everything before it, little-endian
 //! ```
@@ -16,13 +16,13 @@ use bincode::config::{Configuration, Limit};
 use crate::frame::{Body, Frame, Holding, MAXIMUM_HISTORY, Recalled, Relayed, Sample, Word};
 use crate::identifier::{MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, Member};
 use crate::set::ProgramSet;
-use crate::write::{MAXIMUM_SESSIONS, WriteId};
+use crate::write::{MAXIMUM_PULSES, MAXIMUM_SESSIONS, Pulse, WriteId};
 
 /// Maximum length of a frame; one UDP datagram can carry it.
 pub const MAXIMUM_FRAME_BYTES: usize = 32 * 1024;
 
 const MAGIC: [u8; 4] = *b"UNDR";
-const VERSION: u8 = 6;
+const VERSION: u8 = 7;
 const PREFIX_BYTES: usize = 5;
 const CHECKSUM_BYTES: usize = 4;
 /// Maximum number of positions that a plant shows.
@@ -196,6 +196,7 @@ fn kept_sample(sample: &Sample) -> Result<(), FrameError> {
         return Err(FrameError::Promise("a sample carries 1 to 32 cycles"));
     }
     kept_writes(&sample.writes)?;
+    kept_pulses(&sample.pulses)?;
     let width = sample.history[0].width();
     if sample.history.iter().all(|image| image.width() == width) {
         Ok(())
@@ -225,8 +226,20 @@ fn kept_writes(writes: &[WriteId]) -> Result<(), FrameError> {
     }
 }
 
+fn kept_pulses(pulses: &[Pulse]) -> Result<(), FrameError> {
+    let ascending = pulses.is_sorted_by(|one, next| one.input < next.input);
+    if pulses.len() <= MAXIMUM_PULSES && ascending {
+        Ok(())
+    } else {
+        Err(FrameError::Promise("at most 16 pulses are carried, in the order of inputs"))
+    }
+}
+
 fn kept_recalled(recalled: &[Recalled]) -> Result<(), FrameError> {
-    recalled.iter().try_for_each(|one| kept_writes(&one.writes))?;
+    recalled.iter().try_for_each(|one| {
+        kept_writes(&one.writes)?;
+        kept_pulses(&one.pulses)
+    })?;
     let programs: ProgramSet = recalled.iter().map(|one| one.program).collect();
     if programs.len() == recalled.len() {
         Ok(())

@@ -19,7 +19,7 @@ use crate::image::Image;
 use crate::lineage::{Digest, Lineage};
 use crate::segment::{Segment, SegmentMask};
 use crate::set::{ProgramSet, StationSet};
-use crate::write::WriteId;
+use crate::write::{Pulse, WriteId};
 
 /// Samples that one [`Sample`] may carry, this cycle's included.
 pub const MAXIMUM_HISTORY: usize = 32;
@@ -94,6 +94,8 @@ pub struct Sample {
     pub drives: bool,
     /// The newest write of each session that has written lately; the values are in `history`.
     pub writes: SmallVec<[WriteId; 1]>,
+    /// Pulses that are not over after this sample, in the order of inputs.
+    pub pulses: SmallVec<[Pulse; 1]>,
 }
 
 /// Source of an applied output.
@@ -206,6 +208,8 @@ pub struct Partial {
 pub struct Recalled {
     /// Program of the sample.
     pub program: ProgramId,
+    /// Moment of the sample.
+    pub sampled: Moment,
     /// Whether this station has received samples of two cycles of the program since it started: outputs that it proved
     /// in an earlier life are then covered by `applied`.
     pub witnessed: bool,
@@ -218,6 +222,8 @@ pub struct Recalled {
     pub accounted_for: StationSet,
     /// As in a [`Sample`].
     pub writes: SmallVec<[WriteId; 1]>,
+    /// As in a [`Sample`].
+    pub pulses: SmallVec<[Pulse; 1]>,
     /// u(i), with the channels that were failed and the values that they kept, and the values that operators wrote.
     pub inputs: Image,
 }

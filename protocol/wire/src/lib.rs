@@ -36,4 +36,7 @@ pub use segment::{MAXIMUM_SEGMENTS, Segment, SegmentMask};
 pub use set::{Element, ProgramSet, Set, StationSet};
 pub use state_choice::StateChoice;
 pub use time::Time;
-pub use write::{MAXIMUM_SESSIONS, Role, Write, WriteAnswer, WriteId, WriteOutcome, WriteRefusal};
+pub use write::{
+    MAXIMUM_PULSES, MAXIMUM_SESSIONS, Pulse, Role, Write, WriteAnswer, WriteId, WriteOutcome,
+    WriteRefusal,
+};

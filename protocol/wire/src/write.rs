@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::force::{ForceError, PointValue, check_owner_and_reason};
 use crate::identifier::Moment;
 
-/// Sessions whose newest write a remote I/O remembers, and that a sample carries.
+/// Sessions whose newest write a sample carries: the undecided, and then the newest.
 pub const MAXIMUM_SESSIONS: usize = 16;
 
 /// Identifier of a write: the caller's session, and the number of the write in it.
@@ -33,6 +33,18 @@ impl WriteId {
         let number = self.number.checked_add(1)?;
         Some(Self { number, ..self })
     }
+}
+
+/// Pulses that a sample carries. A further one ends early where its remote I/O restarts.
+pub const MAXIMUM_PULSES: usize = 16;
+
+/// A pulse that is not over: a remote I/O that restarts continues it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Pulse {
+    /// Operator input, by its bit in u(i), counted from 0.
+    pub input: u16,
+    /// Samples until it is over: those in which it is TRUE, and the FALSE after them.
+    pub left: u32,
 }
 
 /// Rights of the person or program that writes, in ascending order.
@@ -146,9 +158,9 @@ pub enum WriteRefusal {
         /// The next number of the session; 1 for a session that is not known.
         expected: u32,
     },
-    /// The input has a write that is not sampled or a pulse that is not over, or more sessions than [`MAXIMUM_SESSIONS`] write.
+    /// The input has a write that is not sampled or a pulse that is not over, or this person has too many sessions.
     #[error(
-        "another write of this input is not over, or more than {MAXIMUM_SESSIONS} sessions write: repeat the write"
+        "another write of this input is not over, or too many writes of this person are: repeat the write"
     )]
     Busy,
     /// The program does not run: its state is not known yet, is lost, or its sensors are unknown.

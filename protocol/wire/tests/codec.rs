@@ -5,7 +5,7 @@ use smallvec::smallvec;
 use understudy_wire::{
     Actuation, Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Field, Frame,
     FrameError, Header, Holding, Image, Join, Lineage, MAXIMUM_FRAME_BYTES, MAXIMUM_STATIONS,
-    Member, Moment, Partial, ProgramHash, ProgramId, ProgramSet, Recalled, Relayed, Sample,
+    Member, Moment, Partial, ProgramHash, ProgramId, ProgramSet, Pulse, Recalled, Relayed, Sample,
     Segment, StationId, StationSet, Transfer, Turn, Word, WriteId, decode, encode,
 };
 
@@ -44,14 +44,20 @@ fn write(session: u64, number: u32) -> WriteId {
     WriteId { session, number }
 }
 
+fn pulse(input: u16, left: u32) -> Pulse {
+    Pulse { input, left }
+}
+
 fn recalled(program: u8) -> Recalled {
     Recalled {
         program: ProgramId(program),
+        sampled: moment(3, 3),
         witnessed: true,
         applied: Some(moment(3, 3)),
         excluded: StationSet::from_bits(0b100),
         accounted_for: StationSet::from_bits(0b1),
         writes: smallvec![write(7, 1)],
+        pulses: smallvec![pulse(2, 40)],
         inputs: image(4, 0b1010),
     }
 }
@@ -72,6 +78,7 @@ fn every_kind() -> Vec<(&'static str, Frame)> {
         gone: StationSet::from_bits(0b100),
         drives: true,
         writes: smallvec![write(7, 1), write(9, 4)],
+        pulses: smallvec![pulse(2, 41)],
     };
     let relayed = Relayed { program: ProgramId(1), sample: sample.clone() };
     let turn = Turn {
@@ -191,6 +198,7 @@ fn a_frame_that_breaks_a_promise_never_leaves() {
         gone: StationSet::EMPTY,
         drives: true,
         writes: smallvec![],
+        pulses: smallvec![],
     };
     check_refused(remote_io, Body::Sample(empty.clone()));
     for writes in
@@ -198,6 +206,11 @@ fn a_frame_that_breaks_a_promise_never_leaves() {
     {
         let sample =
             Sample { history: smallvec![image(1, 0)], writes: writes.into(), ..empty.clone() };
+        check_refused(remote_io, Body::Sample(sample));
+    }
+    for pulses in [vec![pulse(1, 2), pulse(1, 3)], (0..17).map(|input| pulse(input, 2)).collect()] {
+        let sample =
+            Sample { history: smallvec![image(1, 0)], pulses: pulses.into(), ..empty.clone() };
         check_refused(remote_io, Body::Sample(sample));
     }
     let uneven = Sample { history: smallvec![image(1, 0), image(2, 0)], ..empty.clone() };

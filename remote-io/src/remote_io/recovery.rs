@@ -166,7 +166,7 @@ impl RemoteIo {
             }
         };
         if self.knowledge.floor().is_none() {
-            self.remember(moment, state.map(|(station, _)| station));
+            self.remember(moment, state);
         }
         let void = self.writing.history_replaced(&self.settings.operator_inputs, moment);
         self.report_void(&void);
@@ -177,14 +177,23 @@ impl RemoteIo {
     }
 
     /// After a restart: restores what the stations recall.
-    fn remember(&mut self, moment: Moment, from: Option<StationId>) {
+    fn remember(&mut self, moment: Moment, state: Option<(StationId, Holding)>) {
         self.holders.recall_gone();
-        if let Some(inputs) = from.and_then(|station| self.holders.inputs(station)) {
-            self.diagnosing.recall(inputs);
-            self.field = inputs.clone();
-            let writes = from.map(|station| self.holders.writes(station));
-            let operator_inputs = &self.settings.operator_inputs;
-            self.writing.recall(operator_inputs, inputs, writes.into_iter().flatten());
+        let recalled = state.and_then(|(from, holding)| {
+            let recalled = self.holders.recalled_at(from, holding.stepped)?;
+            Some((recalled, holding.stepped))
+        });
+        if let Some((recalled, stepped)) = recalled {
+            self.diagnosing.recall(&recalled.inputs);
+            self.field = recalled.inputs.clone();
+            let missed = if stepped <= recalled.sampled {
+                Some(0)
+            } else if stepped.epoch == recalled.sampled.epoch {
+                u32::try_from(stepped.cycle.0 - recalled.sampled.cycle.0).ok()
+            } else {
+                None
+            };
+            self.writing.recall(&self.settings.operator_inputs, recalled, missed);
         }
         let stations = self.holders.excluded();
         if !self.knowledge.pardons() && !stations.is_empty() {

@@ -89,6 +89,7 @@ impl RemoteIo {
                 && !self.trust.suspects()
                 && self.program == Execution::Running,
             writes: self.writing.ids(),
+            pulses: self.writing.pulses(operator_inputs),
         });
         if void > 0 {
             self.report(Event::Voided { moment, samples: void, lineage: base });

@@ -188,11 +188,13 @@ impl Bench {
         };
         let recalled = Recalled {
             program: PROGRAM,
+            sampled: moment(50),
             witnessed: true,
             applied: Some(moment(50)),
             excluded: StationSet::EMPTY,
             accounted_for: StationSet::EMPTY,
             writes: Default::default(),
+            pulses: Default::default(),
             inputs: Image::zero(1),
         };
         Body::Join(Join {

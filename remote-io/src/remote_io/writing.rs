@@ -9,33 +9,32 @@
 //! Invariant *One effect*: values and identifiers travel in the same samples, so that stations recall both or neither;
 //! a write that is repeated under its identifier is answered, and not taken again.
 
+mod sessions;
+
 use std::time::Duration;
 
 use smallvec::SmallVec;
 use understudy_cycle::Output;
 use understudy_wire::{
-    Image, Lineage, MAXIMUM_SESSIONS, Moment, PointValue, Write, WriteAnswer, WriteId,
-    WriteOutcome, WriteRefusal,
+    Image, MAXIMUM_PULSES, Moment, Pulse, Recalled, Write, WriteAnswer, WriteId, WriteOutcome,
+    WriteRefusal,
 };
 
+use self::sessions::{Progress, Session, Sessions};
 use super::RemoteIo;
 use crate::event::Event;
 use crate::history::History;
 use crate::source::{OperatorInput, OperatorInputKind, ValueMismatch};
 
-/// Time after which a session that does not write is forgotten.
+/// Time after which a session that does not write is forgotten; a caller asks again for half of it.
 const REMEMBERED_FOR: Duration = Duration::from_secs(60);
-
-/// Time after which such a session may be forgotten earlier, to make room for another one.
-const REMEMBERED_AT_LEAST: Duration = Duration::from_secs(10);
 
 /// Operator inputs with their values, and the writes that they come from.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) struct Writing {
     /// One for each operator input of the settings.
     values: Vec<Written>,
-    /// In the order of sessions.
-    sessions: Vec<Session>,
+    sessions: Sessions,
 }
 
 /// Value of an operator input.
@@ -48,36 +47,6 @@ struct Written {
     by: WriteId,
     /// Whether a sample has the value.
     is_sampled: bool,
-}
-
-/// The newest write of a session.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-struct Session {
-    id: WriteId,
-    /// Index of its operator input; `None` where only stations recall the write.
-    input: Option<usize>,
-    value: Option<PointValue>,
-    progress: Progress,
-    /// Cycles since the write.
-    idle: u32,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-enum Progress {
-    /// Taken, and not sampled yet.
-    Taken,
-    /// In a sample of which no output was applied yet.
-    Sampled {
-        /// First sample with the value.
-        first: Moment,
-        /// Lineage after it.
-        after: Lineage,
-    },
-    /// An output with it was applied.
-    InEffect {
-        /// First sample with the value.
-        since: Moment,
-    },
 }
 
 /// What became of a write.
@@ -98,32 +67,30 @@ impl Writing {
             by: WriteId::default(),
             is_sampled: true,
         });
-        Self { values: values.collect(), sessions: Vec::new() }
+        Self { values: values.collect(), sessions: Sessions::default() }
     }
 
-    /// Checks a write and takes it.
-    fn take(
-        &mut self,
+    /// What is known of a write that was taken before under its identifier.
+    fn known(
+        &self,
         inputs: &[OperatorInput],
         write: &Write,
-        (forgets_after, keeps_for): (u32, u32),
-    ) -> Result<Taking, WriteRefusal> {
-        self.sessions.retain(|session| session.idle < forgets_after || !session.is_decided());
+    ) -> Option<Result<Taking, WriteRefusal>> {
+        let session = self.sessions.get(write.id.session).filter(|it| it.id == write.id)?;
+        let is_same = session.value.is_none_or(|value| value == write.value)
+            && session.input.is_none_or(|input| inputs[input].place.bit == write.input);
+        Some(match session.progress {
+            _ if !is_same => Err(WriteRefusal::Order { expected: write.id.number + 1 }),
+            Progress::InEffect { since } => Ok(Taking::InEffect(since)),
+            Progress::Taken | Progress::Sampled { .. } => Ok(Taking::Pending),
+        })
+    }
+
+    /// Checks a new write and takes it.
+    fn take(&mut self, inputs: &[OperatorInput], write: &Write) -> Result<Taking, WriteRefusal> {
         let id = write.id;
-        let place = self.sessions.binary_search_by_key(&id.session, |it| it.id.session);
-        let last = place.map_or(0, |place| self.sessions[place].id.number);
-        if let Ok(place) = place
-            && id.number == last
-        {
-            let session = &self.sessions[place];
-            let is_same = session.value.is_none_or(|value| value == write.value)
-                && session.input.is_none_or(|input| inputs[input].place.bit == write.input);
-            return match session.progress {
-                _ if !is_same => Err(WriteRefusal::Order { expected: last + 1 }),
-                Progress::InEffect { since } => Ok(Taking::InEffect(since)),
-                Progress::Taken | Progress::Sampled { .. } => Ok(Taking::Pending),
-            };
-        }
+        let before = self.sessions.get(id.session);
+        let last = before.map_or(0, |session| session.id.number);
         let at = inputs.iter().position(|input| input.place.bit == write.input);
         let at = at.ok_or(WriteRefusal::NotWritable)?;
         let input = &inputs[at];
@@ -139,39 +106,17 @@ impl Writing {
             let expected = last.saturating_add(1);
             return Err(WriteRefusal::Order { expected });
         }
-        let is_undecided = place.is_ok_and(|place| !self.sessions[place].is_decided());
+        let is_undecided = before.is_some_and(|session| !session.is_decided());
         let is_pressed =
             matches!(input.kind, OperatorInputKind::Pulse(_)) && self.values[at].left > 0;
         if is_undecided || !self.values[at].is_sampled || is_pressed {
             return Err(WriteRefusal::Busy);
         }
-        let session = Session {
-            id,
-            input: Some(at),
-            value: Some(write.value),
-            progress: Progress::Taken,
-            idle: 0,
-        };
-        match place {
-            Ok(place) => self.sessions[place] = session,
-            Err(_) => self.add(session, keeps_for)?,
-        }
+        self.sessions.put(Session::taken(write, at))?;
         let stored = write.value.stored();
         self.values[at] =
             Written { stored, left: input.samples(stored), by: id, is_sampled: false };
         Ok(Taking::New)
-    }
-
-    fn add(&mut self, session: Session, keeps_for: u32) -> Result<(), WriteRefusal> {
-        if self.sessions.len() == MAXIMUM_SESSIONS {
-            let old = self.sessions.iter().enumerate();
-            let old = old.filter(|(_, it)| it.idle >= keeps_for && it.is_decided());
-            let (oldest, _) = old.max_by_key(|(_, it)| it.idle).ok_or(WriteRefusal::Busy)?;
-            self.sessions.remove(oldest);
-        }
-        let place = self.sessions.partition_point(|it| it.id.session < session.id.session);
-        self.sessions.insert(place, session);
-        Ok(())
     }
 
     /// Puts the values into u(i).
@@ -184,9 +129,23 @@ impl Writing {
         }
     }
 
-    /// The newest write of each session.
+    /// The newest writes that a sample carries, one for each session.
     pub(super) fn ids(&self) -> SmallVec<[WriteId; 1]> {
-        self.sessions.iter().map(|session| session.id).collect()
+        self.sessions.ids()
+    }
+
+    /// Pulses that are not over after the newest sample.
+    pub(super) fn pulses(&self, inputs: &[OperatorInput]) -> SmallVec<[Pulse; 1]> {
+        let values = inputs.iter().zip(&self.values);
+        let pulses = values.filter(|(input, written)| {
+            matches!(input.kind, OperatorInputKind::Pulse(_)) && written.left > 0
+        });
+        let mut pulses: SmallVec<[Pulse; 1]> = pulses
+            .map(|(input, written)| Pulse { input: input.place.bit, left: written.left })
+            .collect();
+        pulses.sort_unstable_by_key(|pulse| pulse.input);
+        pulses.truncate(MAXIMUM_PULSES);
+        pulses
     }
 
     /// Writes in samples of `history`: those that become void can be found afterwards.
@@ -210,7 +169,7 @@ impl Writing {
         let after = history.head();
         let now = Progress::Sampled { first: moment, after };
         let mut void = SmallVec::new();
-        for session in &mut self.sessions {
+        for session in self.sessions.iter_mut() {
             let is_void = match session.progress {
                 Progress::Taken => {
                     session.progress = now;
@@ -235,7 +194,7 @@ impl Writing {
                 void.push(session.id);
             }
         }
-        self.drop_void(&void, moment);
+        self.sessions.drop_void(&void, moment);
         for (input, written) in inputs.iter().zip(&mut self.values) {
             written.is_sampled = true;
             if written.left > 0 {
@@ -261,7 +220,7 @@ impl Writing {
         moment: Moment,
     ) -> SmallVec<[WriteId; 1]> {
         let mut void = SmallVec::new();
-        for session in &mut self.sessions {
+        for session in self.sessions.iter_mut() {
             if !matches!(session.progress, Progress::Sampled { .. }) {
                 continue;
             }
@@ -274,28 +233,14 @@ impl Writing {
                 void.push(session.id);
             }
         }
-        self.drop_void(&void, moment);
+        self.sessions.drop_void(&void, moment);
         void
-    }
-
-    /// The number of a write without an effect is free again.
-    fn drop_void(&mut self, void: &[WriteId], moment: Moment) {
-        self.sessions.retain_mut(|session| {
-            if void.contains(&session.id) {
-                session.id.number -= 1;
-                session.value = None;
-                session.input = None;
-                // The one before it was decided.
-                session.progress = Progress::InEffect { since: moment };
-            }
-            session.id.number > 0
-        });
     }
 
     /// Outputs of the sample of `moment` were applied. Answers with the writes that are in effect by it, and since when.
     pub(super) fn applied(&mut self, moment: Moment) -> SmallVec<[(WriteId, Moment); 1]> {
         let mut effective = SmallVec::new();
-        for session in &mut self.sessions {
+        for session in self.sessions.iter_mut() {
             if let Progress::Sampled { first, .. } = session.progress
                 && first <= moment
             {
@@ -308,46 +253,36 @@ impl Writing {
 
     /// Ends a cycle.
     pub(super) fn close_cycle(&mut self) {
-        for session in &mut self.sessions {
-            session.idle = session.idle.saturating_add(1);
-        }
+        self.sessions.close_cycle();
     }
 
-    /// After a restart: values and writes as stations recall them. A pulse lasts its whole time from now on, so that the
-    /// program sees one pulse. A signal of another group is not valid until it is written again.
+    /// After a restart: values, writes and pulses as stations recall them of a sample, to which the adopted state adds
+    /// `missed` samples at most; `None` where their number is not known. A pulse lasts for the samples that are left of
+    /// it, so that the program sees one pulse that is not longer than it is declared. A signal of another group is not
+    /// valid until it is written again.
     pub(super) fn recall(
         &mut self,
         inputs: &[OperatorInput],
-        image: &Image,
-        writes: impl IntoIterator<Item = WriteId>,
+        recalled: &Recalled,
+        missed: Option<u32>,
     ) {
         for (input, written) in inputs.iter().zip(&mut self.values) {
-            let is_group = matches!(input.kind, OperatorInputKind::Group { .. });
-            let stored = match is_group {
-                true => input.initial,
-                false => input.place.get(image),
+            let of_input = |pulse: &&Pulse| pulse.input == input.place.bit;
+            let stored = input.place.get(&recalled.inputs);
+            let (stored, left) = match input.kind {
+                OperatorInputKind::Group { .. } => (input.initial, 0),
+                OperatorInputKind::Pulse(_) => {
+                    let left = recalled.pulses.iter().find(of_input).map_or(0, |pulse| pulse.left);
+                    // The FALSE after a pulse is sampled in any case.
+                    let end = left.min(1).max(u32::from(stored != 0));
+                    let left = left.saturating_sub(missed.unwrap_or(left)).max(end);
+                    (u64::from(left > 1), left)
+                }
+                OperatorInputKind::Level | OperatorInputKind::Setpoint { .. } => (stored, 0),
             };
-            *written = Written {
-                stored,
-                left: if is_group { 0 } else { input.samples(stored) },
-                by: WriteId::default(),
-                is_sampled: true,
-            };
+            *written = Written { stored, left, by: WriteId::default(), is_sampled: true };
         }
-        let sessions = writes.into_iter().map(|id| Session {
-            id,
-            input: None,
-            value: None,
-            progress: Progress::Taken,
-            idle: 0,
-        });
-        self.sessions = sessions.take(MAXIMUM_SESSIONS).collect();
-    }
-}
-
-impl Session {
-    fn is_decided(&self) -> bool {
-        matches!(self.progress, Progress::InEffect { .. })
+        self.sessions = Sessions::recalled(recalled.writes.iter().copied());
     }
 }
 
@@ -386,15 +321,15 @@ impl RemoteIo {
     pub(super) fn write(&mut self, write: &Write) {
         let moment = self.moment();
         let period = self.settings.agreement.schedule.period().as_nanos().max(1);
-        let cycles =
-            |time: Duration| u32::try_from(time.as_nanos().div_ceil(period)).unwrap_or(u32::MAX);
-        let memory = (cycles(REMEMBERED_FOR), cycles(REMEMBERED_AT_LEAST));
+        let memory = u32::try_from(REMEMBERED_FOR.as_nanos().div_ceil(period));
+        self.writing.sessions.forget(memory.unwrap_or(u32::MAX));
         let runs =
             self.knowledge.run().is_some() && self.sensors.is_some() && self.question.is_none();
-        let taken = if runs {
-            self.writing.take(&self.settings.operator_inputs, write, memory)
-        } else {
-            Err(WriteRefusal::NotRunning)
+        let inputs = &self.settings.operator_inputs;
+        let taken = match self.writing.known(inputs, write) {
+            Some(known) => known,
+            None if runs => self.writing.take(inputs, write),
+            None => Err(WriteRefusal::NotRunning),
         };
         match taken {
             Ok(Taking::New) => self.report(Event::Written { moment, write: write.clone() }),

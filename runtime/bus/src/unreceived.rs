@@ -93,6 +93,7 @@ mod tests {
                 gone,
                 drives: true,
                 writes: smallvec![],
+                pulses: smallvec![],
             }),
         }
     }

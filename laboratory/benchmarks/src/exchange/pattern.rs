@@ -177,6 +177,7 @@ fn sample() -> Body {
         gone: StationSet::EMPTY,
         drives: true,
         writes: Default::default(),
+        pulses: Default::default(),
     })
 }
 

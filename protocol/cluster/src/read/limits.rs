@@ -4,7 +4,7 @@
 
 use understudy_text::Diagnostic;
 use understudy_wire::{
-    MAXIMUM_FRAME_BYTES, MAXIMUM_IMAGE_BITS, MAXIMUM_SESSIONS, MAXIMUM_STATE_BITS,
+    MAXIMUM_FRAME_BYTES, MAXIMUM_IMAGE_BITS, MAXIMUM_PULSES, MAXIMUM_SESSIONS, MAXIMUM_STATE_BITS,
 };
 
 use super::Member;
@@ -20,8 +20,8 @@ const FRAME_BYTES: usize = 256;
 /// One state that a turn speaks of.
 const HOLDING_BYTES: usize = 8 * INTEGER_BYTES;
 
-/// The newest write of each session, in the samples of a program with operator inputs.
-const WRITES_BYTES: usize = MAXIMUM_SESSIONS * (INTEGER_BYTES + 5);
+/// The newest write of each session and the pulses, in the samples of a program with operator inputs.
+const WRITES_BYTES: usize = MAXIMUM_SESSIONS * (INTEGER_BYTES + 5) + MAXIMUM_PULSES * (3 + 5);
 
 /// At most so many bytes of an image, with the members of a word besides.
 fn image_bytes(bits: usize) -> usize {
@@ -41,7 +41,7 @@ fn turn_bytes(
     widest_inputs: usize,
     widest_outputs: usize,
 ) -> usize {
-    let recalled = image_bytes(widest_inputs) + 4 * INTEGER_BYTES + 2 * SET_BYTES;
+    let recalled = image_bytes(widest_inputs) + 6 * INTEGER_BYTES + 2 * SET_BYTES;
     FRAME_BYTES
         + (programs + 1) * image_bytes(widest_outputs)
         + programs * (HOLDING_BYTES + recalled)
@@ -117,7 +117,7 @@ mod tests {
     use smallvec::SmallVec;
     use understudy_wire::{
         Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
-        Lineage, MAXIMUM_HISTORY, Member, Moment, ProgramId, ProgramSet, Recalled, Sample,
+        Lineage, MAXIMUM_HISTORY, Member, Moment, ProgramId, ProgramSet, Pulse, Recalled, Sample,
         StationId, StationSet, Turn, Word, WriteId, encode,
     };
 
@@ -149,6 +149,11 @@ mod tests {
         sessions.map(write).collect()
     }
 
+    fn all_pulses() -> SmallVec<[Pulse; 1]> {
+        let inputs = (0..MAXIMUM_PULSES as u16).rev();
+        inputs.map(|below| Pulse { input: u16::MAX - below, left: u32::MAX }).collect()
+    }
+
     #[test]
     fn no_frame_is_longer_than_its_bound() {
         for bits in [0, 1, 64, 65, 1000] {
@@ -164,6 +169,7 @@ mod tests {
                     gone: StationSet::from_bits(u128::MAX),
                     drives: true,
                     writes: all_writes(),
+                    pulses: all_pulses(),
                 };
                 let bound = sample_bytes(bits, history, true);
                 check_body(Member::RemoteIo(ProgramId(63)), Body::Sample(sample), bound);
@@ -181,12 +187,18 @@ mod tests {
                 let written = programs.min(2);
                 let recalled = |program: u8| Recalled {
                     program: ProgramId(program),
+                    sampled: LATE,
                     witnessed: true,
                     applied: Some(LATE),
                     excluded: StationSet::from_bits(u128::MAX),
                     accounted_for: StationSet::from_bits(u128::MAX),
                     writes: if usize::from(program) < written {
                         all_writes()
+                    } else {
+                        SmallVec::new()
+                    },
+                    pulses: if usize::from(program) < written {
+                        all_pulses()
                     } else {
                         SmallVec::new()
                     },

@@ -120,6 +120,7 @@ fn sample() -> Sample {
         gone: StationSet::EMPTY,
         drives: true,
         writes: Default::default(),
+        pulses: Default::default(),
     }
 }
 
