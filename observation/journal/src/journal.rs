@@ -13,9 +13,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::continuation::Followed;
-use crate::packed_file::SegmentFile;
 use crate::record::Record;
-use crate::segments::{Segments, segments_of};
+use crate::segments::{OpenSegments, Segments};
 use crate::version::{WrongVersion, check_header, journal_header};
 
 /// Where records go.
@@ -169,14 +168,11 @@ pub const JOURNAL_LIMIT_BYTES: u64 = 1 << 30;
 pub fn records_of(
     path: &Path,
 ) -> io::Result<impl Iterator<Item = Result<Record, JournalError>> + use<>> {
-    let newest = path.to_owned();
-    let segments = segments_of(path)?.into_iter();
-    Ok(segments.flat_map(move |segment| {
-        let (file, error) = match SegmentFile::open(&segment) {
-            Ok(file) => (Some(file), None),
-            Err(error) => (None, Some(Err(error.into()))),
+    Ok(OpenSegments::of(path)?.flat_map(|opened| {
+        let (is_closed, file, error) = match opened {
+            Ok((is_closed, file)) => (is_closed, Some(file), None),
+            Err(error) => (false, None, Some(Err(error.into()))),
         };
-        let is_closed = segment != newest;
         let mut found = file.into_iter().map(BufReader::new).flat_map(records).peekable();
         let whole = iter::from_fn(move || {
             let next = found.next()?;

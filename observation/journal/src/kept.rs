@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io;
+use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -15,6 +15,7 @@ use understudy_cycle::Mode;
 use understudy_text::{Report, decode};
 
 use crate::named_files::{named_bytes, named_file};
+use crate::packed_file::open_file;
 use crate::run_directory::RunDirectoryError;
 
 const FOLDER: &str = "cluster";
@@ -121,12 +122,12 @@ pub fn kept_cluster(run: &Path) -> Result<Cluster, KeptError> {
     }
     let unreadable = |path: PathBuf, reason: String| KeptError::Read { path, reason };
     let text = |path: &Path| {
-        let bytes = fs::read(path).map_err(|error| error.to_string())?;
+        let bytes = read_file(path).map_err(|error| error.to_string())?;
         decode(bytes).map_err(|error| error.to_string())
     };
     let cluster = text(&file).map_err(|reason| unreadable(file.clone(), reason))?;
     let kept_file = folder.join(KEPT_FILE);
-    let kept: Kept = match fs::read(&kept_file) {
+    let kept: Kept = match read_file(&kept_file) {
         Ok(bytes) => serde_json::from_slice(&bytes)
             .map_err(|error| unreadable(kept_file, error.to_string()))?,
         // A folder that a person has put there.
@@ -145,6 +146,13 @@ pub fn kept_cluster(run: &Path) -> Result<Cluster, KeptError> {
         named_file(&folder, file)
     });
     loaded.cluster.ok_or(KeptError::Files { reports: loaded.reports })
+}
+
+/// The bytes of a regular file.
+fn read_file(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open_file(path)?.read_to_end(&mut bytes)?;
+    Ok(bytes)
 }
 
 /// The last part of a name, which no other ladder and no file of ours has.

@@ -42,7 +42,7 @@ pub use operator::{
     Shelving, Unshelving, WriteProblem, WriteRequest, WriteSessions, commands, find_alarm,
     force_value, new_write, write_answer,
 };
-pub use packed_file::SegmentFile;
+pub use packed_file::{SegmentFile, open_file};
 pub use place::{CheckpointPlace, Place, continuation_before, place_before};
 pub use record::{Happening, LABORATORY, Record, RunEvent, moment};
 pub use rules::{Process, SourceCounts, is_blocked, is_provable};

@@ -62,6 +62,17 @@ pub(crate) fn pack_file(from: &Path, to: &Path) -> io::Result<()> {
     fs::rename(begun, to)
 }
 
+/// Opens a file for reading. A pipe or a device, which could block or never end, is refused.
+///
+/// # Errors
+/// What the system says.
+pub fn open_file(path: &Path) -> io::Result<File> {
+    if !fs::metadata(path)?.is_file() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file"));
+    }
+    File::open(path)
+}
+
 fn next_block(text: &mut impl BufRead) -> io::Result<Vec<u8>> {
     let mut block = Vec::new();
     while block.len() < BLOCK {
@@ -103,9 +114,9 @@ impl SegmentFile {
     /// # Errors
     /// What the system says.
     pub fn open(path: &Path) -> io::Result<Self> {
-        let mut file = match File::open(path) {
+        let mut file = match open_file(path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                File::open(path.with_extension(PACKED)).map_err(|_| error)?
+                open_file(&path.with_extension(PACKED)).map_err(|_| error)?
             }
             file => file?,
         };

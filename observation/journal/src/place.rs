@@ -50,24 +50,44 @@ impl Place {
 /// # Errors
 /// What the system says.
 pub fn continuation_before(path: &Path, cycle: i64, newest: usize) -> io::Result<Option<Place>> {
-    let mut segments = segments_of(path)?;
-    segments.truncate(segments.len().saturating_sub(newest));
-    let end = segments.partition_point(|segment| {
-        let found = SegmentFile::open(segment).ok().and_then(continued_after);
-        found.is_none_or(|found| found <= cycle)
-    });
-    let Some(segment) = segments[..end].last() else {
-        return Ok(None);
-    };
-    let file = SegmentFile::open(segment)?;
-    if SegmentFile::open(segment).ok().and_then(continued_after).is_none() {
-        return Ok(None);
-    }
-    Place::of(file, 0, segment != path)
+    looked_again(|| {
+        let mut segments = segments_of(path)?;
+        segments.truncate(segments.len().saturating_sub(newest));
+        let end = segments.partition_point(|segment| {
+            let found =
+                SegmentFile::open(segment).ok().and_then(|mut file| continued_after(&mut file));
+            found.is_none_or(|found| found <= cycle)
+        });
+        let Some(segment) = segments[..end].last() else {
+            return Ok(None);
+        };
+        let mut file = SegmentFile::open(segment)?;
+        match continued_after(&mut file) {
+            None => Ok(None),
+            // The newest was closed since: this is the one after it.
+            Some(found) if found > cycle => Err(io::ErrorKind::NotFound.into()),
+            Some(_) => Place::of(file, 0, segment != path),
+        }
+    })
 }
 
+/// Looks again where a segment was packed, closed or removed between its listing and its opening.
+fn looked_again<T>(look: impl Fn() -> io::Result<T>) -> io::Result<T> {
+    let gone = |error: &io::Error| error.kind() == io::ErrorKind::NotFound;
+    for _ in 1..LOOKS {
+        match look() {
+            Err(error) if gone(&error) => {}
+            found => return found,
+        }
+    }
+    look()
+}
+
+/// Attempts to find a place in a journal whose segments change.
+const LOOKS: usize = 8;
+
 /// The newest cycle before a segment, where its second record says it.
-fn continued_after(file: SegmentFile) -> Option<i64> {
+fn continued_after(file: &mut SegmentFile) -> Option<i64> {
     let mut lines = BufReader::new(file).lines();
     check_header(lines.next()?.ok()?.as_bytes()).ok()?;
     let line = lines.next()?.ok()?;
@@ -82,6 +102,10 @@ fn continued_after(file: SegmentFile) -> Option<i64> {
 /// # Errors
 /// What the system says.
 pub fn place_before(path: &Path, cycle: i64) -> io::Result<Option<CheckpointPlace>> {
+    looked_again(|| find_place(path, cycle))
+}
+
+fn find_place(path: &Path, cycle: i64) -> io::Result<Option<CheckpointPlace>> {
     let segments = segments_of(path)?;
     // The first segments of a run may have none, and the newest has none yet.
     let is_before = |segment: &PathBuf| {

@@ -11,6 +11,7 @@
 //! Invariant: all segments together have at most the limit, but for the line that is being written and the segment that is being packed; no
 //! line is lost or read twice, wherever the writer is killed: a segment that is there as text and packed is the same.
 
+use std::collections::VecDeque;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufRead, BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -106,9 +107,7 @@ impl Segments {
     /// Removes the oldest segments until there is room for the one that begins.
     fn remove_oldest(&self) -> io::Result<()> {
         let closed = closed(&self.path)?;
-        let sizes =
-            closed.iter().map(|(_, path)| fs::metadata(path).map_or(0, |found| found.len()));
-        let sizes: Vec<u64> = sizes.collect();
+        let sizes: Vec<u64> = closed.iter().map(|(_, path)| size_of(path)).collect();
         let mut all = sizes.iter().sum::<u64>() + self.segment_bytes;
         for ((_, path), size) in closed.iter().zip(sizes) {
             if all <= self.limit_bytes {
@@ -125,6 +124,12 @@ impl Segments {
         }
         Ok(())
     }
+}
+
+/// Bytes of a closed segment, as text or packed since; 0 where it is gone.
+fn size_of(path: &Path) -> u64 {
+    let packed = || fs::metadata(path.with_extension(PACKED));
+    fs::metadata(path).or_else(|_| packed()).map_or(0, |found| found.len())
 }
 
 /// Packs closed segments in a thread of its own; one that cannot be packed stays as it is.
@@ -208,6 +213,74 @@ pub fn segments_of(path: &Path) -> io::Result<Vec<PathBuf>> {
     Ok(files)
 }
 
+/// The segments of a journal, opened one after the other, oldest first.
+///
+/// A segment that is packed or closed between its listing and its opening is read as what it has become, and one that is removed as the oldest is
+/// left out: so each line is read once, also of a journal that is written meanwhile.
+#[derive(Debug)]
+pub(crate) struct OpenSegments {
+    path: PathBuf,
+    listed: VecDeque<(u64, PathBuf)>,
+    /// Number of the last one that was opened.
+    last: Option<u64>,
+    is_over: bool,
+}
+
+impl OpenSegments {
+    pub(crate) fn of(path: &Path) -> io::Result<Self> {
+        let listed = closed(path)?.into();
+        Ok(Self { path: path.to_owned(), listed, last: None, is_over: false })
+    }
+
+    /// Whether there are closed segments that were not opened.
+    fn list_again(&mut self) -> io::Result<bool> {
+        let last = self.last;
+        self.listed = closed(&self.path)?.into();
+        self.listed.retain(|(number, _)| Some(*number) > last);
+        Ok(!self.listed.is_empty())
+    }
+
+    /// With whether it is closed.
+    fn open_next(&mut self) -> io::Result<Option<(bool, SegmentFile)>> {
+        loop {
+            while let Some((number, path)) = self.listed.pop_front() {
+                self.last = Some(number);
+                if let Some(file) = found(SegmentFile::open(&path))? {
+                    return Ok(Some((true, file)));
+                }
+            }
+            if self.list_again()? {
+                continue;
+            }
+            let file = found(SegmentFile::open(&self.path));
+            self.is_over = file.is_err();
+            let file = file?;
+            // It may have been closed since, and the file is the one after it.
+            if !self.list_again()? {
+                self.is_over = true;
+                return Ok(file.map(|file| (false, file)));
+            }
+        }
+    }
+}
+
+impl Iterator for OpenSegments {
+    type Item = io::Result<(bool, SegmentFile)>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.is_over { None } else { self.open_next().transpose() }
+    }
+}
+
+/// Nothing where there is no file (any more).
+pub(crate) fn found<T>(opened: io::Result<T>) -> io::Result<Option<T>> {
+    match opened {
+        Ok(file) => Ok(Some(file)),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
 /// A new file with its header, and the bytes of it.
 fn open(path: &Path, number: u64) -> io::Result<(BufWriter<File>, u64)> {
     let file = OpenOptions::new().create(true).write(true).truncate(true).open(path)?;
@@ -285,10 +358,9 @@ mod tests {
     use super::*;
 
     fn lines(path: &Path) -> Vec<u64> {
-        let files = segments_of(path).expect("readable");
         let mut text = String::new();
-        for file in files {
-            let mut file = SegmentFile::open(&file).expect("it is there");
+        for opened in OpenSegments::of(path).expect("readable") {
+            let (_, mut file) = opened.expect("readable");
             file.read_to_string(&mut text).expect("text");
         }
         assert!(text.is_empty() || text.ends_with('\n'));
@@ -300,7 +372,7 @@ mod tests {
 
     fn size(path: &Path) -> u64 {
         let files = segments_of(path).expect("readable");
-        files.iter().map(|file| fs::metadata(file).expect("a file").len()).sum()
+        files.iter().map(|file| size_of(file)).sum()
     }
 
     #[test]
@@ -331,6 +403,91 @@ mod tests {
         segments.flush().expect("written");
         assert_eq!(lines(&path).last(), Some(&5000));
         assert!(lines(&path).len() > kept.len() / 2);
+    }
+
+    /// Between two steps of a reader a segment is closed, packed, or removed as the oldest.
+    #[test]
+    fn whatever_happens_between_listing_and_opening_each_line_is_read_once() {
+        for taken in 0..6 {
+            let folder = Folder::new("segments-between");
+            let path = folder.join("journal.jsonl");
+            let write = |number: u64, text: u64| {
+                let closed = closed_path(&path, number);
+                fs::write(&closed, format!("{text}\n")).expect("written");
+                closed
+            };
+            let texts: Vec<PathBuf> = (1..5).map(|number| write(number, number)).collect();
+            fs::write(&path, "5\n").expect("written");
+            let mut segments = OpenSegments::of(&path).expect("readable");
+            let mut read = String::new();
+            let mut take = |(_, mut file): (bool, SegmentFile)| {
+                file.read_to_string(&mut read).expect("text");
+            };
+            segments.by_ref().take(taken).for_each(|opened| take(opened.expect("readable")));
+            // The first is removed, all others are packed, and the newest is closed and packed too.
+            fs::remove_file(&texts[0]).expect("removed");
+            texts[1..].iter().for_each(|text| pack(text));
+            let closed = closed_path(&path, 5);
+            fs::rename(&path, &closed).expect("closed");
+            pack(&closed);
+            fs::write(&path, "6\n").expect("written");
+            segments.for_each(|opened| take(opened.expect("readable")));
+            let read: Vec<u64> = read.lines().map(|line| line.parse().expect("a number")).collect();
+            let first = if taken == 0 { 2 } else { 1 };
+            let last = if taken >= 5 { 5 } else { 6 };
+            assert_eq!(read, (first..=last).collect::<Vec<_>>(), "after {taken} segments");
+        }
+    }
+
+    /// A journal that is written all the time.
+    #[test]
+    fn readers_of_a_journal_that_is_written_lose_no_line() {
+        let folder = Folder::new("segments-live");
+        let path = folder.join("journal.jsonl");
+        let written = Segments::create(&path, 1 << 22).expect("created");
+        std::thread::scope(|scope| {
+            let writer = scope.spawn(move || {
+                let mut segments = written;
+                for number in 0..60_000 {
+                    writeln!(segments, "{number}{}", "x".repeat(90)).expect("written");
+                }
+                segments.flush().expect("written");
+                segments
+            });
+            let mut reads = 0;
+            while !writer.is_finished() || reads == 0 {
+                let mut text = String::new();
+                for opened in OpenSegments::of(&path).expect("readable") {
+                    let (_, mut file) = opened.expect("readable");
+                    file.read_to_string(&mut text).expect("text");
+                }
+                let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
+                let lines = whole.lines().filter(|line| !line.starts_with('{'));
+                let numbers: Vec<u64> =
+                    lines.map(|line| line.trim_end_matches('x').parse().expect("whole")).collect();
+                assert!(numbers.windows(2).all(|two| two[0] < two[1]), "in order, once");
+                // Only the oldest may go while it is read.
+                let gap = numbers.windows(2).position(|two| two[0] + 1 != two[1]);
+                assert_eq!(gap, None, "{:?}", gap.map(|at| &numbers[at..at + 2]));
+                reads += 1;
+            }
+            drop(writer.join().expect("no panic"));
+        });
+    }
+
+    #[test]
+    fn what_is_no_file_is_refused_and_does_not_block() {
+        let folder = Folder::new("segments-devices");
+        let path = folder.join("journal.jsonl");
+        std::os::unix::fs::symlink("/dev/zero", &path).expect("a link");
+        assert!(SegmentFile::open(&path).is_err());
+        std::os::unix::fs::symlink("/dev/zero", closed_path(&path, 1)).expect("a link");
+        let opened: Vec<bool> = OpenSegments::of(&path)
+            .expect("readable")
+            .take(3)
+            .map(|opened| opened.is_ok())
+            .collect();
+        assert_eq!(opened, [false, false]);
     }
 
     #[test]

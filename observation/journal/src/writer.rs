@@ -6,6 +6,8 @@ use std::io;
 use std::path::Path;
 use std::time::Duration;
 
+use crate::packed_file::open_file;
+
 /// In the directory of a run.
 const LOCK: &str = "run.lock";
 
@@ -54,7 +56,7 @@ pub enum Writing {
 
 /// Whether somebody writes the run in this directory now.
 pub fn writing(run: &Path) -> Writing {
-    let Ok(file) = File::open(run.join(LOCK)) else {
+    let Ok(file) = open_file(&run.join(LOCK)) else {
         return Writing::Unknown;
     };
     match file.try_lock_shared() {

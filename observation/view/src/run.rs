@@ -6,7 +6,7 @@ use std::sync::Arc;
 use serde_json::Value;
 use understudy_cluster::Cluster;
 use understudy_journal::{
-    Commander, JournalError, Writing, check_journal, continuation_before, kept_cluster,
+    Commander, JournalError, Writing, check_journal, continuation_before, kept_cluster, open_file,
     place_before, segments_of, writing,
 };
 use understudy_node::STATES_EVERY;
@@ -341,8 +341,8 @@ impl Run {
 
     /// The origin of the summary, for journals whose own record of it is gone.
     fn origin_of_summary(&self) -> Option<Moment> {
-        let summary = std::fs::read(self.path.join("summary.json")).ok()?;
-        let summary: Value = serde_json::from_slice(&summary).ok()?;
+        let summary = open_file(&self.path.join("summary.json")).ok()?;
+        let summary: Value = serde_json::from_reader(std::io::BufReader::new(summary)).ok()?;
         let (epoch, cycle) = summary["origin"].as_str()?.split_once(':')?;
         Some(Moment { epoch: Epoch(epoch.parse().ok()?), cycle: Cycle(cycle.parse().ok()?) })
     }

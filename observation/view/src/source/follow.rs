@@ -295,7 +295,16 @@ impl Follower {
                     open.number = Some(number);
                 }
                 let path = self.path.clone();
-                self.open(&path, None)
+                if !self.open(&path, None)? {
+                    return Ok(false);
+                }
+                // It may have been closed since it was listed: then the file is the one after what follows.
+                let closed = closed_segments(&self.path)?;
+                let follows = |(other, _): &&(u64, PathBuf)| number.is_some_and(|own| *other > own);
+                match closed.iter().find(follows).cloned() {
+                    Some((number, path)) => self.open(&path, Some(number)),
+                    None => Ok(true),
+                }
             }
         }
     }
