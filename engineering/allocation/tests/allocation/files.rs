@@ -74,6 +74,10 @@ fn figure<T>(value: T, source: String) -> Figure<T> {
 
 fn catalogues() -> impl Strategy<Value = Catalogue> {
     let number = (prop::sample::select(Quantity::ALL.to_vec()), 0_u64..100_000, word());
+    let number = number.prop_map(|(quantity, value, source)| {
+        // A larger one is refused.
+        (quantity, value.min(quantity.most()), source)
+    });
     let text = (prop::sample::select(Statement::ALL.to_vec()), word(), word());
     let kind = prop::sample::select(Kind::ALL.to_vec());
     let controller = (
