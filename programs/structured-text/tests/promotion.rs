@@ -6,6 +6,12 @@ use running::{Running, once, program, read, shown};
 use understudy_text::Severity;
 use understudy_typed::Elementary;
 
+/// The value of an expression for the values of its variables.
+type Value<T> = Box<dyn Fn(&[i32]) -> T>;
+
+/// An operator on two numbers.
+type Binary = fn(i32, i32) -> i32;
+
 /// The variables of random expressions: one of each narrow type.
 const VARIABLES: [(&str, Elementary); 6] = [
     ("s8", Elementary::Sint),
@@ -34,7 +40,7 @@ impl Random {
 /// An expression as text, and what C computes for it from the variables, each as an `int`.
 struct Tried {
     text: String,
-    value: Box<dyn Fn(&[i32]) -> i32>,
+    value: Value<i32>,
 }
 
 /// The number as a variable of a type holds it.
@@ -67,7 +73,7 @@ fn expression(random: &mut Random, depth: usize) -> Tried {
     };
     let (one, two) = (left.value, right.value);
     let (left, right) = (left.text, right.text);
-    let signs: [(&str, fn(i32, i32) -> i32); 6] = [
+    let signs: [(&str, Binary); 6] = [
         ("+", i32::wrapping_add),
         ("-", i32::wrapping_sub),
         ("*", i32::wrapping_mul),
@@ -75,7 +81,7 @@ fn expression(random: &mut Random, depth: usize) -> Tried {
         ("OR", |left, right| left | right),
         ("XOR", |left, right| left ^ right),
     ];
-    let (text, value): (String, Box<dyn Fn(&[i32]) -> i32>) = match random.below(11) {
+    let (text, value): (String, Value<i32>) = match random.below(11) {
         6 => (
             format!("({left} / ({right} OR 1))"),
             Box::new(move |given| one(given).wrapping_div(two(given) | 1)),
@@ -110,13 +116,13 @@ fn random_expressions_are_what_c_computes() {
     for _ in 0..150 {
         let mut outputs = String::new();
         let mut body = String::new();
-        let mut wanted: Vec<(Elementary, Box<dyn Fn(&[i32]) -> i64>)> = Vec::new();
+        let mut wanted: Vec<(Elementary, Value<i64>)> = Vec::new();
         for at in 0..12 {
             let depth = 1 + random.below(4);
             let tried = expression(&mut random, depth);
             let value = tried.value;
             // Stored in each narrow type and in wider ones, compared, and as an index of itself.
-            let (of, text, value): (_, _, Box<dyn Fn(&[i32]) -> i64>) = match random.below(9) {
+            let (of, text, value): (_, _, Value<i64>) = match random.below(9) {
                 found @ 0..6 => {
                     let of = VARIABLES[found].1;
                     let value = move |given: &[i32]| i64::from(cast(value(given), of));

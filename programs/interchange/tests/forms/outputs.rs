@@ -46,8 +46,11 @@ const DECLARED: [(&str, bool); 9] = [
     ("retained output", true),
 ];
 
+/// A row of [`TYPES`].
+type Type = (&'static str, char, &'static str, Option<(&'static str, &'static str, &'static str)>);
+
 /// Types, the size of an address, a value, and the output of a standard block that goes there.
-const TYPES: [(&str, char, &str, Option<(&str, &str, &str)>); 9] = [
+const TYPES: [Type; 9] = [
     ("BOOL", 'X', "TRUE", Some(("TON", "IN", "Q"))),
     ("BOOL", 'X', "FALSE", Some(("CTU", "CU", "Q"))),
     ("INT", 'W', "0", Some(("CTU", "CU", "CV"))),
