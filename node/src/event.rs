@@ -100,6 +100,20 @@ pub enum Event {
         /// Program of the state.
         program: ProgramId,
     },
+    /// No sample of a program was received for a second or some cycles, from its remote I/O or relayed: no output of the program is applied.
+    SamplesMissing {
+        /// Current cycle.
+        moment: Moment,
+        /// The program.
+        program: ProgramId,
+    },
+    /// Samples of the program are received again.
+    SamplesReturned {
+        /// Current cycle.
+        moment: Moment,
+        /// The program.
+        program: ProgramId,
+    },
     /// A member of this cluster runs another configuration; its frames are dropped.
     Refused {
         /// Member whose frames are dropped.
@@ -108,6 +122,20 @@ pub enum Event {
         theirs: ConfigurationHash,
         /// The configuration of this station.
         ours: ConfigurationHash,
+    },
+    /// A member whose frames were dropped is no longer received with another configuration.
+    RefusalEnded {
+        /// Member that was refused.
+        member: Member,
+    },
+    /// This station does not take part yet, and more stations have one other configuration than have its own: its process ends.
+    Outvoted {
+        /// The other configuration.
+        theirs: ConfigurationHash,
+        /// Stations with its own configuration, it included.
+        stations: u32,
+        /// Stations with the other one.
+        others: u32,
     },
     /// The host woke this station too late to keep its times.
     Stalled {
@@ -120,8 +148,10 @@ pub enum Event {
 
 impl From<Refusal> for Event {
     fn from(refusal: Refusal) -> Self {
-        let Refusal { member, theirs, ours } = refusal;
-        Self::Refused { member, theirs, ours }
+        match refusal {
+            Refusal::Begins { member, theirs, ours } => Self::Refused { member, theirs, ours },
+            Refusal::Ends { member } => Self::RefusalEnded { member },
+        }
     }
 }
 
@@ -130,6 +160,9 @@ impl From<Notice> for Event {
         match notice {
             Notice::Flagged { moment, station } => Self::Flagged { moment, station },
             Notice::Cleared { moment, station } => Self::Cleared { moment, station },
+            Notice::Outvoted { theirs, stations, others } => {
+                Self::Outvoted { theirs, stations, others }
+            }
             Notice::Stalled { moment, late } => Self::Stalled { moment, late },
         }
     }

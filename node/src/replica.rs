@@ -13,8 +13,8 @@ use std::sync::Arc;
 
 use understudy_executable::Scratch;
 use understudy_wire::{
-    Body, Digest, Frame, Holding, Image, Lineage, Moment, ProgramId, Recalled, Sample, Segment,
-    StationId,
+    Body, Digest, Frame, Holding, Image, Lineage, Moment, ProgramId, Recalled, Sample,
+    SamplesReceived, Segment, StationId, StationSet,
 };
 
 use self::log::Log;
@@ -52,6 +52,8 @@ pub(crate) struct Replica {
     /// For other stations, of a state of several segments.
     snapshots: Vec<Snapshot>,
     remembered: Remembered,
+    /// Stations that were accounted for when this one gave them its state, and that may prove outputs with it from then on.
+    given: StationSet,
     history: usize,
 }
 
@@ -125,6 +127,7 @@ impl Replica {
             joining: Joining::default(),
             snapshots: Vec::new(),
             remembered: Remembered::Nothing,
+            given: StationSet::EMPTY,
             history,
         }
     }
@@ -189,11 +192,14 @@ impl Replica {
         };
         if inputs.width() == program.executable.input_count() {
             if let Remembered::Received(known) = &mut self.remembered {
-                known.witnessed |= known.sampled < moment;
+                if known.sampled < moment {
+                    known.received = SamplesReceived::Several;
+                }
                 known.sampled = moment;
                 known.applied = sample.applied;
                 known.excluded = sample.excluded;
                 known.accounted_for = sample.gone;
+                self.given = StationSet::EMPTY;
                 known.writes.clone_from(&sample.writes);
                 known.pulses.clone_from(&sample.pulses);
                 known.inputs.clone_from(inputs);
@@ -202,8 +208,7 @@ impl Replica {
             let recalled = Recalled {
                 program: self.id,
                 sampled: moment,
-                // Outputs of the first sample may have been proved in this station's earlier life.
-                witnessed: false,
+                received: SamplesReceived::OneCycle,
                 applied: sample.applied,
                 excluded: sample.excluded,
                 accounted_for: sample.gone,
@@ -216,8 +221,9 @@ impl Replica {
     }
 
     /// A station reports at `now` to hold the state of the cycle `stepped`. If that is no newer than the newest sample
-    /// received here, `silent_after` cycles after it, the remote I/O is not received there either; if that station
-    /// received samples itself, as it recalls, no newer output was computed from its state, unless it is taking over another one.
+    /// received here, `silent_after` cycles after it, the remote I/O is not received there either. No newer output was computed from its state
+    /// if that station received samples itself, as it recalls, or if it has received none since it started and holds the state that it was given
+    /// here after it had been accounted for; unless it is taking over another one.
     pub(crate) fn receive_holding(
         &mut self,
         station: StationId,
@@ -229,9 +235,15 @@ impl Replica {
         let Remembered::Received(recalled) = &mut self.remembered else {
             return;
         };
-        let theirs = theirs.filter(|theirs| theirs.witnessed);
+        let was_given = self.given.contains(station);
+        let theirs = theirs.filter(|theirs| match theirs.received {
+            SamplesReceived::Several => true,
+            SamplesReceived::OneCycle => false,
+            SamplesReceived::Nothing => was_given,
+        });
         if stepped > recalled.sampled {
             recalled.accounted_for.remove(station);
+            self.given.remove(station);
         } else if let Some(theirs) = theirs
             && now >= recalled.sampled.plus(u64::from(silent_after))
             && !gives_to
@@ -246,7 +258,7 @@ impl Replica {
         if self.remembered == Remembered::Nothing
             && recalled.inputs.width() == program.executable.input_count()
         {
-            let recalled = Recalled { witnessed: false, ..recalled.clone() };
+            let recalled = Recalled { received: SamplesReceived::Nothing, ..recalled.clone() };
             self.remembered = Remembered::Relayed(recalled);
         }
     }

@@ -23,7 +23,7 @@ use std::sync::Arc;
 pub use turn::STATES_EVERY;
 
 use smallvec::SmallVec;
-use understudy_cycle::{Arrival, Input, Machine, Output, Participant};
+use understudy_cycle::{Arrival, Input, Machine, Output, Outvoted, Participant};
 use understudy_executable::Scratch;
 use understudy_wire::{
     Body, ConfigurationHash, Digest, Frame, Holding, Image, Lineage, Member, Moment, ProgramId,
@@ -54,6 +54,8 @@ pub struct Station {
     lacked: ProgramSet,
     /// Programs of `lacked` whose samples this station had.
     awaited: ProgramSet,
+    /// Cycles in a row without a sample, for each replica; reported at a bound, and without effect on the cycle.
+    unsampled: SmallVec<[u32; 2]>,
 }
 
 /// Who starts the cycles.
@@ -141,6 +143,7 @@ impl Station {
             differed: SmallVec::new(),
             lacked: ProgramSet::EMPTY,
             awaited: ProgramSet::EMPTY,
+            unsampled: settings.runs().map(|_| 0).collect(),
             settings,
         };
         station.member.wake_at(station.next_wakeup());
@@ -317,6 +320,8 @@ impl Hash for Station {
             differed,
             lacked,
             awaited,
+            // Only reported.
+            unsampled: _,
         } = self;
         (member, replicas).hash(hasher);
         (cycle, started, role, wanted).hash(hasher);
@@ -328,7 +333,12 @@ impl Machine for Station {
     type Event = Event;
 
     fn handle_input(&mut self, now: Time, input: Input<'_>) {
-        self.member.note_stall(now);
+        self.member.note_time(now);
+        // Itself, those that publish, and those that ask to join.
+        let all = StationSet::first(self.settings.agreement.schedule.stations());
+        let own = all.without(self.member.flagged()).or(self.joining).or(self.cycle.joiners);
+        let stations = own.or(StationSet::only(self.own())).len();
+        self.member.count_votes(now, stations, !self.publishes());
         match input {
             Input::Wakeup => self.wake(now),
             Input::Frame(frame) => self.receive(now, frame),
@@ -343,5 +353,9 @@ impl Machine for Station {
 
     fn wakeup(&self) -> Time {
         self.member.wakeup()
+    }
+
+    fn outvoted(&self) -> Option<Outvoted> {
+        self.member.outvoted()
     }
 }

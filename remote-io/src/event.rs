@@ -70,6 +70,17 @@ pub enum Event {
         /// Stations that hold them.
         stations: StationSet,
     },
+    /// No station holds a state, and members of this cluster are received that have another configuration: this remote I/O may be the one with
+    /// the wrong program, so it starts nothing cold. The operator chooses, unless the others get its configuration, or more stations than others
+    /// have it.
+    ConfigurationDisputed {
+        /// Current cycle.
+        moment: Moment,
+        /// Living stations with the configuration of this remote I/O.
+        stations: u32,
+        /// Members that are received with another one.
+        others: u32,
+    },
     /// No living station can prove the state that the newest applied output came from: the outputs are held, then
     /// fail-safe.
     StateLost {
@@ -84,7 +95,7 @@ pub enum Event {
         /// Whether the operator is asked; the program starts cold otherwise.
         asks: bool,
     },
-    /// A station has returned that can prove the state: the program continues.
+    /// A station has returned that can prove the state, which was lost or disputed: the program continues.
     StateRecovered {
         /// Current cycle.
         moment: Moment,
@@ -251,6 +262,20 @@ pub enum Event {
         /// The configuration of this remote I/O.
         ours: ConfigurationHash,
     },
+    /// A member whose frames were dropped is no longer received with another configuration.
+    RefusalEnded {
+        /// Member that was refused.
+        member: Member,
+    },
+    /// This remote I/O does not take part yet, and more stations have one other configuration than have its own: its process ends.
+    Outvoted {
+        /// The other configuration.
+        theirs: ConfigurationHash,
+        /// Stations with its own configuration.
+        stations: u32,
+        /// Stations with the other one.
+        others: u32,
+    },
     /// The host woke this remote I/O too late to keep its times.
     Stalled {
         /// Current cycle.
@@ -319,8 +344,10 @@ pub enum Missing {
 
 impl From<Refusal> for Event {
     fn from(refusal: Refusal) -> Self {
-        let Refusal { member, theirs, ours } = refusal;
-        Self::Refused { member, theirs, ours }
+        match refusal {
+            Refusal::Begins { member, theirs, ours } => Self::Refused { member, theirs, ours },
+            Refusal::Ends { member } => Self::RefusalEnded { member },
+        }
     }
 }
 
@@ -329,6 +356,9 @@ impl From<Notice> for Event {
         match notice {
             Notice::Flagged { moment, station } => Self::Flagged { moment, station },
             Notice::Cleared { moment, station } => Self::Cleared { moment, station },
+            Notice::Outvoted { theirs, stations, others } => {
+                Self::Outvoted { theirs, stations, others }
+            }
             Notice::Stalled { moment, late } => Self::Stalled { moment, late },
         }
     }

@@ -5,7 +5,9 @@
 use std::cmp::Reverse;
 
 use understudy_cycle::Agreement;
-use understudy_wire::{Holding, Moment, ProgramId, Recalled, StationId, StationSet};
+use understudy_wire::{
+    Holding, Moment, ProgramId, Recalled, SamplesReceived, StationId, StationSet,
+};
 
 /// One entry for each station that can hold the program's state.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -123,7 +125,8 @@ impl Holders {
             let living = self.entries.iter().filter(|entry| self.lives(entry));
             living.filter_map(|entry| Some((entry.station, entry.recalled.as_ref()?)))
         };
-        let first_hand = recalling().filter(|(_, recalled)| recalled.witnessed);
+        let first_hand =
+            recalling().filter(|(_, recalled)| recalled.received == SamplesReceived::Several);
         let accounted_for = first_hand.fold(StationSet::EMPTY, |all, (station, recalled)| {
             all.or(StationSet::only(station)).or(recalled.accounted_for)
         });

@@ -12,6 +12,7 @@
 //! ```text
 //!   Listening ── a living station holds a state ──────────────► Running from its lineage
 //!           ├─── no living station holds one ─────────────────► Running from the initial state (cold start)
+//!           ├─── no living station holds one, and other members have another configuration ── the operator decides ──► Running
 //!           └─── different ones of one cycle, or a stale one ── the operator decides ──► Running
 //!
 //!   Running ──── living stations, none of them on this history, for `listen_cycles` ──► the state is lost:
@@ -35,7 +36,7 @@ use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_cycle::{Arrival, Input, Machine, Output, Participant, RemoteIoInput};
+use understudy_cycle::{Arrival, Input, Machine, Output, Outvoted, Participant, RemoteIoInput};
 use understudy_wire::{
     Body, ConfigurationHash, Frame, Holding, Image, Member, Moment, ProgramId, Recalled, Source,
     StateChoice, StationId, StationSet, Time,
@@ -132,6 +133,8 @@ enum Question {
     Disputed,
     /// Whether the program continues from a stale state, or cold.
     StateLost,
+    /// Whether the program starts cold, although members of the cluster have another configuration.
+    ConfigurationDisputed,
 }
 
 /// What was applied at the last deadline.
@@ -201,7 +204,7 @@ impl RemoteIo {
             (Member::Station(station), _) => station,
             // Samples of other programs start no cycle here: they only prove signals.
             (Member::RemoteIo(program), Body::Sample(sample)) => {
-                if self.member.admits(&frame.header) {
+                if self.member.admits(now, &frame.header) {
                     let sources = &self.settings.signal_sources;
                     let moment = frame.header.moment;
                     self.signals.note(sources, program, moment, sample);
@@ -212,7 +215,7 @@ impl RemoteIo {
         };
         match self.member.arrival(now, frame) {
             Arrival::Stale => {
-                if self.member.admits(&frame.header) {
+                if self.member.admits(now, &frame.header) {
                     self.holders.hear(station, own_holding(&frame.body, self.settings.program));
                 }
                 return;
@@ -292,6 +295,9 @@ impl RemoteIo {
         self.deadline = Deadline::Ahead;
         self.turns.fill(None);
         self.find_history(now, moment);
+        let is_new = matches!(self.knowledge, Knowledge::Listening { .. });
+        // A station has started this cycle, whether its turn is received or not.
+        self.member.count_votes(now, self.own_stations().max(1), is_new);
         self.sample(now);
     }
 
@@ -326,6 +332,8 @@ impl RemoteIo {
         let passed = now.since(self.decides_at()).as_nanos() / period.as_nanos();
         let passed = u32::try_from(passed).unwrap_or(u32::MAX);
         self.deadline = Deadline::Passed { idle: idle.saturating_add(1).saturating_add(passed) };
+        let is_new = matches!(self.knowledge, Knowledge::Listening { .. });
+        self.member.count_votes(now, self.own_stations(), is_new);
     }
 }
 
@@ -379,7 +387,7 @@ impl Machine for RemoteIo {
     type Event = Event;
 
     fn handle_input(&mut self, now: Time, input: Input<'_>) {
-        self.member.note_stall(now);
+        self.member.note_time(now);
         self.end_forces(now);
         match input {
             Input::Wakeup => self.wake(now),
@@ -395,6 +403,10 @@ impl Machine for RemoteIo {
 
     fn wakeup(&self) -> Time {
         self.member.wakeup()
+    }
+
+    fn outvoted(&self) -> Option<Outvoted> {
+        self.member.outvoted()
     }
 
     /// The turns of a cycle count at its deadline; between cycles a frame may start the next one.

@@ -7,8 +7,8 @@ use understudy_cycle::{Agreement, Input, Machine, Mode, Output, RemoteIoInput, S
 use understudy_remote_io::{Event, Release, RemoteIo, Settings, StaleState, ValueFault};
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
-    Join, Lineage, Member, Moment, ProgramHash, ProgramId, ProgramSet, Recalled, Source, StationId,
-    StationSet, Time,
+    Join, Lineage, Member, Moment, ProgramHash, ProgramId, ProgramSet, Recalled, SamplesReceived,
+    Source, StationId, StationSet, Time,
 };
 
 const PERIOD: Duration = Duration::from_millis(10);
@@ -80,7 +80,7 @@ fn run(held: [Held; 3], release: Release, released_at: u64, cycles: u64) -> Vec<
                     recalled: vec![Recalled {
                         program: ProgramId(0),
                         sampled: moment(50),
-                        witnessed: true,
+                        received: SamplesReceived::Several,
                         applied: None,
                         excluded: StationSet::EMPTY,
                         accounted_for: StationSet::EMPTY,

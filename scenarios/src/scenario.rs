@@ -86,10 +86,11 @@ impl Scenario {
 }
 
 /// Every action as scenario files write it, in the order in which they are explained.
-pub const ACTIONS: [&str; 21] = [
+pub const ACTIONS: [&str; 22] = [
     "crash",
     "restart",
     "restart-misconfigured",
+    "restart-wrong-program",
     "restart-in-epoch",
     "stop",
     "continue",

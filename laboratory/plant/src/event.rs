@@ -28,6 +28,11 @@ pub enum Event {
         /// The configuration of this plant.
         ours: ConfigurationHash,
     },
+    /// A member whose frames were dropped is no longer received with another configuration.
+    RefusalEnded {
+        /// Member that was refused.
+        member: Member,
+    },
 }
 
 /// Cause of a step of a plant.
@@ -44,7 +49,9 @@ pub enum Pace {
 
 impl From<Refusal> for Event {
     fn from(refusal: Refusal) -> Self {
-        let Refusal { member, theirs, ours } = refusal;
-        Self::Refused { member, theirs, ours }
+        match refusal {
+            Refusal::Begins { member, theirs, ours } => Self::Refused { member, theirs, ours },
+            Refusal::Ends { member } => Self::RefusalEnded { member },
+        }
     }
 }

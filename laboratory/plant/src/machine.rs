@@ -128,7 +128,7 @@ impl PlantMachine {
 
     fn hear(&mut self, now: Time, frame: &Frame) {
         let header = &frame.header;
-        if !self.endpoint.admits(header) {
+        if !self.endpoint.admits(now, header) {
             return;
         }
         match (&frame.body, header.sender) {
@@ -206,6 +206,7 @@ impl Machine for PlantMachine {
     type Event = Event;
 
     fn handle_input(&mut self, now: Time, input: Input<'_>) {
+        self.endpoint.end_refusals(now);
         match input {
             Input::Wakeup => self.wake(now),
             Input::Frame(frame) => self.hear(now, frame),

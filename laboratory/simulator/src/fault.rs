@@ -36,6 +36,9 @@ pub enum Action {
     },
     /// It starts again with a configuration of its own, as after a wrong download: it and all others refuse each other.
     RestartMisconfigured,
+    /// It starts again with a configuration that names another program: members that are restarted so have one and the same, and admit each
+    /// other.
+    RestartWrongProgram,
     /// It stands still, and frames wait for it (SIGSTOP).
     Stop,
     /// It goes on (SIGCONT).
@@ -164,6 +167,7 @@ impl Action {
             Self::Restart => "restart",
             Self::RestartInEpoch { .. } => "restart-in-epoch",
             Self::RestartMisconfigured => "restart-misconfigured",
+            Self::RestartWrongProgram => "restart-wrong-program",
             Self::Stop => "stop",
             Self::Continue => "continue",
             Self::Slow { .. } => "slow",

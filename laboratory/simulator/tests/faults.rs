@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use understudy_cycle::Mode;
 use understudy_node::Event;
+use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_simulator::{Action, Fault, Network, Record, Simulation, Tally};
 use understudy_wire::{ConfigurationHash, Member, ProgramId, StationId};
 
@@ -130,6 +131,77 @@ fn a_misconfigured_station_is_refused_with_both_hashes() {
     named.sort_unstable();
     refusals.sort_unstable();
     assert_eq!(refusals, named);
+}
+
+/// A remote I/O and one of its stations are restarted with one and the same wrong program: they admit each other, and everything else that they
+/// receive has another configuration. Nothing of their program is applied, and with the right one again the operator decides.
+#[test]
+fn a_wrong_program_drives_nothing() {
+    for station in [ROBOT, UNDERSTUDY] {
+        for (first, second) in [(ROBOT_IO, station), (station, ROBOT_IO)] {
+            for apart in [0, 1, 3, 40] {
+                for phase in [0.0, 0.3, 0.6, 0.9] {
+                    let restart = |cycle, member| {
+                        let action = Action::RestartWrongProgram;
+                        [(cycle, phase, member, Action::Crash), (cycle, phase, member, action)]
+                    };
+                    let mut simulation =
+                        Simulation::new(press_cell::parts(Mode::Full, 1), Network::default(), 1);
+                    let steps = restart(50, first).into_iter().chain(restart(50 + apart, second));
+                    for (at_cycle, phase, member, action) in steps {
+                        simulation.schedule(Fault { at_cycle, phase, member, action });
+                    }
+                    let (mut asked, mut outvoted) = (0, Vec::new());
+                    let mut observe = |_, _, member, record: Record<'_>| match record {
+                        Record::RemoteIo(RemoteIoEvent::ConfigurationDisputed { .. }) => asked += 1,
+                        Record::RemoteIo(RemoteIoEvent::Outvoted { .. })
+                        | Record::Station(Event::Outvoted { .. }) => outvoted.push(member),
+                        _ => {}
+                    };
+                    simulation.run(500, 100, &mut observe).expect("the cluster gets ready");
+                    let case = format!("{first:?} and {apart} cycles later {second:?}, at {phase}");
+                    assert_eq!(simulation.violations().first(), None, "{case}");
+                    assert_eq!(asked, 1, "{case}");
+                    // The station has the majority against it; the remote I/O where it receives two stations of the others.
+                    assert!(outvoted.contains(&station), "{case}: {outvoted:?}");
+                    assert!(
+                        outvoted.iter().all(|it| [station, ROBOT_IO].contains(it)),
+                        "{case}: {outvoted:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// A program that all members have starts cold, although one member with another configuration is received.
+#[test]
+fn one_member_with_another_configuration_keeps_no_cluster_from_its_start() {
+    let members = || MEMBERS.into_iter().chain([Member::Station(StationId(3))]);
+    for other in members() {
+        let all = members().flat_map(|member| {
+            let action = match member == other {
+                true => Action::RestartMisconfigured,
+                false => Action::Restart,
+            };
+            [(50, 0.0, member, Action::Crash), (50, 0.1, member, action)]
+        });
+        let mut simulation =
+            Simulation::new(press_cell::parts(Mode::Full, 2), Network::default(), 1);
+        for (at_cycle, phase, member, action) in all {
+            simulation.schedule(Fault { at_cycle, phase, member, action });
+        }
+        let (mut cold, mut asked) = (Vec::new(), 0);
+        let mut observe = |_, _, member, record: Record<'_>| match record {
+            Record::RemoteIo(RemoteIoEvent::StartedCold { .. }) => cold.push(member),
+            Record::RemoteIo(RemoteIoEvent::ConfigurationDisputed { .. }) => asked += 1,
+            _ => {}
+        };
+        simulation.run(300, 100, &mut observe).expect("the cluster gets ready");
+        // The start of the run, and the restart: of both programs, or of that whose remote I/O is right.
+        let expected = if matches!(other, Member::RemoteIo(_)) { 3 } else { 4 };
+        assert_eq!((cold.len(), asked), (expected, 0), "{other:?}: {cold:?}");
+    }
 }
 
 /// Up to a slot and far beyond it: a slow station is late, then silent, and never wrong.

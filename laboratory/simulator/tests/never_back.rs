@@ -72,6 +72,43 @@ fn a_broken_link_of_a_remote_io_costs_no_protection() {
     }
 }
 
+/// A station dies, and its remote I/O after it; the station comes back while the remote I/O is away, and takes its state from the other one that
+/// holds it. Nothing is lost: the remote I/O goes on from that state without a question, in whichever order the two come back.
+#[test]
+fn a_state_that_a_living_station_holds_is_not_lost() {
+    for (dies, phase) in [station(0), Member::Station(UNDERSTUDY)]
+        .into_iter()
+        .flat_map(|dies| [0.0, 0.2, 0.4, 0.6, 0.8].map(|phase| (dies, phase)))
+    {
+        for (station_back, remote_io_back) in
+            [(20, 22), (20, 40), (20, 200), (22, 20), (200, 20), (20, 20), (20, 21), (21, 20)]
+        {
+            let mut simulation =
+                Simulation::new(press_cell::parts(Mode::Full, 1), Network::default(), 1);
+            let remote_io_dies = 10 + 300;
+            simulation.schedule(fault(10, phase, dies, Action::Crash));
+            simulation.schedule(fault(remote_io_dies, phase, ROBOT_IO, Action::Crash));
+            let back =
+                |after: u64, member| fault(remote_io_dies + after, phase, member, Action::Restart);
+            simulation.schedule(back(station_back, dies));
+            simulation.schedule(back(remote_io_back, ROBOT_IO));
+            let mut asked = Vec::new();
+            let mut observe = |_, _, _, record: Record<'_>| {
+                if let Record::RemoteIo(event) = record
+                    && matches!(event, Event::StateLost { .. } | Event::Disputed { .. })
+                {
+                    asked.push(event.clone());
+                }
+            };
+            simulation.run(800, 100, &mut observe).expect("the cluster gets ready");
+            let what = format!("{dies:?} {station_back}, remote I/O {remote_io_back}, at {phase}");
+            assert_eq!(simulation.violations(), [], "{what}");
+            assert_eq!(asked, [], "{what}");
+            simulation.run(5, 100, &mut |_, _, _, _| {}).expect("protection comes back");
+        }
+    }
+}
+
 /// The robot's remote I/O receives no station that runs its program for so long that what it samples, and nobody applies, fills every memory:
 /// it goes on from its newest applied output.
 #[test]

@@ -5,8 +5,7 @@ use std::collections::HashMap;
 use proptest::prelude::*;
 use understudy_logic::{Circuit, CircuitBuilder};
 use understudy_wire::{
-    ClusterHash, ConfigurationHash, Cycle, Epoch, Header, Member, ProgramHash, StationId,
-    StationSet, Transfer,
+    ClusterHash, ConfigurationHash, Cycle, Epoch, Header, Member, ProgramHash, Transfer,
 };
 
 use super::*;
@@ -260,7 +259,7 @@ fn a_station_is_a_witness_from_its_second_sample_on() {
         };
         replica.remember(&program, frame.header.moment, sample);
         let recalled = replica.recalled(moment(0)).expect("it was received");
-        recalled.witnessed
+        recalled.received == SamplesReceived::Several
     };
     let first = truth.sample(true);
     assert!(!remember(&first));

@@ -84,8 +84,10 @@ impl Replica {
             return Vec::new();
         };
         if let Remembered::Relayed(recalled) | Remembered::Received(recalled) = &mut self.remembered
+            && recalled.accounted_for.contains(to)
         {
             recalled.accounted_for.remove(to);
+            self.given.insert(to);
         }
         let width = held.state.bits.width();
         let segment_of = |held: &Held, whole, place| {

@@ -4,10 +4,19 @@
 //! it, so that the next rank takes over when the cycle master is not received; two that start the same cycle at once do
 //! no harm.
 
-use understudy_wire::{Body, StationSet, Time};
+use std::sync::Arc;
+use std::time::Duration;
+
+use understudy_wire::{Body, Frame, Member, Moment, StationSet, Time};
 
 use super::{CycleNotes, Role, Station, Token};
 use crate::event::Event;
+
+/// Cycles of a second, and at least three.
+fn missing_after(period: Duration) -> u32 {
+    let cycles = Duration::from_secs(1).as_nanos() / period.as_nanos().max(1);
+    u32::try_from(cycles).unwrap_or(u32::MAX).max(3)
+}
 
 impl Station {
     /// Ends the current cycle: updates the flags, and the replicas in shadow mode.
@@ -25,10 +34,33 @@ impl Station {
                 self.member.report(Event::Synchronised { moment, program });
             }
         }
+        self.note_samples(moment);
         self.joining = self.cycle.joiners;
         self.close_relay();
         self.differed = std::mem::take(&mut self.cycle.differs);
         self.cycle = CycleNotes::default();
+    }
+
+    /// Reports the programs whose samples are missing, and those whose samples have returned.
+    fn note_samples(&mut self, moment: Moment) {
+        let agreement = &self.settings.agreement;
+        // A remote I/O that starts listens first, longest where a station is missing.
+        let bound = missing_after(agreement.schedule.period()).max(agreement.listen_cycles * 6);
+        for (replica, unsampled) in self.replicas.iter().zip(&mut self.unsampled) {
+            let program = replica.id();
+            let is_of_it = |frame: &Arc<Frame>| frame.header.sender == Member::RemoteIo(program);
+            if self.cycle.samples.iter().any(is_of_it) {
+                if *unsampled >= bound {
+                    self.member.report(Event::SamplesReturned { moment, program });
+                }
+                *unsampled = 0;
+            } else if *unsampled < bound {
+                *unsampled += 1;
+                if *unsampled == bound {
+                    self.member.report(Event::SamplesMissing { moment, program });
+                }
+            }
+        }
     }
 
     /// Time at which this station starts the next cycle if no other one does: a guard time later for each living lower

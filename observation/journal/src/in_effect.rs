@@ -117,10 +117,20 @@ fn effect(record: &Record) -> Option<Effect> {
             Station::Excluded { program, .. } => about("excluded", program),
             Station::Readmitted { program, .. } => about("readmitted", program),
             Station::Refused { member, .. } => about("refused", member),
+            Station::SamplesMissing { program, .. } => about("samples-missing", program),
+            Station::SamplesReturned { program, .. } => {
+                return Some(Effect::Ends(about("samples-missing", program)));
+            }
+            Station::RefusalEnded { member } => {
+                return Some(Effect::Ends(about("refused", member)));
+            }
             _ => return None,
         },
         Happening::RemoteIo(event) => return of_remote_io(record, event),
         Happening::Plant(Plant::Refused { member, .. }) => about("refused", member),
+        Happening::Plant(Plant::RefusalEnded { member }) => {
+            return Some(Effect::Ends(about("refused", member)));
+        }
         Happening::Plant(Plant::Stepped { .. }) => return None,
         Happening::Host(event) => match event {
             HostEvent::Ready { .. } => of("ready"),
@@ -146,6 +156,7 @@ fn of_remote_io(record: &Record, event: &RemoteIo) -> Option<Effect> {
         RemoteIo::StartedCold { .. } => of("started-cold"),
         RemoteIo::AdoptedLineage { .. } => of("adopted-lineage"),
         RemoteIo::Disputed { .. } => of("disputed"),
+        RemoteIo::ConfigurationDisputed { .. } => of("configuration-disputed"),
         RemoteIo::StateLost { .. } => of("state-lost"),
         RemoteIo::StateRecovered { .. } => of("state-recovered"),
         RemoteIo::ChoiceRefused { newest: Some(_), .. } => of("choice-refused"),
@@ -160,6 +171,9 @@ fn of_remote_io(record: &Record, event: &RemoteIo) -> Option<Effect> {
         RemoteIo::Cleared { station, .. } => return Some(Effect::Ends(about("flagged", station))),
         RemoteIo::ValueFault { accused, .. } => about("value-fault", &accused.bits()),
         RemoteIo::Refused { member, .. } => about("refused", member),
+        RemoteIo::RefusalEnded { member } => {
+            return Some(Effect::Ends(about("refused", member)));
+        }
         _ => return None,
     };
     Some(Effect::Replaces(replaces))

@@ -177,8 +177,12 @@ pub fn moment(event: &Happening) -> Option<Moment> {
             | Station::DigestDiffers { moment, .. }
             | Station::Excluded { moment, .. }
             | Station::Readmitted { moment, .. }
+            | Station::SamplesMissing { moment, .. }
+            | Station::SamplesReturned { moment, .. }
             | Station::Stalled { moment, .. } => Some(*moment),
-            Station::Refused { .. } => None,
+            Station::Refused { .. } | Station::RefusalEnded { .. } | Station::Outvoted { .. } => {
+                None
+            }
         },
         Happening::RemoteIo(event) => match event {
             RemoteIo::Sampled { moment, .. }
@@ -206,9 +210,12 @@ pub fn moment(event: &Happening) -> Option<Moment> {
             | RemoteIo::DigestDiffers { moment, .. }
             | RemoteIo::ValueFault { moment, .. }
             | RemoteIo::Disputed { moment, .. }
+            | RemoteIo::ConfigurationDisputed { moment, .. }
             | RemoteIo::Stalled { moment, .. } => Some(*moment),
             RemoteIo::StartedCold { born, .. } => Some(*born),
-            RemoteIo::Refused { .. } => None,
+            RemoteIo::Refused { .. }
+            | RemoteIo::RefusalEnded { .. }
+            | RemoteIo::Outvoted { .. } => None,
         },
         Happening::Plant(understudy_plant::Event::Stepped { moment, .. }) => Some(*moment),
         Happening::Plant(_) | Happening::Host(_) | Happening::Run(_) => None,

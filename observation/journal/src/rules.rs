@@ -28,7 +28,8 @@ impl Process {
             Action::Continue
             | Action::Restart
             | Action::RestartInEpoch { .. }
-            | Action::RestartMisconfigured => Some(Self::Running),
+            | Action::RestartMisconfigured
+            | Action::RestartWrongProgram => Some(Self::Running),
             _ => None,
         }
     }

@@ -9,6 +9,7 @@ use understudy_typed::Fault;
 use understudy_wire::{Element, Member, ProgramId, ProgramSet, Set, Source, StationId, StationSet};
 
 use crate::event::Level;
+pub(crate) use members::odd_configuration_text;
 pub(crate) use processes::fault_text;
 pub(crate) use signals::Writes;
 

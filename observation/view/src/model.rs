@@ -15,6 +15,7 @@ mod run_events;
 mod standing;
 mod turns;
 
+use std::collections::BTreeSet;
 use std::sync::{Arc, OnceLock};
 
 use understudy_cluster::Cluster;
@@ -90,6 +91,8 @@ pub struct Model {
     series: Series,
     events: Events,
     alarms: Alarms,
+    /// Who refuses whom.
+    refusals: BTreeSet<members::Refusal>,
     pub(crate) process_alarms: ProcessAlarms,
     timings: Timings,
     observers: Vec<OnceLock<Option<Observer>>>,
@@ -132,6 +135,7 @@ impl Model {
             series: Series::new(programs, schedule.stations(), bounds.changes),
             events: Events::new(bounds.events),
             alarms: Alarms::default(),
+            refusals: BTreeSet::new(),
             process_alarms: ProcessAlarms::new(cluster.alarms(), programs),
             timings: Timings::new(schedule, bounds.timings),
             observers: vec![OnceLock::new(); programs],

@@ -19,6 +19,6 @@ pub use agreement::{Agreement, Mode};
 pub use attendance::{Attendance, Change};
 pub use clock::{Arrival, CycleClock};
 pub use copies::Copies;
-pub use machine::{Input, Machine, Output, RemoteIoInput};
-pub use participant::{Endpoint, Notice, Participant, Refusal};
+pub use machine::{Input, Machine, Output, Outvoted, RemoteIoInput};
+pub use participant::{Endpoint, Notice, OUTVOTED_AFTER, Participant, Refusal};
 pub use schedule::{Schedule, ScheduleError};

@@ -7,7 +7,9 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_wire::{Force, Frame, Image, SignalPlace, StateChoice, Time, Write, WriteAnswer};
+use understudy_wire::{
+    ConfigurationHash, Force, Frame, Image, SignalPlace, StateChoice, Time, Write, WriteAnswer,
+};
 
 /// An input of a member.
 #[derive(Debug, Clone, Copy)]
@@ -52,6 +54,19 @@ pub enum Output<Event> {
     Answer(WriteAnswer),
 }
 
+/// A majority of stations with another configuration, against a member that does not take part yet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Outvoted {
+    /// The configuration of this member.
+    pub ours: ConfigurationHash,
+    /// The other configuration.
+    pub theirs: ConfigurationHash,
+    /// Stations with the configuration of this member; it is counted if it is a station.
+    pub stations: u32,
+    /// Stations with the other one.
+    pub others: u32,
+}
+
 /// A member.
 pub trait Machine {
     /// An event that it reports.
@@ -65,6 +80,11 @@ pub trait Machine {
 
     /// When it wants [`Input::Wakeup`] at the latest.
     fn wakeup(&self) -> Time;
+
+    /// The majority against this member, whose process should end then.
+    fn outvoted(&self) -> Option<Outvoted> {
+        None
+    }
 
     /// How long a frame that arrives now may wait for others, so that they are taken together; never past [`Self::wakeup`], before which all that
     /// has arrived is taken.

@@ -17,20 +17,31 @@ use crate::agreement::Agreement;
 use crate::attendance::{Attendance, Change};
 use crate::clock::{Arrival, CycleClock};
 use crate::copies::Copies;
-use crate::machine::Output;
+use crate::machine::{Output, Outvoted};
 use crate::reception::{Admission, Reception};
 use crate::waking::Waking;
 
-/// A member of this cluster that has another configuration, reported once for each member.
+/// A change in whether the frames of a member of this cluster are dropped, because it has another configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Refusal {
-    /// Member whose frames are dropped.
-    pub member: Member,
-    /// Its configuration.
-    pub theirs: ConfigurationHash,
-    /// Configuration of the member that reports.
-    pub ours: ConfigurationHash,
+pub enum Refusal {
+    /// They are dropped from now on.
+    Begins {
+        /// Member whose frames are dropped.
+        member: Member,
+        /// Its configuration.
+        theirs: ConfigurationHash,
+        /// Configuration of the member that reports.
+        ours: ConfigurationHash,
+    },
+    /// None is received any more, or the member has this configuration now.
+    Ends {
+        /// Member whose frames were dropped.
+        member: Member,
+    },
 }
+
+/// A majority of stations with another configuration counts when it was received for this time without a break.
+pub const OUTVOTED_AFTER: Duration = Duration::from_secs(2);
 
 /// What stations and remote I/Os report in the same way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,6 +59,15 @@ pub enum Notice {
         moment: Moment,
         /// Station that was received.
         station: StationId,
+    },
+    /// This member does not take part yet, and more stations have one other configuration than have its own.
+    Outvoted {
+        /// The other configuration.
+        theirs: ConfigurationHash,
+        /// Stations with its own configuration, it included.
+        stations: u32,
+        /// Stations with the other one.
+        others: u32,
     },
     /// The host woke this member too late to keep its times.
     Stalled {
@@ -78,19 +98,28 @@ impl<Event: From<Refusal>> Endpoint<Event> {
         }
     }
 
-    /// Whether a frame with this header counts; reports the first of a member with another configuration.
-    pub fn admits(&mut self, header: &Header) -> bool {
-        match self.reception.admit(header) {
+    /// Whether a frame with this header counts that arrives at `now`; reports when the refusal of a member begins and ends.
+    pub fn admits(&mut self, now: Time, header: &Header) -> bool {
+        let member = header.sender;
+        match self.reception.admit(now, header) {
             Admission::Admitted => true,
+            Admission::AdmittedAgain => {
+                self.report(Event::from(Refusal::Ends { member }));
+                true
+            }
             Admission::Dropped => false,
             Admission::Refused { theirs } => {
-                self.report(Event::from(Refusal {
-                    member: header.sender,
-                    theirs,
-                    ours: self.agreement.configuration,
-                }));
+                let ours = self.agreement.configuration;
+                self.report(Event::from(Refusal::Begins { member, theirs, ours }));
                 false
             }
+        }
+    }
+
+    /// Reports the refusals that have ended by `now`.
+    pub fn end_refusals(&mut self, now: Time) {
+        while let Some(member) = self.reception.ended(now) {
+            self.report(Event::from(Refusal::Ends { member }));
         }
     }
 
@@ -141,6 +170,9 @@ pub struct Participant<Event> {
     pub attendance: Attendance,
     copies: Copies,
     waking: Waking,
+    /// Since when more stations have one other configuration than have this one.
+    outvoted_since: Option<Time>,
+    outvoted: Option<Outvoted>,
 }
 
 impl<Event: From<Refusal> + From<Notice>> Participant<Event> {
@@ -152,6 +184,8 @@ impl<Event: From<Refusal> + From<Notice>> Participant<Event> {
             attendance: Attendance::new(agreement.schedule.stations(), agreement.flag_after),
             copies: Copies::default(),
             waking: Waking::default(),
+            outvoted_since: None,
+            outvoted: None,
         }
     }
 
@@ -165,14 +199,43 @@ impl<Event: From<Refusal> + From<Notice>> Participant<Event> {
         self.clock.moment().unwrap_or_default()
     }
 
-    /// Whether a frame with this header counts; reports the first of a member with another configuration.
-    pub fn admits(&mut self, header: &Header) -> bool {
-        self.endpoint.admits(header)
+    /// As [`Endpoint::admits`].
+    pub fn admits(&mut self, now: Time, header: &Header) -> bool {
+        self.endpoint.admits(now, header)
+    }
+
+    /// The number of members of this cluster that are received and have another configuration.
+    pub fn refused(&self) -> usize {
+        self.endpoint.reception.refused()
+    }
+
+    /// The majority against this member, once it was reported.
+    pub fn outvoted(&self) -> Option<Outvoted> {
+        self.outvoted
+    }
+
+    /// Reports once that more stations with one other configuration than stations with this one were received for [`OUTVOTED_AFTER`] up to `now`.
+    /// `stations` are those with this configuration; `is_new` says that this member does not take part yet: one that does is never outvoted, so
+    /// that no member that starts with a wrong configuration can end one that works.
+    pub fn count_votes(&mut self, now: Time, stations: usize, is_new: bool) {
+        let most_common = self.endpoint.reception.most_common();
+        let majority = most_common.filter(|(_, others)| is_new && *others > stations);
+        let Some((theirs, others)) = majority else {
+            self.outvoted_since = None;
+            return;
+        };
+        let since = *self.outvoted_since.get_or_insert(now);
+        if now.since(since) >= OUTVOTED_AFTER && self.outvoted.is_none() {
+            let ours = self.agreement().configuration;
+            let (stations, others) = (stations as u32, others as u32);
+            self.outvoted = Some(Outvoted { ours, theirs, stations, others });
+            self.report(Event::from(Notice::Outvoted { theirs, stations, others }));
+        }
     }
 
     /// The cycle of a frame that comes at `now`; a frame that is not admitted is stale.
     pub fn arrival(&mut self, now: Time, frame: &Frame) -> Arrival {
-        if !self.endpoint.admits(&frame.header) {
+        if !self.endpoint.admits(now, &frame.header) {
             return Arrival::Stale;
         }
         let period = self.agreement().schedule.period();
@@ -234,8 +297,9 @@ impl<Event: From<Refusal> + From<Notice>> Participant<Event> {
         self.copies.wakeup()
     }
 
-    /// Reports an input at `now` that shows the host to have woken this member too late.
-    pub fn note_stall(&mut self, now: Time) {
+    /// Reports what has passed until an input at `now`: refusals that have ended, and that the host woke this member too late.
+    pub fn note_time(&mut self, now: Time) {
+        self.endpoint.end_refusals(now);
         if let Some(late) = self.waking.stall(now, &self.endpoint.agreement.schedule) {
             let moment = self.moment();
             self.report(Event::from(Notice::Stalled { moment, late }));
@@ -277,7 +341,10 @@ impl<Event> Hash for Participant<Event> {
             attendance,
             copies,
             waking,
+            outvoted_since,
+            outvoted,
         } = self;
         (reception, clock, attendance, copies, waking).hash(hasher);
+        (outvoted_since, outvoted).hash(hasher);
     }
 }

@@ -210,9 +210,8 @@ pub struct Recalled {
     pub program: ProgramId,
     /// Moment of the sample.
     pub sampled: Moment,
-    /// Whether this station has received samples of two cycles of the program since it started: outputs that it proved
-    /// in an earlier life are then covered by `applied`.
-    pub witnessed: bool,
+    /// Samples of the program that this station has received since it started.
+    pub received: SamplesReceived,
     /// The newest applied sample that it knows of, as in a [`Sample`].
     pub applied: Option<Moment>,
     /// Stations that the remote I/O had excluded.
@@ -226,6 +225,17 @@ pub struct Recalled {
     pub pulses: SmallVec<[Pulse; 1]>,
     /// u(i), with the channels that were failed and the values that they kept, and the values that operators wrote.
     pub inputs: Image,
+}
+
+/// Samples of a program that a station has received since it started: what they tell of the outputs that it may have proved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum SamplesReceived {
+    /// None: it has proved no output since it started, whatever state it holds.
+    Nothing,
+    /// Of one cycle: outputs of that sample may have been proved in an earlier life of this station.
+    OneCycle,
+    /// Of several cycles: outputs that it proved in an earlier life are covered by [`Recalled::applied`].
+    Several,
 }
 
 /// x(i), or a segment of it, for the station that asked.

@@ -24,7 +24,7 @@ pub use force::{
 };
 pub use frame::{
     Actuation, Body, Field, Frame, Header, Holding, Join, MAXIMUM_HISTORY, Partial, Recalled,
-    Relayed, Sample, Source, Transfer, Turn, Word,
+    Relayed, Sample, SamplesReceived, Source, Transfer, Turn, Word,
 };
 pub use identifier::{
     ClusterHash, ConfigurationHash, Cycle, Epoch, MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, Member,

@@ -6,7 +6,7 @@ use understudy_wire::{
     Actuation, Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Field, Frame,
     FrameError, Header, Holding, Image, Join, Lineage, MAXIMUM_FRAME_BYTES, MAXIMUM_STATIONS,
     Member, Moment, Partial, ProgramHash, ProgramId, ProgramSet, Pulse, Recalled, Relayed, Sample,
-    Segment, StationId, StationSet, Transfer, Turn, Word, WriteId, decode, encode,
+    SamplesReceived, Segment, StationId, StationSet, Transfer, Turn, Word, WriteId, decode, encode,
 };
 
 fn moment(epoch: u64, cycle: u64) -> Moment {
@@ -52,7 +52,7 @@ fn recalled(program: u8) -> Recalled {
     Recalled {
         program: ProgramId(program),
         sampled: moment(3, 3),
-        witnessed: true,
+        received: SamplesReceived::Several,
         applied: Some(moment(3, 3)),
         excluded: StationSet::from_bits(0b100),
         accounted_for: StationSet::from_bits(0b1),

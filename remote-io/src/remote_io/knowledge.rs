@@ -48,6 +48,8 @@ pub(super) enum Knowledge {
         cycles: u32,
         /// Whether a living station held a state in the last of them.
         held: bool,
+        /// Cycles in a row in which the newest state could not be proved: a station that has just taken it over is accounted for some cycles later.
+        unproved: u32,
         /// Whether the operator has released all excluded stations meanwhile.
         pardons: bool,
     },
@@ -69,7 +71,7 @@ pub(super) enum Knowledge {
 
 impl Default for Knowledge {
     fn default() -> Self {
-        Self::Listening { cycles: 0, held: false, pardons: false }
+        Self::Listening { cycles: 0, held: false, unproved: 0, pardons: false }
     }
 }
 

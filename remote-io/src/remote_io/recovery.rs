@@ -4,6 +4,8 @@
 //! ```text
 //!   no living station holds a state, and none that comes
 //!   too late in each cycle ────────────────────────────── cold start
+//!   the same, and as many members have another
+//!   configuration as stations have this one ───────────── the operator chooses, whatever `release` says
 //!   a state at the floor, or one that covers it ────────── adopted
 //!   different states of one cycle after a restart ──────── the operator chooses (`release`)
 //!   only states before the floor, or none that provably
@@ -53,7 +55,7 @@ impl RemoteIo {
                 };
                 let waited = unfollowed.saturating_sub(listen_cycles);
                 if let Some(from) = follower
-                    && self.question.take() == Some(Question::StateLost)
+                    && self.question.take().is_some()
                 {
                     self.report(Event::StateRecovered { moment, from });
                 }
@@ -76,20 +78,55 @@ impl RemoteIo {
         if waited < listen_cycles * patience || waited == 0 || self.sensors.is_none() {
             return;
         }
-        match self.verdict() {
+        let verdict = self.verdict();
+        if let Knowledge::Listening { unproved, .. } = &mut self.knowledge {
+            match verdict {
+                Verdict::Stale(..) => *unproved = unproved.saturating_add(u32::from(counted)),
+                _ => *unproved = 0,
+            }
+            if (1..listen_cycles).contains(unproved) && self.question.is_none() {
+                return;
+            }
+        }
+        match verdict {
             // The operator has been asked: a state that is not received for a moment is no reason to start cold.
             Verdict::Cold if self.question == Some(Question::StateLost) => {}
             // Nor is one whose station is received too late in each cycle.
             Verdict::Cold if self.holders.may_hold() => {}
+            Verdict::Cold if self.may_have_the_wrong_program() => {
+                let (stations, others) = (self.own_stations() as u32, self.member.refused() as u32);
+                let asks = Event::ConfigurationDisputed { moment, stations, others };
+                self.ask(Question::ConfigurationDisputed, asks);
+            }
             Verdict::Cold => self.start(moment, None),
             Verdict::Adopt(from, holding) => self.start(moment, Some((from, holding))),
             Verdict::Disputed(stations) => {
-                if self.question.replace(Question::Disputed) != Some(Question::Disputed) {
-                    self.report(Event::Disputed { moment, stations });
-                }
+                self.ask(Question::Disputed, Event::Disputed { moment, stations });
             }
             Verdict::Stale(holder, holding) => self.lose_state(moment, holder, &holding),
         }
+    }
+
+    /// Asks the operator, and reports it once.
+    fn ask(&mut self, question: Question, event: Event) {
+        if self.question.replace(question) != Some(question) {
+            self.report(event);
+        }
+    }
+
+    /// Living stations with the configuration of this remote I/O, also those that have not joined yet.
+    pub(super) fn own_stations(&self) -> usize {
+        let all = StationSet::first(self.settings.agreement.schedule.stations());
+        let living: StationSet =
+            self.holders.stations().filter(|station| self.holders.is_living(*station)).collect();
+        all.without(self.member.flagged()).or(living).len()
+    }
+
+    /// Whether as many members of this cluster have another configuration as stations have this one: what starts cold then may be a wrong program
+    /// next to the right one.
+    fn may_have_the_wrong_program(&self) -> bool {
+        let others = self.member.refused();
+        others > 0 && self.own_stations() <= others
     }
 
     fn verdict(&self) -> Verdict {
@@ -121,7 +158,8 @@ impl RemoteIo {
         }
         self.question = Some(Question::StateLost);
         let applied = self.knowledge.floor().map(|floor| floor.moment);
-        let asks = self.settings.stale_state == StaleState::Operator;
+        let asks =
+            self.settings.stale_state == StaleState::Operator || self.may_have_the_wrong_program();
         self.report(Event::StateLost { moment, applied, newest: newest.stepped, holder, asks });
         if !asks {
             self.start(moment, None);
@@ -133,7 +171,9 @@ impl RemoteIo {
         let moment = self.moment();
         let newest = self.holders.newest().map(|(from, newest)| (from, *newest));
         match (self.question, choice, newest) {
-            (Some(Question::StateLost), StateChoice::Cold, _) => self.start(moment, None),
+            (Some(Question::StateLost | Question::ConfigurationDisputed), StateChoice::Cold, _) => {
+                self.start(moment, None)
+            }
             (Some(_), StateChoice::Newest { cycle }, Some((from, newest)))
                 if cycle.is_none_or(|cycle| cycle == newest.stepped.cycle) =>
             {

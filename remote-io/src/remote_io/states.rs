@@ -11,7 +11,7 @@ use understudy_testing::states::Table;
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
     Join, Lineage, Member, Moment, ProgramHash, ProgramId, ProgramSet, Recalled, Sample,
-    StateChoice, StationId, StationSet, Time, Turn, Word,
+    SamplesReceived, StateChoice, StationId, StationSet, Time, Turn, Word,
 };
 
 use super::knowledge::Knowledge;
@@ -189,7 +189,7 @@ impl Bench {
         let recalled = Recalled {
             program: PROGRAM,
             sampled: moment(50),
-            witnessed: true,
+            received: SamplesReceived::Several,
             applied: Some(moment(50)),
             excluded: StationSet::EMPTY,
             accounted_for: StationSet::EMPTY,
@@ -221,6 +221,7 @@ impl Bench {
         match question {
             Some(Question::Disputed) => name.push_str(", states disputed"),
             Some(Question::StateLost) => name.push_str(", state lost"),
+            Some(Question::ConfigurationDisputed) => name.push_str(", configuration disputed"),
             None => {}
         }
         name

@@ -3,7 +3,7 @@
 use std::io;
 use std::net::SocketAddr;
 
-use understudy_wire::Member;
+use understudy_wire::{ConfigurationHash, Member};
 
 use crate::link::ZENOH_PORT_OFFSET;
 
@@ -68,6 +68,20 @@ pub enum BusError {
         /// What the panic said.
         message: String,
     },
+    /// More stations have another configuration than have that of this member, which does not take part yet.
+    #[error(
+        "U0598: {others} stations of this cluster have configuration {theirs}, and {stations} have {ours}, the one of this cluster file: nothing was started; start this member with the cluster file of the others, or the others with this one"
+    )]
+    Outvoted {
+        /// The configuration of this member.
+        ours: ConfigurationHash,
+        /// The configuration of the majority.
+        theirs: ConfigurationHash,
+        /// Stations with the configuration of this member.
+        stations: u32,
+        /// Stations of the majority.
+        others: u32,
+    },
     /// Nobody is there, or one side does not believe the other's certificate.
     #[error("U0509: {name} does not take a call at {address}: {reason}")]
     Uncalled {
@@ -123,6 +137,7 @@ impl BusError {
             Self::Panicked { .. } => "U0507",
             Self::Uncalled { .. } => "U0509",
             Self::Unanswered { .. } => "U0510",
+            Self::Outvoted { .. } => "U0598",
         }
     }
 

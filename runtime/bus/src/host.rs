@@ -12,7 +12,7 @@ use nix::sys::time::TimeSpec;
 use serde::{Deserialize, Serialize};
 use tracing::span::EnteredSpan;
 use tracing::{Span, debug, trace, trace_span};
-use understudy_cycle::{Input, Machine, Output, RemoteIoInput};
+use understudy_cycle::{Input, Machine, Output, Outvoted, RemoteIoInput};
 use understudy_wire::{Body, Frame, Moment, Time, encode};
 
 use crate::clock::Clock;
@@ -150,12 +150,12 @@ impl<M: Machine> Host<'_, M> {
     /// Runs the member on the calling thread until it is told to stop.
     ///
     /// # Errors
-    /// [`BusError::System`] where the system refuses to let it sleep.
+    /// [`BusError::System`] where the system refuses to let it sleep; [`BusError::Outvoted`] where a majority has another configuration.
     pub fn run(mut self) -> Result<Summary, BusError> {
         let mut round = Round::default();
         self.drain(self.clock.now(), &mut round);
         loop {
-            if self.obey(&mut round) {
+            if self.obey(&mut round) || self.machine.outvoted().is_some() {
                 break;
             }
             self.look(&mut round);
@@ -193,7 +193,10 @@ impl<M: Machine> Host<'_, M> {
         round.summary.link = self.link.counters();
         let stopped = HostEvent::Stopped(round.summary);
         self.sink.record(now, Noted::Host(stopped));
-        Ok(round.summary)
+        self.machine.outvoted().map_or(Ok(round.summary), |outvoted| {
+            let Outvoted { ours, theirs, stations, others } = outvoted;
+            Err(BusError::Outvoted { ours, theirs, stations, others })
+        })
     }
 
     /// True where it is to stop.

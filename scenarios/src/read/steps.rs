@@ -135,6 +135,7 @@ impl Reader<'_> {
             "crash" => one(Action::Crash),
             "restart" => one(Action::Restart),
             "restart-misconfigured" => one(Action::RestartMisconfigured),
+            "restart-wrong-program" => one(Action::RestartWrongProgram),
             "restart-in-epoch" => {
                 fields.require(&["epoch"], &mut self.diagnostics);
                 let epoch = fields.format_count("epoch", &mut self.diagnostics)?;
@@ -349,7 +350,9 @@ impl Reader<'_> {
             };
             // A process that was restarted runs, whatever it was restarted with.
             let action = match step.action {
-                Action::RestartMisconfigured | Action::RestartInEpoch { .. } => Action::Restart,
+                Action::RestartMisconfigured
+                | Action::RestartWrongProgram
+                | Action::RestartInEpoch { .. } => Action::Restart,
                 Action::Crash | Action::Restart | Action::Stop | Action::Continue => step.action,
                 _ => continue,
             };

@@ -160,6 +160,33 @@ impl Draw<'_> {
                     step(to, Action::Restart),
                 ]
             }
+            Kind::WrongProgram => {
+                let Member::RemoteIo(program) = member else {
+                    return None;
+                };
+                let station = match Role::Understudy.members(schedule).next() {
+                    Some(understudy) if self.random.random_range(0..2) == 0 => understudy,
+                    _ => Member::Station(StationId(program.0)),
+                };
+                // Restarted one after the other, in either order.
+                let apart = self.random.random_range(0..=4);
+                let first = self.random.random_range(0..2) == 0;
+                let (one, other) = if first { (member, station) } else { (station, member) };
+                let at = |at_cycle: u64, member: Member, action: Action| {
+                    let at_cycle = at_cycle.min(self.cycles.end - 1);
+                    Fault { at_cycle, phase, member, action }
+                };
+                vec![
+                    at(from, one, Action::Crash),
+                    at(from, one, Action::RestartWrongProgram),
+                    at(from + apart, other, Action::Crash),
+                    at(from + apart, other, Action::RestartWrongProgram),
+                    at(to + apart, member, Action::Crash),
+                    at(to + apart, member, Action::Restart),
+                    at(to + apart, station, Action::Crash),
+                    at(to + apart, station, Action::Restart),
+                ]
+            }
             Kind::Slow => {
                 let by = schedule.period() / 20 * self.random.random_range(1..=40);
                 lasting(Action::Slow { by }, Action::Slow { by: Duration::ZERO })

@@ -25,6 +25,8 @@ pub enum Kind {
     Slow,
     /// It is restarted with another configuration for a while.
     Misconfiguration,
+    /// A remote I/O and one of its stations are restarted with one and the same wrong program for a while.
+    WrongProgram,
     /// One member does not hear another for a while.
     OneWayCut,
     /// The link from one member to another is broken for long, then a station crashes.
@@ -59,7 +61,7 @@ pub enum Kind {
 
 impl Kind {
     /// In the order in which they are explained.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 23] = [
         Self::Write,
         Self::Crash,
         Self::RestartStorm,
@@ -67,6 +69,7 @@ impl Kind {
         Self::Stop,
         Self::Slow,
         Self::Misconfiguration,
+        Self::WrongProgram,
         Self::OneWayCut,
         Self::BrokenLink,
         Self::Cut,
@@ -94,6 +97,7 @@ impl Kind {
             Self::Stop => "stop",
             Self::Slow => "slow",
             Self::Misconfiguration => "misconfiguration",
+            Self::WrongProgram => "wrong-program",
             Self::OneWayCut => "one-way-cut",
             Self::BrokenLink => "broken-link",
             Self::Cut => "cut",
@@ -119,7 +123,7 @@ impl Kind {
                 &[Role::Controller, Role::Understudy]
             }
             Self::Loss | Self::Duplication | Self::Jitter | Self::Corruption => &[Role::Network],
-            Self::Write => &[Role::RemoteIo],
+            Self::Write | Self::WrongProgram => &[Role::RemoteIo],
             _ => &[Role::Controller, Role::Understudy, Role::RemoteIo],
         }
     }

@@ -55,7 +55,7 @@ fn one_in(cycles: u64) -> Budget {
 #[test]
 fn everybody_starts_together() {
     let everybody = [&STATIONS[..], &REMOTE_IOS[..]].concat();
-    check_from(restarted(&everybody), 1, one_in(5), 34_027);
+    check_from(restarted(&everybody), 1, one_in(5), 34_035);
 }
 
 #[test]
@@ -75,7 +75,7 @@ fn a_remote_io_has_restarted() {
 
 #[test]
 fn the_cycle_master_has_restarted() {
-    check_from(restarted(&[station(0)]), 1, one_in(3), 14_396);
+    check_from(restarted(&[station(0)]), 1, one_in(3), 14_407);
 }
 
 #[test]

@@ -4,9 +4,9 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use understudy_cycle::{Agreement, Input, Machine, RemoteIoInput};
-use understudy_node::Station;
+use understudy_node::{Program, Station};
 use understudy_remote_io::RemoteIo;
-use understudy_wire::{ConfigurationHash, Epoch, Frame, Member, SignalPlace};
+use understudy_wire::{ConfigurationHash, Epoch, Frame, Member, ProgramHash, SignalPlace};
 
 use super::{Observe, Record, Simulation};
 use crate::fault::{Action, Fault};
@@ -28,9 +28,13 @@ impl Simulation {
             (Member::Plant(program), Action::Crash) => self.plants.crash(program),
             (Member::Plant(_), Action::Restart) => self.restart(member, action),
             (Member::Plant(_), _) => {}
-            (_, Action::Restart | Action::RestartMisconfigured | Action::RestartInEpoch { .. }) => {
-                self.restart(member, action)
-            }
+            (
+                _,
+                Action::Restart
+                | Action::RestartMisconfigured
+                | Action::RestartWrongProgram
+                | Action::RestartInEpoch { .. },
+            ) => self.restart(member, action),
             (Member::Station(station), Action::FlipState { program, bit }) => {
                 if let Some(machine) = self.stations[station.index()].machine() {
                     machine.flip_state(program, usize::from(bit));
@@ -76,9 +80,11 @@ impl Simulation {
 
     fn restart(&mut self, member: Member, action: Action) {
         let agreed = |agreement: &Arc<Agreement>| match action {
-            Action::RestartMisconfigured => Arc::new(misconfigured(agreement, member)),
+            Action::RestartMisconfigured => Arc::new(misconfigured(agreement, number(member))),
+            Action::RestartWrongProgram => Arc::new(misconfigured(agreement, 0)),
             _ => Arc::clone(agreement),
         };
+        let has_wrong_programs = action == Action::RestartWrongProgram;
         match member {
             Member::Station(station) => {
                 self.founded += 1;
@@ -88,6 +94,10 @@ impl Simulation {
                     _ => Epoch(self.founded),
                 };
                 settings.agreement = agreed(&settings.agreement);
+                if has_wrong_programs {
+                    settings.programs = settings.programs.iter().map(wrong_program).collect();
+                    settings.generated = None;
+                }
                 let slot = &mut self.stations[station.index()];
                 slot.restart(Station::new(self.now, settings));
                 self.wakeups.set(member, slot.due());
@@ -95,6 +105,9 @@ impl Simulation {
             Member::RemoteIo(program) => {
                 let mut settings = self.parts.remote_ios[program.index()].clone();
                 settings.agreement = agreed(&settings.agreement);
+                if has_wrong_programs {
+                    settings.hash = wrong_hash(settings.hash);
+                }
                 let slot = &mut self.remote_ios[program.index()];
                 slot.restart(RemoteIo::new(self.now, settings));
                 self.wakeups.set(member, slot.due());
@@ -117,13 +130,25 @@ impl Simulation {
     }
 }
 
-/// A configuration that no other member has. Two members of one wrong configuration would be a cluster of their own, whose outputs the right one
-/// cannot know of (`Holders::covers_all_applied` says what remains).
-fn misconfigured(agreement: &Agreement, member: Member) -> Agreement {
-    let number = match member {
+/// A number that no other member has, above 0.
+fn number(member: Member) -> u64 {
+    match member {
         Member::Station(station) => (u64::from(station.0) + 1) << 8,
-        Member::RemoteIo(program) | Member::Plant(program) => u64::from(program.0),
-    };
+        Member::RemoteIo(program) | Member::Plant(program) => u64::from(program.0) + 1,
+    }
+}
+
+/// A program that computes the same from another initial lineage: whatever is applied of it is wrong, as the referee knows the right program.
+fn wrong_program(program: &Program) -> Program {
+    Program { hash: wrong_hash(program.hash), ..program.clone() }
+}
+
+fn wrong_hash(hash: ProgramHash) -> ProgramHash {
+    ProgramHash(!hash.0)
+}
+
+/// The wrong configuration with this number.
+fn misconfigured(agreement: &Agreement, number: u64) -> Agreement {
     Agreement {
         configuration: ConfigurationHash(!agreement.configuration.0 ^ number),
         ..agreement.clone()

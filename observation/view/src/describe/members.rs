@@ -33,7 +33,13 @@ descriptions! { station: StationEvent, members: Members;
         format!("does not publish for {}: its state was found faulty", program_name(*program, members));
     Readmitted { program, .. } => "readmitted" Notice
         format!("is readmitted and requests the state of {}", program_name(*program, members));
-    Refused { member, theirs, ours } => "refused" Warning refused_text(*member, theirs, ours, members);
+    SamplesMissing { program, .. } => "samples-missing" Alarm
+        format!("receives no samples of {}", members.name(Member::RemoteIo(*program)));
+    SamplesReturned { program, .. } => "samples-returned" Notice
+        format!("receives samples of {} again", members.name(Member::RemoteIo(*program)));
+    Refused { member, theirs, ours } => "refused" Alarm refused_text(*member, theirs, ours, members);
+    RefusalEnded { member } => "refusal-ended" Notice refusal_ended_text(*member, members);
+    Outvoted { theirs, stations, others } => "outvoted" Alarm outvoted_text(theirs, *stations, *others);
     Stalled { late, .. } => "stalled" Notice format!("host stall: woken {late:.1?} late");
 }
 
@@ -53,6 +59,10 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
     Disputed { stations: who, .. } => "disputed" Alarm format!(
         "{} hold different states of the same cycle: the operator has to decide by releasing its outputs",
         stations(*who, members)
+    );
+    ConfigurationDisputed { stations, others, .. } => "configuration-disputed" Alarm format!(
+        "its program does not start: {others} members of the cluster have another configuration, and only {stations} stations have its own; \
+         correct the configuration, or order a cold start"
     );
     StateLost { applied, newest, holder, asks, .. } => "state-lost" Alarm
         state_lost_text(*applied, *newest, name(*holder, members), *asks);
@@ -90,7 +100,9 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
         let (who, whose) = (stations(*accused, members), program_name(*program, members));
         format!("{who} have different states of {whose} after the same inputs")
     };
-    Refused { member, theirs, ours } => "refused" Warning refused_text(*member, theirs, ours, members);
+    Refused { member, theirs, ours } => "refused" Alarm refused_text(*member, theirs, ours, members);
+    RefusalEnded { member } => "refusal-ended" Notice refusal_ended_text(*member, members);
+    Outvoted { theirs, stations, others } => "outvoted" Alarm outvoted_text(theirs, *stations, *others);
     Stalled { late, .. } => "stalled" Notice format!("host stall: woken {late:.1?} late");
     Forced { force, .. } => "forced" Alarm {
         let (signal, value) = (members.place(force.signal), members.value(force.signal, force.value));
@@ -126,7 +138,8 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
 descriptions! { plant: PlantEvent, members: Members;
     Stepped { field, .. } => "stepped" Info
         format!("sensors {}, {} parts finished", field.sensors, field.finished);
-    Refused { member, theirs, ours } => "refused" Warning refused_text(*member, theirs, ours, members);
+    Refused { member, theirs, ours } => "refused" Alarm refused_text(*member, theirs, ours, members);
+    RefusalEnded { member } => "refusal-ended" Notice refusal_ended_text(*member, members);
 }
 
 fn name(station: StationId, members: &Members) -> &str {
@@ -190,6 +203,27 @@ fn flagged_text(station: StationId, members: &Members) -> String {
 fn cleared_text(station: StationId, members: &Members) -> String {
     let name = name(station, members);
     format!("{name} is received again, and its slot is open")
+}
+
+/// The alarm of a member that has another configuration than the cluster file.
+pub(crate) fn odd_configuration_text<H: std::fmt::Display>(
+    name: &str,
+    theirs: &H,
+    right: &H,
+) -> String {
+    format!(
+        "{name} runs configuration {theirs}, and the cluster file is {right}: start it with this cluster file"
+    )
+}
+
+fn refusal_ended_text(member: Member, members: &Members) -> String {
+    format!("{} is no longer received with another configuration", members.name(member))
+}
+
+fn outvoted_text<H: std::fmt::Display>(theirs: &H, stations: u32, others: u32) -> String {
+    format!(
+        "ends: {others} stations have configuration {theirs}, and {stations} have its own; start it with the right cluster file"
+    )
 }
 
 fn refused_text<H: std::fmt::Display>(

@@ -1,13 +1,27 @@
 //! What stations report, and the processes that carry members.
 
+use std::collections::BTreeSet;
+
 use understudy_bus::HostEvent;
 use understudy_journal::{Process, Record, moment};
 use understudy_node::Event as StationEvent;
-use understudy_wire::{Member, ProgramId, ProgramSet, StationId, StationSet};
+use understudy_wire::{ConfigurationHash, Member, ProgramId, ProgramSet, StationId, StationSet};
 
 use super::Model;
 use super::standing::{Change, ProgramChange, StationChange};
-use crate::describe::describe;
+use crate::describe::{describe, odd_configuration_text};
+
+/// A member that drops the frames of another one, since their configurations differ.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Refusal {
+    by: String,
+    other: Member,
+    /// The one of the two that has another configuration than the cluster file.
+    odd: Member,
+}
+
+/// Alarm of a member that has another configuration than the cluster file.
+const REFUSED: &str = "refused";
 
 impl Model {
     pub(super) fn station(&mut self, record: &Record, station: StationId, event: &StationEvent) {
@@ -34,7 +48,18 @@ impl Model {
                 }
                 return;
             }
-            StationEvent::Refused { member, .. } => self.refused(*member, cycle),
+            StationEvent::Refused { member, theirs, ours } => {
+                self.refused(*member, cycle);
+                self.refusal_begins(record, *member, (*theirs, *ours), cycle);
+            }
+            StationEvent::RefusalEnded { member } => {
+                self.refusal_ends(&record.name, *member, cycle);
+            }
+            StationEvent::SamplesMissing { program, .. } => {
+                let remote_io = self.members.name(Member::RemoteIo(*program));
+                let reason = format!("{} receives no samples of {remote_io}", record.name);
+                self.not_driven(*program, cycle, &reason);
+            }
             _ => {}
         }
         let own = |change| Some(Change::Station(station, change));
@@ -65,6 +90,49 @@ impl Model {
             _ => None,
         };
         self.happened(record, cycle, cause);
+    }
+
+    /// Two members refuse each other: the alarm of the one whose configuration is not that of the cluster file, however many refuse it.
+    pub(super) fn refusal_begins(
+        &mut self,
+        record: &Record,
+        other: Member,
+        (theirs, ours): (ConfigurationHash, ConfigurationHash),
+        cycle: i64,
+    ) {
+        let right = self.cluster.agreement().configuration;
+        let (odd, theirs) = match record.member {
+            Some(by) if ours != right => (by, ours),
+            _ => (other, theirs),
+        };
+        let refusal = Refusal { by: record.name.clone(), other, odd };
+        self.refusals.insert(refusal);
+        let name = self.members.name(odd).to_owned();
+        let text = odd_configuration_text(&name, &theirs, &right);
+        self.alarms.raise((name, REFUSED), cycle, text);
+    }
+
+    /// The member `by` refuses another one no longer.
+    pub(super) fn refusal_ends(&mut self, by: &str, other: Member, cycle: i64) {
+        let is_it = |refusal: &Refusal| refusal.by == by && refusal.other == other;
+        self.refusals_end(&is_it, cycle);
+    }
+
+    /// The process of a member has begun or ended: it refuses nobody.
+    pub(super) fn refuses_none(&mut self, member: Member, cycle: i64) {
+        let name = self.members.name(member).to_owned();
+        self.refusals_end(&|refusal| refusal.by == name, cycle);
+    }
+
+    fn refusals_end(&mut self, ends: &dyn Fn(&Refusal) -> bool, cycle: i64) {
+        let (over, lasting) = self.refusals.iter().cloned().partition(ends);
+        self.refusals = lasting;
+        let over: BTreeSet<Refusal> = over;
+        for Refusal { odd, .. } in over {
+            if !self.refusals.iter().any(|refusal| refusal.odd == odd) {
+                self.alarms.over(&(self.members.name(odd).to_owned(), REFUSED), cycle);
+            }
+        }
     }
 
     fn exclusion_alarm(
@@ -144,6 +212,7 @@ impl Model {
 
     /// A process begins, unless it is known to have ended: its records may be read afterwards.
     fn ready(&mut self, member: Member, cycle: i64) {
+        self.refuses_none(member, cycle);
         if !self.changes.now().is_down(member) {
             let change = Change::Process(member, Process::Running);
             self.changes.process(member, cycle, change);

@@ -54,6 +54,9 @@ impl ProgramTrack {
     }
 }
 
+/// Alarms of questions to the operator about a state: they end with the program's state known.
+const QUESTIONS: [&str; 2] = ["disputed", "configuration-disputed"];
+
 impl Model {
     pub(super) fn remote_io(&mut self, record: &Record, program: ProgramId, event: &RemoteIoEvent) {
         let place = program.index();
@@ -116,6 +119,7 @@ impl Model {
         let mut alarm = None;
         let change = match event {
             RemoteIoEvent::StartedCold { awaits_release, .. } => {
+                self.alarms.all_over(&record.name, &QUESTIONS, cycle);
                 own(ProgramChange::StartedCold { awaits_release: *awaits_release })
             }
             RemoteIoEvent::Released { .. } => {
@@ -137,8 +141,12 @@ impl Model {
                 alarm = Some("disputed");
                 None
             }
-            RemoteIoEvent::AdoptedLineage { .. } => {
-                self.alarms.over(&subject("disputed"), cycle);
+            RemoteIoEvent::ConfigurationDisputed { .. } => {
+                alarm = Some("configuration-disputed");
+                None
+            }
+            RemoteIoEvent::AdoptedLineage { .. } | RemoteIoEvent::StateRecovered { .. } => {
+                self.alarms.all_over(&record.name, &QUESTIONS, cycle);
                 None
             }
             RemoteIoEvent::Flagged { station, .. } => {
@@ -149,8 +157,13 @@ impl Model {
                 let cleared = StationChange::Cleared(program);
                 Some(Change::Station(*station, cleared))
             }
-            RemoteIoEvent::Refused { member, .. } => {
+            RemoteIoEvent::Refused { member, theirs, ours } => {
                 self.refused(*member, cycle);
+                self.refusal_begins(record, *member, (*theirs, *ours), cycle);
+                None
+            }
+            RemoteIoEvent::RefusalEnded { member } => {
+                self.refusal_ends(&record.name, *member, cycle);
                 None
             }
             RemoteIoEvent::Forced { force, .. } => {
@@ -322,9 +335,15 @@ impl Model {
                     self.plant_fault(record, cycle, field.plant_faults);
                 }
             }
-            PlantEvent::Refused { member, .. } => {
+            PlantEvent::Refused { member, theirs, ours } => {
                 let cycle = self.cycles.of(None);
                 self.refused(*member, cycle);
+                self.refusal_begins(record, *member, (*theirs, *ours), cycle);
+                self.happened(record, cycle, None);
+            }
+            PlantEvent::RefusalEnded { member } => {
+                let cycle = self.cycles.of(None);
+                self.refusal_ends(&record.name, *member, cycle);
                 self.happened(record, cycle, None);
             }
         }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use understudy_journal::{Record, RunEvent};
+use understudy_journal::{Happening, Record, RunEvent};
 use understudy_view::{Bounds, LostState, Model, Protection};
 use understudy_wire::{Member, ProgramId, StationId};
 
@@ -77,4 +77,74 @@ fn of_a_dead_remote_io_nothing_is_known() {
     note(&mut model, Member::RemoteIo(ProgramId(0)));
     assert_eq!(lost(&model), None);
     assert_eq!(protection(&model), None);
+}
+
+/// Faults, and the alarms of the given kinds with the cycles in which each was raised and was over. An attached viewer is not told what was done.
+fn alarms(faults: &str, cycles: u64, kinds: &[&str], attached: bool) -> Vec<String> {
+    let cell = cell();
+    let text = format!("title = \"alarms\"\ncycles = {cycles}\n{faults}");
+    let mut model = Model::new(Arc::new(cell.clone()), Bounds::default());
+    let of_fault = |record: &Record| matches!(record.event, Happening::Run(RunEvent::Fault { .. }));
+    for record in records(&cell, &scenario(&cell, &text), 1) {
+        if !attached || !of_fault(&record) {
+            model.note(&record);
+        }
+    }
+    let alarms = model.alarms().filter(|alarm| kinds.contains(&alarm.alarm));
+    alarms
+        .map(|alarm| {
+            let over = alarm.over.map_or("lasts".to_owned(), |over| format!("over in {over}"));
+            format!("{} {} in {}, {over}: {}", alarm.name, alarm.alarm, alarm.cycle, alarm.text)
+        })
+        .collect()
+}
+
+fn fault(at: u64, station: &str, action: &str) -> String {
+    format!("[[step]]\nat = {at}\nstation = \"{station}\"\naction = \"{action}\"\n")
+}
+
+/// Nobody drives the plant of a remote I/O that is dead or suspended: an alarm within two seconds, from the stations that live, until it is back.
+#[test]
+fn a_remote_io_that_sends_no_samples_is_an_alarm() {
+    for (ends, begins) in [("crash", "restart"), ("stop", "continue")] {
+        let faults = fault(100, "robot-io", ends) + &fault(400, "robot-io", begins);
+        let found = alarms(&faults, 600, &["not-driven"], true);
+        let [alarm] = &found[..] else {
+            panic!("{ends}: {found:?}");
+        };
+        let cycle = |before: &str| -> u64 {
+            let (_, rest) = alarm.split_once(before).expect("a cycle");
+            let digits: String = rest.chars().take_while(char::is_ascii_digit).collect();
+            digits.parse().expect("a number")
+        };
+        assert!(alarm.starts_with("robot-io not-driven in "), "{alarm}");
+        assert!((101..=300).contains(&cycle("driven in ")), "{alarm}");
+        assert!((395..=440).contains(&cycle("over in ")), "{alarm}");
+    }
+    let station = fault(100, "robot", "crash") + &fault(400, "robot", "restart");
+    assert_eq!(alarms(&station, 600, &["not-driven"], true), [""; 0]);
+}
+
+/// A member with another configuration is one alarm, however many refuse it, while it is received.
+#[test]
+fn a_member_with_another_configuration_is_an_alarm_while_it_lasts() {
+    let faults = fault(100, "robot", "crash")
+        + &fault(110, "robot", "restart-misconfigured")
+        + &fault(300, "robot", "crash")
+        + &fault(310, "robot", "restart");
+    let found = alarms(&faults, 600, &["refused"], false);
+    let of_robot: Vec<&String> =
+        found.iter().filter(|alarm| alarm.starts_with("robot refused")).collect();
+    assert!(matches!(&of_robot[..], [one] if one.contains("over in 3")), "{found:?}");
+    assert!(found.iter().all(|alarm| alarm.contains("over in ")), "{found:?}");
+    let wrong = fault(100, "robot", "crash")
+        + &fault(100, "robot-io", "crash")
+        + &fault(110, "robot", "restart-wrong-program")
+        + &fault(110, "robot-io", "restart-wrong-program");
+    let kinds = ["refused", "configuration-disputed"];
+    let found = alarms(&wrong, 600, &kinds, false);
+    for expected in ["robot refused", "robot-io refused", "robot-io configuration-disputed"] {
+        let is_it = |alarm: &&String| alarm.starts_with(expected) && alarm.contains(", lasts");
+        assert!(found.iter().any(|alarm| is_it(&alarm)), "{expected}: {found:#?}");
+    }
 }
