@@ -281,7 +281,16 @@ impl Station {
         first.min(self.starts_cycle_at())
     }
 
+    /// Counts the stations with its configuration: itself, those that publish, and those that ask to join.
+    fn count_votes(&mut self, now: Time) {
+        let all = StationSet::first(self.settings.agreement.schedule.stations());
+        let own = all.without(self.member.flagged()).or(self.joining).or(self.cycle.joiners);
+        let stations = own.or(StationSet::only(self.own())).len();
+        self.member.count_votes(now, stations, !self.publishes());
+    }
+
     fn wake(&mut self, now: Time) {
+        self.count_votes(now);
         self.member.send_copies(now);
         self.publish_if_due(now);
         if self.asks_at().is_some_and(|due| due <= now) {
@@ -334,11 +343,6 @@ impl Machine for Station {
 
     fn handle_input(&mut self, now: Time, input: Input<'_>) {
         self.member.note_time(now);
-        // Itself, those that publish, and those that ask to join.
-        let all = StationSet::first(self.settings.agreement.schedule.stations());
-        let own = all.without(self.member.flagged()).or(self.joining).or(self.cycle.joiners);
-        let stations = own.or(StationSet::only(self.own())).len();
-        self.member.count_votes(now, stations, !self.publishes());
         match input {
             Input::Wakeup => self.wake(now),
             Input::Frame(frame) => self.receive(now, frame),

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
-use understudy_cycle::{Notice, Refusal};
+use understudy_cycle::{Notice, Outvoted, Refusal};
 use understudy_wire::{
     ConfigurationHash, Force, Image, Lineage, Member, Moment, ProgramId, SignalPlace, Source,
     StationId, StationSet, Write, WriteId, WriteRefusal,
@@ -356,7 +356,7 @@ impl From<Notice> for Event {
         match notice {
             Notice::Flagged { moment, station } => Self::Flagged { moment, station },
             Notice::Cleared { moment, station } => Self::Cleared { moment, station },
-            Notice::Outvoted { theirs, stations, others } => {
+            Notice::Outvoted(Outvoted { theirs, stations, others, .. }) => {
                 Self::Outvoted { theirs, stations, others }
             }
             Notice::Stalled { moment, late } => Self::Stalled { moment, late },

@@ -295,9 +295,8 @@ impl RemoteIo {
         self.deadline = Deadline::Ahead;
         self.turns.fill(None);
         self.find_history(now, moment);
-        let is_new = matches!(self.knowledge, Knowledge::Listening { .. });
         // A station has started this cycle, whether its turn is received or not.
-        self.member.count_votes(now, self.own_stations().max(1), is_new);
+        self.count_votes(now, self.own_stations().max(1));
         self.sample(now);
     }
 
@@ -332,8 +331,13 @@ impl RemoteIo {
         let passed = now.since(self.decides_at()).as_nanos() / period.as_nanos();
         let passed = u32::try_from(passed).unwrap_or(u32::MAX);
         self.deadline = Deadline::Passed { idle: idle.saturating_add(1).saturating_add(passed) };
+        self.count_votes(now, self.own_stations());
+    }
+
+    /// Counts the stations with its configuration.
+    fn count_votes(&mut self, now: Time, stations: usize) {
         let is_new = matches!(self.knowledge, Knowledge::Listening { .. });
-        self.member.count_votes(now, self.own_stations(), is_new);
+        self.member.count_votes(now, stations, is_new);
     }
 }
 

@@ -32,6 +32,22 @@ pub struct Need {
     pub ethernet: bool,
 }
 
+impl Need {
+    /// A controller without terminals, program and network.
+    pub fn nothing() -> Self {
+        Self {
+            role: Role::Controller,
+            inputs: 0,
+            outputs: 0,
+            analog_inputs: 0,
+            analog_outputs: 0,
+            program: None,
+            scan_within: None,
+            ethernet: false,
+        }
+    }
+}
+
 /// Rules for the comparison of needs with figures.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Terms {

@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::controller::{Catalogue, Controller};
 use crate::fit::{Verdict, fit};
 use crate::need::{Need, Terms};
-use crate::requirement::{Asked, Requirement, RequirementError, Role};
+use crate::requirement::{Asked, Requirement, RequirementError};
 
 /// Result of a search.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -47,16 +47,7 @@ pub fn search<'a>(
     if !refused.is_empty() {
         return Err(refused);
     }
-    let need = Need {
-        role: Role::Controller,
-        inputs: 0,
-        outputs: 0,
-        analog_inputs: 0,
-        analog_outputs: 0,
-        program: None,
-        scan_within: None,
-        ethernet: false,
-    };
+    let need = Need::nothing();
     let terms = Terms { requirements: requirements.to_vec(), ..Terms::default() };
     let mut found = Found { controllers: Vec::new(), unknown: Vec::new() };
     for controller in catalogue.controllers() {

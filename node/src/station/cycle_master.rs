@@ -4,10 +4,9 @@
 //! it, so that the next rank takes over when the cycle master is not received; two that start the same cycle at once do
 //! no harm.
 
-use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_wire::{Body, Frame, Member, Moment, StationSet, Time};
+use understudy_wire::{Body, Member, Moment, StationSet, Time};
 
 use super::{CycleNotes, Role, Station, Token};
 use crate::event::Event;
@@ -46,10 +45,11 @@ impl Station {
         let agreement = &self.settings.agreement;
         // A remote I/O that starts listens first, longest where a station is missing.
         let bound = missing_after(agreement.schedule.period()).max(agreement.listen_cycles * 6);
-        for (replica, unsampled) in self.replicas.iter().zip(&mut self.unsampled) {
+        for (place, replica) in self.replicas.iter().enumerate() {
             let program = replica.id();
-            let is_of_it = |frame: &Arc<Frame>| frame.header.sender == Member::RemoteIo(program);
-            if self.cycle.samples.iter().any(is_of_it) {
+            let is_sampled = self.has_sample(Member::RemoteIo(program));
+            let unsampled = &mut self.unsampled[place];
+            if is_sampled {
                 if *unsampled >= bound {
                     self.member.report(Event::SamplesReturned { moment, program });
                 }

@@ -117,7 +117,7 @@ impl Station {
         Body::Turn(turn)
     }
 
-    fn has_sample(&self, sender: Member) -> bool {
+    pub(super) fn has_sample(&self, sender: Member) -> bool {
         let mut samples = self.cycle.samples.iter();
         samples.any(|frame| frame.header.sender == sender)
     }

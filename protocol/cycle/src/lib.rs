@@ -20,5 +20,5 @@ pub use attendance::{Attendance, Change};
 pub use clock::{Arrival, CycleClock};
 pub use copies::Copies;
 pub use machine::{Input, Machine, Output, Outvoted, RemoteIoInput};
-pub use participant::{Endpoint, Notice, OUTVOTED_AFTER, Participant, Refusal};
+pub use participant::{Endpoint, Notice, Participant, Refusal};
 pub use schedule::{Schedule, ScheduleError};

@@ -41,7 +41,7 @@ pub enum Refusal {
 }
 
 /// A majority of stations with another configuration counts when it was received for this time without a break.
-pub const OUTVOTED_AFTER: Duration = Duration::from_secs(2);
+const OUTVOTED_AFTER: Duration = Duration::from_secs(2);
 
 /// What stations and remote I/Os report in the same way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,14 +61,7 @@ pub enum Notice {
         station: StationId,
     },
     /// This member does not take part yet, and more stations have one other configuration than have its own.
-    Outvoted {
-        /// The other configuration.
-        theirs: ConfigurationHash,
-        /// Stations with its own configuration, it included.
-        stations: u32,
-        /// Stations with the other one.
-        others: u32,
-    },
+    Outvoted(Outvoted),
     /// The host woke this member too late to keep its times.
     Stalled {
         /// Current cycle.
@@ -214,7 +207,7 @@ impl<Event: From<Refusal> + From<Notice>> Participant<Event> {
         self.outvoted
     }
 
-    /// Reports once that more stations with one other configuration than stations with this one were received for [`OUTVOTED_AFTER`] up to `now`.
+    /// Reports once that more stations with one other configuration than stations with this one were received for two seconds up to `now`.
     /// `stations` are those with this configuration; `is_new` says that this member does not take part yet: one that does is never outvoted, so
     /// that no member that starts with a wrong configuration can end one that works.
     pub fn count_votes(&mut self, now: Time, stations: usize, is_new: bool) {
@@ -228,8 +221,9 @@ impl<Event: From<Refusal> + From<Notice>> Participant<Event> {
         if now.since(since) >= OUTVOTED_AFTER && self.outvoted.is_none() {
             let ours = self.agreement().configuration;
             let (stations, others) = (stations as u32, others as u32);
-            self.outvoted = Some(Outvoted { ours, theirs, stations, others });
-            self.report(Event::from(Notice::Outvoted { theirs, stations, others }));
+            let outvoted = Outvoted { ours, theirs, stations, others };
+            self.outvoted = Some(outvoted);
+            self.report(Event::from(Notice::Outvoted(outvoted)));
         }
     }
 

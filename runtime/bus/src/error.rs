@@ -3,7 +3,8 @@
 use std::io;
 use std::net::SocketAddr;
 
-use understudy_wire::{ConfigurationHash, Member};
+use understudy_cycle::Outvoted;
+use understudy_wire::Member;
 
 use crate::link::ZENOH_PORT_OFFSET;
 
@@ -70,18 +71,10 @@ pub enum BusError {
     },
     /// More stations have another configuration than have that of this member, which does not take part yet.
     #[error(
-        "U0598: {others} stations of this cluster have configuration {theirs}, and {stations} have {ours}, the one of this cluster file: nothing was started; start this member with the cluster file of the others, or the others with this one"
+        "U0598: {} stations of this cluster have configuration {}, and {} have {}, the one of this cluster file: nothing was started; start this member with the cluster file of the others, or the others with this one",
+        .0.others, .0.theirs, .0.stations, .0.ours
     )]
-    Outvoted {
-        /// The configuration of this member.
-        ours: ConfigurationHash,
-        /// The configuration of the majority.
-        theirs: ConfigurationHash,
-        /// Stations with the configuration of this member.
-        stations: u32,
-        /// Stations of the majority.
-        others: u32,
-    },
+    Outvoted(Outvoted),
     /// Nobody is there, or one side does not believe the other's certificate.
     #[error("U0509: {name} does not take a call at {address}: {reason}")]
     Uncalled {
@@ -137,7 +130,7 @@ impl BusError {
             Self::Panicked { .. } => "U0507",
             Self::Uncalled { .. } => "U0509",
             Self::Unanswered { .. } => "U0510",
-            Self::Outvoted { .. } => "U0598",
+            Self::Outvoted(_) => "U0598",
         }
     }
 

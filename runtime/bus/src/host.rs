@@ -12,7 +12,7 @@ use nix::sys::time::TimeSpec;
 use serde::{Deserialize, Serialize};
 use tracing::span::EnteredSpan;
 use tracing::{Span, debug, trace, trace_span};
-use understudy_cycle::{Input, Machine, Output, Outvoted, RemoteIoInput};
+use understudy_cycle::{Input, Machine, Output, RemoteIoInput};
 use understudy_wire::{Body, Frame, Moment, Time, encode};
 
 use crate::clock::Clock;
@@ -193,10 +193,10 @@ impl<M: Machine> Host<'_, M> {
         round.summary.link = self.link.counters();
         let stopped = HostEvent::Stopped(round.summary);
         self.sink.record(now, Noted::Host(stopped));
-        self.machine.outvoted().map_or(Ok(round.summary), |outvoted| {
-            let Outvoted { ours, theirs, stations, others } = outvoted;
-            Err(BusError::Outvoted { ours, theirs, stations, others })
-        })
+        match self.machine.outvoted() {
+            Some(outvoted) => Err(BusError::Outvoted(outvoted)),
+            None => Ok(round.summary),
+        }
     }
 
     /// True where it is to stop.

@@ -39,7 +39,7 @@ const END_PATIENCE: Duration = Duration::from_secs(1);
 /// Form of the lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LogFormat {
-    /// For people.
+    /// Text for people, one line for each event.
     #[default]
     Text,
     /// One JSON object on each line.

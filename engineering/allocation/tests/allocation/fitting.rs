@@ -209,16 +209,7 @@ fn requirements_of_a_person_are_three_valued_too() {
 
 #[test]
 fn what_is_not_needed_need_not_be_known() {
-    let nothing = Need {
-        role: Role::Controller,
-        inputs: 0,
-        outputs: 0,
-        analog_inputs: 0,
-        analog_outputs: 0,
-        program: None,
-        scan_within: None,
-        ethernet: false,
-    };
+    let nothing = Need::nothing();
     let bare = Controller::new("Works", "Z", "W", Kind::Plc);
     let found = fit(&bare, None, &nothing, &Terms::default());
     assert_eq!((found.verdict, found.findings.len()), (Verdict::Fits, 0));

@@ -118,7 +118,7 @@ impl Model {
         self.refusals_end(&is_it, cycle);
     }
 
-    /// The process of a member has begun or ended: it refuses nobody.
+    /// The process of a member has begun or ended: it refuses no member.
     pub(super) fn refuses_none(&mut self, member: Member, cycle: i64) {
         let name = self.members.name(member).to_owned();
         self.refusals_end(&|refusal| refusal.by == name, cycle);
