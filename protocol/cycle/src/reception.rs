@@ -25,6 +25,8 @@ pub(crate) struct Reception {
 /// A refused member.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 struct Other {
+    /// The sender that was named when the refusal began.
+    member: Member,
     configuration: ConfigurationHash,
     /// When its last frame was received.
     received: Time,
@@ -72,13 +74,17 @@ impl Reception {
         }
         if header.configuration != self.configuration {
             // A sender that is in no cluster of this size is reported too, once for all of them.
-            let member = if known { header.sender } else { self.own };
+            let key = if known { header.sender } else { self.own };
             let theirs = header.configuration;
-            let other = Other { configuration: theirs, received: now };
-            return match self.refused.insert(member, other) {
-                Some(before) if before.configuration == theirs => Admission::Dropped,
-                _ => Admission::Refused { theirs },
-            };
+            if let Some(other) = self.refused.get_mut(&key)
+                && other.configuration == theirs
+            {
+                other.received = now;
+                return Admission::Dropped;
+            }
+            let other = Other { member: header.sender, configuration: theirs, received: now };
+            self.refused.insert(key, other);
+            return Admission::Refused { theirs };
         }
         match known {
             true if self.refused.remove(&header.sender).is_some() => Admission::AdmittedAgain,
@@ -90,9 +96,9 @@ impl Reception {
     /// A member that is no longer refused at `now`, since nothing more was received of it; one call for each.
     pub(crate) fn ended(&mut self, now: Time) -> Option<Member> {
         let is_over = |other: &Other| now.since(other.received) >= self.refused_for;
-        let (member, _) = self.refused.iter().find(|(_, other)| is_over(other))?;
-        let member = *member;
-        self.refused.remove(&member);
+        let (key, other) = self.refused.iter().find(|(_, other)| is_over(other))?;
+        let (key, member) = (*key, other.member);
+        self.refused.remove(&key);
         Some(member)
     }
 
@@ -110,5 +116,57 @@ impl Reception {
             }
         }
         stations.into_iter().max_by_key(|(_, count)| *count)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use understudy_wire::{Moment, ProgramId, StationId};
+
+    use super::*;
+    use crate::agreement::Mode;
+    use crate::schedule::Schedule;
+
+    const PERIOD: Duration = Duration::from_millis(10);
+
+    fn header(sender: Member, configuration: u64) -> Header {
+        Header {
+            cluster: ClusterHash(1),
+            configuration: ConfigurationHash(configuration),
+            moment: Moment::default(),
+            sender,
+            alone: false,
+        }
+    }
+
+    /// The end of a refusal names the member of its beginning, also one that a cluster of this size does not have.
+    #[test]
+    fn a_refusal_ends_for_the_member_that_it_began_with() {
+        let agreement = Agreement {
+            cluster: ClusterHash(1),
+            configuration: ConfigurationHash(2),
+            schedule: Schedule::new(PERIOD, 2, 1, 1).expect("within the bounds"),
+            mode: Mode::Full,
+            history: 4,
+            flag_after: 3,
+            shadow_cycles: 1,
+            listen_cycles: 2,
+        };
+        let own = Member::Station(StationId(0));
+        for sender in [
+            Member::Station(StationId(1)),
+            Member::Station(StationId(40)),
+            Member::RemoteIo(ProgramId(0)),
+            Member::RemoteIo(ProgramId(40)),
+        ] {
+            let mut reception = Reception::new(own, &agreement);
+            let first = reception.admit(Time(0), &header(sender, 3));
+            assert_eq!(first, Admission::Refused { theirs: ConfigurationHash(3) }, "{sender:?}");
+            let last = Time(0) + PERIOD * 50;
+            assert_eq!(reception.admit(last, &header(sender, 3)), Admission::Dropped);
+            assert_eq!(reception.ended(last + (REFUSED_FOR - PERIOD)), None, "{sender:?}");
+            assert_eq!(reception.ended(last + REFUSED_FOR), Some(sender));
+            assert_eq!((reception.ended(last + REFUSED_FOR), reception.refused()), (None, 0));
+        }
     }
 }
