@@ -120,7 +120,7 @@ impl Laboratory<'_> {
             Command::Force(force) => {
                 return self.tell(member, line("force", serde_json::to_string(force))).await;
             }
-            Command::Write(_) if !self.write_limiter.admits() => {
+            Command::Write(write) if !self.write_limiter.admits(&write.owner) => {
                 let refusal = WriteRefusal::Busy;
                 return Err(Refusal::Write { refusal });
             }

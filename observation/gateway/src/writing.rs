@@ -7,13 +7,16 @@
 //! Invariant: however many requests arrive, at most [`MAXIMUM_WRITES`] are under way and at most [`WRITES_PER_SECOND`] are passed on
 //! in a second; the others are refused at once.
 
+use std::collections::BTreeMap;
 use std::io::Write as _;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use tokio::sync::Semaphore;
+use tokio::time::Instant;
 use understudy_bus::WriteLimiter;
 use understudy_cluster::Cluster;
-use understudy_journal::{Commander, Refusal, WriteRequest, WriteSessions, new_write};
+use understudy_journal::{Commander, Done, Refusal, WriteRequest, WriteSessions, new_write};
 use understudy_view::Run;
 use understudy_wire::{Member, Write, WriteId, WriteRefusal};
 
@@ -31,7 +34,14 @@ pub struct WriteGate {
     sessions: WriteSessions,
     limiter: WriteLimiter,
     places: Semaphore,
+    numbered: Mutex<Numbered>,
 }
+
+/// Writes that callers have numbered themselves, with the time when they were sent last, and the outcome of those that are in effect.
+type Numbered = BTreeMap<WriteId, (Instant, Write, Option<Done>)>;
+
+/// Time for which the outcome of a numbered write is remembered; callers repeat it for half of it.
+const REMEMBERED_FOR: Duration = Duration::from_secs(60);
 
 impl WriteGate {
     /// The operator inputs of `run`.
@@ -42,6 +52,7 @@ impl WriteGate {
             sessions: WriteSessions::new(run.commander()),
             limiter: WriteLimiter::new(WRITES_PER_SECOND),
             places: Semaphore::new(MAXIMUM_WRITES),
+            numbered: Mutex::default(),
         }
     }
 
@@ -70,22 +81,62 @@ impl WriteGate {
         write: Write,
         id: Option<WriteId>,
     ) -> Result<u64, Refusal> {
-        let refusal = WriteRefusal::Busy;
-        let busy = Refusal::Write { refusal };
         // A flood is not logged.
+        let refusal = WriteRefusal::Busy;
+        let busy = Err(Refusal::Write { refusal });
+        let known = id.and_then(|id| self.numbered().get(&id).cloned());
+        // Another write under the same identifier is one for the remote I/O, which refuses it.
+        let known =
+            known.filter(|(_, sent, _)| (sent.input, sent.value) == (write.input, write.value));
+        if let Some((_, _, Some(done))) = known {
+            return Ok(done.cycle.unwrap_or_default());
+        }
+        // One that was sent before may be in effect, so it is not refused.
+        let busy = if known.is_some() { Err(Refusal::Undecided) } else { busy };
         let Ok(_place) = self.places.try_acquire() else {
-            return Err(busy);
+            return busy;
         };
-        if !self.limiter.admits() {
-            return Err(busy);
+        if !self.limiter.admits(&write.owner) {
+            return busy;
         }
         let owner = write.owner.clone();
         let done = match id {
-            Some(id) => self.commander.write(member, &Write { id, ..write }).await,
+            Some(id) => self.send_numbered(member, &Write { id, ..write }, known.is_some()).await,
             None => self.sessions.write(member, write).await,
         };
         let done = done.inspect_err(|refusal| self.log(member, &owner, refusal));
         Ok(done?.cycle.unwrap_or_default())
+    }
+
+    async fn send_numbered(
+        &self,
+        member: Member,
+        write: &Write,
+        is_sent: bool,
+    ) -> Result<Done, Refusal> {
+        let id = write.id;
+        let now = Instant::now();
+        {
+            let mut numbered = self.numbered();
+            numbered.retain(|_, (sent, ..)| now.duration_since(*sent) < REMEMBERED_FOR);
+            numbered.insert(id, (now, write.clone(), None));
+        }
+        let done = self.commander.write_again(member, write, is_sent).await;
+        match &done {
+            Ok(done) => {
+                self.numbered().insert(id, (Instant::now(), write.clone(), Some(*done)));
+            }
+            Err(refusal) if refusal.is_undecided() => {}
+            // It has no effect, so its number is free.
+            Err(_) => {
+                self.numbered().remove(&id);
+            }
+        }
+        done
+    }
+
+    fn numbered(&self) -> MutexGuard<'_, Numbered> {
+        self.numbered.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn log(&self, member: Member, owner: &str, refusal: &Refusal) {

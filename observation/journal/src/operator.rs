@@ -31,7 +31,7 @@ use crate::record::{Happening, Record, RunEvent};
 
 pub use acknowledgement::Acknowledgement;
 pub use new_write::{RequestedValue, WriteProblem, WriteRequest, force_value, new_write};
-pub use sessions::{DECIDED_WITHIN, WriteSessions};
+pub use sessions::{DECIDED_WITHIN, WriteSessions, attempt_until_decided};
 pub use shelving::{AlarmRefusal, MAXIMUM_SHELVING_SECONDS, Shelving, Unshelving, find_alarm};
 pub use socket::RunSocket;
 pub(crate) use socket::SOCKET;
@@ -137,7 +137,7 @@ pub enum Refusal {
     Alarm(AlarmRefusal),
     /// The outcome of a write is not known yet.
     #[error(
-        "U0648: the remote I/O has taken the value, and no output with it was applied in time: check the state of the program"
+        "U0648: the outcome of the write is not known: the value may be in effect; check the state of the program"
     )]
     Undecided,
     /// Another process writes the run, and says why.

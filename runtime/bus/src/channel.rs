@@ -47,7 +47,7 @@ use crate::writes::{self, Callers};
 
 pub(crate) use followed::{Telemetry, followed};
 pub use tls::{Admitted, TlsKeys};
-pub(crate) use tls::{WRITE_KEYS, hash_key, insert, prefix, tls_config};
+pub(crate) use tls::{WRITE_KEYS, endpoint, hash_key, insert, prefix, tls_config};
 
 use tls::access_control;
 
@@ -303,7 +303,7 @@ impl<E: Send + 'static> Channel<E> {
         let listen = |source| BusError::listen(self.address, source).to_string();
         let listener = TcpListener::bind(self.address).map_err(listen)?;
         let inner = inner_address()?;
-        let listen = format!("tls/{inner}#tls_handshake_timeout_ms={HANDSHAKE_TIMEOUT_MS}");
+        let listen = format!("{}#tls_handshake_timeout_ms={HANDSHAKE_TIMEOUT_MS}", endpoint(inner));
         let mut config = tls_config("peer", &self.settings.keys)?;
         insert(&mut config, "transport/unicast/accept_timeout", &json!(HANDSHAKE_TIMEOUT_MS))?;
         insert(&mut config, "listen/endpoints", &json!([listen]))?;
@@ -377,10 +377,11 @@ impl<E> Channel<E> {
                     Ok(Order::Write(write)) => {
                         let write = Write { role, ..write };
                         let id = write.id;
-                        let is_taken = callers.wait(&write, &query, &key, clock.now())
-                            && control.give(Order::Write(write));
-                        if is_taken {
-                            return;
+                        if callers.wait(&write, &query, &key, clock.now()) {
+                            if control.give(Order::Write(write)) {
+                                return;
+                            }
+                            callers.forget(id);
                         }
                         let refusal = WriteRefusal::Busy;
                         let outcome = WriteOutcome::Refused { refusal };

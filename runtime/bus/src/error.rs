@@ -85,6 +85,18 @@ pub enum BusError {
         /// What Zenoh said.
         reason: String,
     },
+    /// A call was taken, and its answer was lost on the way.
+    #[error(
+        "U0581: the answer of {name} at {address} to `{request}` is lost: what was asked may be done; ask for the state of the member"
+    )]
+    AnswerLost {
+        /// Name of the member.
+        name: String,
+        /// Its address.
+        address: SocketAddr,
+        /// The request.
+        request: &'static str,
+    },
     /// A call was taken, and what was asked is not answered.
     #[error(
         "U0510: {name} at {address} does not answer `{request}`: this certificate is not admitted to it, or is revoked"
@@ -131,6 +143,7 @@ impl BusError {
             Self::Uncalled { .. } => "U0509",
             Self::Unanswered { .. } => "U0510",
             Self::Outvoted(_) => "U0598",
+            Self::AnswerLost { .. } => "U0581",
         }
     }
 

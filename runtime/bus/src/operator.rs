@@ -7,7 +7,7 @@ use serde_json::json;
 use understudy_wire::{ClusterHash, Force, Role, SignalPlace, StateChoice, Write};
 use zenoh::Wait;
 
-use crate::channel::{TlsKeys, WRITE_KEYS, hash_key, insert, prefix, tls_config};
+use crate::channel::{TlsKeys, WRITE_KEYS, endpoint, hash_key, insert, prefix, tls_config};
 use crate::error::{BusError, reason};
 
 /// Longer than it takes a member on a network that works.
@@ -94,7 +94,7 @@ impl Call {
         };
         let config = || -> zenoh::Result<zenoh::Config> {
             let mut config = tls_config("client", keys)?;
-            insert(&mut config, "connect/endpoints", &json!([format!("tls/{address}")]))?;
+            insert(&mut config, "connect/endpoints", &json!([endpoint(address)]))?;
             insert(&mut config, "connect/timeout_ms", &json!(PATIENCE.as_millis() as u64))?;
             insert(&mut config, "connect/exit_on_failure", &json!(true))?;
             Ok(config)
@@ -111,7 +111,8 @@ impl Call {
     /// Asks, and waits for the answer.
     ///
     /// # Errors
-    /// [`BusError::Unanswered`] where none comes: this certificate is not admitted to what was asked.
+    /// [`BusError::Unanswered`] where this certificate is not admitted to what was asked, [`BusError::AnswerLost`] where
+    /// the answer does not arrive and what was asked may be done.
     pub fn ask(&self, request: &Request) -> Result<String, BusError> {
         let unanswered = || BusError::Unanswered {
             name: self.name.clone(),
@@ -128,13 +129,31 @@ impl Call {
             .timeout(PATIENCE)
             .wait()
             .map_err(|_| unanswered())?;
+        let mut is_late = false;
         while let Ok(reply) = replies.recv() {
-            if let Ok(sample) = reply.result() {
-                let text = sample.payload().try_to_string();
-                return text.map(String::from).map_err(|_| unanswered());
+            match reply.result() {
+                Ok(sample) => {
+                    let text = sample.payload().try_to_string();
+                    return text.map(String::from).map_err(|_| unanswered());
+                }
+                // Members answer with samples only, so this is the time limit of Zenoh.
+                Err(_) => is_late = true,
             }
         }
+        // A member that does not admit the question ends it at once, over a connection that stays.
+        if is_late || !self.is_connected() {
+            return Err(BusError::AnswerLost {
+                name: self.name.clone(),
+                address: self.address,
+                request: request.key(),
+            });
+        }
         Err(unanswered())
+    }
+
+    fn is_connected(&self) -> bool {
+        let info = self.session.info();
+        info.routers_zid().wait().next().is_some() || info.peers_zid().wait().next().is_some()
     }
 
     /// Gives each line of the member's journal to `take` until that says false, or `patience` passes without a line.

@@ -118,7 +118,7 @@ impl Control {
     /// Gives an order; never blocks. False where it was not taken, because too many wait or too many writes came.
     pub fn give(&self, order: Order) -> bool {
         match &order {
-            Order::Write(_) if !self.limiter.admits() => return false,
+            Order::Write(write) if !self.limiter.admits(&write.owner) => return false,
             Order::Stop => self.standing.stopping.store(true, Ordering::SeqCst),
             Order::Cut(cuts) => {
                 *self.standing.cuts() = *cuts;

@@ -3,6 +3,7 @@
 //! The member answers when it knows the outcome, which can take cycles; a caller waits for it here. Invariants: the member
 //! never waits for a caller, and no caller can send more than [`WRITES_PER_SECOND`] in all.
 
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -26,13 +27,24 @@ const WAITING_CALLERS: usize = 64;
 /// Time after which a caller is no longer waited for.
 const FORGOTTEN_AFTER: Duration = Duration::from_secs(30);
 
-/// Bounds the number of writes in a second.
+/// A person gets at most this many times the places that are left for the others.
+const SHARE: u32 = 4;
+
+/// Bounds the number of writes in a second, and leaves a fifth of them to other persons than the one who writes most.
 #[derive(Debug)]
 pub struct WriteLimiter {
     clock: Clock,
     per_second: u32,
-    window: Mutex<(u64, u32)>,
+    window: Mutex<Window>,
     refused: AtomicU64,
+}
+
+/// Writes of one second, by person.
+#[derive(Debug, Default)]
+struct Window {
+    second: u64,
+    total: u32,
+    by_person: BTreeMap<String, u32>,
 }
 
 impl WriteLimiter {
@@ -41,21 +53,25 @@ impl WriteLimiter {
         Self {
             clock: Clock::start(),
             per_second,
-            window: Mutex::new((0, 0)),
+            window: Mutex::default(),
             refused: AtomicU64::new(0),
         }
     }
 
-    /// Whether one more is taken; counts it where it is not.
-    pub fn admits(&self) -> bool {
+    /// Whether one more of this person is taken; counts it where it is not.
+    pub fn admits(&self, person: &str) -> bool {
         let second = self.clock.now().0 / 1_000_000_000;
         let mut window = self.window.lock().unwrap_or_else(PoisonError::into_inner);
-        if window.0 != second {
-            *window = (second, 0);
+        if window.second != second {
+            *window = Window { second, ..Window::default() };
         }
-        window.1 = window.1.saturating_add(1);
-        let admits = window.1 <= self.per_second;
-        if !admits {
+        let free = self.per_second.saturating_sub(window.total);
+        let count = window.by_person.get(person).copied().unwrap_or_default();
+        let admits = count < free.saturating_mul(SHARE);
+        if admits {
+            window.total += 1;
+            window.by_person.insert(person.to_owned(), count + 1);
+        } else {
             self.refused.fetch_add(1, Ordering::Relaxed);
         }
         admits
@@ -90,26 +106,36 @@ pub(crate) struct Callers(Arc<Mutex<Vec<Caller>>>);
 
 struct Caller {
     id: WriteId,
+    person: String,
     query: Query,
     key: String,
     since: Time,
 }
 
 impl Callers {
-    /// Lets a caller wait for the outcome of its write; false where too many wait.
+    /// Lets a caller wait for the outcome of its write, in the place of its earlier attempt if there is one; false where
+    /// too many of this person wait.
     pub(crate) fn wait(&self, write: &Write, query: &Query, key: &str, now: Time) -> bool {
         let mut callers = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        callers.retain(|caller| now.since(caller.since) < FORGOTTEN_AFTER);
-        let fits = callers.len() < WAITING_CALLERS;
+        callers.retain(|caller| caller.id != write.id && now.since(caller.since) < FORGOTTEN_AFTER);
+        let of_person = callers.iter().filter(|caller| caller.person == write.owner).count();
+        let fits = of_person < WAITING_CALLERS.saturating_sub(callers.len());
         if fits {
             callers.push(Caller {
                 id: write.id,
+                person: write.owner.clone(),
                 query: query.clone(),
                 key: key.to_owned(),
                 since: now,
             });
         }
         fits
+    }
+
+    /// Waits no longer for the outcome of a write.
+    pub(crate) fn forget(&self, id: WriteId) {
+        let mut callers = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        callers.retain(|caller| caller.id != id);
     }
 
     /// Sends an answer to all who wait for it.
@@ -140,11 +166,14 @@ mod tests {
     #[test]
     fn a_flood_is_bounded_and_counted() {
         let limiter = WriteLimiter::new(WRITES_PER_SECOND);
-        let admitted = (0..1000).filter(|_| limiter.admits()).count();
+        let persons = ["anna", "ben", "carl"];
+        let flood = |person| (0..1000).filter(|_| limiter.admits(person)).count();
+        let admitted = persons.map(flood);
         // The second may have ended meanwhile.
-        let bound = 2 * WRITES_PER_SECOND as usize;
-        assert!((WRITES_PER_SECOND as usize..=bound).contains(&admitted));
-        assert_eq!(limiter.take_refused(), 1000 - admitted as u64);
+        let (all, bound) = (admitted.iter().sum::<usize>(), 2 * WRITES_PER_SECOND as usize);
+        assert!((WRITES_PER_SECOND as usize..=bound).contains(&all), "{admitted:?}");
+        assert!(admitted.iter().all(|&count| count > 0), "a person is locked out: {admitted:?}");
+        assert_eq!(limiter.take_refused(), 3000 - all as u64);
         assert_eq!(limiter.take_refused(), 0);
     }
 }

@@ -10,7 +10,7 @@
 mod members;
 
 use std::fs;
-use std::net::{SocketAddr, TcpListener};
+use std::net::{Ipv6Addr, SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};
 use std::thread::spawn;
 use std::time::{Duration, Instant, SystemTime};
@@ -19,12 +19,12 @@ use members::{Chatter, endpoints, peers, station};
 use serde_json::json;
 use understudy_bus::{
     Admitted, BusError, Call, ChannelSettings, Commands, DONE, Guard, LinkKind, MemberSettings,
-    NoField, Request, TlsKeys, run_member,
+    NoField, Peer, Request, TlsKeys, run_member,
 };
 use understudy_cycle::Mode;
 use understudy_keys::{Authority, Date, People};
 use understudy_testing::press_cell;
-use understudy_wire::{ConfigurationHash, Force, Role, SignalPlace};
+use understudy_wire::{ConfigurationHash, Force, Role, SignalPlace, Write, WriteId};
 use zenoh::Wait;
 
 const DEADLINE: Duration = Duration::from_secs(60);
@@ -153,6 +153,20 @@ fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
     let denied = asked(member, "passer-by", Request::Status);
     assert!(matches!(denied, Err(BusError::Unanswered { .. })), "{denied:?}");
 
+    // This member takes writes and never answers them: that is no refusal.
+    let write = Request::Write(Write {
+        id: WriteId { session: 1, number: 1 },
+        input: 0,
+        value: true.into(),
+        role: Role::Operator,
+        owner: "anna".to_owned(),
+        reason: "to see it".to_owned(),
+    });
+    let lost = asked(member, "line-operator", write.clone());
+    assert!(matches!(lost, Err(BusError::AnswerLost { .. })), "{lost:?}");
+    let denied = asked(member, "passer-by", write);
+    assert!(matches!(denied, Err(BusError::Unanswered { .. })), "{denied:?}");
+
     let listener = TcpListener::bind(("127.0.0.1", 0)).expect("a free port");
     let site = listener.local_addr().expect("bound");
     drop(listener);
@@ -172,4 +186,67 @@ fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
     let ended = running.join().expect("no panic");
     ended.expect("it ends as it is told to");
     router.close().wait().expect("it is open");
+}
+
+/// Keys whose certificates name `address`.
+fn issued_at(address: Ipv6Addr) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("channel-ipv6");
+    if folder.exists() {
+        fs::remove_dir_all(&folder).expect("an old folder goes");
+    }
+    let text = format!(
+        "[cluster]\nname = \"line\"\n\
+         [[controller]]\nname = \"robot\"\nladder = \"robot.ladder\"\naddress = \"[{address}]:7450\"\n\
+         [[understudy]]\nname = \"understudy\"\naddress = \"[{address}]:7451\"\n\
+         [[remote_io]]\nname = \"robot-io\"\ncontroller = \"robot\"\naddress = \"[{address}]:7452\"\n"
+    );
+    let cluster = understudy_testing::cluster(&text, Mode::Full);
+    let now = Date::of(SystemTime::now());
+    let mut authority = Authority::init(&folder, &cluster, now).expect("an empty folder");
+    let people = [("leader".to_owned(), Role::Engineer)];
+    let people = People::from(&people[..]);
+    authority.issue(&cluster, &["robot".to_owned()], people, 1, now).expect("names of the cluster");
+    folder.join("members")
+}
+
+#[test]
+fn an_operator_reaches_a_member_with_an_ipv6_address() {
+    let Ok(found) = TcpListener::bind((Ipv6Addr::LOCALHOST, 0)) else {
+        return understudy_testing::skip("this machine has no IPv6");
+    };
+    let address = found.local_addr().expect("bound");
+    drop(found);
+    let folder = issued_at(Ipv6Addr::LOCALHOST);
+    let peers = [Peer { member: station(0), name: "robot".into(), address }];
+    let endpoint = endpoints(station(0), &peers);
+    let hash = endpoint.cluster();
+    let own = keys(&folder, "robot");
+    let running = spawn(move || {
+        let admitted = || Admitted { engineers: vec!["leader.1".into()], ..Admitted::default() };
+        let settings = MemberSettings {
+            endpoints: endpoint,
+            link: LinkKind::Udp,
+            guard: Guard::Off,
+            channel: Some(ChannelSettings {
+                keys: own,
+                admitted: Box::new(admitted),
+                configuration: "what everybody has to agree on".into(),
+            }),
+            field: Box::new(NoField),
+            commands: Commands::None,
+            ends_with_parent: false,
+            real_time: false,
+        };
+        run_member(Chatter::new(station(0), 1), settings, std::io::sink())
+    });
+    let ask = |request| Call::to(address, hash, "robot", &keys(&folder, "leader"))?.ask(&request);
+    let text = until("the member", || ask(Request::Configuration));
+    assert_eq!(text, "what everybody has to agree on");
+    let started = Instant::now();
+    while !running.is_finished() {
+        // Where the answer is lost, the member ends all the same.
+        let _ = ask(Request::Stop);
+        assert!(started.elapsed() < DEADLINE, "the leader is not obeyed");
+    }
+    running.join().expect("no panic").expect("it ends as it is told to");
 }

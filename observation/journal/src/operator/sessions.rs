@@ -24,7 +24,7 @@ const PAUSE: Duration = Duration::from_millis(250);
 const UNUSED_FOR: Duration = Duration::from_secs(30);
 
 /// Refusals of the write itself: it has no effect, however often it was sent. All others say that a remote I/O did not take it now.
-const FINAL: [&str; 7] = ["U0556", "U0640", "U0641", "U0642", "U0643", "U0644", "U0647"];
+const FINAL: [&str; 6] = ["U0556", "U0640", "U0641", "U0642", "U0643", "U0647"];
 
 impl Refusal {
     /// Its code in the documentation of errors.
@@ -48,26 +48,26 @@ impl Commander {
     /// # Errors
     /// [`Refusal`]; only where it [is undecided](Refusal::is_undecided), the write may have an effect.
     pub async fn write(&self, member: Member, write: &Write) -> Result<Done, Refusal> {
-        let until = Instant::now() + DECIDED_WITHIN;
-        let mut is_sent = false;
-        loop {
+        self.write_again(member, write, false).await
+    }
+
+    /// As [`Commander::write`], of a write that `is_sent` already under its identifier.
+    ///
+    /// # Errors
+    /// [`Refusal`].
+    pub async fn write_again(
+        &self,
+        member: Member,
+        write: &Write,
+        is_sent: bool,
+    ) -> Result<Done, Refusal> {
+        let attempt = || async {
             let command = Command::Write(write.clone());
             let attempt = self.give(member, command, write.owner.clone(), write.reason.clone());
             let done = tokio::time::timeout(ATTEMPT, attempt).await;
-            let refusal = match done.unwrap_or(Err(Refusal::Undecided)) {
-                Ok(done) => return Ok(done),
-                Err(refusal) => refusal,
-            };
-            // A remote I/O that refuses the second attempt for now may have taken the first.
-            is_sent |= refusal.is_undecided();
-            if !is_sent || FINAL.contains(&refusal.code().as_str()) {
-                return Err(refusal);
-            }
-            if Instant::now() >= until {
-                return Err(Refusal::Undecided);
-            }
-            tokio::time::sleep(PAUSE).await;
-        }
+            done.unwrap_or(Err(Refusal::Undecided))
+        };
+        until_decided(is_sent, attempt).await
     }
 
     /// As [`Commander::write`], from a thread that has nothing else to do.
@@ -77,6 +77,46 @@ impl Commander {
     pub fn write_and_wait(&self, member: Member, write: &Write) -> Result<Done, Refusal> {
         super::block_on(self.write(member, write))?
     }
+}
+
+/// Attempts to write under one identifier until the outcome is known, for [`DECIDED_WITHIN`]. A write that may have been
+/// taken is never refused: its outcome is then not known.
+///
+/// # Errors
+/// [`Refusal`].
+async fn until_decided<A: Future<Output = Result<Done, Refusal>>>(
+    mut is_sent: bool,
+    mut attempt: impl FnMut() -> A,
+) -> Result<Done, Refusal> {
+    let until = Instant::now() + DECIDED_WITHIN;
+    loop {
+        let refusal = match attempt().await {
+            Ok(done) => return Ok(done),
+            Err(refusal) => refusal,
+        };
+        // A remote I/O that refuses the second attempt for now may have taken the first.
+        is_sent |= refusal.is_undecided();
+        let code = refusal.code();
+        if !is_sent || FINAL.contains(&code.as_str()) {
+            return Err(refusal);
+        }
+        // The remote I/O has forgotten the session, so the outcome will not be known.
+        let is_forgotten = code == WriteRefusal::Order { expected: 1 }.code();
+        if is_forgotten || Instant::now() >= until {
+            return Err(Refusal::Undecided);
+        }
+        tokio::time::sleep(PAUSE).await;
+    }
+}
+
+/// As [`until_decided`], from a thread that has nothing else to do.
+///
+/// # Errors
+/// [`Refusal`].
+pub fn attempt_until_decided(
+    mut attempt: impl FnMut() -> Result<Done, Refusal>,
+) -> Result<Done, Refusal> {
+    super::block_on(until_decided(false, || std::future::ready(attempt())))?
 }
 
 /// Next identifier of a session, and the time of its last write.
@@ -204,8 +244,40 @@ mod tests {
         assert!(ids[..3].iter().all(|id| *id == ids[0]));
         assert_eq!(Some(ids[3]), ids[0].next());
         let void = refused(WriteRefusal::Void);
-        let (outcomes, _) = run(&[&[undecided, void.clone()]]);
+        let (outcomes, _) = run(&[&[undecided.clone(), void.clone()]]);
         assert_eq!(outcomes, [void]);
+        // A write that may be in effect is not refused where its session is forgotten.
+        let order = refused(WriteRefusal::Order { expected: 1 });
+        let (outcomes, _) = run(&[&[undecided.clone(), order]]);
+        assert_eq!(outcomes, [undecided]);
+    }
+
+    /// However a remote I/O refuses for now what it may have taken, the write is not refused.
+    #[test]
+    fn a_write_that_was_sent_is_refused_only_by_what_is_final() {
+        let refusals = [
+            WriteRefusal::NotWritable,
+            WriteRefusal::Type,
+            WriteRefusal::Limits,
+            WriteRefusal::Role { required: Role::Engineer },
+            WriteRefusal::Busy,
+            WriteRefusal::NotRunning,
+            WriteRefusal::Void,
+        ];
+        for refusal in refusals {
+            let is_for_now = matches!(refusal, WriteRefusal::Busy | WriteRefusal::NotRunning);
+            for first in [Refusal::Undecided, Refusal::Said("U0581: lost".to_owned())] {
+                let is_sent = first.is_undecided();
+                let mut answers = vec![done(7), refused(refusal), Err(first.clone())];
+                let outcome = attempt_until_decided(|| answers.pop().expect("an answer"));
+                let expected = match (is_sent, is_for_now) {
+                    (true, true) => done(7),
+                    (true, false) => refused(refusal),
+                    (false, _) => Err(first),
+                };
+                assert_eq!(outcome, expected, "{refusal:?}");
+            }
+        }
     }
 
     #[test]

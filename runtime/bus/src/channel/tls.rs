@@ -1,5 +1,6 @@
 //! Mutual TLS, and who may do what over it: the settings that both ends of the channel share.
 
+use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use serde_json::json;
@@ -49,6 +50,12 @@ pub(crate) fn prefix(cluster: ClusterHash, name: &str) -> String {
 /// Where a member says the hash of its configuration to whoever does not know it.
 pub(crate) fn hash_key(name: &str) -> String {
     format!("understudy/cluster/{name}")
+}
+
+/// The endpoint of an address. Zenoh takes what is before the last colon for the name in the certificate, and an IPv6
+/// address in brackets is no name there.
+pub(crate) fn endpoint(address: SocketAddr) -> String {
+    format!("tls/{}:{}", address.ip(), address.port())
 }
 
 /// Nothing but mutual TLS to and from named addresses.
