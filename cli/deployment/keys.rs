@@ -23,7 +23,7 @@ Example:
   understudy keys revoke tank --folder cell/keys
   understudy keys issue cell/cluster.toml tank --folder cell/keys
 
-`init` issues keys to all members and to one operator. Copy the folder members/NAME only to the machine of NAME (docs/how-to/deployment.md). Keep
+`init` issues keys to all members and to one engineer. Copy the folder members/NAME only to the machine of NAME (docs/how-to/deployment.md). Keep
 the folder authority where keys are issued.")]
 pub(crate) struct Arguments {
     #[command(subcommand)]
@@ -32,7 +32,7 @@ pub(crate) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum What {
-    /// Create the authority, and keys for all members and one operator
+    /// Create the authority, and keys for all members and one engineer
     Init {
         /// Cluster file
         #[arg(value_name = "CLUSTER.toml")]

@@ -8,11 +8,12 @@ use std::time::{Duration, SystemTime};
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
-use understudy_bus::{Call, Request};
+use understudy_bus::{BusError, Call, Request};
 use understudy_cluster::{Cluster, Overrides};
 use understudy_executable::Interface;
 use understudy_journal::{
-    Command, Done, OperatorAction, Refusal, RequestedValue, WriteRequest, force_value, new_write,
+    Command, Done, OperatorAction, Refusal, RequestedValue, WriteRequest, attempt_until_decided,
+    force_value, new_write,
 };
 use understudy_keys::{Date, OperatorKeys};
 use understudy_member::tls_keys;
@@ -272,12 +273,23 @@ fn refused(refusal: &Refusal) -> Answer {
     Answer::failed(Status::Failed, &refusal.code(), refusal.to_string())
 }
 
-/// The answer of a remote I/O to a write.
-fn outcome(arguments: &Arguments, text: &str) -> Result<Answer, Answer> {
-    let answer: WriteAnswer = serde_json::from_str(text)
-        .map_err(|_| refused(&Refusal::Said(format!("U0556: {text:.200}"))))?;
-    let done = Done::of_write(answer.outcome).map_err(|refusal| refused(&refusal))?;
-    let cycle = done.cycle.unwrap_or_default();
+/// Writes to a remote I/O, and asks again over a new call where the answer is lost.
+fn write_elsewhere(
+    arguments: &Arguments,
+    request: &Request,
+    call: impl Fn() -> Result<Call, BusError>,
+) -> Result<Answer, Answer> {
+    let said = |error: BusError| Refusal::Said(error.to_string());
+    let done = attempt_until_decided(|| {
+        let text = match call().map_err(said)?.ask(request) {
+            Err(BusError::AnswerLost { .. }) => return Err(Refusal::Undecided),
+            answer => answer.map_err(said)?,
+        };
+        let answer: WriteAnswer = serde_json::from_str(&text)
+            .map_err(|_| Refusal::Said(format!("U0556: {text:.200}")))?;
+        Done::of_write(answer.outcome)
+    });
+    let cycle = done.map_err(|refusal| refused(&refusal))?.cycle.unwrap_or_default();
     let text = format!("write {}: in effect since cycle {cycle} of the cluster", arguments.name);
     let result = json!({ "name": arguments.name, "done": "write", "cycle": cycle });
     Ok(Answer::done(text, result))
@@ -315,7 +327,12 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
         Answer::failed(Status::BadInput, "U0608", message)
     })?;
     let hash = cluster.agreement().cluster;
-    let call = Call::to(address, hash, &arguments.name, &tls_keys(&keys.tls))?;
+    let tls = tls_keys(&keys.tls);
+    let call = || Call::to(address, hash, &arguments.name, &tls);
+    if let Some(request @ Request::Write(_)) = &request {
+        return write_elsewhere(arguments, request, call);
+    }
+    let call = call()?;
     let Some(request) = request else {
         let mut left = arguments.lines;
         let take = |line: &str| {
@@ -327,9 +344,6 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
         return Ok(Answer::done("", json!(null)));
     };
     let text = call.ask(&request)?;
-    if let Request::Write(_) = request {
-        return outcome(arguments, &text);
-    }
     let result = serde_json::from_str(&text).unwrap_or_else(|_| json!({ "text": text }));
     Ok(Answer::done(text, result))
 }
