@@ -13,7 +13,7 @@ use understudy_cluster::{Cluster, Overrides};
 use understudy_executable::Interface;
 use understudy_journal::{
     Command, Done, OperatorAction, Refusal, RequestedValue, WriteRequest, attempt_until_decided,
-    force_value, new_write,
+    force_value, new_write, repeated,
 };
 use understudy_keys::{Date, OperatorKeys};
 use understudy_member::tls_keys;
@@ -336,6 +336,9 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
     let Some(request) = request else {
         let mut left = arguments.lines;
         let take = |line: &str| {
+            if repeated(line).is_ok() {
+                return true;
+            }
             left = left.saturating_sub(1);
             // The reader closed the pipe.
             writeln!(std::io::stdout(), "{line}").is_ok() && left > 0

@@ -1,12 +1,12 @@
 //! A page that looks at a cluster which runs already: a laboratory of another process, and members with addresses and keys of their own.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde_json::{Value, json};
 
 use crate::shared::DEADLINE;
-use crate::shared::deployed::{Running, addressed_cell, text};
+use crate::shared::deployed::{Deployed, text};
 use crate::{Page, answer, empty_folder, member, one_at_a_time, understudy};
 
 const CELL: &str = "examples/press-cell/cluster.toml";
@@ -115,46 +115,12 @@ fn a_laboratory_of_another_process_is_looked_at_and_commanded() {
     assert!(lines[0]["text"].as_str().is_some_and(|text| text.contains("anna has acknowledged")));
 }
 
-/// Every member of the press cell as a process with an address and keys of its own.
-struct Deployed {
-    cluster: PathBuf,
-    keys: PathBuf,
-    _members: Vec<Running>,
-}
-
-fn deployed(folder: &Path) -> Deployed {
-    let cluster = addressed_cell(folder);
-    let file = fs::read_to_string(&cluster).expect("it is ours");
-    let times = "period = \"50ms\"\nlink = \"udp\"";
-    assert!(file.contains("period = \"10ms\"") && !file.contains("\nlink"));
-    fs::write(&cluster, file.replace("period = \"10ms\"", times)).expect("it is ours");
-    let keys = folder.join("keys");
-    let (status, made, _) = answer(&["keys", "init", text(&cluster), "--folder", text(&keys)]);
-    assert_eq!(status, 0, "{made:#}");
-    let members = [
-        ("node", "robot"),
-        ("node", "press"),
-        ("node", "understudy"),
-        ("remote-io", "robot-io"),
-        ("remote-io", "press-io"),
-        ("plant", "arm"),
-        ("plant", "ram"),
-    ];
-    let start = |(what, name): (&str, &str)| {
-        let own = keys.join("members").join(name);
-        let member = [what, text(&cluster), "--name", name, "--keys", text(&own)];
-        Running::start(&[&member[..], &["--no-real-time"]].concat())
-    };
-    let members = members.into_iter().map(start).collect();
-    Deployed { cluster, keys, _members: members }
-}
-
 #[test]
 fn members_elsewhere_are_looked_at_with_an_operators_keys() {
     let _turn = one_at_a_time();
     let folder = empty_folder("attach-elsewhere");
     let runs = folder.join("runs");
-    let running = deployed(&folder);
+    let running = Deployed::start(&folder);
     let cluster = text(&running.cluster);
     let operator = running.keys.join("members/engineer");
 

@@ -9,6 +9,7 @@ mod attach;
 mod browser;
 mod commands;
 mod demo;
+mod elsewhere;
 mod paths;
 mod present;
 #[allow(dead_code, reason = "each test uses its part")]

@@ -1,12 +1,15 @@
 //! A cluster as it is deployed: every member at an address of its own, as a process of its own.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Stdio};
 
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
 use understudy_bus::free_addresses;
 
-use super::understudy;
+use super::{answer, understudy};
 
 pub(crate) fn text(path: &Path) -> &str {
     path.to_str().expect("text")
@@ -53,5 +56,81 @@ impl Drop for Running {
         // It can only fail where the process has ended by itself.
         let _ = self.0.kill();
         let _ = self.0.wait();
+    }
+}
+
+/// The members of the press cell, with the command that runs each.
+const MEMBERS: [(&str, &str); 7] = [
+    ("robot", "node"),
+    ("press", "node"),
+    ("understudy", "node"),
+    ("robot-io", "remote-io"),
+    ("press-io", "remote-io"),
+    ("arm", "plant"),
+    ("ram", "plant"),
+];
+
+/// Every member of the press cell as a process with an address and keys of its own, at a period of 50 ms.
+pub(crate) struct Deployed {
+    folder: PathBuf,
+    pub(crate) cluster: PathBuf,
+    pub(crate) keys: PathBuf,
+    members: BTreeMap<&'static str, Running>,
+}
+
+impl Deployed {
+    pub(crate) fn start(folder: &Path) -> Self {
+        let cluster = addressed_cell(folder);
+        let file = fs::read_to_string(&cluster).expect("it is ours");
+        let times = "period = \"50ms\"\nlink = \"udp\"";
+        assert!(file.contains("period = \"10ms\"") && !file.contains("\nlink"));
+        fs::write(&cluster, file.replace("period = \"10ms\"", times)).expect("it is ours");
+        let keys = folder.join("keys");
+        let (status, made, _) = answer(&["keys", "init", text(&cluster), "--folder", text(&keys)]);
+        assert_eq!(status, 0, "{made:#}");
+        let folder = folder.to_owned();
+        let mut deployed = Self { folder, cluster, keys, members: BTreeMap::new() };
+        MEMBERS.iter().for_each(|(name, _)| deployed.start_with(name, &deployed.cluster.clone()));
+        deployed
+    }
+
+    /// Starts a member with a cluster file, in place of the process that ran as it. Its journal and its errors are files of their own.
+    pub(crate) fn start_with(&mut self, name: &str, cluster: &Path) {
+        let found = MEMBERS.iter().find(|(member, _)| *member == name);
+        let (name, command) = found.expect("a member");
+        self.members.remove(name);
+        let own = self.keys.join("members").join(name);
+        let journal = self.journal(name);
+        for before in [&journal, &self.errors(name)] {
+            // Of the process before.
+            let _ = fs::remove_file(before);
+        }
+        let member = [command, text(cluster), "--name", name, "--keys", text(&own)];
+        let child = understudy(&[&member[..], &["--no-real-time"]].concat())
+            .args(["--journal", text(&journal)])
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(fs::File::create(self.errors(name)).expect("a file"))
+            .spawn();
+        self.members.insert(name, Running(child.expect("the binary is built")));
+    }
+
+    /// The file of a member's own journal.
+    pub(crate) fn journal(&self, name: &str) -> PathBuf {
+        self.folder.join(format!("{name}.jsonl"))
+    }
+
+    /// The file of what a member says on standard error.
+    pub(crate) fn errors(&self, name: &str) -> PathBuf {
+        self.folder.join(format!("{name}.errors"))
+    }
+
+    pub(crate) fn process(&mut self, name: &str) -> &mut Child {
+        &mut self.members.get_mut(name).expect("it was started").0
+    }
+
+    pub(crate) fn signal(&mut self, name: &str, signal: Signal) {
+        let id = i32::try_from(self.process(name).id()).expect("a process id");
+        kill(Pid::from_raw(id), signal).expect("it runs");
     }
 }

@@ -20,6 +20,7 @@
 mod error;
 mod follower;
 mod found;
+mod in_effect;
 mod recorder;
 
 pub use error::AttachError;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tokio::sync::mpsc::{Receiver, channel};
 use tokio::sync::oneshot;
@@ -12,20 +12,25 @@ use understudy_bus::{DONE, Request};
 use understudy_cluster::AlarmDeclaration;
 use understudy_journal::{
     Command, Commanded, Commander, Commands, Done, Happening, Journal, OperatorAction, Record,
-    Refusal, RunDirectory, RunEvent, RunSocket, commands, monotonic_ns,
+    Refusal, RunDirectory, RunEvent, RunSocket, commands, monotonic_ns, repeated,
 };
+use understudy_node::Event as StationEvent;
 use understudy_remote_io::Event as RemoteIoEvent;
-use understudy_wire::{Member, Write, WriteAnswer};
+use understudy_wire::{Member, Moment, Write, WriteAnswer};
 
 use crate::error::AttachError;
 use crate::follower::{Calls, Follower, Told};
 use crate::found::Found;
+use crate::in_effect::InEffect;
 
 /// Lines that wait to be written, at most; then their followers wait, and lose what comes meanwhile.
 const UNWRITTEN: usize = 16_384;
 
 /// How often readers of the journal see what is new.
 const SHOW: Duration = Duration::from_millis(50);
+
+/// Stations that report turns for this time without a deadline of any remote I/O: none of them lives, or none is received here.
+const WITHOUT_DEADLINES: Duration = Duration::from_millis(500);
 
 const PROCESS: &str = "its process runs elsewhere: end, start or suspend it on its own machine";
 const LINKS: &str = "links between members on other machines cannot be cut from here";
@@ -117,6 +122,8 @@ impl Found {
             signals: self.signals,
             alarms: self.alarms,
             has_origin: false,
+            published: None,
+            in_effect: InEffect::default(),
         };
         let directory = directory.clone();
         let recorder = std::thread::Builder::new()
@@ -141,6 +148,9 @@ struct Recorder {
     signals: Vec<(usize, usize)>,
     alarms: Arc<[AlarmDeclaration]>,
     has_origin: bool,
+    /// The first turn that was reported, and when.
+    published: Option<(Moment, Instant)>,
+    in_effect: InEffect,
 }
 
 impl Recorder {
@@ -160,7 +170,7 @@ impl Recorder {
                     Some(told) => self.note(told),
                     None => break,
                 },
-                _ = show.tick() => self.journal.flush(),
+                _ = show.tick() => self.show(),
             }
         }
         self.own(RunEvent::Finished);
@@ -174,11 +184,20 @@ impl Recorder {
     fn note(&mut self, told: Told) {
         let (member, line) = match told {
             Told::Line(member, line) => (member, line),
-            Told::Attached(member) => return self.own(RunEvent::Attached { member }),
+            Told::Attached(member) => {
+                self.in_effect.attached(member);
+                return self.own(RunEvent::Attached { member });
+            }
             Told::Detached(member, reason) => {
                 return self.own(RunEvent::Detached { member, reason });
             }
         };
+        if let Ok(repeated) = repeated(&line) {
+            for record in self.in_effect.repeated(member, repeated, self.has_origin) {
+                self.write_of_member(&record);
+            }
+            return;
+        }
         // A line that is not a record of its sender is dropped.
         let Ok(record) = serde_json::from_str::<Record>(&line) else {
             return;
@@ -186,14 +205,36 @@ impl Recorder {
         if record.member != Some(member) {
             return;
         }
-        self.journal.write(&record);
-        if let (false, Happening::RemoteIo(RemoteIoEvent::Applied { moment, .. })) =
-            (self.has_origin, &record.event)
-        {
-            self.has_origin = true;
-            let (moment, cycle) = (*moment, moment.cycle.0);
-            self.own(RunEvent::Origin { moment, cycle });
+        self.write_of_member(&record);
+        match &record.event {
+            Happening::RemoteIo(RemoteIoEvent::Applied { moment, .. }) => self.origin(*moment),
+            Happening::Station(StationEvent::Published { moment, .. }) => {
+                self.published.get_or_insert((*moment, Instant::now()));
+            }
+            _ => {}
         }
+    }
+
+    fn write_of_member(&mut self, record: &Record) {
+        self.in_effect.note(record);
+        self.journal.write(record);
+    }
+
+    /// The cycles of the cluster are counted from here on: with the first deadline of a remote I/O, and with a turn where no remote I/O reports one.
+    fn origin(&mut self, moment: Moment) {
+        if !self.has_origin {
+            self.has_origin = true;
+            self.own(RunEvent::Origin { moment, cycle: moment.cycle.0 });
+        }
+    }
+
+    fn show(&mut self) {
+        if let Some((moment, first)) = self.published
+            && first.elapsed() > WITHOUT_DEADLINES
+        {
+            self.origin(moment);
+        }
+        self.journal.flush();
     }
 
     /// Sends a write; its outcome takes cycles, in which the journal goes on.

@@ -8,6 +8,7 @@
 //! Invariant: whoever starts at a checkpoint or a continuation counts cycles as whoever started at the first record.
 
 use serde::{Deserialize, Serialize};
+use understudy_node::Event as Station;
 use understudy_remote_io::{Event as RemoteIo, Missing};
 use understudy_wire::{Image, Member, Moment, StationSet};
 
@@ -29,7 +30,7 @@ pub struct Continuation {
     pub origin: i64,
     /// The count of cycles.
     pub numbering: Numbering,
-    /// The stations that any remote I/O has received.
+    /// The stations that have taken a turn: they have reported one, or a remote I/O has received one.
     pub received: StationSet,
     /// By program, its remote I/O; nothing before its first deadline.
     pub programs: Vec<Option<ProgramSoFar>>,
@@ -128,9 +129,13 @@ impl Followed {
                     track.inputs = Some(sampled.clone());
                 }
             }
+            (Happening::Station(Station::Published { .. }), Some(Member::Station(station))) => {
+                self.received.insert(station);
+                self.in_effect.note(record, self.cycles.of(moment(&record.event)));
+            }
             (Happening::Run(RunEvent::Origin { moment, cycle }), _) => {
                 let cycle = i64::try_from(*cycle).unwrap_or(i64::MAX / 2);
-                self.cycles.origin_is(*moment, cycle);
+                self.cycles.origin_is_recorded(*moment, cycle);
                 self.move_to_origin();
             }
             _ => {

@@ -99,6 +99,16 @@ impl Cycles {
         }
     }
 
+    /// A record of the journal says that `moment` is cycle `cycle` of the run. It follows the first deadline, and where no remote I/O has reported
+    /// one the count begins with it.
+    pub fn origin_is_recorded(&mut self, moment: Moment, cycle: i64) {
+        if self.numbering.latest().is_none() {
+            *self = Self::at(moment, cycle);
+        } else {
+            self.origin_is(moment, cycle);
+        }
+    }
+
     /// Offset to be added to every earlier cycle.
     pub fn take_shift(&mut self) -> Option<i64> {
         Some(std::mem::take(&mut self.shift)).filter(|shift| *shift != 0)

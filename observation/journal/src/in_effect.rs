@@ -78,6 +78,11 @@ impl InEffect {
         }
     }
 
+    /// Whether a turn of a station changes what is in effect.
+    pub(crate) fn awaits_turns(&self) -> bool {
+        !self.joining.is_empty()
+    }
+
     fn end_all(&mut self, is_over: impl Fn(&Subject) -> bool) {
         for (_, number) in self.by_subject.extract_if(.., |subject, _| is_over(subject)) {
             self.records.remove(&number);

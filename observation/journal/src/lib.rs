@@ -19,6 +19,7 @@ mod packed_file;
 mod packing;
 mod place;
 mod record;
+mod repeated;
 mod rules;
 mod run_directory;
 mod segments;
@@ -45,6 +46,7 @@ pub use operator::{
 pub use packed_file::{SegmentFile, open_file};
 pub use place::{CheckpointPlace, Place, continuation_before, place_before};
 pub use record::{Happening, LABORATORY, Record, RunEvent, moment};
+pub use repeated::{RecordsInEffect, repeated};
 pub use rules::{Process, SourceCounts, is_blocked, is_provable};
 pub use run_directory::{KEYS, RunDirectory, RunDirectoryError, time_name, time_text};
 pub use segments::{Segments, closed_segments, segments_of};

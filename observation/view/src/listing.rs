@@ -233,7 +233,7 @@ impl Listing {
             }
             (Happening::Run(RunEvent::Origin { moment, cycle }), _) => {
                 let cycle = i64::try_from(*cycle).unwrap_or(i64::MAX / 2);
-                self.cycles.origin_is(*moment, cycle);
+                self.cycles.origin_is_recorded(*moment, cycle);
                 cycle
             }
             (

@@ -93,8 +93,8 @@ impl StationState {
 /// Standing of a station, from the records up to a cycle, except for its process.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct StationStanding {
-    /// A remote I/O has received it at least once.
-    pub(crate) was_received: bool,
+    /// It has taken a turn at least once: it has reported one, or a remote I/O has received one.
+    pub(crate) took_turns: bool,
     pub(crate) joining: bool,
     /// Programs whose state it has and is not proved yet.
     pub(crate) shadow: ProgramSet,
@@ -128,8 +128,8 @@ impl StationStanding {
             _ if self.refused => StationState::Refused,
             _ if !self.shadow.is_empty() => StationState::ShadowMode,
             _ if self.joining => StationState::Joining,
-            _ if self.is_flagged() && self.was_received => StationState::Flagged,
-            _ if self.was_received => StationState::NotReceived,
+            _ if self.is_flagged() && self.took_turns => StationState::Flagged,
+            _ if self.took_turns => StationState::NotReceived,
             None => StationState::NotStarted,
             Some(Process::Running) => StationState::Joining,
         }

@@ -10,7 +10,7 @@
 //! | `command/release`, `command/stop` | asked: done | engineers | no |
 //! | `write/operator`, `write/engineer` | asked with a write as JSON: its outcome | operators; engineers | no |
 //! | `command/force`, `command/unforce` | asked with a force or a signal as JSON: done, or why not | engineers | no |
-//! | `journal` | told: the lines of its journal, those of a moment at once | all | no |
+//! | `journal` | told: the lines of its journal, those of a moment at once; twice a second those in effect again | all | no |
 //!
 //! and under `understudy/cluster/<member>`, for callers whose cluster file may be another one: asked, the hash of the configuration.
 //!
@@ -89,6 +89,17 @@ pub struct ChannelSettings {
     pub admitted: Box<dyn FnMut() -> Admitted + Send>,
     /// The canonical text of its configuration.
     pub configuration: String,
+    /// Finds the lines of its journal that are in effect.
+    pub in_effect: Box<dyn LinesInEffect>,
+}
+
+/// The lines of a journal that are in effect: they are repeated for whoever attaches while the member runs.
+pub trait LinesInEffect: Send {
+    /// Takes the next line of the journal.
+    fn note(&mut self, line: &[u8]);
+
+    /// Those in effect now, as lines that can be told from others.
+    fn repetition(&self) -> Vec<u8>;
 }
 
 /// A channel that runs; ends when it is dropped.
@@ -235,6 +246,11 @@ impl<E: Send + 'static> Channel<E> {
                 continue;
             }
             looked = now;
+            // Whoever attaches now knows the present soon, and not when something changes.
+            let repetition = self.settings.in_effect.repetition();
+            if let Some(opened) = opened.as_ref().filter(|_| !repetition.is_empty()) {
+                let _ = opened.journal.put(repetition).wait();
+            }
             // One look later than it was seen, so that the answer is out before its channel ends.
             if stopping {
                 self.control.give(Order::Stop);
@@ -271,12 +287,14 @@ impl<E: Send + 'static> Channel<E> {
         clippy::disallowed_methods,
         reason = "who looks on is told a moment later, and the cycle never waits for this thread"
     )]
-    fn gather(&self, first: Vec<u8>) -> Vec<u8> {
+    fn gather(&mut self, first: Vec<u8>) -> Vec<u8> {
         std::thread::sleep(GATHER);
+        self.settings.in_effect.note(&first);
         let mut lines = first;
         while lines.len() < GATHERED_BYTES
             && let Ok(line) = self.telemetry.lines.try_recv()
         {
+            self.settings.in_effect.note(&line);
             lines.extend_from_slice(&line);
         }
         lines

@@ -39,7 +39,7 @@ mod writes;
 mod zenoh_link;
 
 pub use announcer::{Announcer, Question};
-pub use channel::{Admitted, ChannelSettings, DONE, TlsKeys};
+pub use channel::{Admitted, ChannelSettings, DONE, LinesInEffect, TlsKeys};
 pub use clock::Clock;
 pub use connections::{
     Connection, Connections, Listener, RESERVED_DESCRIPTORS, RefusedConnections, RelayedCallers,

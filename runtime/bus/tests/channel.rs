@@ -18,8 +18,8 @@ use std::time::{Duration, Instant, SystemTime};
 use members::{Chatter, endpoints, peers, station};
 use serde_json::json;
 use understudy_bus::{
-    Admitted, BusError, Call, ChannelSettings, Commands, DONE, Guard, LinkKind, MemberSettings,
-    NoField, Peer, Request, TlsKeys, run_member,
+    Admitted, BusError, Call, ChannelSettings, Commands, DONE, Guard, LinesInEffect, LinkKind,
+    MemberSettings, NoField, Peer, Request, TlsKeys, run_member,
 };
 use understudy_cycle::Mode;
 use understudy_keys::{Authority, Date, People};
@@ -28,6 +28,17 @@ use understudy_wire::{ConfigurationHash, Force, Role, SignalPlace, Write, WriteI
 use zenoh::Wait;
 
 const DEADLINE: Duration = Duration::from_secs(60);
+
+/// Of a journal without records in effect.
+struct NothingInEffect;
+
+impl LinesInEffect for NothingInEffect {
+    fn note(&mut self, _: &[u8]) {}
+
+    fn repetition(&self) -> Vec<u8> {
+        Vec::new()
+    }
+}
 
 /// Keys of the robot, of the router, and of two who call through it.
 fn issued() -> PathBuf {
@@ -113,6 +124,7 @@ fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
                 keys: own,
                 admitted: Box::new(admitted),
                 configuration: "what everybody has to agree on".into(),
+                in_effect: Box::new(NothingInEffect),
             }),
             field: Box::new(NoField),
             commands: Commands::None,
@@ -231,6 +243,7 @@ fn an_operator_reaches_a_member_with_an_ipv6_address() {
                 keys: own,
                 admitted: Box::new(admitted),
                 configuration: "what everybody has to agree on".into(),
+                in_effect: Box::new(NothingInEffect),
             }),
             field: Box::new(NoField),
             commands: Commands::None,

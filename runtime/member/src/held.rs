@@ -3,8 +3,11 @@
 use std::sync::Arc;
 use std::time::SystemTime;
 
-use understudy_bus::{Admitted, ChannelSettings, Guard, NewLife, TlsKeys, hold_back_signals};
+use understudy_bus::{
+    Admitted, ChannelSettings, Guard, LinesInEffect, NewLife, TlsKeys, hold_back_signals,
+};
 use understudy_cluster::{Cluster, Security};
+use understudy_journal::RecordsInEffect;
 use understudy_keys::{Date, MemberKeys, RevocationWatch, TlsFiles};
 use understudy_wire::Member;
 
@@ -74,6 +77,24 @@ fn channel(keys: Arc<MemberKeys>, cluster: &Cluster) -> ChannelSettings {
             }
         }),
         configuration: cluster.canonical_text().to_owned(),
+        in_effect: Box::new(InEffect::default()),
+    }
+}
+
+/// The records of a member that are in effect, in the lines of its journal.
+#[derive(Default)]
+struct InEffect(RecordsInEffect);
+
+impl LinesInEffect for InEffect {
+    fn note(&mut self, line: &[u8]) {
+        // A line that was cut is no record.
+        if let Ok(line) = std::str::from_utf8(line) {
+            self.0.note_line(line);
+        }
+    }
+
+    fn repetition(&self) -> Vec<u8> {
+        self.0.repetition()
     }
 }
 

@@ -398,6 +398,7 @@ impl Now {
     fn station(&mut self, station: StationId, event: &StationEvent) {
         match event {
             StationEvent::Published { .. } => {
+                self.received.insert(station);
                 self.joining.remove(&station);
                 self.shadow.retain(|(own, _)| *own != station);
             }

@@ -110,7 +110,8 @@ impl Model {
     pub fn oldest(&self) -> Option<i64> {
         let oldest =
             self.histories.iter().filter_map(|history| Some(history.steps().front()?.cycle));
-        Some(oldest.max()?.max(0))
+        // Without a remote I/O there is the present alone.
+        Some(oldest.max().or_else(|| self.newest())?.max(0))
     }
 
     /// The standing in a cycle, for the newest with what was done to the members since.

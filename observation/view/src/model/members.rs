@@ -157,12 +157,12 @@ impl Model {
         }
     }
 
-    /// A turn. It is a change only for a station that was joining or in shadow mode, which it is until its first turn.
+    /// A turn. It is a change only for a station that has not taken one, or was joining or in shadow mode until this one.
     fn published(&mut self, station: StationId, cycle: i64) {
         let member = Member::Station(station);
         self.is_alive(member, cycle);
         let own = self.changes.now().station(station);
-        if own.is_some_and(|own| own.joining || !own.shadow.is_empty()) {
+        if own.is_some_and(|own| own.joining || !own.shadow.is_empty() || !own.took_turns) {
             let change = Change::Station(station, StationChange::Published);
             self.changes.reported(member, cycle, change);
         }
@@ -180,7 +180,7 @@ impl Model {
         self.received.note(cycle, heard);
         for station in heard.iter() {
             let own = self.changes.now().station(station);
-            if own.is_some_and(|own| !own.was_received || own.refused) {
+            if own.is_some_and(|own| !own.took_turns || own.refused) {
                 let change = Change::Station(station, StationChange::Received);
                 self.changes.push(cycle, change);
             }

@@ -39,7 +39,7 @@ impl Model {
             }
             RunEvent::Origin { moment, cycle } => {
                 let cycle = i64::try_from(*cycle).unwrap_or(i64::MAX / 2);
-                self.cycles.origin_is(*moment, cycle);
+                self.cycles.origin_is_recorded(*moment, cycle);
             }
             RunEvent::ScenarioOver { verdict } => {
                 self.changes.push(cycle, Change::ScenarioOver(verdict.clone()));

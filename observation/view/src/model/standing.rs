@@ -248,11 +248,12 @@ impl StationChange {
             Self::Joins => own.joining = true,
             Self::Adopted(program) => own.shadow.insert(*program),
             Self::Published => {
+                own.took_turns = true;
                 own.joining = false;
                 own.shadow = ProgramSet::EMPTY;
             }
             Self::Received => {
-                own.was_received = true;
+                own.took_turns = true;
                 own.refused = false;
             }
             Self::Refused => own.refused = true,

@@ -100,7 +100,9 @@ fn read(run: &Run, mut source: Source) -> Model {
 fn present(model: &Model) -> Value {
     let mut snapshot = serde_json::to_value(model.snapshot()).expect("JSON");
     let fields = snapshot.as_object_mut().expect("an object");
-    for of_what_was_read in ["alarms", "events", "host_stalls", "read_from", "records", "timing"] {
+    let of_what_was_read =
+        ["alarms", "events", "host_stalls", "left_out", "read_from", "records", "timing"];
+    for of_what_was_read in of_what_was_read {
         assert!(fields.remove(of_what_was_read).is_some());
     }
     // Whether another remote I/O received the station when it was said: otherwise both causes are named.

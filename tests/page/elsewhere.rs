@@ -1,0 +1,170 @@
+//! What a page says of members on other machines: attached while they run for long, while some of them are gone, and while some run another program.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::time::Instant;
+
+use nix::sys::signal::Signal;
+use serde_json::Value;
+
+use crate::shared::DEADLINE;
+use crate::shared::deployed::{Deployed, text};
+use crate::{Page, empty_folder, member, one_at_a_time, understudy};
+
+/// Cycles of 50 ms in 2 s.
+const TWO_SECONDS: i64 = 40;
+
+/// A page of its own, with a run of its own.
+fn attached(running: &Deployed, runs: &Path) -> Page {
+    let operator = running.keys.join("members/engineer");
+    let mut command = understudy(&["watch", text(&running.cluster), "--address", "127.0.0.1:0"]);
+    command.args(["--keys", text(&operator), "--out", text(runs)]);
+    Page::start(command)
+}
+
+/// Waits until a member takes calls, so that a page can be attached.
+fn first_page(running: &Deployed, runs: &Path) -> Page {
+    let operator = running.keys.join("members/engineer");
+    let started = Instant::now();
+    loop {
+        let name = "robot-io";
+        let call = ["operate", text(&running.cluster), "--name", name, "--keys", text(&operator)];
+        let asked = understudy(&call).arg("status").output().expect("the binary is built");
+        if asked.status.success() {
+            return attached(running, runs);
+        }
+        assert!(started.elapsed() < DEADLINE, "{}", String::from_utf8_lossy(&asked.stderr));
+    }
+}
+
+/// Both programs are protected, and served by all stations.
+fn is_healthy(state: &Value) -> bool {
+    let programs = state["programs"].as_array().expect("programs");
+    programs
+        .iter()
+        .all(|program| program["source"] == "direct" && program["protection"]["protected"] == true)
+        && state["redundancy"]["survives"] == 1
+}
+
+/// What the alarm of a remote I/O says that drives nothing.
+const NOT_DRIVEN: &str = "no remote I/O drives the outputs of";
+
+/// What the alarm of a member says that runs another cluster file.
+const ODD: &str = "start it with this cluster file";
+
+/// Lasting alarms with these words: the names, with the cycle in which each was raised.
+fn alarms(state: &Value, words: &str) -> BTreeMap<String, i64> {
+    let alarms = state["alarms"].as_array().expect("alarms").iter();
+    let is_such = |alarm: &&Value| {
+        alarm["lasts"] == true && alarm["what"].as_str().is_some_and(|what| what.contains(words))
+    };
+    let named = alarms.filter(is_such).map(|alarm| {
+        let name = alarm["who"].as_str().expect("a name").to_owned();
+        (name, alarm["cycle"].as_i64().expect("a cycle"))
+    });
+    named.collect()
+}
+
+fn cycle(state: &Value) -> i64 {
+    state["cycle"].as_i64().expect("a cycle")
+}
+
+fn is_detached(state: &Value, name: &str) -> bool {
+    let note = member(state, name)["note"].as_str();
+    note.is_some_and(|note| note.contains("journal not received"))
+}
+
+#[test]
+fn protection_is_known_at_once_and_a_remote_io_that_is_gone_is_an_alarm() {
+    let _turn = one_at_a_time();
+    let folder = empty_folder("elsewhere-gone");
+    let mut running = Deployed::start(&folder);
+    let first = first_page(&running, &folder.join("first"));
+    first.wait_for("a healthy cluster", is_healthy);
+    // Nothing changes any more, and a page that comes now knows what was so before.
+    let second = attached(&running, &folder.join("second"));
+    let healthy = second.wait_for("the same at a second page", is_healthy);
+    assert!(alarms(&healthy, NOT_DRIVEN).is_empty(), "{healthy:#}");
+
+    // Killed, and one that only stands still.
+    for (name, signal) in [("robot-io", Signal::SIGKILL), ("press-io", Signal::SIGSTOP)] {
+        let last = first.wait_for("cycles", |_| true);
+        running.signal(name, signal);
+        let is_raised = |state: &Value| alarms(state, NOT_DRIVEN).contains_key(name);
+        for page in [&first, &second] {
+            let state = page.wait_for("an alarm", is_raised);
+            let raised = alarms(&state, NOT_DRIVEN)[name];
+            let after = raised - cycle(&last);
+            assert!((0..=TWO_SECONDS).contains(&after), "{name}: after {after} cycles, {state:#}");
+        }
+    }
+    // A page that comes now finds no remote I/O: it shows what the stations say, the alarms, and of whom it knows nothing.
+    let late = attached(&running, &folder.join("late"));
+    let state = late.wait_for("the alarms", |state| alarms(state, NOT_DRIVEN).len() == 2);
+    let begun = cycle(&state);
+    let state = late.wait_for("cycles that go on", |state| cycle(state) > begun + 5);
+    for name in ["robot", "press", "understudy"] {
+        // They take their turns, and no remote I/O is there to receive them.
+        assert_eq!(member(&state, name)["state"], "not-received", "{state:#}");
+        assert!(!is_detached(&state, name), "{state:#}");
+    }
+    for (place, name) in ["robot-io", "press-io"].into_iter().enumerate() {
+        assert_eq!(member(&state, name)["state"], "not-reporting", "{state:#}");
+        assert!(is_detached(&state, name), "{state:#}");
+        assert_eq!(state["programs"][place]["source"], "unknown", "{state:#}");
+        assert!(state["programs"][place]["protection"].is_null(), "{state:#}");
+    }
+    assert_eq!(state["redundancy"]["survives"], 0, "{state:#}");
+    running.signal("press-io", Signal::SIGCONT);
+    for page in [&first, &second, &late] {
+        page.wait_for("one of them back", |state| {
+            let alarms = alarms(state, NOT_DRIVEN);
+            alarms.len() == 1 && alarms.contains_key("robot-io")
+        });
+    }
+    running.start_with("robot-io", &running.cluster.clone());
+    for page in [&first, &second, &late] {
+        page.wait_for("all of them back", |state| alarms(state, NOT_DRIVEN).is_empty());
+    }
+}
+
+/// A roll-out machine by machine, or a wrong download.
+#[test]
+fn a_controller_and_a_remote_io_with_another_program_drive_nothing_and_are_alarms() {
+    let _turn = one_at_a_time();
+    let folder = empty_folder("elsewhere-wrong-program");
+    let mut running = Deployed::start(&folder);
+    let first = first_page(&running, &folder.join("first"));
+    first.wait_for("a healthy cluster", is_healthy);
+    // The robot's outputs are those of another program, with the same points.
+    let ladder = fs::read_to_string(folder.join("robot.ladder")).expect("it is ours");
+    let wrong = folder.join("wrong");
+    fs::create_dir_all(&wrong).expect("a folder");
+    fs::copy(folder.join("press.ladder"), wrong.join("press.ladder")).expect("copied");
+    let changed = ladder.replacen("moving_right arm_up /stop", "moving_right arm_up", 1);
+    assert_ne!(changed, ladder);
+    fs::write(wrong.join("robot.ladder"), changed).expect("written");
+    let other = wrong.join("cluster.toml");
+    fs::copy(&running.cluster, &other).expect("copied");
+    for name in ["robot", "robot-io"] {
+        running.process(name).kill().expect("it runs");
+        running.process(name).wait().expect("it ends");
+    }
+    for name in ["robot", "robot-io"] {
+        running.start_with(name, &other);
+    }
+    let is_raised = |state: &Value| alarms(state, ODD).contains_key("robot");
+    first.wait_for("an alarm of the controller", is_raised);
+    let second = attached(&running, &folder.join("second"));
+    second.wait_for("the same at a page that came later", is_raised);
+    let status = running.process("robot").wait().expect("it ends");
+    let said = fs::read_to_string(running.errors("robot")).expect("it is ours");
+    assert_eq!(status.code(), Some(1), "{said}");
+    assert!(said.contains("error[U0598]"), "{said}");
+    let journal = fs::read_to_string(running.journal("robot-io")).expect("a journal");
+    let driven = journal.lines().filter(|line| {
+        line.contains("\"source\":\"direct\"") || line.contains("\"source\":\"reconstructed\"")
+    });
+    assert_eq!(driven.collect::<Vec<_>>(), [""; 0], "a wrong program drives");
+}
