@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
 use understudy_executable::Interface;
-use understudy_typed::{Elementary, Point, Points, Program};
+use understudy_typed::{Declared, Point, Points, Program};
 
 use crate::model::{Direction, Terminal, Terminals};
 
@@ -36,14 +36,16 @@ pub enum BindingProblem {
         /// The inputs, or the outputs, of the controller.
         known: Arc<[String]>,
     },
-    /// A terminal and the signal that it is bound to are of different types.
+    /// A terminal and the signal that it is bound to are of different types, or the receiver of the two lacks values of the sender.
     OtherType {
         /// The terminal and its type.
         terminal: Terminal,
+        /// Whether the model drives the signal or is driven by it.
+        direction: Direction,
         /// What it is bound to.
         signal: String,
-        /// The signal's type.
-        of: Elementary,
+        /// Type and range of the signal.
+        declared: Declared,
     },
     /// Two sensors are bound to one input of the controller.
     DrivenTwice {
@@ -134,11 +136,16 @@ impl Binding {
                     });
                     continue;
                 };
-                if point.of != terminal.of {
+                let (sender, receiver) = match direction {
+                    Direction::Sensor => (terminal.declared, point.declared()),
+                    Direction::Actuator => (point.declared(), terminal.declared),
+                };
+                if !receiver.takes(sender) {
                     problems.push(BindingProblem::OtherType {
                         terminal: terminal.clone(),
+                        direction,
                         signal: signal.clone(),
-                        of: point.of,
+                        declared: point.declared(),
                     });
                 }
                 let place = point.bit as usize;

@@ -5,7 +5,7 @@ use std::hash::{Hash, Hasher};
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 use understudy_executable::{Executable, Interface};
-use understudy_typed::Elementary;
+use understudy_typed::{Declared, Elementary};
 use understudy_wire::{Field, Image};
 
 use crate::binding::{Binding, BindingProblem, Driver, Signals};
@@ -81,17 +81,17 @@ pub struct Terminal {
     /// Its name.
     pub name: String,
     /// What it shows, or what moves it.
-    pub of: Elementary,
+    pub declared: Declared,
 }
 
 impl Terminal {
     /// One that is on or off.
     fn bit(name: &str) -> Self {
-        Self { name: name.to_owned(), of: Elementary::Bool }
+        Self { name: name.to_owned(), declared: Declared { of: Elementary::Bool, range: None } }
     }
 
     pub(crate) fn bits(&self) -> usize {
-        self.of.bits() as usize
+        self.declared.of.bits() as usize
     }
 }
 
@@ -140,6 +140,14 @@ impl ModelKind {
                 always_zero: Vec::new(),
                 positions: Vec::new(),
             },
+        }
+    }
+
+    /// The points that count parts or plant faults and are no BOOL.
+    pub fn counted_numbers(&self) -> Vec<Terminal> {
+        match self {
+            Self::Robot(_) | Self::Press(_) => Vec::new(),
+            Self::Program(program) => program_model::counted_numbers(&program.interface),
         }
     }
 

@@ -9,8 +9,8 @@
 use std::hash::{Hash, Hasher};
 
 use smallvec::SmallVec;
-use understudy_executable::{Executable, Scratch};
-use understudy_typed::{Point, Points, Program};
+use understudy_executable::{Executable, Interface, Scratch};
+use understudy_typed::{Elementary, Point, Points, Program};
 use understudy_wire::Image;
 
 use crate::model::{Counts, Model, PlantProgram, Terminal};
@@ -31,7 +31,7 @@ fn is_sensor(point: &&Point) -> bool {
 }
 
 fn terminal(point: &Point) -> Terminal {
-    Terminal { name: point.name.clone(), of: point.of }
+    Terminal { name: point.name.clone(), declared: point.declared() }
 }
 
 /// The inputs that the controller drives: all but `part_arrives`.
@@ -42,6 +42,14 @@ pub(crate) fn actuators(inputs: &Points) -> Vec<Terminal> {
 /// The outputs that the controller senses: all but those that are counted.
 pub(crate) fn sensors(outputs: &Points) -> Vec<Terminal> {
     outputs.iter().filter(is_sensor).map(terminal).collect()
+}
+
+/// The points of a plant's own meaning that are no BOOL: they have no edge to be counted.
+pub(crate) fn counted_numbers(interface: &Interface) -> Vec<Terminal> {
+    let inputs = interface.inputs.iter().filter(|point| !is_actuator(point));
+    let outputs = interface.outputs.iter().filter(|point| !is_sensor(point));
+    let numbers = inputs.chain(outputs).filter(|point| point.of != Elementary::Bool);
+    numbers.map(terminal).collect()
 }
 
 /// The bits of points, one behind the other.

@@ -1,4 +1,7 @@
 //! A program from any form of file: a ladder where it is Boolean, else a typed program.
+//!
+//! A program whose inputs and outputs are whole numbers is executed as a typed program, also where a ladder could hold it: a number is a point with the
+//! type and the range of its declaration, on which all members agree. Bits of a ladder have neither.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -6,7 +9,7 @@ use std::time::Duration;
 use understudy_ladder::Program as Ladder;
 use understudy_structured_text::parse;
 use understudy_text::{Diagnostic, Severity};
-use understudy_typed::Program as Typed;
+use understudy_typed::{Elementary, Program as Typed};
 
 use crate::format::{Format, Reading, read, unknown_form};
 use crate::plcopen;
@@ -16,7 +19,7 @@ use crate::twincat;
 /// What a file holds.
 #[derive(Debug, Clone)]
 pub enum Source {
-    /// A program of bits, timers, counters and bounded integers.
+    /// A program whose points are bits: bits, timers, counters and bounded integers.
     Ladder(Ladder),
     /// A program with numbers, for one period.
     Typed(Arc<Typed>),
@@ -58,8 +61,10 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
     let Reading { program, period, diagnostics, .. } = read(format, name, text, wanted.program);
     let ladder = SourceFile { source: program.map(Source::Ladder), period, diagnostics };
     let is_ladder = ladder.source.is_some();
+    let has_numbers =
+        matches!(&ladder.source, Some(Source::Ladder(ladder)) if has_bits_of_numbers(ladder));
     let are_several = wanted.program.is_none() && text.matches("<pouInstance").nth(1).is_some();
-    if is_ladder && !are_several || format != Format::PlcOpen {
+    if is_ladder && !are_several && !has_numbers || format != Format::PlcOpen {
         return ladder;
     }
     // What no ladder can hold may be a program with numbers, or a library.
@@ -69,8 +74,8 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
         return SourceFile { diagnostics: parsed.1, ..ladder };
     }
     let read = whole(text, parsed, wanted.program, wanted.period);
-    let runs_several = read.typed.as_ref().is_some_and(|typed| typed.tasks.len() > 1);
-    if is_ladder && !runs_several {
+    let is_better = |typed: &Typed| typed.tasks.len() > 1 || has_numbers_as_points(typed);
+    if is_ladder && !read.typed.as_ref().is_some_and(is_better) {
         return ladder;
     }
     let mut found = source(read);
@@ -93,7 +98,8 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
 fn source(whole: Whole) -> SourceFile {
     let mut diagnostics = whole.diagnostics;
     let library = (!whole.checked.is_empty()).then_some(Source::Library(whole.checked));
-    let source = match (whole.ladder, whole.typed) {
+    let has_numbers = whole.typed.as_ref().is_some_and(has_numbers_as_points);
+    let source = match (whole.ladder.filter(|_| !has_numbers), whole.typed) {
         (Some(ladder), _) => {
             diagnostics.extend(whole.reasons);
             diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
@@ -103,6 +109,21 @@ fn source(whole: Whole) -> SourceFile {
         (None, None) => library,
     };
     SourceFile { source, period: whole.period, diagnostics }
+}
+
+/// Whether an input or an output is more than a bit.
+fn has_numbers_as_points(program: &Typed) -> bool {
+    let mut points = program.inputs.iter().chain(&program.outputs);
+    points.any(|point| point.of != Elementary::Bool)
+}
+
+/// Whether a signal has a name as the bits of a number have, such as `speed.0`.
+fn has_bits_of_numbers(ladder: &Ladder) -> bool {
+    let mut signals = ladder.inputs.iter().chain(&ladder.outputs);
+    signals.any(|signal| {
+        let end = signal.name.rsplit_once('.').map(|(_, end)| end);
+        end.is_some_and(|end| end.parse::<u8>().is_ok())
+    })
 }
 
 /// The error of a file that a program is wanted of, and that has none.

@@ -138,6 +138,8 @@ struct Lowering<'a> {
     units: Vec<UnitEntry<'a>>,
     unit_names: HashMap<String, usize>,
     types: HashMap<String, TypeState<'a>>,
+    /// Bounds of the variables that are subranges, by the places of their names.
+    ranges: HashMap<Range<usize>, (i128, i128)>,
     /// By the ids of the program's structures.
     structures: Vec<Rc<StructureInfo>>,
     /// Values of enumerations by their names.
@@ -199,6 +201,7 @@ impl<'a> Lowering<'a> {
             units,
             unit_names,
             types: HashMap::new(),
+            ranges: HashMap::new(),
             structures: Vec::new(),
             enumerators: HashMap::new(),
             globals: HashMap::new(),

@@ -3,6 +3,8 @@
 //! An image is a row of bits. A point takes as many as its type is wide, at a multiple of its width, in order of declaration; so one of BOOLs alone
 //! is the image of a circuit, and no point crosses a word of 64 bits.
 
+use std::fmt;
+
 use crate::types::Elementary;
 
 /// An input or output of a program.
@@ -12,13 +14,61 @@ pub struct Point {
     pub name: String,
     /// Its type.
     pub of: Elementary,
+    /// The least and the greatest value of the subrange that it is declared with.
+    pub range: Option<(i128, i128)>,
     /// Its first bit in the image.
     pub bit: u32,
     /// Where it stands in the program's state, as a slot.
     pub slot: u32,
 }
 
+/// Type and subrange, as a declaration writes them: `INT`, `INT (0..7)`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Declared {
+    /// The type.
+    pub of: Elementary,
+    /// The least and the greatest value of a subrange.
+    pub range: Option<(i128, i128)>,
+}
+
+impl Declared {
+    /// Whether every value of `sender` is one of this declaration, stored in the same bits.
+    pub fn takes(self, sender: Self) -> bool {
+        let Some((low, high)) = self.range else {
+            return self.of == sender.of;
+        };
+        let (least, most) = sender.range.unwrap_or_else(|| sender.of.limits());
+        self.of == sender.of && low <= least && most <= high
+    }
+
+    /// Whether a stored value is within the subrange.
+    pub fn contains(self, stored: u64) -> bool {
+        self.limited(stored) == stored & self.of.mask()
+    }
+
+    /// The stored value of the subrange that is nearest to a stored value.
+    pub fn limited(self, stored: u64) -> u64 {
+        let stored = stored & self.of.mask();
+        let limited = |(low, high)| self.of.signed(stored).clamp(low, high) as u64 & self.of.mask();
+        self.range.map_or(stored, limited)
+    }
+}
+
+impl fmt::Display for Declared {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.range {
+            Some((low, high)) => write!(formatter, "{} ({low}..{high})", self.of),
+            None => self.of.fmt(formatter),
+        }
+    }
+}
+
 impl Point {
+    /// How it is declared.
+    pub fn declared(&self) -> Declared {
+        Declared { of: self.of, range: self.range }
+    }
+
     /// Its value in a packed image, zero-extended.
     ///
     /// # Panics
@@ -50,9 +100,15 @@ pub struct Points {
 impl Points {
     /// Appends a point at the next multiple of its width.
     pub fn push(&mut self, name: impl Into<String>, of: Elementary, slot: u32) {
+        self.push_declared(name, Declared { of, range: None }, slot);
+    }
+
+    /// As [`Self::push`], of a point that may have a subrange.
+    pub fn push_declared(&mut self, name: impl Into<String>, declared: Declared, slot: u32) {
+        let Declared { of, range } = declared;
         let bit = self.width.next_multiple_of(of.bits());
         self.width = bit + of.bits();
-        self.points.push(Point { name: name.into(), of, bit, slot });
+        self.points.push(Point { name: name.into(), of, range, bit, slot });
     }
 
     /// The point of a name.

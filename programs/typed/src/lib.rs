@@ -29,7 +29,7 @@ pub use self::form::{
     Argument, Branch, Call, Case, Expression, ExpressionKind, For, Index, Initial, Place, Program,
     Root, Routine, RoutineId, RoutineKind, Statement, StatementKind, Task, Variable,
 };
-pub use self::image::{Point, Points};
+pub use self::image::{Declared, Point, Points};
 pub use self::interpreter::{Done, Effect, Interpreter, Made, Read, Trace};
 pub use self::machine::{Machine, Scratch};
 pub use self::naming::Part;

@@ -120,6 +120,12 @@ impl Elementary {
         matches!(self, Self::Sint | Self::Int | Self::Dint | Self::Lint) || self.is_time()
     }
 
+    /// The least and the greatest number that its bits hold.
+    pub fn limits(self) -> (i128, i128) {
+        let mask = i128::from(self.mask());
+        if self.is_signed() { (-(mask >> 1) - 1, mask >> 1) } else { (0, mask) }
+    }
+
     /// SINT … ULINT.
     pub fn is_integer(self) -> bool {
         matches!(

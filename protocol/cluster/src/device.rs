@@ -4,7 +4,7 @@ use std::fmt;
 use std::net::SocketAddr;
 use std::time::Duration;
 
-use understudy_typed::Elementary;
+use understudy_typed::Declared;
 
 use crate::place::Place;
 
@@ -85,8 +85,8 @@ pub struct Side {
 pub struct Binding {
     /// Name of the signal.
     pub name: String,
-    /// Type of the signal.
-    pub of: Elementary,
+    /// Type and range of the signal.
+    pub declared: Declared,
     /// First bit of the signal in the process image.
     pub bit: usize,
     /// Its place.

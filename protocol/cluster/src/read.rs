@@ -25,6 +25,7 @@
 //! | U0224 | an input with two sources |
 //! | U0225 | a source of an input that does not fit its type |
 //! | U0226 | an alarm whose condition does not fit its signal |
+//! | U0227 | a sender and a receiver of different types or ranges |
 //! | U0251 | warning: an input that no sensor drives |
 //! | U0252 | warning: an output that moves nothing |
 //! | U0253 | warning: not one understudy where the mode wants one |

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use understudy_text::duration;
 use understudy_text::tables::Constant;
-use understudy_typed::Elementary;
+use understudy_typed::{Declared, Elementary};
 
 /// The value of a signal as a person types it, such as `true`, `12.5` or `1.5 s`, as the process image stores it.
 ///
@@ -69,10 +69,23 @@ pub fn stored_value(value: &Constant, of: Elementary) -> Result<u64, String> {
         Elementary::Time => "write a duration in quotes, such as \"1.5 s\"".to_owned(),
         _ if of.is_real() => "write a finite number, such as 12.5".to_owned(),
         _ if of.is_time() => "dates have no value here".to_owned(),
-        _ => format!(
-            "write a whole number from {} to {}",
-            if of.is_signed() { -(1i128 << (of.bits() - 1)) } else { 0 },
-            of.signed(if of.is_signed() { of.mask() >> 1 } else { of.mask() })
-        ),
+        _ => whole_number(of.limits()),
     })
+}
+
+/// As [`stored_value`], of a signal that may have a subrange.
+///
+/// # Errors
+/// What is written instead.
+pub(crate) fn value_within(value: &Constant, declared: Declared) -> Result<u64, String> {
+    let expected = |error| declared.range.map_or(error, whole_number);
+    let stored = stored_value(value, declared.of).map_err(expected)?;
+    match declared.range {
+        Some(range) if !declared.contains(stored) => Err(whole_number(range)),
+        _ => Ok(stored),
+    }
+}
+
+fn whole_number((least, most): (i128, i128)) -> String {
+    format!("write a whole number from {least} to {most}")
 }

@@ -102,12 +102,7 @@ fn store(of: Elementary, number: f64) -> u64 {
 }
 
 fn saturated(of: Elementary, number: i128) -> u64 {
-    let (least, most) = if of.is_signed() {
-        let half = 1_i128 << (of.bits() - 1);
-        (-half, half - 1)
-    } else {
-        (0, i128::from(of.mask()))
-    };
+    let (least, most) = of.limits();
     number.clamp(least, most) as u64 & of.mask()
 }
 

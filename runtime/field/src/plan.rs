@@ -116,10 +116,13 @@ impl Plan {
                 Place::Number(registers) => {
                     let words = words.get(..usize::from(registers.count()));
                     let words = words.ok_or(Unread::Short)?;
-                    number::value(registers, binding.of, words).map_err(|_| Unread::NotFinite {
+                    let of = binding.declared.of;
+                    let value = number::value(registers, of, words);
+                    let value = value.map_err(|_| Unread::NotFinite {
                         name: binding.name.clone(),
                         place: binding.place,
-                    })?
+                    })?;
+                    binding.declared.limited(value)
                 }
             };
             // No signal crosses a word of the image.
@@ -132,7 +135,7 @@ impl Plan {
     pub(crate) fn words(&self, image: &Image) -> Vec<Vec<u16>> {
         self.fill(|binding| {
             let stored = image.words()[binding.bit / 64] >> (binding.bit % 64);
-            stored & binding.of.mask()
+            stored & binding.declared.of.mask()
         })
     }
 
@@ -170,7 +173,7 @@ impl Plan {
             match &binding.place {
                 Place::Bit(place) => target[0] |= (stored as u16 & 1) << bit_of(*place),
                 Place::Number(registers) => {
-                    let numbers = number::words(registers, binding.of, stored);
+                    let numbers = number::words(registers, binding.declared.of, stored);
                     for (target, word) in target.iter_mut().zip(numbers) {
                         *target = word;
                     }
@@ -223,7 +226,12 @@ mod tests {
         let binding = |(point, (_, place)): (&understudy_typed::Point, &(Elementary, String))| {
             // A program may have signals without a place.
             let place = place.parse().ok()?;
-            Some(Binding { name: point.name.clone(), of: point.of, bit: point.bit as usize, place })
+            Some(Binding {
+                name: point.name.clone(),
+                declared: point.declared(),
+                bit: point.bit as usize,
+                place,
+            })
         };
         Side {
             width: points.width(),
@@ -314,7 +322,7 @@ mod tests {
             let plan = Plan::new(&side);
             let mut image = Image::zero(side.width);
             for (binding, word) in side.bindings.iter().zip(words) {
-                image.words_mut()[binding.bit / 64] |= (word & binding.of.mask()) << (binding.bit % 64);
+                image.words_mut()[binding.bit / 64] |= (word & binding.declared.of.mask()) << (binding.bit % 64);
             }
             prop_assert_eq!(plan.image(&plan.words(&image)), Ok(image));
         }

@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use understudy_typed::{Elementary, Root, Type};
+use understudy_typed::{Declared, Elementary, Root, Type};
 
 use crate::syntax::{Class, Declaration, Name, Span};
 
@@ -115,7 +115,8 @@ impl Lowering<'_> {
         }
         let elementary = resolved.of.elementary();
         let mut points = Vec::new();
-        if is_point && !self.points_of(&resolved.of, name.as_str(), 0, &mut points) {
+        let root = (&resolved.of, resolved.range);
+        if is_point && !self.points_of(root, name.as_str(), 0, &mut points) {
             let found = self.describe(&resolved.of);
             let message = format!(
                 "`{name}` at {address} is {found}; a point is a number, a bit or a time, or a structure of them"
@@ -130,7 +131,7 @@ impl Lowering<'_> {
         self.overlap(name, address, resolved)?;
         let slot = self.state(resolved.of.slots(), &name.span())?;
         self.program.initial.extend(initial(&resolved.image, slot));
-        for (mut shown, of, offset) in points {
+        for (mut shown, declared, offset) in points {
             let known = match is_input {
                 true => &mut self.program.inputs,
                 false => &mut self.program.outputs,
@@ -138,7 +139,7 @@ impl Lowering<'_> {
             if known.iter().any(|point| point.name.eq_ignore_ascii_case(&shown)) {
                 shown = format!("{shown} {address}");
             }
-            known.push(shown, of, slot + offset);
+            known.push_declared(shown, declared, slot + offset);
         }
         Some(Symbol::Variable(Rc::new(Variable {
             name: name.as_str().to_owned(),
@@ -151,30 +152,32 @@ impl Lowering<'_> {
         })))
     }
 
-    /// The points of a variable: itself, or the parts of a structure and the elements of arrays of structures. Whether
+    /// The points of a variable of this type and subrange: itself, or the parts of a structure and the elements of arrays of structures. Whether
     /// all of it has one.
     pub(super) fn points_of(
         &self,
-        of: &Type,
+        (of, range): (&Type, Option<(i128, i128)>),
         name: &str,
         slot: u32,
-        points: &mut Vec<(String, Elementary, u32)>,
+        points: &mut Vec<(String, Declared, u32)>,
     ) -> bool {
         if points.len() >= MAXIMUM_POINTS {
             return false;
         }
         if let Some(of) = of.elementary() {
-            points.push((name.to_owned(), of, slot));
+            points.push((name.to_owned(), Declared { of, range }, slot));
             return true;
         }
         match of {
             Type::Structure(id, _) => {
-                let is_data = self.structures[id.0 as usize].unit.is_none();
+                let info = &self.structures[id.0 as usize];
+                let is_data = info.unit.is_none();
                 let mut fields = self.program.structures[id.0 as usize].fields.iter();
                 is_data
                     && fields.all(|field| {
                         let name = format!("{name}.{}", field.name);
-                        self.points_of(&field.of, &name, slot + field.slot, points)
+                        let of = (&field.of, info.ranges.get(&field.slot).copied());
+                        self.points_of(of, &name, slot + field.slot, points)
                     })
             }
             // Elements that share a slot have no point of their own.
@@ -183,7 +186,8 @@ impl Lowering<'_> {
                     let slots = (array.stride() / 64) as u32;
                     (*low..=*high).zip(0..).all(|(at, place)| {
                         let name = format!("{name}[{at}]");
-                        self.points_of(&array.element, &name, slot + place * slots, points)
+                        let of = (&array.element, None);
+                        self.points_of(of, &name, slot + place * slots, points)
                     })
                 }
                 _ => false,

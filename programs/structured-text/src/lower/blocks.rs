@@ -187,7 +187,8 @@ impl<'a> Lowering<'a> {
         let fields = layout.fields.iter().enumerate();
         let fields = fields.map(|(at, field)| (field.name.to_ascii_uppercase(), at));
         let image = layout.image.done();
-        let info = StructureInfo { fields: fields.collect(), unit: Some(unit) };
+        let info =
+            StructureInfo { fields: fields.collect(), ranges: HashMap::new(), unit: Some(unit) };
         let structure = Structure { name: found.name.as_str().to_owned(), fields: layout.fields };
         let id = self.add_structure(structure, info);
         Some(Block { of: Type::Structure(id, layout.slots as u32), image, ..layout.block })

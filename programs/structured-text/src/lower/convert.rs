@@ -12,11 +12,7 @@ use super::ranges::ranges;
 
 /// The least and the greatest number of an integer, a bit string or a time.
 pub(super) fn limits(of: Elementary) -> (i128, i128) {
-    let mask = i128::from(of.mask());
-    match of.is_signed() {
-        true => (-(mask >> 1) - 1, mask >> 1),
-        false => (0, mask),
-    }
+    of.limits()
 }
 
 /// How a type fits another.

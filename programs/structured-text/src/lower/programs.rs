@@ -339,7 +339,8 @@ impl<'a> Lowering<'a> {
 
     fn point(&mut self, name: &str, variable: &Variable, slot: u32, is_input: bool) {
         let mut points = Vec::new();
-        if !self.points_of(&variable.of, name, slot, &mut points) {
+        let root = (&variable.of, self.ranges.get(&variable.span).copied());
+        if !self.points_of(root, name, slot, &mut points) {
             let found = self.describe(&variable.of);
             let message = match is_input {
                 true => format!(
@@ -357,8 +358,8 @@ impl<'a> Lowering<'a> {
             true => &mut self.program.inputs,
             false => &mut self.program.outputs,
         };
-        for (name, of, slot) in points {
-            known.push(name, of, slot);
+        for (name, declared, slot) in points {
+            known.push_declared(name, declared, slot);
         }
     }
 

@@ -49,6 +49,8 @@ pub(super) enum TypeState<'a> {
 pub(super) struct StructureInfo {
     /// The fields by their names in capitals.
     pub(super) fields: HashMap<String, usize>,
+    /// Bounds of the fields that are subranges, by their slots.
+    pub(super) ranges: HashMap<u32, (i128, i128)>,
     /// The unit whose memory it is.
     pub(super) unit: Option<usize>,
 }
@@ -282,6 +284,7 @@ impl<'a> Lowering<'a> {
     ) -> Option<Resolved> {
         let mut fields: Vec<Field> = Vec::new();
         let mut known = HashMap::new();
+        let mut ranges = HashMap::new();
         let mut image = Builder::default();
         let mut slots: u64 = 0;
         let mut is_whole = true;
@@ -303,6 +306,7 @@ impl<'a> Lowering<'a> {
                 return None;
             }
             image.put(start * 64, &resolved.of, &resolved.image);
+            ranges.extend(resolved.range.map(|range| (start as u32, range)));
             fields.push(Field {
                 name: declaration.name.as_str().to_owned(),
                 of: resolved.of,
@@ -316,7 +320,7 @@ impl<'a> Lowering<'a> {
         let image = image.done();
         let id = self.add_structure(
             Structure { name: name.to_owned(), fields },
-            StructureInfo { fields: known, unit: None },
+            StructureInfo { fields: known, ranges, unit: None },
         );
         Some(Resolved::new(Type::Structure(id, slots as u32), image))
     }
@@ -335,6 +339,9 @@ impl<'a> Lowering<'a> {
     /// The type of a declaration with its own initial value in the image.
     pub(super) fn declared_type(&mut self, declaration: &syntax::Declaration) -> Option<Resolved> {
         let mut resolved = self.resolve(&declaration.of)?;
+        if let Some(range) = resolved.range {
+            self.ranges.insert(declaration.name.span(), range);
+        }
         if let Some(initial) = &declaration.initial {
             resolved.image = self.initial_image(initial, &resolved)?;
         }

@@ -8,7 +8,7 @@ use understudy_executable::Interface;
 use understudy_text::Diagnostic;
 use understudy_text::spelling::suggestion;
 use understudy_text::tables::Constant;
-use understudy_typed::{Elementary, Point};
+use understudy_typed::{Declared, Elementary, Point};
 use understudy_wire::ProgramId;
 
 use super::Member;
@@ -143,6 +143,8 @@ fn condition(
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<AlarmCondition> {
     let of = point.of;
+    // A subrange bounds no calculation, so a limit may lie outside.
+    let declared = Declared { of, range: None };
     let (limit, is_above) = match (&section.when, &section.above, &section.below) {
         (Some(when), None, None) => {
             if of != Elementary::Bool {
@@ -151,7 +153,7 @@ fn condition(
                 diagnostics.push(misfit(message, when.span.clone(), help));
                 return None;
             }
-            return value("when", when, of, diagnostics)
+            return value("when", when, declared, diagnostics)
                 .map(|value| AlarmCondition::Is(value != 0));
         }
         (None, Some(above), None) => (above, true),
@@ -166,7 +168,7 @@ fn condition(
         return None;
     }
     let span = limit.span.clone();
-    let limit = value(key, limit, of, diagnostics);
+    let limit = value(key, limit, declared, diagnostics);
     let over = match &section.hysteresis {
         None => limit?,
         Some(hysteresis) => {
@@ -178,7 +180,7 @@ fn condition(
                 );
                 return None;
             }
-            let distance = value("hysteresis", hysteresis, of, diagnostics)?;
+            let distance = value("hysteresis", hysteresis, declared, diagnostics)?;
             let over = moved(of, limit?, distance, is_above);
             let Some(over) = over else {
                 let message = format!("the limit and the hysteresis leave the range of {of}");

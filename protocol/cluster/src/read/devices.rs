@@ -163,7 +163,7 @@ fn side(
         }
         bindings.push(Binding {
             name: point.name.clone(),
-            of: point.of,
+            declared: point.declared(),
             bit: point.bit as usize,
             place: *place,
         });
@@ -217,7 +217,13 @@ fn fit(point: &Point, place: &Place, is_input: bool) -> Result<(), (String, Stri
         true => (registers.of, *of),
         false => (*of, registers.of),
     };
-    if registers.of == natural(*of) || contains(target, source) {
+    // Of an output with a subrange, its values alone are written.
+    let (least, most) = match is_input {
+        true => source.limits(),
+        false => point.range.unwrap_or_else(|| source.limits()),
+    };
+    let (low, high) = target.limits();
+    if registers.of == natural(*of) || low <= least && most <= high {
         return Ok(());
     }
     misfit(format!(
@@ -238,14 +244,5 @@ fn natural(of: Elementary) -> Elementary {
         Elementary::Bool | Elementary::Dint => Elementary::Dint,
         other if other.is_time() => Elementary::Lint,
         other => other,
-    }
-}
-
-/// Whether each number of the second type is one of the first.
-fn contains(wide: Elementary, narrow: Elementary) -> bool {
-    match (wide.is_signed(), narrow.is_signed()) {
-        (true, false) => wide.bits() > narrow.bits(),
-        (false, true) => false,
-        _ => wide.bits() >= narrow.bits(),
     }
 }

@@ -12,7 +12,7 @@ use understudy_wire::Image;
 
 use super::Member;
 use crate::fields::{MAXIMUM_MISFITS, Placed};
-use crate::value::stored_value;
+use crate::value::value_within;
 
 /// y(i) from the names that are set.
 pub(super) fn values(
@@ -26,10 +26,10 @@ pub(super) fn values(
     let width = interface.outputs.width();
     let mut image = Image::zero(width.min(understudy_wire::MAXIMUM_IMAGE_BITS));
     for (output, name, value) in outputs(member, interface, entries, diagnostics) {
-        match stored_value(value, output.of) {
+        match value_within(value, output.declared()) {
             Ok(stored) => output.set(image.words_mut(), stored),
             Err(expected) => {
-                let message = format!("`{}` is {}: {expected}", output.name, output.of);
+                let message = format!("`{}` is {}: {expected}", output.name, output.declared());
                 diagnostics.push(Diagnostic::error("U0204", message, name.span.clone()));
             }
         }

@@ -6,7 +6,7 @@ use understudy_text::spelling::suggestion;
 use understudy_wire::ProgramId;
 
 use super::Member;
-use super::plants::Draft;
+use super::plants::{Draft, of_other_type};
 use crate::fields::Placed;
 
 /// Each terminal with what it follows; those that nothing has are reported and left out.
@@ -19,13 +19,14 @@ pub(crate) fn resolve(
     let entries = draft.section.follows.iter();
     entries
         .filter_map(|(terminal, (_, sensor))| {
-            let followed = followed(sensor, draft, drafts, members, diagnostics)?;
+            let followed = followed(terminal, sensor, draft, drafts, members, diagnostics)?;
             Some((terminal.clone(), followed))
         })
         .collect()
 }
 
 fn followed(
+    terminal: &str,
     sensor: &Placed<String>,
     draft: &Draft,
     drafts: &[Draft],
@@ -62,6 +63,16 @@ fn followed(
         report("U0209", message, &suggestion(signal, inputs.names()));
         return None;
     };
+    let actuators = draft.kind.iter().flat_map(|kind| kind.terminals().actuators);
+    let own = actuators.into_iter().find(|own| own.name == terminal);
+    // A terminal that the plant does not have is reported with the others.
+    if let Some(own) = own.filter(|own| !own.declared.takes(point.declared())) {
+        let receiver = format!("`{terminal}` of the plant `{}`", draft.name);
+        let sender = format!("the sensor `{signal}` of the plant `{plant}`");
+        let receiver = (receiver, own.declared);
+        let span = sensor.span.clone();
+        diagnostics.push(of_other_type((sender, point.declared()), receiver, span));
+    }
     Some(Followed {
         from: ProgramId(other.program as u8),
         sensor: point.bit as usize,

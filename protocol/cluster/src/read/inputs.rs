@@ -9,7 +9,7 @@ use understudy_remote_io::{OperatorInput, OperatorInputKind, PointPlace, SignalI
 use understudy_text::Diagnostic;
 use understudy_text::spelling::suggestion;
 use understudy_text::tables::Constant;
-use understudy_typed::{Elementary, Point};
+use understudy_typed::{Declared, Elementary, Point};
 use understudy_wire::{ProgramId, Role};
 
 use super::Member;
@@ -19,7 +19,7 @@ use crate::format::OPERATOR_INPUTS;
 use crate::source::{
     GroupSignal, InputSource, InputSourceKind, OperatorDeclaration, SignalDeclaration,
 };
-use crate::value::stored_value;
+use crate::value::value_within;
 
 /// Suffixes of the input that says whether a signal is valid; names in Structured Text have no dot.
 const VALID: [&str; 2] = [".valid", "_valid"];
@@ -116,17 +116,17 @@ fn misfit(message: String, span: Range<usize>, help: &str) -> Diagnostic {
     Diagnostic::error("U0225", message, span).with_help(help.to_owned())
 }
 
-/// The stored form of a value in the file.
+/// The stored form of a value in the file, of a signal that is declared so.
 pub(super) fn value(
     key: &str,
     value: &Placed<Constant>,
-    of: Elementary,
+    declared: Declared,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<u64> {
-    match stored_value(&value.value, of) {
+    match value_within(&value.value, declared) {
         Ok(stored) => Some(stored),
         Err(expected) => {
-            let message = format!("`{key}` of a {of}: {expected}");
+            let message = format!("`{key}` of a {declared}: {expected}");
             diagnostics.push(Diagnostic::error("U0204", message, value.span.clone()));
             None
         }
@@ -161,7 +161,7 @@ fn operator(
         return None;
     }
     let mut optional = |key: &str, found: Option<&Placed<Constant>>| {
-        found.and_then(|found| value(key, found, point.of, diagnostics))
+        found.and_then(|found| value(key, found, point.declared(), diagnostics))
     };
     let (low, high) = (optional("low", text.low.as_ref()), optional("high", text.high.as_ref()));
     let initial = optional("initial", text.initial.as_ref());
@@ -260,8 +260,9 @@ impl Signal<'_> {
         period: Duration,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Option<InputSourceKind> {
-        let default =
-            self.default.and_then(|default| value("default", default, point.of, diagnostics));
+        let default = self
+            .default
+            .and_then(|default| value("default", default, point.declared(), diagnostics));
         let Placed { value: from, span } = self.from?;
         let is_name = |text: &str| !text.is_empty() && !text.contains(['/', '*', '$', '?', '#']);
         if ![&group.group, &group.controller, &group.output].into_iter().all(|text| is_name(text)) {
@@ -302,8 +303,9 @@ impl Signal<'_> {
         members: &[Member],
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Option<InputSourceKind> {
-        let default =
-            self.default.and_then(|default| value("default", default, point.of, diagnostics));
+        let default = self
+            .default
+            .and_then(|default| value("default", default, point.declared(), diagnostics));
         let Placed { value: from, span } = self.from?;
         let unknown = |message: String, help: String| {
             Diagnostic::error("U0209", message, span.clone()).with_help(help)
@@ -333,10 +335,15 @@ impl Signal<'_> {
             diagnostics.push(unknown(format!("`{controller}` has no output `{output}`"), help));
             return None;
         };
-        if found.of != point.of {
+        let (sent, received) = (found.declared(), point.declared());
+        if !received.takes(sent) {
             let message =
-                format!("`{from}` is {}, and the input `{}` is {}", found.of, point.name, point.of);
-            diagnostics.push(misfit(message, span.clone(), "declare both with the same type"));
+                format!("`{from}` is {sent}, and the input `{}` is {received}", point.name);
+            let help = match sent.of == received.of {
+                true => "declare the output with a range within that of the input",
+                false => "declare both with the same type",
+            };
+            diagnostics.push(misfit(message, span.clone(), help));
             return None;
         }
         let valid = valid_bit(valid, span, diagnostics)?;

@@ -6,10 +6,11 @@ use std::time::Duration;
 
 use understudy_executable::Interface;
 use understudy_plant::{
-    BindingProblem, Direction, Followed, ModelKind, Plant, PlantProgram, Signals,
+    BindingProblem, Direction, Followed, ModelKind, Plant, PlantProgram, Signals, Terminal,
 };
 use understudy_text::Diagnostic;
 use understudy_text::spelling::{nearest, suggestion};
+use understudy_typed::Declared;
 use understudy_wire::ProgramId;
 
 use super::Member;
@@ -35,7 +36,7 @@ pub(crate) struct Draft {
     pub(crate) section: PlantSection,
     pub(crate) name: String,
     pub(crate) program: usize,
-    kind: Option<ModelKind>,
+    pub(crate) kind: Option<ModelKind>,
     /// Of a model that is a program.
     code: Option<Code>,
 }
@@ -89,6 +90,13 @@ pub(crate) fn place(
             }
             None => None,
         };
+        for Terminal { name: counted, declared } in kind.iter().flat_map(ModelKind::counted_numbers)
+        {
+            let message = format!("`{counted}` of the plant `{name}` is {declared}, not BOOL");
+            let help = "parts and plant faults are counted at the edges of a BOOL";
+            let span = section.span.clone();
+            diagnostics.push(Diagnostic::error("U0227", message, span).with_help(help));
+        }
         if let Some(program) = program {
             drafts.push(Draft { section, name, program, kind, code });
         }
@@ -232,6 +240,20 @@ fn feeder(draft: &Draft, drafts: &[Draft], diagnostics: &mut Vec<Diagnostic>) ->
     Some(ProgramId(feeder.program as u8))
 }
 
+/// A sender and a receiver that do not agree on the values between them.
+pub(crate) fn of_other_type(
+    (sender, sent): (String, Declared),
+    (receiver, received): (String, Declared),
+    span: Range<usize>,
+) -> Diagnostic {
+    let message = format!("{receiver} is {received}, and {sender}, which drives it, is {sent}");
+    let help = match sent.of == received.of {
+        true => format!("declare the sender as {received}, or the receiver as {sent}"),
+        false => "declare both with one type".to_owned(),
+    };
+    Diagnostic::error("U0227", message, span).with_help(help)
+}
+
 fn describe(problem: BindingProblem, draft: &Draft) -> Diagnostic {
     let section = &draft.section;
     let controller =
@@ -274,13 +296,15 @@ fn describe(problem: BindingProblem, draft: &Draft) -> Diagnostic {
             };
             Diagnostic::error("U0209", message, signal_span(&terminal)).with_help(help)
         }
-        BindingProblem::OtherType { terminal, signal, of } => {
-            let message = format!(
-                "`{signal}` of `{controller}` is {of}, and `{}` of the plant `{}` is {}",
-                terminal.name, draft.name, terminal.of
-            );
-            Diagnostic::error("U0216", message, signal_span(&terminal.name))
-                .with_help("declare both with one type")
+        BindingProblem::OtherType { terminal, direction, signal, declared } => {
+            let own = format!("`{}` of the plant `{}`", terminal.name, draft.name);
+            let signal = format!("`{signal}` of `{controller}`");
+            let span = signal_span(&terminal.name);
+            let own = (own, terminal.declared);
+            match direction {
+                Direction::Sensor => of_other_type(own, (signal, declared), span),
+                Direction::Actuator => of_other_type((signal, declared), own, span),
+            }
         }
         BindingProblem::DrivenTwice { terminal, signal } => {
             let message = format!("two sensors drive the input `{signal}` of `{controller}`");

@@ -5,6 +5,7 @@ mod common;
 mod configuration;
 mod findings;
 mod inputs;
+mod meeting;
 mod press_cell;
 mod schema;
 mod template;
