@@ -190,7 +190,8 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         found.add(Kind::Scenario, scenario.report);
     }
     let given = std::mem::take(&mut found.given);
-    next::after_check(found.answer(), &given)
+    let libraries: Vec<PathBuf> = found.libraries.iter().map(|(name, _)| name.into()).collect();
+    next::after_check(found.answer(), &given, arguments.program.as_deref(), &libraries)
 }
 
 /// Members of the `cluster.toml` in the folder of a scenario, if it is valid.

@@ -8,11 +8,12 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use understudy_interchange::plcopen::Fidelity;
 use understudy_interchange::{
-    Bodies, Compared, Format, Reading, Wanted, WriteError, Written, read, typed_text, unknown_form,
-    write,
+    Bodies, Compared, Format, Reading, Source, Wanted, WriteError, Written, read, read_source,
+    typed_text, unknown_form, write,
 };
+use understudy_ladder::Program;
 use understudy_text::duration::parse_positive;
-use understudy_text::{Lines, MAXIMUM_SHOWN, Report, shortened};
+use understudy_text::{Diagnostic, Lines, MAXIMUM_SHOWN, Report, shortened};
 
 use crate::answer::{Answer, Status};
 use crate::files;
@@ -96,14 +97,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let wanted = Wanted { program: arguments.unit.as_deref(), period: arguments.period };
     let form = form_of_output(arguments);
     let failed = |error: WriteError| (code(&error), error.to_string());
+    let has_numbers = reading.program.is_some()
+        && matches!(read_source(&report.name, &report.text, wanted).source, Some(Source::Typed(_)));
     let written = match (&reading.program, form) {
-        (Some(program), form) => {
-            let period = arguments.period.or(reading.period);
-            let written = |form: Form| write(form.format(), program, period).map_err(failed);
-            Some(form.and_then(written))
-        }
-        // What is no ladder may be a program with numbers.
-        (None, Ok(form @ (Form::St | Form::Plcopen | Form::PlcopenFbd))) => {
+        // What is no ladder may be a program with numbers; a form that has numbers keeps those that a ladder has as bits.
+        (program, Ok(form @ (Form::St | Form::Plcopen | Form::PlcopenFbd)))
+            if program.is_none() || has_numbers =>
+        {
             let bodies = match form {
                 Form::PlcopenFbd => Bodies::Blocks,
                 _ => Bodies::AsRead,
@@ -116,6 +116,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
                 }
                 Err(error) => Some(Err(failed(error))),
             }
+        }
+        (Some(program), form) => {
+            let period = arguments.period.or(reading.period);
+            let written = |form: Form| write(form.format(), program, period).map_err(failed);
+            if has_numbers {
+                report.diagnostics.push(in_bits(program));
+            }
+            Some(form.and_then(written))
         }
         (None, _) => None,
     };
@@ -152,6 +160,20 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         }
     };
     Ok(answer.with_reports(vec![report]))
+}
+
+/// The finding on numbers that a ladder has bit by bit.
+fn in_bits(program: &Program) -> Diagnostic {
+    let signals = program.inputs.iter().chain(&program.outputs);
+    let numbers = signals.filter_map(|signal| signal.name.strip_suffix(".0"));
+    let numbers: Vec<String> = numbers.map(|name| format!("`{name}`")).collect();
+    let message = format!(
+        "the written form has no numbers: {} as the bits of the values that the program reaches, such as {}.0",
+        numbers.join(", "),
+        numbers.first().map_or("", |first| first.trim_matches('`'))
+    );
+    let help = "stations and `check` take numbers of the original; .st and .xml keep them";
+    Diagnostic::warning("U1018", message, 0..0).with_help(help)
 }
 
 /// Code of the error that prevented the conversion.

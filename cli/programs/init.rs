@@ -1,6 +1,6 @@
 //! `understudy init`: a new cluster from a template or from existing programs.
 
-mod from;
+pub(super) mod from;
 
 use std::path::{Path, PathBuf};
 
@@ -20,8 +20,8 @@ Example:
   understudy init cell --from plc.xml tank.st conveyor.ladder
   understudy init cell --from north=north/plc.xml south=south/plc.xml
 
---from reads programs in all formats of `understudy convert`. Each program gets a controller, a remote I/O and a placeholder for its plant;
-a file with several programs gives one controller per program. NAME= sets the name of the controller.")]
+--from takes every program that `understudy check` finds right. Each program gets a controller, a remote I/O and a placeholder for its plant;
+a file with several programs gives one controller per program, unless they share variables. NAME= sets the name of the controller.")]
 pub(crate) struct Arguments {
     /// Folder to create; existing files are not overwritten
     #[arg(value_name = "DIR")]

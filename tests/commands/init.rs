@@ -133,6 +133,8 @@ fn each_program_that_a_task_of_a_project_runs_gets_a_controller() {
     let end = pump.find("</pou>").expect("its end") + "</pou>".len();
     let twin = pump[start..end].replacen("\"pump\"", "\"twin\"", 1);
     assert_ne!(twin, pump[start..end], "the unit is named pump");
+    // Its own outputs: programs that write one output stay together.
+    let twin = twin.replace("%QX0.", "%QX1.");
     let mut project = pump.clone();
     project.insert_str(end, &twin);
     let instance = project.find("<pouInstance ").expect("a task runs it");

@@ -9,6 +9,7 @@ mod campaign;
 mod check;
 mod convert;
 mod des;
+mod drafts;
 mod durations;
 mod examples;
 mod explain;

@@ -1,18 +1,33 @@
 //! Next steps after a successful check.
 
 use std::ffi::OsStr;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use crate::answer::Answer;
+use crate::answer::{Answer, Status};
 use crate::kind::Kind;
+use crate::programs::init::from::can_draft;
 
 /// A command with more files is not shown.
 const READABLE: usize = 8;
 
-pub(super) fn after_check(answer: Answer, given: &[(Kind, &Path)]) -> Answer {
+/// The folder that is proposed for a new cluster.
+const FOLDER: &str = "cell";
+
+/// `program` is the one that was chosen of a file with several; `libraries` are files without a program.
+pub(super) fn after_check(
+    answer: Answer,
+    given: &[(Kind, &Path)],
+    program: Option<&str>,
+    libraries: &[PathBuf],
+) -> Answer {
+    if answer.status != Status::Done {
+        return answer;
+    }
     let all = |wanted| given.iter().filter(move |(kind, _)| *kind == wanted);
     let first = |wanted| all(wanted).map(|(_, path)| *path).next();
-    let ladders: Vec<&Path> = all(Kind::Program).map(|(_, path)| *path).collect();
+    let programs = all(Kind::Program).map(|(_, path)| *path);
+    let programs: Vec<&Path> =
+        programs.filter(|path| !libraries.iter().any(|library| library == path)).collect();
     match (first(Kind::Cluster), first(Kind::Scenario)) {
         (Some(cluster), Some(scenario)) => answer
             .and_next(&[&"simulate", &cluster, &"--scenario", &scenario])
@@ -28,15 +43,10 @@ pub(super) fn after_check(answer: Answer, given: &[(Kind, &Path)]) -> Answer {
                 answer
             }
         }
-        (None, None) if !ladders.is_empty() => {
-            let answer = answer.and_next(&[&"verify", &ladders[0]]);
-            if ladders.len() > READABLE {
-                return answer;
-            }
-            let mut from: Vec<&dyn AsRef<OsStr>> = vec![&"init", &"cell", &"--from"];
-            from.extend(ladders.iter().map(|path| path as &dyn AsRef<OsStr>));
-            answer.and_next(&from)
-        }
+        (None, None) if !programs.is_empty() => match program {
+            Some(program) => answer.and_next(&[&"verify", &programs[0], &"--program", &program]),
+            None => with_draft(answer.and_next(&[&"verify", &programs[0]]), &programs),
+        },
         (None, None) => {
             let command = |kind| match kind {
                 Kind::Model => Some("synth"),
@@ -50,4 +60,16 @@ pub(super) fn after_check(answer: Answer, given: &[(Kind, &Path)]) -> Answer {
             }
         }
     }
+}
+
+/// Adds the command that drafts a cluster of these programs, where it does so.
+fn with_draft(answer: Answer, programs: &[&Path]) -> Answer {
+    let folder = Path::new(FOLDER);
+    let files: Vec<PathBuf> = programs.iter().map(|path| path.to_path_buf()).collect();
+    if files.len() > READABLE || folder.exists() || !can_draft(folder, &files) {
+        return answer;
+    }
+    let mut from: Vec<&dyn AsRef<OsStr>> = vec![&"init", &FOLDER, &"--from"];
+    from.extend(programs.iter().map(|path| path as &dyn AsRef<OsStr>));
+    answer.and_next(&from)
 }

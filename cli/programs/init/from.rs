@@ -10,9 +10,7 @@ use std::time::Duration;
 use understudy_cluster::{
     Draft, DraftProgram, MAXIMUM_PROGRAM_NAME, is_name, read as read_cluster,
 };
-use understudy_interchange::{
-    Format, Reading, USUAL_PERIOD, read_all, unknown_form, write as write_program,
-};
+use understudy_interchange::{Apart, Format, Source, USUAL_PERIOD, read_apart};
 use understudy_text::{Report, Severity, decode};
 use understudy_wire::MAXIMUM_PROGRAMS;
 
@@ -23,20 +21,7 @@ use crate::kind::{self, Kind};
 use crate::programs::convert::code;
 
 pub(super) fn run(folder: &Path, arguments: &[PathBuf]) -> Result<Answer, Answer> {
-    let mut found = Found::default();
-    for argument in arguments {
-        found.read(&Source::new(argument));
-    }
-    found.check();
-    if found.is_wrong() {
-        return Err(found.refusal());
-    }
-    let draft = found.draft(folder);
-    let texts = draft.files();
-    found.check_draft(&texts);
-    if found.is_wrong() {
-        return Err(found.refusal());
-    }
+    let (texts, found) = drafted(folder, arguments)?;
     let texts = texts.into_iter().map(|(name, text)| NewFile { name, bytes: text.into_bytes() });
     // A program that is already in the folder is used in place.
     let copies = found.copies.into_iter().filter(|copy| {
@@ -50,13 +35,36 @@ pub(super) fn run(folder: &Path, arguments: &[PathBuf]) -> Result<Answer, Answer
     Ok(written(folder, &paths, marks).with_used(found.reports))
 }
 
+/// Whether a cluster can be drafted from these files.
+pub(crate) fn can_draft(folder: &Path, arguments: &[PathBuf]) -> bool {
+    drafted(folder, arguments).is_ok()
+}
+
+/// The texts of the draft, which was checked, and what was found.
+fn drafted(folder: &Path, arguments: &[PathBuf]) -> Result<(Vec<(String, String)>, Found), Answer> {
+    let mut found = Found::default();
+    for argument in arguments {
+        found.read(&Given::new(argument));
+    }
+    found.check();
+    if found.is_wrong() {
+        return Err(found.refusal());
+    }
+    let texts = found.draft(folder).files();
+    found.check_draft(&texts);
+    if found.is_wrong() {
+        return Err(found.refusal());
+    }
+    Ok((texts, found))
+}
+
 /// A file named on the command line.
-struct Source<'a> {
+struct Given<'a> {
     name: Option<&'a str>,
     path: PathBuf,
 }
 
-impl<'a> Source<'a> {
+impl<'a> Given<'a> {
     /// `NAME=FILE` or a file. An existing file whose name contains `=` is a file.
     fn new(argument: &'a Path) -> Self {
         let split = argument.to_str().and_then(|text| text.split_once('='));
@@ -96,8 +104,8 @@ struct Found {
 }
 
 impl Found {
-    fn read(&mut self, source: &Source<'_>) {
-        let path = &source.path;
+    fn read(&mut self, given: &Given<'_>) {
+        let path = &given.path;
         let read = files::bytes(path).and_then(|bytes| {
             let text = files::decoded(path, bytes.clone())?;
             kind::expect(Kind::Program, path, &text)?;
@@ -111,74 +119,61 @@ impl Found {
             }
         };
         let name = path.display().to_string();
-        let mut report = Report { name: name.clone(), text, diagnostics: Vec::new() };
-        match Format::of(&name, &report.text) {
-            None => report.diagnostics.push(unknown_form(&report.text)),
-            Some(format) => {
-                let readings = read_all(format, &name, &report.text);
-                let is_only = readings.len() == 1;
-                for reading in readings {
-                    self.add(source, format, reading, is_only.then_some(&bytes), &mut report);
-                }
-            }
+        let (programs, diagnostics) = read_apart(&name, &text);
+        let mut report = Report { name, text, diagnostics };
+        for program in programs {
+            self.add(given, program, &bytes, &mut report);
         }
         self.reports.push(report);
     }
 
-    /// A program of a file: a copy of the file if it is the only program, otherwise a ladder file.
-    fn add(
-        &mut self,
-        source: &Source<'_>,
-        format: Format,
-        reading: Reading,
-        only: Option<&Vec<u8>>,
-        report: &mut Report,
-    ) {
-        report.diagnostics.extend(reading.diagnostics);
-        let Some(program) = reading.program else {
-            return;
+    /// A program of a file: a copy of the file, or a text of its own where the file has several.
+    fn add(&mut self, given: &Given<'_>, program: Apart, whole: &[u8], report: &mut Report) {
+        let Apart { source, period, written } = program;
+        let unit = match &source {
+            Source::Ladder(ladder) => ladder.name.to_string(),
+            Source::Typed(typed) => typed.name.clone(),
+            Source::Library(_) => return,
         };
-        let unit = program.name.to_string();
-        // Digraphs are unnamed.
+        let format = Format::of(&report.name, &report.text);
+        // Digraphs are unnamed, and several programs have no common name.
+        let stem = given.path.file_stem().unwrap_or_default().to_string_lossy();
+        let are_several = matches!(&source, Source::Typed(typed) if typed.tasks.len() > 1);
         let own = match format {
-            Format::Digraph => source.path.file_stem().unwrap_or_default().to_string_lossy(),
+            Some(Format::Digraph) => stem,
+            _ if are_several && is_name(&stem) => stem,
             _ => unit.as_str().into(),
         };
-        let name = source.controller(&own, only.is_some());
-        let (ending, bytes) = match only {
-            Some(bytes) => (ending(&source.path, format), bytes.clone()),
-            None => match write_program(Format::Ladder, &program, reading.period) {
-                Ok(written) => {
-                    report.diagnostics.extend(written.losses);
-                    ("ladder".to_owned(), written.text.into_bytes())
-                }
-                Err(error) => {
-                    let message = format!("{}: {unit}: {error}", report.name);
-                    self.fail(code(&error), message);
-                    return;
-                }
-            },
+        let name = given.controller(&own, written.is_none());
+        let (ending, bytes) = match written {
+            None => (ending(&given.path, format), whole.to_vec()),
+            Some(Ok((format, written))) => {
+                report.diagnostics.extend(written.losses);
+                (format.ending().to_owned(), written.text.into_bytes())
+            }
+            Some(Err(error)) => {
+                let message = format!("{}: {unit}: {error}", report.name);
+                self.fail(code(&error), message);
+                return;
+            }
         };
-        if program.outputs.is_empty() {
+        let file = format!("{name}.{ending}");
+        let origin = format!("{}, program {unit}", report.name);
+        let drafted = DraftProgram::new(name, file.clone(), origin, &source);
+        if !drafted.has_outputs() {
+            let such_as = memory(&source).map(|name| format!(", such as `{name}`"));
             let message = format!(
-                "{}: the program `{unit}` has no outputs to protect; declare outputs (VAR_OUTPUT, or AT %QX…) or omit the program",
-                report.name
+                "{}: the program `{unit}` has no outputs to protect; declare what it computes{} as outputs (VAR_OUTPUT, or AT %Q…) or omit the program",
+                report.name,
+                such_as.unwrap_or_default()
             );
             self.fail("U0622", message);
         }
-        let file = format!("{name}.{ending}");
-        self.periods.extend(reading.period);
-        self.sources.push(source.path.clone());
-        self.copies.push(Copied {
-            source: source.path.clone(),
-            file: NewFile { name: file.clone(), bytes },
-        });
-        self.programs.push(DraftProgram {
-            name,
-            file,
-            origin: format!("{}, program {unit}", report.name),
-            program,
-        });
+        self.periods.extend(period);
+        self.sources.push(given.path.clone());
+        self.copies
+            .push(Copied { source: given.path.clone(), file: NewFile { name: file, bytes } });
+        self.programs.push(drafted);
     }
 
     /// Number and names of the programs.
@@ -189,7 +184,7 @@ impl Found {
             taken.insert(other.to_owned(), Path::new(""));
         }
         for (program, source) in self.programs.iter().zip(&self.sources) {
-            let name = &program.name;
+            let name = program.name();
             let file = source.display();
             let fix = format!("name it on the command line: --from NAME={file}");
             if !is_name(name) || name.len() > MAXIMUM_PROGRAM_NAME {
@@ -270,12 +265,24 @@ impl Found {
     }
 }
 
+/// A variable that is no input, of a program without outputs.
+fn memory(source: &Source) -> Option<&str> {
+    match source {
+        Source::Ladder(ladder) => ladder.memory.first().map(|memory| memory.name.as_str()),
+        Source::Typed(typed) => {
+            let mut variables = typed.variables.iter().map(|variable| variable.name.as_str());
+            variables.find(|name| typed.inputs.find(name).is_none())
+        }
+        Source::Library(_) => None,
+    }
+}
+
 /// File extension of a copy, with the format of the original.
-fn ending(path: &Path, format: Format) -> String {
+fn ending(path: &Path, format: Option<Format>) -> String {
     let name = path.to_string_lossy();
     match (Format::of_ending(&name), path.extension()) {
         (Some(_), Some(ending)) => ending.to_string_lossy().to_lowercase(),
-        _ => format.ending().to_owned(),
+        _ => format.map_or("", Format::ending).to_owned(),
     }
 }
 

@@ -113,27 +113,6 @@ impl Format {
     }
 }
 
-/// Reads every program of the file `name`: the programs that its tasks run, or all where it has no tasks. What is wrong with several of
-/// them is in the first reading only.
-pub fn read_all(format: Format, name: &str, text: &str) -> Vec<Reading> {
-    let units = match format {
-        Format::PlcOpen => plcopen::programs(text),
-        Format::StructuredText => written::programs(text),
-        Format::Ladder | Format::Digraph | Format::LdMicro => Vec::new(),
-    };
-    if units.len() < 2 {
-        return vec![read(format, name, text, None)];
-    }
-    let mut known = Vec::new();
-    let each = units.iter().map(|unit| {
-        let mut reading = read(format, name, text, Some(unit));
-        reading.diagnostics.retain(|found| !known.contains(found));
-        known.extend_from_slice(&reading.diagnostics);
-        reading
-    });
-    each.collect()
-}
-
 /// Reads the program of the file `name`; `unit` chooses one where there are several.
 pub fn read(format: Format, name: &str, text: &str, unit: Option<&str>) -> Reading {
     let mut reading = read_form(format, name, text, unit);

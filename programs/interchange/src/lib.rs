@@ -1,5 +1,6 @@
 //! Programs in and out of other tools: PLCopen XML, Structured Text, the digraph XML of the paper, LDmicro.
 
+mod apart;
 mod diagrams;
 pub mod digraph;
 mod format;
@@ -12,8 +13,9 @@ mod twincat;
 mod typed_text;
 mod written;
 
+pub use apart::{Apart, read_apart};
 pub use diagrams::{DrawnBody, DrawnUnit, draw_typed, drawn_units, listing};
-pub use format::{Format, Reading, parse_program, read, read_all, unknown_form};
+pub use format::{Format, Reading, parse_program, read, unknown_form};
 pub use source::{Source, SourceFile, Wanted, no_program, read_source};
 pub use typed_text::{Bodies, typed_text};
 pub use written::{Compared, USUAL_PERIOD, WriteError, Written, write};

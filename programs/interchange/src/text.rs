@@ -21,7 +21,7 @@ pub(crate) struct Whole {
     pub(crate) ladder: Option<Ladder>,
     /// The units of a library.
     pub(crate) checked: Vec<String>,
-    /// The interval of the first task.
+    /// The shortest interval of a task.
     pub(crate) period: Option<Duration>,
     /// What was found of the program.
     pub(crate) diagnostics: Vec<Diagnostic>,
@@ -49,12 +49,12 @@ pub(crate) fn whole(
         Some(typed) => (None, vec![several(&file, typed)]),
         None => (None, Vec::new()),
     };
-    let first = file.tasks.iter().find_map(|task| task.interval);
+    let shortest = file.tasks.iter().filter_map(|task| task.interval).min();
     Whole {
         typed,
         ladder,
         checked: if is_right { checked } else { Vec::new() },
-        period: first.map(|interval| Duration::from_nanos(interval.unsigned_abs())),
+        period: shortest.map(|interval| Duration::from_nanos(interval.unsigned_abs())),
         diagnostics,
         reasons,
     }
@@ -102,12 +102,4 @@ impl Whole {
 /// Reads the program of a Structured Text as a ladder; `program` chooses one where there are several.
 pub(crate) fn read(text: &str, program: Option<&str>) -> Reading {
     whole(text, parse(text), program, None).reading()
-}
-
-/// Names of the programs of a text, in its order.
-pub(crate) fn programs(text: &str) -> Vec<String> {
-    let (file, _) = parse(text);
-    let units = file.units.iter();
-    let programs = units.filter(|unit| unit.kind == UnitKind::Program);
-    programs.map(|unit| unit.name.as_str().to_owned()).collect()
 }

@@ -2,17 +2,22 @@
 //!
 //! Invariant: what is drafted runs as it is. What only the engineer of the plant knows stands below a line with [`MARK`].
 
+mod signals;
+mod statements;
 mod stub;
 
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use understudy_ladder::{Program, Signal};
+use understudy_interchange::Source;
 use understudy_text::duration;
+use understudy_typed::Elementary;
 
 use crate::fields::MAXIMUM_NAME_LENGTH;
 use crate::format::{LONGEST_PERIOD, SHORTEST_PERIOD};
 use crate::read::MARK;
+use crate::value::value_text;
+use signals::{Signal, Signals};
 use stub::Stub;
 
 /// The name of the drafted understudy.
@@ -38,17 +43,28 @@ pub struct Draft {
 /// A program of a [`Draft`].
 #[derive(Debug, Clone)]
 pub struct DraftProgram {
-    /// Names the controller.
-    pub name: String,
-    /// The file that the cluster file names.
-    pub file: String,
-    /// Where it comes from, for people.
-    pub origin: String,
-    /// The program itself.
-    pub program: Program,
+    name: String,
+    file: String,
+    origin: String,
+    signals: Signals,
 }
 
 impl DraftProgram {
+    /// A program that names its controller, the file that the cluster file names, where it comes from, for people, and what it is.
+    pub fn new(name: String, file: String, origin: String, source: &Source) -> Self {
+        Self { name, file, origin, signals: Signals::of(source) }
+    }
+
+    /// The name of its controller.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Whether it has an output that can be protected.
+    pub fn has_outputs(&self) -> bool {
+        !self.signals.outputs.is_empty()
+    }
+
     /// Names of all members that the draft makes for it.
     pub fn members(&self) -> [String; 3] {
         let name = &self.name;
@@ -182,19 +198,31 @@ functional = [{plants}]
 
 fn push_remote_io(text: &mut String, program: &DraftProgram) {
     let name = &program.name;
+    let outputs = &program.signals.outputs;
+    let now = match outputs.iter().all(Signal::is_bit) {
+        true => "All are off now.",
+        false => "Each is off, 0 or the value of its range that is nearest to 0 now.",
+    };
     let _ = write!(
         text,
         "
 [[remote_io]]
 controller = \"{name}\"
 
-# {MARK} the outputs of `{name}` in a safe plant. They are driven when no station can prove an output. All are off now.
+# {MARK} the outputs of `{name}` in a safe plant. They are driven when no station can prove an output. {now}
 [remote_io.fail_safe]
 "
     );
-    for output in &program.program.outputs {
-        let line = format!("{} = false", key(&output.name));
-        let _ = match note(output) {
+    for output in outputs {
+        let of = output.declared.of;
+        let line = match of.is_time() && of != Elementary::Time {
+            true => format!("# `{}` is {of}: no value can be written here", output.name),
+            false => {
+                let safe = value_text(of, output.nearest(0) as u64 & of.mask());
+                format!("{} = {safe}", key(&output.name))
+            }
+        };
+        let _ = match &output.note {
             Some(note) => writeln!(text, "{line}  # {note}"),
             None => writeln!(text, "{line}"),
         };
@@ -230,15 +258,6 @@ ladder = {file:?}
 fn key(name: &str) -> String {
     let bare = |letter: char| letter.is_ascii_alphanumeric() || "-_".contains(letter);
     if name.chars().all(bare) { name.to_owned() } else { format!("{name:?}") }
-}
-
-/// What a program says about a signal: its address and its comment.
-fn note(signal: &Signal) -> Option<String> {
-    let address = signal.address.as_ref().map(|address| address.to_string());
-    let parts = address.iter().chain(&signal.description);
-    let parts: Vec<&str> = parts.map(String::as_str).collect();
-    let text = comment(&parts.join(" "));
-    (!text.is_empty()).then_some(text)
 }
 
 /// One line that a comment can have.

@@ -1,13 +1,15 @@
-//! A stand-in for a plant: a ladder that moves the inputs of a program one after the other, whatever its outputs are.
+//! A stand-in for a plant, which moves the inputs of a program one after the other, whatever its outputs are: a ladder where all signals are BOOL,
+//! else Structured Text.
 
 use std::collections::HashSet;
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use understudy_ladder::{Language, MAXIMUM_PRESET_VALUE, Namer, Signal};
+use understudy_ladder::{Language, MAXIMUM_PRESET_VALUE, Namer};
 use understudy_text::duration;
 
-use super::{DraftProgram, note};
+use super::DraftProgram;
+use super::signals::Signal;
 use crate::read::MARK;
 
 /// Signals of a plant that mean something of their own.
@@ -21,21 +23,40 @@ const FAILED: &str = ".failed";
 
 pub(super) struct Stub<'a> {
     pub(super) program: &'a DraftProgram,
+    language: Language,
+    /// The name of the program of the stub.
+    pub(super) unit: String,
     /// The signals of the program with the names of their terminals.
-    inputs: Vec<Named<'a>>,
-    outputs: Vec<Named<'a>>,
+    pub(super) inputs: Vec<Named<'a>>,
+    pub(super) outputs: Vec<Named<'a>>,
     /// Names of the stub's own.
     tick: String,
-    pace: String,
-    step: String,
+    pub(super) pace: String,
+    pub(super) step: String,
+    /// Of Structured Text, a name for each output as it was in the scan before.
+    pub(super) before: Vec<String>,
 }
 
 /// A terminal of the plant, and the signal that it stands for.
-type Named<'a> = (String, &'a Signal);
+pub(super) type Named<'a> = (String, &'a Signal);
+
+/// How the inputs move.
+pub(super) struct Round {
+    /// Inputs that begin at different steps.
+    pub(super) half: usize,
+    /// Steps, of which each input is on for half.
+    pub(super) steps: usize,
+    /// From one step to the next.
+    pub(super) pace: Duration,
+}
 
 impl<'a> Stub<'a> {
     pub(super) fn new(program: &'a DraftProgram) -> Self {
-        let mut namer = Namer::new(Language::Ladder);
+        let language = match program.signals.are_bits() {
+            true => Language::Ladder,
+            false => Language::StructuredText,
+        };
+        let mut namer = Namer::new(language);
         for name in SPECIAL {
             namer.name(name);
         }
@@ -43,14 +64,26 @@ impl<'a> Stub<'a> {
             let named = signals.iter().map(|signal| (namer.name(&signal.name), signal));
             named.collect()
         };
-        let inputs = terminals(&program.program.inputs);
-        let outputs = terminals(&program.program.outputs);
-        let [tick, pace, step] = ["tick", "pace", "step"].map(|name| namer.name(name));
-        Self { program, inputs, outputs, tick, pace, step }
+        let inputs = terminals(&program.signals.inputs);
+        let outputs = terminals(&program.signals.outputs);
+        let step = match language {
+            Language::Ladder => "step",
+            // STEP is a word of charts.
+            Language::StructuredText => "stage",
+        };
+        let [tick, pace, step] = ["tick", "pace", step].map(|name| namer.name(name));
+        let before = outputs.iter().map(|(name, _)| namer.name(&format!("{name}_before")));
+        let before = before.collect();
+        let unit = namer.name(&(program.name.replace('-', "_") + "_plant"));
+        Self { program, language, unit, inputs, outputs, tick, pace, step, before }
     }
 
     pub(super) fn file(&self) -> String {
-        format!("{}.ladder", self.program.plant())
+        let ending = match self.language {
+            Language::Ladder => "ladder",
+            Language::StructuredText => "st",
+        };
+        format!("{}.{ending}", self.program.plant())
     }
 
     /// Terminals whose signals bear other names.
@@ -61,6 +94,13 @@ impl<'a> Stub<'a> {
     }
 
     pub(super) fn text(&self, period: Duration) -> String {
+        match self.language {
+            Language::Ladder => self.ladder(period),
+            Language::StructuredText => super::statements::text(self, period),
+        }
+    }
+
+    fn ladder(&self, period: Duration) -> String {
         let name = &self.program.name;
         let mut text = format!(
             "\
@@ -72,7 +112,7 @@ impl<'a> Stub<'a> {
 program {}
 
 ",
-            name.replace('-', "_") + "_plant"
+            self.unit
         );
         for (terminal, signal) in &self.outputs {
             declare(&mut text, "input ", terminal, signal, "");
@@ -94,7 +134,7 @@ program {}
     }
 
     /// The inputs that say that a channel is failed, and all others.
-    fn channels(&self) -> (Vec<&Named<'_>>, Vec<&Named<'_>>) {
+    pub(super) fn channels(&self) -> (Vec<&Named<'_>>, Vec<&Named<'_>>) {
         let names = self.inputs.iter().map(|(_, signal)| &*signal.name);
         let names: HashSet<&str> = names.collect();
         let says_failed = |(_, signal): &&Named<'_>| {
@@ -109,10 +149,8 @@ program {}
             return;
         }
         let Self { tick, pace, step, .. } = self;
-        let half = inputs.len().min(MAXIMUM_PRESET_VALUE as usize / 2);
-        let cycles = (ROUND_CYCLES / (2 * half)).clamp(2, 10);
-        let time = duration::text(period * cycles as u32);
-        let round = 2 * half;
+        let Round { half, steps: round, pace: time } = Round::of(inputs.len(), period);
+        let time = duration::text(time);
         let _ = write!(
             text,
             "\nmemory {tick}
@@ -144,7 +182,16 @@ rung \"each input is on for half a round\"
     }
 }
 
+impl Round {
+    /// That of so many inputs, at least one.
+    pub(super) fn of(inputs: usize, period: Duration) -> Self {
+        let half = inputs.min(MAXIMUM_PRESET_VALUE as usize / 2);
+        let cycles = (ROUND_CYCLES / (2 * half)).clamp(2, 10);
+        Self { half, steps: 2 * half, pace: period * cycles as u32 }
+    }
+}
+
 fn declare(text: &mut String, kind: &str, terminal: &str, signal: &Signal, initial: &str) {
-    let note = note(signal).map(|note| format!("  -- {note}"));
+    let note = signal.note.as_ref().map(|note| format!("  -- {note}"));
     let _ = writeln!(text, "{kind} {terminal}{initial}{}", note.unwrap_or_default());
 }

@@ -1,0 +1,99 @@
+//! The inputs and outputs of a drafted program, whatever it was written in.
+
+use understudy_executable::declared;
+use understudy_interchange::Source;
+use understudy_ladder::Signal as LadderSignal;
+use understudy_typed::{Declared, Elementary, Points, Program, Type};
+
+use super::comment;
+
+/// What a program reads and drives.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Signals {
+    pub(super) inputs: Vec<Signal>,
+    pub(super) outputs: Vec<Signal>,
+}
+
+/// An input or an output.
+#[derive(Debug, Clone)]
+pub(super) struct Signal {
+    pub(super) name: String,
+    pub(super) declared: Declared,
+    /// The least and the greatest value that a whole number means something at.
+    pub(super) limits: (i128, i128),
+    /// What the program says about it: its address and its comment.
+    pub(super) note: Option<String>,
+}
+
+impl Signals {
+    pub(super) fn of(source: &Source) -> Self {
+        match source {
+            Source::Ladder(ladder) => {
+                let of_all = |signals: &[LadderSignal]| signals.iter().map(Signal::bit).collect();
+                Self { inputs: of_all(&ladder.inputs), outputs: of_all(&ladder.outputs) }
+            }
+            Source::Typed(program) => {
+                let of_all = |points: &Points| {
+                    declared(points)
+                        .map(|point| Signal::point(&point.name, point.declared(), program))
+                        .collect()
+                };
+                Self { inputs: of_all(&program.inputs), outputs: of_all(&program.outputs) }
+            }
+            Source::Library(_) => Self::default(),
+        }
+    }
+
+    /// Whether all are BOOL.
+    pub(super) fn are_bits(&self) -> bool {
+        self.inputs.iter().chain(&self.outputs).all(Signal::is_bit)
+    }
+}
+
+impl Signal {
+    fn bit(signal: &LadderSignal) -> Self {
+        let address = signal.address.as_ref().map(ToString::to_string);
+        Self {
+            name: signal.name.to_string(),
+            declared: Declared { of: Elementary::Bool, range: None },
+            limits: (0, 1),
+            note: note(address.as_deref(), signal.description.as_deref()),
+        }
+    }
+
+    fn point(name: &str, declared: Declared, program: &Program) -> Self {
+        let variable = program.variables.iter().find(|variable| variable.name == name);
+        let enumeration = variable.and_then(|variable| match variable.of {
+            Type::Enumeration(id, _) => program.enumerations.get(id.0 as usize),
+            _ => None,
+        });
+        let values = || {
+            let values = enumeration?.values.iter().map(|(_, value)| i128::from(*value));
+            Some((values.clone().min()?, values.max()?))
+        };
+        let (address, description) = variable.map_or((None, None), |variable| {
+            (variable.address.as_deref(), variable.description.as_deref())
+        });
+        Self {
+            name: name.to_owned(),
+            declared,
+            limits: declared.range.or_else(values).unwrap_or_else(|| declared.of.limits()),
+            note: note(address, description),
+        }
+    }
+
+    /// The value that is nearest to a whole number.
+    pub(super) fn nearest(&self, wanted: i128) -> i128 {
+        wanted.clamp(self.limits.0, self.limits.1)
+    }
+
+    pub(super) fn is_bit(&self) -> bool {
+        self.declared.of == Elementary::Bool
+    }
+}
+
+fn note(address: Option<&str>, description: Option<&str>) -> Option<String> {
+    let parts: Vec<&str> = address.into_iter().chain(description).collect();
+    let text = comment(&parts.join(" "));
+    (!text.is_empty()).then_some(text)
+}
