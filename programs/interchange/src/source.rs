@@ -60,22 +60,21 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
     }
     let Reading { program, period, diagnostics, .. } = read(format, name, text, wanted.program);
     let ladder = SourceFile { source: program.map(Source::Ladder), period, diagnostics };
-    let is_ladder = ladder.source.is_some();
-    let has_numbers =
-        matches!(&ladder.source, Some(Source::Ladder(ladder)) if has_bits_of_numbers(ladder));
-    let are_several = wanted.program.is_none() && text.matches("<pouInstance").nth(1).is_some();
-    if is_ladder && !are_several && !has_numbers || format != Format::PlcOpen {
+    if format != Format::PlcOpen {
         return ladder;
     }
-    // What no ladder can hold may be a program with numbers, or a library.
+    let is_ladder = ladder.source.is_some();
+    // The points are those of the declarations, and what no ladder can hold may be a program with numbers, or a library.
     let parsed = plcopen::read_typed(text);
     if !is_ladder && parsed.1.iter().any(|found| found.code == "U1001") {
         // Nothing was read, so there is nothing to lower.
         return SourceFile { diagnostics: parsed.1, ..ladder };
     }
     let read = whole(text, parsed, wanted.program, wanted.period);
-    let is_better = |typed: &Typed| typed.tasks.len() > 1 || has_numbers_as_points(typed);
-    if is_ladder && !read.typed.as_ref().is_some_and(is_better) {
+    let is_more = |typed: &Typed| typed.tasks.len() > 1 || has_numbers_as_points(typed);
+    let has_bits =
+        matches!(&ladder.source, Some(Source::Ladder(ladder)) if has_bits_of_numbers(ladder));
+    if is_ladder && !has_bits && !read.typed.as_ref().is_some_and(is_more) {
         return ladder;
     }
     let mut found = source(read);
@@ -89,7 +88,7 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
     let is_other = |found: &Diagnostic| ["U1001", "U1006", "U1013"].contains(&found.code);
     let may_be_ladder = !ladder.diagnostics.iter().any(is_other);
     let has_fewer = errors(&ladder.diagnostics) <= errors(&found.diagnostics);
-    if found.source.is_none() && may_be_ladder && has_fewer {
+    if found.source.is_none() && !is_ladder && may_be_ladder && has_fewer {
         found.diagnostics = ladder.diagnostics;
     }
     found

@@ -1,24 +1,36 @@
-//! An output is read by the world: each one that is declared is a point, whatever writes it and whatever the form.
+//! An output is read by the world, and an input is written by it: each one that is declared is a point of its type, whatever the body does with it and
+//! whatever the form.
 
 use understudy_interchange::{Source, Wanted, read_source};
+use understudy_ladder::Signal;
 use understudy_text::{Severity, has_errors};
+use understudy_typed::Points;
 
-/// What the world sees of a source: outputs, and what is kept in memory.
+/// What the world sees of a source: points and their types, and what is kept in memory.
 struct Seen {
-    outputs: Vec<String>,
+    inputs: Vec<(String, &'static str)>,
+    outputs: Vec<(String, &'static str)>,
     memory: Vec<String>,
 }
 
 fn seen(name: &str, text: &str) -> Seen {
     let read = read_source(name, text, Wanted::default());
     assert!(!has_errors(&read.diagnostics), "{text}\n{:#?}", read.diagnostics);
+    let bits = |signals: &[Signal]| {
+        signals.iter().map(|signal| (signal.name.to_string(), "BOOL")).collect()
+    };
+    let points = |points: &Points| {
+        points.iter().map(|point| (point.name.clone(), point.of.name())).collect()
+    };
     match read.source.expect("a program") {
         Source::Ladder(ladder) => Seen {
-            outputs: ladder.outputs.iter().map(|signal| signal.name.to_string()).collect(),
+            inputs: bits(&ladder.inputs),
+            outputs: bits(&ladder.outputs),
             memory: ladder.memory.iter().map(|signal| signal.name.to_string()).collect(),
         },
         Source::Typed(program) => Seen {
-            outputs: program.outputs.iter().map(|point| point.name.clone()).collect(),
+            inputs: points(&program.inputs),
+            outputs: points(&program.outputs),
             memory: program.variables.iter().map(|variable| variable.name.clone()).collect(),
         },
         Source::Library(units) => panic!("a library: {units:?}"),
@@ -32,6 +44,15 @@ fn has(names: &[String], variable: &str) -> bool {
         rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
     })
 }
+
+/// The type of a point.
+fn type_of(points: &[(String, &'static str)], variable: &str) -> Option<&'static str> {
+    points.iter().find(|(name, _)| name == variable).map(|(_, of)| *of)
+}
+
+/// How the variable `n` is declared where it is an input.
+const INPUTS: [&str; 4] =
+    ["input", "local at %I", "global at %I", "global at %I that no unit names"];
 
 /// How the variable `n` is declared, and whether it is an output.
 const DECLARED: [(&str, bool); 9] = [
@@ -83,13 +104,14 @@ fn placed(declared: &str, size: char) -> (&'static str, &'static str, String, bo
     let is_global = declared.starts_with("global");
     let list = match declared {
         "output" | "output at %M" | "retained output" => "outputVars",
-        "global at %Q that no unit names" => "",
+        "input" => "inputVars",
+        "global at %Q that no unit names" | "global at %I that no unit names" => "",
         _ if is_global => "externalVars",
         _ => "localVars",
     };
     let attributes = if declared.starts_with("retained") { r#" retain="true""# } else { "" };
     let address = match declared.split_once(" at %") {
-        Some((_, area)) => address(if area.starts_with('Q') { 'Q' } else { 'M' }),
+        Some((_, area)) => address(area.chars().next().unwrap_or('M')),
         None => String::new(),
     };
     (list, attributes, address, is_global)
@@ -184,6 +206,7 @@ fn text(declared: &str, of: usize, wired: Wired) -> String {
             format!("VAR_OUTPUT RETAIN n{} : {kind}; END_VAR", at(&address))
         }
         "outputVars" => format!("VAR_OUTPUT n{} : {kind}; END_VAR", at(&address)),
+        "inputVars" => format!("VAR_INPUT n : {kind}; END_VAR"),
         "externalVars" => format!("VAR_EXTERNAL n : {kind}; END_VAR"),
         "localVars" => format!("VAR n{} : {kind}; END_VAR", at(&address)),
         _ => String::new(),
@@ -226,8 +249,8 @@ fn every_declared_output_is_a_point_and_what_is_located_is_kept() {
                 for (name, text) in &texts {
                     let seen = seen(name, text);
                     let case = format!("{name}: {declared}, {kind}, {wired:?}\n{text}");
-                    assert!(has(&seen.outputs, "lamp"), "{case}");
-                    assert_eq!(has(&seen.outputs, "n"), is_output, "{case}");
+                    assert_eq!(type_of(&seen.outputs, "lamp"), Some("BOOL"), "{case}");
+                    assert_eq!(type_of(&seen.outputs, "n"), is_output.then_some(*kind), "{case}");
                     // Memory that nothing uses is in the account of a conversion; what is always the same needs no
                     // memory, unless others read it at its address.
                     let is_constant = wired == Wired::Value || TYPES[of].3.is_none();
@@ -242,6 +265,26 @@ fn every_declared_output_is_a_point_and_what_is_located_is_kept() {
 }
 
 #[test]
+fn every_declared_input_is_a_point_of_its_type() {
+    for declared in INPUTS {
+        for (of, (kind, ..)) in TYPES.iter().enumerate() {
+            let texts = [
+                ("p.xml", document("FBD", declared, of, Wired::Nothing)),
+                ("p.xml", document("LD", declared, of, Wired::Nothing)),
+                ("p.st", text(declared, of, Wired::Nothing)),
+            ];
+            for (name, text) in &texts {
+                let seen = seen(name, text);
+                let case = format!("{name}: {declared}, {kind}\n{text}");
+                assert_eq!(type_of(&seen.inputs, "a"), Some("BOOL"), "{case}");
+                assert_eq!(type_of(&seen.inputs, "n"), Some(*kind), "{case}");
+                assert_eq!(type_of(&seen.outputs, "n"), None, "{case}");
+            }
+        }
+    }
+}
+
+#[test]
 fn every_part_of_a_structure_is_a_point() {
     for (body, is_ladder) in
         [("", true), ("s.on := TRUE;", true), ("s.count := 3;", true), ("s.level := 1.0;", false)]
@@ -252,10 +295,10 @@ fn every_part_of_a_structure_is_a_point() {
 PROGRAM p VAR_INPUT a : BOOL; END_VAR VAR_OUTPUT s : part; y : BOOL; END_VAR y := a; {body} END_PROGRAM"
         );
         let seen = seen("p.st", &text);
-        for name in ["s.on", "s.count", "y"] {
-            assert!(has(&seen.outputs, name), "{name}: {text} {:?}", seen.outputs);
+        for (name, of) in [("s.on", "BOOL"), ("s.count", "INT"), ("y", "BOOL")] {
+            assert_eq!(type_of(&seen.outputs, name), Some(of), "{name}: {text}");
         }
-        assert_eq!(has(&seen.outputs, "s.level"), !is_ladder);
+        assert_eq!(type_of(&seen.outputs, "s.level").is_some(), !is_ladder);
     }
 }
 
@@ -286,6 +329,6 @@ fn an_output_that_cannot_be_a_point_is_said() {
 fn outputs_that_nothing_writes_are_kept_in_the_other_forms() {
     let ladder = "program p\ninput a\noutput y\noutput spare\nrung\n    a (y)\n";
     let ldmicro = "LDmicro0.1\nIO LIST\n    Xa at 1\n    Yspare at 2\nEND\nPROGRAM\nRUNG\n    CONTACTS Xa 0\n    COIL Yy 0 0 0\nEND\n";
-    assert!(has(&seen("p.ladder", ladder).outputs, "spare"));
-    assert!(has(&seen("p.ld", ldmicro).outputs, "Yspare"));
+    assert!(type_of(&seen("p.ladder", ladder).outputs, "spare").is_some());
+    assert!(type_of(&seen("p.ld", ldmicro).outputs, "Yspare").is_some());
 }

@@ -63,14 +63,14 @@ impl<'a> Scope<'a> {
                 _ => scope.declare(variable),
             }
         }
-        // An output of the configuration that no unit names is one of each program.
+        // An input or output of the configuration that no unit names is one of each program.
         let is_named = |global: &Variable| {
             let mut variables = project.pous.iter().flat_map(|pou| &pou.variables);
             variables.any(|known| {
                 known.section == Section::External && known.name.eq_ignore_ascii_case(&global.name)
             })
         };
-        for global in globals.iter().filter(|global| is_output(global) && !is_named(global)) {
+        for global in globals.iter().filter(|global| is_wired(global) && !is_named(global)) {
             scope.declare(global);
         }
         scope
@@ -308,13 +308,22 @@ fn is_given(variable: &Variable) -> bool {
 
 /// Whether the world reads it.
 fn is_output(variable: &Variable) -> bool {
-    let located = variable.address.as_ref();
-    let area = located.map(|address| address.trim().to_ascii_uppercase());
-    match area.as_deref().and_then(|area| area.get(..2)) {
+    match area(variable).as_deref() {
         Some("%Q") => true,
         Some("%I") => false,
         _ => variable.section == Section::Output,
     }
+}
+
+/// Whether a variable is at the address of an input or an output.
+fn is_wired(variable: &Variable) -> bool {
+    matches!(area(variable).as_deref(), Some("%I" | "%Q"))
+}
+
+/// The beginning of an address, in capitals.
+fn area(variable: &Variable) -> Option<String> {
+    let address = variable.address.as_ref()?.trim();
+    Some(address.get(..2)?.to_ascii_uppercase())
 }
 
 /// `%IX0.3`, in any case.
