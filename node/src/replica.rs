@@ -186,14 +186,20 @@ impl Replica {
     }
 
     /// Remembers the sample of `moment`, whether it can be followed or not.
-    pub(crate) fn remember(&mut self, program: &Program, moment: Moment, sample: &Sample) {
+    pub(crate) fn remember(
+        &mut self,
+        program: &Program,
+        moment: Moment,
+        sample: &Sample,
+        received: SamplesReceived,
+    ) {
         let Some(inputs) = sample.history.last() else {
             return;
         };
         if inputs.width() == program.executable.input_count() {
             if let Remembered::Received(known) = &mut self.remembered {
                 if known.sampled < moment {
-                    known.received = SamplesReceived::Several;
+                    known.received = SamplesReceived::Later;
                 }
                 known.sampled = moment;
                 known.applied = sample.applied;
@@ -208,7 +214,7 @@ impl Replica {
             let recalled = Recalled {
                 program: self.id,
                 sampled: moment,
-                received: SamplesReceived::OneCycle,
+                received,
                 applied: sample.applied,
                 excluded: sample.excluded,
                 accounted_for: sample.gone,
@@ -222,8 +228,8 @@ impl Replica {
 
     /// A station reports at `now` to hold the state of the cycle `stepped`. If that is no newer than the newest sample
     /// received here, `silent_after` cycles after it, the remote I/O is not received there either. No newer output was computed from its state
-    /// if that station received samples itself, as it recalls, or if it has received none since it started and holds the state that it was given
-    /// here after it had been accounted for; unless it is taking over another one.
+    /// if that station received samples itself, as it recalls, or if it has received none since it started, or none after the one that accounts
+    /// for it, and holds the state that it was given here after that; unless it is taking over another one.
     pub(crate) fn receive_holding(
         &mut self,
         station: StationId,
@@ -237,8 +243,8 @@ impl Replica {
         };
         let was_given = self.given.contains(station);
         let theirs = theirs.filter(|theirs| match theirs.received {
-            SamplesReceived::Several => true,
-            SamplesReceived::OneCycle => false,
+            SamplesReceived::Later => true,
+            SamplesReceived::First => was_given && theirs.sampled <= recalled.sampled,
             SamplesReceived::Nothing => was_given,
         });
         if stepped > recalled.sampled {

@@ -27,7 +27,7 @@ use understudy_cycle::{Arrival, Input, Machine, Output, Outvoted, Participant};
 use understudy_executable::Scratch;
 use understudy_wire::{
     Body, ConfigurationHash, Digest, Frame, Holding, Image, Lineage, Member, Moment, ProgramId,
-    ProgramSet, Recalled, Sample, StationId, StationSet, Time,
+    ProgramSet, Recalled, Sample, SamplesReceived, StationId, StationSet, Time,
 };
 
 use crate::event::Event;
@@ -226,7 +226,12 @@ impl Station {
         let Some(replica) = replica_mut(&mut self.replicas, program) else {
             return;
         };
-        replica.remember(&self.settings.programs[program.index()], moment, sample);
+        let (clock, schedule) = (&self.member.clock, &self.settings.agreement.schedule);
+        let received = match clock.anchor().since(self.started) >= schedule.period() {
+            true => SamplesReceived::Later,
+            false => SamplesReceived::First,
+        };
+        replica.remember(&self.settings.programs[program.index()], moment, sample, received);
         if replica.set_excluded(excluded) {
             self.member.report(if excluded {
                 Event::Excluded { moment, program }

@@ -126,7 +126,7 @@ impl Holders {
             living.filter_map(|entry| Some((entry.station, entry.recalled.as_ref()?)))
         };
         let first_hand =
-            recalling().filter(|(_, recalled)| recalled.received == SamplesReceived::Several);
+            recalling().filter(|(_, recalled)| recalled.received == SamplesReceived::Later);
         let accounted_for = first_hand.fold(StationSet::EMPTY, |all, (station, recalled)| {
             all.or(StationSet::only(station)).or(recalled.accounted_for)
         });

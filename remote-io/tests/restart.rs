@@ -80,7 +80,7 @@ fn run(held: [Held; 3], release: Release, released_at: u64, cycles: u64) -> Vec<
                     recalled: vec![Recalled {
                         program: ProgramId(0),
                         sampled: moment(50),
-                        received: SamplesReceived::Several,
+                        received: SamplesReceived::Later,
                         applied: None,
                         excluded: StationSet::EMPTY,
                         accounted_for: StationSet::EMPTY,

@@ -109,6 +109,43 @@ fn a_state_that_a_living_station_holds_is_not_lost() {
     }
 }
 
+/// A station that was gone comes back, and within a few cycles its remote I/O restarts, at each part of the cycle: the other station has the state,
+/// and nobody is asked.
+#[test]
+fn a_station_that_has_just_returned_is_no_reason_to_ask() {
+    const PHASES: [f64; 5] = [0.0, 0.2, 0.4, 0.6, 0.9];
+    let mut asked = 0;
+    for (after, returns, fails) in (0..6).flat_map(|after| {
+        PHASES.into_iter().flat_map(move |a| PHASES.into_iter().map(move |b| (after, a, b)))
+    }) {
+        for (station, twice) in
+            [(station(0), false), (Member::Station(UNDERSTUDY), false), (station(0), true)]
+        {
+            let mut simulation =
+                Simulation::new(press_cell::parts(Mode::Full, 1), Network::default(), 1);
+            simulation.schedule(fault(10, 0.0, station, Action::Crash));
+            simulation.schedule(fault(60, returns, station, Action::Restart));
+            let mut restarts = vec![60 + after];
+            if twice {
+                restarts.insert(0, 58);
+            }
+            for at in restarts {
+                simulation.schedule(fault(at, fails, ROBOT_IO, Action::Crash));
+                simulation.schedule(fault(at, fails, ROBOT_IO, Action::Restart));
+            }
+            simulation
+                .run(200, 100, &mut |_, _, _, record| {
+                    let lost = matches!(record, Record::RemoteIo(Event::StateLost { .. }));
+                    asked += u32::from(lost);
+                })
+                .expect("the cluster gets ready");
+            let what = format!("{station:?} at {returns}, {after} later at {fails}, {twice}");
+            assert_eq!(simulation.violations(), [], "{what}");
+        }
+    }
+    assert_eq!(asked, 0);
+}
+
 /// The robot's remote I/O receives no station that runs its program for so long that what it samples, and nobody applies, fills every memory:
 /// it goes on from its newest applied output.
 #[test]

@@ -257,9 +257,9 @@ fn a_station_is_a_witness_from_its_second_sample_on() {
         let Body::Sample(sample) = &frame.body else {
             panic!("a sample");
         };
-        replica.remember(&program, frame.header.moment, sample);
+        replica.remember(&program, frame.header.moment, sample, SamplesReceived::First);
         let recalled = replica.recalled(moment(0)).expect("it was received");
-        recalled.received == SamplesReceived::Several
+        recalled.received == SamplesReceived::Later
     };
     let first = truth.sample(true);
     assert!(!remember(&first));

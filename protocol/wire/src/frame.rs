@@ -232,10 +232,10 @@ pub struct Recalled {
 pub enum SamplesReceived {
     /// None: it has proved no output since it started, whatever state it holds.
     Nothing,
-    /// Of one cycle: outputs of that sample may have been proved in an earlier life of this station.
-    OneCycle,
-    /// Of several cycles: outputs that it proved in an earlier life are covered by [`Recalled::applied`].
-    Several,
+    /// Of one cycle, in which it may have started: outputs of that sample may have been proved in an earlier life of this station.
+    First,
+    /// Of a cycle that began after it started: outputs that it proved in an earlier life are covered by [`Recalled::applied`].
+    Later,
 }
 
 /// x(i), or a segment of it, for the station that asked.

@@ -52,7 +52,7 @@ fn recalled(program: u8) -> Recalled {
     Recalled {
         program: ProgramId(program),
         sampled: moment(3, 3),
-        received: SamplesReceived::Several,
+        received: SamplesReceived::Later,
         applied: Some(moment(3, 3)),
         excluded: StationSet::from_bits(0b100),
         accounted_for: StationSet::from_bits(0b1),

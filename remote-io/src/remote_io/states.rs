@@ -189,7 +189,7 @@ impl Bench {
         let recalled = Recalled {
             program: PROGRAM,
             sampled: moment(50),
-            received: SamplesReceived::Several,
+            received: SamplesReceived::Later,
             applied: Some(moment(50)),
             excluded: StationSet::EMPTY,
             accounted_for: StationSet::EMPTY,

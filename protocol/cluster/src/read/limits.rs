@@ -188,7 +188,7 @@ mod tests {
                 let recalled = |program: u8| Recalled {
                     program: ProgramId(program),
                     sampled: LATE,
-                    received: understudy_wire::SamplesReceived::Several,
+                    received: understudy_wire::SamplesReceived::Later,
                     applied: Some(LATE),
                     excluded: StationSet::from_bits(u128::MAX),
                     accounted_for: StationSet::from_bits(u128::MAX),
