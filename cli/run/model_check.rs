@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use understudy_cluster::Cluster;
 use understudy_journal::Members;
-use understudy_model_checking::{ALL, Budget, Counterexample, Model, Promise, Start, check};
+use understudy_model_checking::{Budget, Counterexample, Model, Promise, Start, check};
 use understudy_scenarios::{Expectation, Scenario, parts, write};
 use understudy_wire::Member;
 
@@ -21,6 +21,7 @@ use crate::overrides::OverrideArguments;
 Example:
   understudy model-check examples/press-cell/cluster.toml --faults 1 --cycles 2
   understudy model-check examples/press-cell/cluster.toml --restarted all --kinds loss,delay --cycles 12
+  understudy model-check examples/press-cell/cluster.toml --wrong-program robot,robot-io --cycles 12
   understudy model-check examples/press-cell/cluster.toml --behind robot --restarted press-io
   understudy model-check examples/press-cell/cluster.toml --broken robot-io:understudy --kinds crash
 
@@ -42,6 +43,9 @@ pub(crate) struct Arguments {
     /// Members that have just restarted when a run begins; `all`: all stations and remote I/Os. Default: all synchronised
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     restarted: Vec<String>,
+    /// Members that have just restarted with a wrong program, one and the same: wrong outputs alone count then
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    wrong_program: Vec<String>,
     /// Members that were suspended in the previous cycle
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     behind: Vec<String>,
@@ -94,11 +98,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let overrides = arguments.overrides.overrides();
     let (cluster, reports) = files::cluster(&arguments.cluster, overrides)?;
     let start = start(arguments, &cluster)?;
-    let model = Model::new(parts(&cluster), start, budget(arguments), &ALL)
+    let checked = start.properties();
+    let model = Model::new(parts(&cluster), start, budget(arguments))
         .map_err(|error| Answer::failed(Status::Failed, "U0530", error))?;
     let processors = available_parallelism().map_or(1, usize::from);
     let verdict = check(model, arguments.jobs.unwrap_or(processors).max(1));
-    let properties: Vec<Property> = ALL
+    let properties: Vec<Property> = checked
         .iter()
         .map(|property| {
             let broken = verdict.counterexamples.iter();
@@ -140,6 +145,7 @@ fn start(arguments: &Arguments, cluster: &Cluster) -> Result<Start, Answer> {
         found
     };
     let (restarted, behind) = (find(&arguments.restarted), find(&arguments.behind));
+    let misled = find(&arguments.wrong_program);
     let mut broken = Vec::new();
     for link in &arguments.broken {
         let (from, to) = link.split_once(':').unwrap_or((link, ""));
@@ -150,7 +156,7 @@ fn start(arguments: &Arguments, cluster: &Cluster) -> Result<Start, Answer> {
         }
     }
     if unknown.is_empty() {
-        return Ok(Start { restarted, behind, broken });
+        return Ok(Start { restarted, misled, behind, broken });
     }
     let known: Vec<&str> =
         cluster.members().filter(plays).filter_map(|member| cluster.member_name(member)).collect();

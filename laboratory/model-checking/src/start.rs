@@ -6,6 +6,7 @@
 use understudy_simulator::{Action, Fault};
 use understudy_wire::{MAXIMUM_HISTORY, Member};
 
+use crate::properties::{ALL, Promise, Property};
 use crate::step::Place;
 
 /// Of a cluster that was synchronised. The default is that nothing has happened.
@@ -13,6 +14,8 @@ use crate::step::Place;
 pub struct Start {
     /// Who starts again as the run begins, and knows nothing.
     pub restarted: Vec<Member>,
+    /// Who starts again as the run begins with a wrong program, one and the same configuration for all of them.
+    pub misled: Vec<Member>,
     /// Who stood still for a cycle.
     pub behind: Vec<Member>,
     /// Links, from a sender to a receiver, that were broken for longer than the history of a sample.
@@ -26,6 +29,14 @@ const BROKEN_CYCLES: u64 = MAXIMUM_HISTORY as u64 + 2;
 const SYNCHRONISED: Place = Place { cycle: 1, slot: 0 };
 
 impl Start {
+    /// The properties that hold from here on. Members with a wrong program are refused by the others, so that nothing but wrong outputs counts.
+    pub fn properties(&self) -> Vec<Property> {
+        let holds = |property: &Property| {
+            self.misled.is_empty() || property.promise == Promise::NothingWrong
+        };
+        ALL.into_iter().filter(holds).collect()
+    }
+
     /// Where the run begins.
     pub(crate) fn first(&self) -> Place {
         Place {
@@ -40,7 +51,7 @@ impl Start {
 
     /// All to whom something has happened, in the order of the schedule.
     pub(crate) fn members(&self) -> impl Iterator<Item = Member> + '_ {
-        self.behind.iter().chain(&self.restarted).copied()
+        self.behind.iter().chain(&self.restarted).chain(&self.misled).copied()
     }
 
     /// What has happened, in the order in which it has to be scheduled.
@@ -59,9 +70,12 @@ impl Start {
         let restarts = self.restarted.iter().flat_map(|&member| {
             [Action::Crash, Action::Restart].map(|action| fault(first, member, action))
         });
+        let misled = self.misled.iter().flat_map(|&member| {
+            [Action::Crash, Action::RestartWrongProgram].map(|action| fault(first, member, action))
+        });
         let broken = self.broken.iter().flat_map(|&(from, to)| {
             [fault(SYNCHRONISED, from, Action::Cut { to }), fault(first, from, Action::Heal { to })]
         });
-        stops.chain(goes_on).chain(restarts).chain(broken).collect()
+        stops.chain(goes_on).chain(restarts).chain(misled).chain(broken).collect()
     }
 }

@@ -42,16 +42,11 @@ pub struct World {
 }
 
 impl Model {
-    /// A cluster of these parts, once it has come into step on a quiet network, and `start` has happened to it.
+    /// A cluster of these parts, once it has come into step on a quiet network, and `start` has happened to it; [`Start::properties`] are checked.
     ///
     /// # Errors
     /// [`NotReady`] where it does not come into step.
-    pub fn new(
-        parts: Parts,
-        start: Start,
-        budget: Budget,
-        properties: &[Property],
-    ) -> Result<Self, NotReady> {
+    pub fn new(parts: Parts, start: Start, budget: Budget) -> Result<Self, NotReady> {
         let stations = (0..parts.stations.len()).map(|rank| Member::Station(StationId(rank as u8)));
         let programs = 0..parts.remote_ios.len();
         let remote_ios = programs.map(|program| Member::RemoteIo(ProgramId(program as u8)));
@@ -59,7 +54,8 @@ impl Model {
         let period = parts.stations[0].agreement.schedule.period();
         let mut origin = Simulation::new(parts, Self::network(period), 0);
         origin.run(1, PATIENCE_CYCLES, &mut |_, _, _, _| {})?;
-        Ok(Self { origin, start, members, period, budget, properties: properties.to_vec() })
+        let properties = start.properties();
+        Ok(Self { origin, start, members, period, budget, properties })
     }
 
     /// On which each frame takes T/20, and nothing is left to chance.

@@ -31,6 +31,7 @@ use crate::signals::SignalReferee;
 use crate::slot::Slot;
 use crate::tally::Tally;
 use crate::wakeups::Wakeups;
+use judging::{Misled, Synchronised};
 
 /// Something for the journal.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -82,6 +83,10 @@ pub struct Simulation {
     arrived: Vec<[StationSet; 3]>,
     /// For each remote I/O, the stations that had the state of its program at its last deadline, and at the one before.
     holders: Vec<[StationSet; 2]>,
+    /// For each program, the stations that had its state when outputs were last applied.
+    synchronised: Vec<Synchronised>,
+    /// For each remote I/O, what is known of it while it has a wrong program.
+    misled: Vec<Option<Misled>>,
     violations: Vec<Violation>,
     faults: Vec<Fault>,
     pace: Pace,
@@ -134,6 +139,8 @@ impl Simulation {
             ready: ProgramSet::EMPTY,
             arrived: vec![[StationSet::EMPTY; 3]; parts.remote_ios.len()],
             holders: vec![[StationSet::EMPTY; 2]; parts.remote_ios.len()],
+            synchronised: vec![Synchronised::new(parts.stations.len()); parts.remote_ios.len()],
+            misled: vec![None; parts.remote_ios.len()],
             violations: Vec::new(),
             faults: Vec::new(),
             pace: Pace::new(parts.stations[0].agreement.schedule.period()),

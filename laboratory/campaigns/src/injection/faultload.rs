@@ -27,12 +27,28 @@ impl Injection {
         first..last + 1
     }
 
-    /// Whether two injections would both decide whether the process of one member runs.
+    /// The cycles in which it decides whether processes run: to the end of the run where it leaves one crashed or stopped.
+    fn decides_in(&self) -> Range<u64> {
+        let leaves = |place: usize, step: &Fault| {
+            let later = &self.steps[place + 1..];
+            matches!(step.action, Action::Crash | Action::Stop)
+                && !later.iter().any(|other| other.member == step.member)
+        };
+        let cycles = self.cycles();
+        let lasts = self.steps.iter().enumerate().any(|(place, step)| leaves(place, step));
+        cycles.start..if lasts { u64::MAX } else { cycles.end }
+    }
+
+    /// Whether two injections would both decide whether the process of one member runs, or both give members a wrong program: two pairs may be
+    /// most of a cluster, and then no member can tell which program is the right one.
     pub(super) fn collides_with(&self, other: &Self) -> bool {
+        if (self.kind, other.kind) == (Kind::WrongProgram, Kind::WrongProgram) {
+            return true;
+        }
         let decides = |step: &&Fault| matches!(step.action, Action::Crash | Action::Stop);
         let mut decided = self.steps.iter().filter(decides);
         let by_other = |member| other.steps.iter().filter(decides).any(|it| it.member == member);
-        let (own, others) = (self.cycles(), other.cycles());
+        let (own, others) = (self.decides_in(), other.decides_in());
         let meet = own.start < others.end && others.start < own.end;
         meet && decided.any(|step| by_other(step.member))
     }

@@ -1,5 +1,6 @@
 //! Invariants *The plant decides history* and *Never back*: a program continues only from a state that its own samples led to, never
-//! from one before the newest applied output, and starts cold only where no living station has its state.
+//! from one before the newest applied output, and starts cold, or asks the operator, only where no living
+//! station has its state.
 
 use understudy_simulator::Violation;
 
@@ -15,6 +16,7 @@ pub(super) const PROPERTY: Property = Property {
                 Violation::UnknownHistory { .. }
                     | Violation::WentBack { .. }
                     | Violation::NeedlessColdStart { .. }
+                    | Violation::NeedlessQuestion { .. }
             )
         };
         !world.simulation.violations().iter().any(back)

@@ -3,7 +3,7 @@
 mod cell;
 mod starts;
 
-use understudy_model_checking::{ALL, Budget, Model, Start, Step, check};
+use understudy_model_checking::{Budget, Model, Start, Step, check};
 use understudy_simulator::Tally;
 
 use cell::parts;
@@ -20,7 +20,7 @@ fn check_all(understudies: usize, budget: Budget, states: usize) {
 }
 
 fn check_from(start: Start, understudies: usize, budget: Budget, states: usize) {
-    let model = Model::new(parts(understudies), start, budget, &ALL).expect("it comes into step");
+    let model = Model::new(parts(understudies), start, budget).expect("it comes into step");
     let verdict = check(model, 2);
     assert_eq!(verdict.counterexamples, []);
     assert_eq!(verdict.states, states, "a protocol that has changed has other states");
@@ -57,7 +57,7 @@ fn a_crash_and_a_loss_in_two_cycles() {
 /// Without an understudy a lost station does cost a cycle: the checker finds it, and the simulator replays what it found.
 #[test]
 fn a_counterexample_is_found_and_replayed() {
-    let model = || Model::new(parts(0), Start::default(), ONE, &ALL).expect("it comes into step");
+    let model = || Model::new(parts(0), Start::default(), ONE).expect("it comes into step");
     let verdict = check(model(), 1);
     let [example] = &verdict.counterexamples[..] else {
         panic!("{:?}", verdict.counterexamples);

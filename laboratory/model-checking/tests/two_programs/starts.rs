@@ -83,6 +83,24 @@ fn the_understudy_has_restarted_with_a_controller() {
     check_from(restarted(&[station(1), station(2)]), 1, one_in(3), 12_756);
 }
 
+/// A remote I/O and one of its stations start again with one and the same wrong program, in any order and with anything else that happens: as
+/// long as they receive as many members with the right one, their program drives nothing.
+fn check_misled(station: Member, states: usize) {
+    let start = Start { misled: vec![remote_io(0), station], ..Start::default() };
+    let budget = Budget { crashes: 1, stops: 1, losses: 1, total: 1, cycles: 9, ..NONE };
+    check_from(start, 1, budget, states);
+}
+
+#[test]
+fn a_remote_io_and_its_controller_have_a_wrong_program() {
+    check_misled(station(0), 149_707);
+}
+
+#[test]
+fn a_remote_io_and_the_understudy_have_a_wrong_program() {
+    check_misled(station(2), 128_108);
+}
+
 #[test]
 fn a_controller_is_a_cycle_behind() {
     check_from(behind(station(0)), 1, one_in(3), 14_020);

@@ -62,6 +62,15 @@ pub enum Violation {
         /// The station.
         station: StationId,
     },
+    /// The operator was asked for the state of a program although a living station holds it, and no station that could hold a newer one has lost
+    /// its memory.
+    #[error("in cycle {moment} the operator was asked although station {} had the state", station.0)]
+    NeedlessQuestion {
+        /// In this cycle.
+        moment: Moment,
+        /// The station.
+        station: StationId,
+    },
     /// A signal of another program was sampled with a value that the other program did not compute.
     #[error(
         "in cycle {moment} the signal at input bit {input} was sampled as {value:#x}, which the other program did not compute"

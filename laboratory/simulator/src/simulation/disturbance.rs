@@ -64,6 +64,9 @@ impl Simulation {
                 }
             }
             (Member::Station(station), _) => {
+                if action == Action::Crash {
+                    self.note_crash(station);
+                }
                 let slot = &mut self.stations[station.index()];
                 let waiting = disturb(slot, action);
                 self.wakeups.set(member, slot.due());
@@ -108,6 +111,9 @@ impl Simulation {
                 if has_wrong_programs {
                     settings.hash = wrong_hash(settings.hash);
                 }
+                let misled = &mut self.misled[program.index()];
+                // It may go on with what its stations have started with it before.
+                *misled = has_wrong_programs.then(|| misled.unwrap_or_default());
                 let slot = &mut self.remote_ios[program.index()];
                 slot.restart(RemoteIo::new(self.now, settings));
                 self.wakeups.set(member, slot.due());

@@ -23,13 +23,16 @@ impl Hash for Simulation {
             ready,
             arrived,
             holders,
+            synchronised,
+            misled,
             violations,
             faults,
             pace,
             founded,
         } = self;
         (links, stations, remote_ios, plants, referees).hash(hasher);
-        (ready, arrived, holders, violations.len(), pace, founded).hash(hasher);
+        (ready, arrived, holders, synchronised, misled, violations.len(), pace, founded)
+            .hash(hasher);
         for fault in faults {
             (fault.at_cycle, fault.phase.to_bits(), fault.member, fault.action).hash(hasher);
         }

@@ -1,20 +1,89 @@
 //! What the referees are shown of a remote I/O, and what they say.
 
-use understudy_remote_io::Event;
+use understudy_remote_io::{Event, RemoteIo};
 use understudy_wire::{Lineage, Member, ProgramId, Source, StationId, StationSet};
 
 use super::{Observe, Record, Simulation};
 use crate::referee::Violation;
 
+/// A remote I/O with a wrong program, as the referee knows it: by who runs and whom it can receive, and not by what it says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub(super) struct Misled {
+    /// Stations with another configuration that it could receive at its last deadline, and at the one before.
+    contradicted_by: [StationSet; 2],
+    /// Whether the wrong program may run: the operator has chosen its cold start, or it has started where the remote I/O can receive more
+    /// stations with its configuration than with another one. No member can tell then which of the two is right.
+    is_permitted: bool,
+}
+
+/// Stations that had the state of a program when outputs of it were last applied.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(super) struct Synchronised {
+    /// For each station, the deadlines with proved outputs since it last had the state, or ran without it.
+    absent_for: Vec<u32>,
+    /// Stations that have crashed since.
+    crashed: StationSet,
+}
+
+impl Synchronised {
+    pub(super) fn new(stations: usize) -> Self {
+        Self { absent_for: vec![u32::MAX; stations], crashed: StationSet::EMPTY }
+    }
+
+    /// Proved outputs were applied while `holders` had the state, and `running` ran, with it or without.
+    fn applied(&mut self, holders: StationSet, running: StationSet) {
+        for (rank, absent_for) in (0..).zip(&mut self.absent_for) {
+            let station = StationId(rank);
+            // It has received a sample since it started.
+            if holders.contains(station) && *absent_for == 0 {
+                self.crashed.remove(station);
+            }
+            *absent_for = match (holders.contains(station), running.contains(station)) {
+                (true, _) => 0,
+                // The others do not know that it has no state.
+                (false, true) => 1,
+                (false, false) => absent_for.saturating_add(1),
+            };
+        }
+    }
+
+    fn crash(&mut self, station: StationId, has_state: bool) {
+        self.crashed.insert(station);
+        if has_state {
+            self.absent_for[station.index()] = 1;
+        }
+    }
+
+    /// The stations that could have a state whose outputs were applied, as far as the others know; none where one of them has lost its memory.
+    fn in_doubt(&self, known_after: u32) -> StationSet {
+        let stations = (0..).map(StationId).zip(&self.absent_for);
+        let stations = stations.filter(|(_, absent_for)| **absent_for < known_after);
+        let stations: StationSet = stations.map(|(station, _)| station).collect();
+        if stations.and(self.crashed).is_empty() { stations } else { StationSet::EMPTY }
+    }
+}
+
 impl Simulation {
     pub(super) fn judge(&mut self, program: ProgramId, event: &Event, observe: &mut Observe<'_>) {
+        if self.is_permitted(program, event) {
+            self.ready.remove(program);
+            self.tallies[program.index()].count(event);
+            return;
+        }
         let mut holder = None;
         if let Event::Sampled { moment, before, .. } = event {
             let found = self.holder_before(program, *before);
             holder = found.map(|station| (*moment, station));
         }
-        if let Event::Applied { .. } = event {
+        if let Event::Applied { source, .. } = event {
             let holders = self.holders(program);
+            if matches!(source, Source::Direct | Source::Reconstructed) {
+                let with_state = self.with_state(program);
+                let running = (0..).map(StationId).zip(&self.stations);
+                let running = running.filter(|(_, slot)| slot.running().is_some());
+                let running = running.map(|(station, _)| station).collect();
+                self.synchronised[program.index()].applied(with_state, running);
+            }
             let [last, earlier] = &mut self.holders[program.index()];
             *earlier = std::mem::replace(last, holders);
             let [newest, last, earlier] = &mut self.arrived[program.index()];
@@ -27,6 +96,11 @@ impl Simulation {
             && referee.cold_starts() > started
         {
             found = Some(Violation::NeedlessColdStart { moment, station });
+        }
+        if let Event::StateLost { moment, asks: true, .. } = event
+            && let Some(station) = self.holder_in_doubt(program)
+        {
+            found = Some(Violation::NeedlessQuestion { moment: *moment, station });
         }
         if let Event::Sampled { moment, inputs, .. } = event {
             let settings = &self.parts.remote_ios[program.index()];
@@ -50,6 +124,46 @@ impl Simulation {
         self.tallies[program.index()].count(event);
     }
 
+    /// Whether a remote I/O with a wrong program may drive it, so that nothing that it applies is judged.
+    fn is_permitted(&mut self, program: ProgramId, event: &Event) -> bool {
+        let Some(mut misled) = self.misled[program.index()] else {
+            return false;
+        };
+        match event {
+            Event::Applied { .. } => {
+                let (_, others) = self.received_by(program);
+                let [last, _] = misled.contradicted_by;
+                misled.contradicted_by = [others, last];
+            }
+            Event::StartedCold { .. } => {
+                let (own, _) = self.received_by(program);
+                let [last, earlier] = misled.contradicted_by;
+                let chosen = self.referees[program.index()].operator_may_choose();
+                misled.is_permitted = chosen || own.len() > last.and(earlier).len();
+            }
+            _ => {}
+        }
+        self.misled[program.index()] = Some(misled);
+        misled.is_permitted
+    }
+
+    /// Stations that run and that the remote I/O of a program can receive: those with its configuration, and the others.
+    fn received_by(&self, program: ProgramId) -> (StationSet, StationSet) {
+        let remote_io = self.remote_ios[program.index()].running();
+        let own = remote_io.map(RemoteIo::configuration);
+        let (mut equal, mut others) = (StationSet::EMPTY, StationSet::EMPTY);
+        for (rank, slot) in (0..).zip(&self.stations) {
+            let station = StationId(rank);
+            let reaches = self.links.reaches(Member::Station(station), Member::RemoteIo(program));
+            if let (Some(running), true) = (slot.running(), reaches) {
+                let set =
+                    if Some(running.configuration()) == own { &mut equal } else { &mut others };
+                set.insert(station);
+            }
+        }
+        (equal, others)
+    }
+
     /// Of the stations that have the state of a program now, one that had it at the last two deadlines and that the remote I/O received before both:
     /// asked where a sample extends a state, `before`, that the referee does not know. Who has come back, or has taken over the state of one that has,
     /// only in the last cycle has not been able to say so.
@@ -57,30 +171,61 @@ impl Simulation {
         if self.referees[program.index()].state_of(before).is_some() {
             return None;
         }
-        let [_, last, earlier] = self.arrived[program.index()];
-        let [held, held_before] = self.holders[program.index()];
-        let now = self.holders(program);
-        now.iter().find(|&station| {
-            let sets = [last, earlier, held, held_before];
-            sets.iter().all(|set| set.contains(station))
-        })
+        self.lasting_holders(program).iter().next()
     }
 
-    /// The stations that run, that the remote I/O of a program can receive and that can receive it, with a state that its next sample could extend.
+    /// A station loses its memory: outputs of a state that it has now may be applied yet.
+    pub(super) fn note_crash(&mut self, station: StationId) {
+        for program in (0..self.remote_ios.len()).map(|index| ProgramId(index as u8)) {
+            let has_state = self.with_state(program).contains(station);
+            self.synchronised[program.index()].crash(station, has_state);
+        }
+    }
+
+    /// A station that has the state of a program, where all stations that could have another one whose outputs were applied have it too, and
+    /// receive each other.
+    fn holder_in_doubt(&self, program: ProgramId) -> Option<StationId> {
+        let agreement = &self.parts.remote_ios[program.index()].agreement;
+        let known_after = agreement.flag_after + agreement.history as u32 + 6;
+        let in_doubt = self.synchronised[program.index()].in_doubt(known_after);
+        let holders = self.lasting_holders(program);
+        let pairs = in_doubt.iter().flat_map(|from| in_doubt.iter().map(move |to| (from, to)));
+        let mut pairs = pairs.filter(|(from, to)| from != to);
+        let receive_each_other =
+            pairs.all(|(from, to)| self.links.reaches(Member::Station(from), Member::Station(to)));
+        let all_have_it = receive_each_other && in_doubt.without(holders).is_empty();
+        all_have_it.then(|| in_doubt.iter().next()).flatten()
+    }
+
+    /// Stations that have the state of a program now and had it at the last two deadlines, and that the remote I/O received before both.
+    fn lasting_holders(&self, program: ProgramId) -> StationSet {
+        let [_, last, earlier] = self.arrived[program.index()];
+        let [held, held_before] = self.holders[program.index()];
+        self.holders(program).and(last).and(earlier).and(held).and(held_before)
+    }
+
+    /// Those of [`Self::with_state`] that the remote I/O of a program can receive and that can receive it.
     fn holders(&self, program: ProgramId) -> StationSet {
         let remote_io = Member::RemoteIo(program);
-        let Some(running) = self.remote_ios[program.index()].running() else {
+        if self.remote_ios[program.index()].running().is_none() {
             return StationSet::EMPTY;
+        }
+        let reaches = |station: &StationId| {
+            let station = Member::Station(*station);
+            self.links.reaches(station, remote_io) && self.links.reaches(remote_io, station)
         };
-        let (own, referee) = (running.configuration(), &self.referees[program.index()]);
+        self.with_state(program).iter().filter(reaches).collect()
+    }
+
+    /// The stations that run with the right configuration and a state of a program that its next sample could extend.
+    fn with_state(&self, program: ProgramId) -> StationSet {
+        let right = self.parts.remote_ios[program.index()].agreement.configuration;
+        let referee = &self.referees[program.index()];
         let holds = |station: &StationId| {
             let admitted = self.stations[station.index()].running();
-            let admitted = admitted.filter(|it| it.configuration() == own);
+            let admitted = admitted.filter(|it| it.configuration() == right);
             let state = admitted.and_then(|it| it.state_of(program));
-            let station = Member::Station(*station);
             state.is_some_and(|(lineage, _)| referee.would_be_lost(lineage))
-                && self.links.reaches(station, remote_io)
-                && self.links.reaches(remote_io, station)
         };
         // The others do not run the program.
         let understudies = self.remote_ios.len()..self.stations.len();
