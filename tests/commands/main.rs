@@ -31,6 +31,7 @@ mod scan;
 mod verdicts;
 mod verify;
 mod view;
+mod whole_numbers;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -10,6 +10,7 @@ mod alarms;
 mod boiler;
 mod campaigns;
 mod deaths;
+mod drafts;
 mod field;
 mod gates;
 mod handshake;

@@ -1,0 +1,93 @@
+//! A whole number at an input or an output is a number for every command, with the type and the range of its declaration.
+
+use std::fs;
+
+use crate::{empty_folder, understudy_in};
+
+/// Type, register, and two values: what is written and the end of a range.
+const TYPES: [(&str, &str, i64, i64); 10] = [
+    ("SINT", "int", -128, 127),
+    ("INT", "int", -2, 32_767),
+    ("DINT", "dint", -70_000, 5),
+    ("LINT", "lint", -5_000_000_000, 0),
+    ("USINT", "uint", 200, 255),
+    ("UINT", "uint", 3, 65_535),
+    ("UDINT", "udint", 4_000_000_000, 4_294_967_295),
+    ("BYTE", "uint", 255, 255),
+    ("WORD", "uint", 32_768, 65_535),
+    ("INT (-3..12)", "int", -3, 12),
+];
+
+const PERIOD: &str = "10ms";
+
+/// A program that gives back what an operator sets, beside a device, and one that reads it.
+fn cluster(of: &str, register: &str, low: i64, high: i64) -> [(&'static str, String); 4] {
+    let one = format!(
+        "PROGRAM one\n  VAR_INPUT n : {of}; m : {of}; END_VAR\n  VAR_OUTPUT q : {of}; END_VAR\n  q := n;\nEND_PROGRAM\n"
+    );
+    let two = format!(
+        "PROGRAM two\n  VAR_INPUT n : {of}; END_VAR\n  VAR_OUTPUT q : {of}; END_VAR\n  q := n;\nEND_PROGRAM\n"
+    );
+    let head = "[cluster]\nname = \"cell\"\n[[controller]]\nname = \"one\"\nladder = \"one.st\"\n";
+    let setpoint = format!(
+        "[[remote_io]]\ncontroller = \"one\"\nfail_safe = {{ q = {high} }}\n[remote_io.inputs]\nn = {{ operator = \"setpoint\", low = {low}, high = {high}, initial = {low} }}\n"
+    );
+    let alarm = format!("[[alarm]]\nsignal = \"one.q\"\nbelow = {high}\ntext = \"low\"\n");
+    let field = format!(
+        "{head}{setpoint}[remote_io.field]\nmodbus = \"127.0.0.1:1502\"\ninputs = {{ m = \"input:0 {register}\" }}\noutputs = {{ q = \"holding:0 {register}\" }}\n{alarm}"
+    );
+    let signals = format!(
+        "{head}[[controller]]\nname = \"two\"\nladder = \"two.st\"\n[[understudy]]\nname = \"u\"\n{setpoint}[[remote_io]]\ncontroller = \"two\"\n[remote_io.inputs]\nn = {{ from = \"one.q\", default = {high}, stale_after = 5 }}\n{alarm}"
+    );
+    [("one.st", one), ("two.st", two), ("field.toml", field), ("signals.toml", signals)]
+}
+
+#[test]
+fn every_command_has_whole_numbers_as_numbers() {
+    for (place, (of, register, low, high)) in TYPES.into_iter().enumerate() {
+        let folder = empty_folder(&format!("whole_numbers_{place}"));
+        for (name, text) in cluster(of, register, low, high) {
+            fs::write(folder.join(name), text).expect("written");
+        }
+        let run = |arguments: &[&str]| {
+            let answer = understudy_in(&folder, arguments);
+            assert_eq!(answer.status, 0, "{of}: {}", answer.shown());
+            answer.output
+        };
+        run(&["check", "field.toml"]);
+        run(&["check", "signals.toml"]);
+        fs::write(folder.join("inputs.txt"), format!("{low} 0\n{high} 0\n")).expect("written");
+        let scanned = run(&["scan", "one.st", "--inputs", "inputs.txt", "--period", PERIOD]);
+        assert_eq!(scanned, format!("{low} 0 -> {low}\n{high} 0 -> {high}\n"), "{of}");
+        run(&["simulate", "signals.toml", "--cycles", "40", "--seed", "1", "--out", "runs"]);
+        for controller in ["one", "two"] {
+            let output = format!("{controller}.q");
+            let why = run(&["why", &output, "runs/latest", "--at", "30"]);
+            let first = format!("{output} is {low} in cycle 30");
+            assert_eq!(why.lines().next(), Some(first.as_str()), "{of}: {why}");
+        }
+    }
+}
+
+/// What is written keeps the numbers, and is drafted, as what was read.
+#[test]
+fn conversions_keep_whole_numbers() {
+    for (place, (of, _, low, high)) in TYPES.into_iter().enumerate() {
+        let folder = empty_folder(&format!("whole_numbers_converted_{place}"));
+        let [(name, text), ..] = cluster(of, "int", low, high);
+        fs::write(folder.join(name), text).expect("written");
+        fs::write(folder.join("inputs.txt"), format!("{low} 0\n{high} 0\n")).expect("written");
+        for written in ["one.xml", "again.st"] {
+            let answer = understudy_in(&folder, &["convert", name, written]);
+            assert_eq!(answer.status, 0, "{of}: {}", answer.shown());
+            let answer = understudy_in(&folder, &["scan", written, "--inputs", "inputs.txt"]);
+            let expected = format!("{low} 0 -> {low}\n{high} 0 -> {high}\n");
+            assert_eq!(answer.output, expected, "{of}: {}", answer.shown());
+        }
+        // A ladder has bits, and says so; it has no bit strings (U1056) and no 64 of them (U1048).
+        let answer = understudy_in(&folder, &["convert", name, "one.ladder"]);
+        let codes: &[&str] = if answer.status == 0 { &["U1018"] } else { &["U1048", "U1056"] };
+        let is_said = codes.iter().any(|code| answer.errors.contains(code));
+        assert!(is_said, "{of}: {}", answer.shown());
+    }
+}
