@@ -6,7 +6,8 @@ use understudy_ladder::{Parsed, Program, parse};
 use understudy_text::{Diagnostic, has_errors};
 
 use crate::plcopen::Fidelity;
-use crate::{digraph, ldmicro, plcopen, text as written};
+use crate::text::whole;
+use crate::{digraph, ldmicro, plcopen, text as written, twincat};
 
 /// A form of programs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -140,6 +141,9 @@ fn read_form(format: Format, name: &str, text: &str, unit: Option<&str>) -> Read
             }
         }
         Format::PlcOpen => {
+            if let Some(parsed) = twincat::read(text) {
+                return whole(text, parsed, unit, None).reading();
+            }
             let read = plcopen::read(text, unit);
             Reading {
                 program: read.program,

@@ -2,14 +2,17 @@
 //!
 //! Declarations and bodies are texts; a body in another language is refused by its name, as are properties and transitions.
 
+mod project;
+
 use roxmltree::Node;
 use understudy_structured_text::parser::{
     parse_body_at, parse_declarations_at, parse_statements_at,
 };
-use understudy_structured_text::syntax::{Body, File, Name, Unit, UnitKind};
+use understudy_structured_text::syntax::{Body, File, Name, ProgramInstance, Task, Unit, UnitKind};
 use understudy_text::Diagnostic;
 
-use crate::plcopen::xml::{attribute, child, children, elements, parse, start_tag, text};
+pub use self::project::{Joined, files_of_project, is_part};
+use crate::plcopen::xml::{attribute, child, children, elements, parse, start_tag, text, word};
 
 /// What every file of TwinCAT has as its root.
 const ROOT: &str = "TcPlcObject";
@@ -36,6 +39,7 @@ pub(crate) fn read(text: &str) -> Option<(File, Vec<Diagnostic>)> {
         match object.tag_name().name() {
             "POU" => reader.unit(object),
             "GVL" | "DUT" => reader.declarations(object),
+            "Task" => reader.task(object),
             name => reader.foreign(name, object),
         }
     }
@@ -54,6 +58,31 @@ impl Reader {
         let message = format!("the element `{name}` of TwinCAT is not supported");
         let error = Diagnostic::error("U1010", message, start_tag(node));
         self.diagnostics.push(error);
+    }
+
+    /// A task with the programs that it calls; its cycle time is in microseconds.
+    fn task(&mut self, object: Node<'_, '_>) {
+        let Some(name) = attribute(object, "Name") else {
+            return;
+        };
+        let name = Name::new(name.as_str(), name.span());
+        let number = |element: &str| {
+            let written = child(object, element).map(word)?;
+            written.parse::<i64>().ok()
+        };
+        self.file.tasks.push(Task {
+            name: name.clone(),
+            interval: number("CycleTime").and_then(|cycle| cycle.checked_mul(1_000)),
+            priority: number("Priority"),
+            single: None,
+        });
+        for called in children(object, "PouCall").filter_map(|call| child(call, "Name")) {
+            let of = word(called);
+            let of = Name::new(of.as_str(), of.span());
+            let task = Some(name.clone());
+            let instance = ProgramInstance { name: of.clone(), task, of, connections: Vec::new() };
+            self.file.instances.push(instance);
+        }
     }
 
     /// The text of the declaration of an object.
