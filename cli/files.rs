@@ -7,13 +7,15 @@ use std::time::SystemTime;
 
 use serde_json::{Value, json};
 use understudy_cluster::{Cluster, Loaded, Overrides, TemplateFile};
-use understudy_interchange::{Source, Wanted, parse_program, read_source};
+use understudy_interchange::{
+    Joined, Source, Wanted, files_of_project, is_part, parse_program, read_source,
+};
 use understudy_journal::{Members, RunDirectory, RunDirectoryError, named_file};
 use understudy_ladder::Program;
 use understudy_parity::ParityController;
 use understudy_scenarios::{Scenario, read as read_scenario};
 use understudy_text::spelling::nearest;
-use understudy_text::{Report, decode, has_errors};
+use understudy_text::{Diagnostic, Report, decode, has_errors};
 
 use crate::answer::{Answer, Status};
 use crate::kind::{self, Kind};
@@ -71,6 +73,108 @@ fn nearest_file(path: &Path) -> Option<PathBuf> {
     let name = path.file_name()?.to_str()?;
     let nearest = nearest(name, names.iter().map(String::as_str).filter(|known| *known != name))?;
     Some(folder.join(nearest))
+}
+
+/// The text of a program: of one file, or of the files of a TwinCAT project.
+pub(crate) struct ProgramText {
+    pub(crate) name: String,
+    pub(crate) text: String,
+    joined: Option<Joined>,
+}
+
+impl ProgramText {
+    /// The program in a file, in the files that a project (`.plcproj`) names, or in those of its folder.
+    ///
+    /// # Errors
+    /// If a file cannot be read, or one of a project is not well-formed.
+    pub(crate) fn of(path: &Path) -> Result<Self, Answer> {
+        let name = path.display().to_string();
+        match project(path)? {
+            Some(files) => Self::together(name, &files),
+            None => Ok(Self { text: text(path)?, name, joined: None }),
+        }
+    }
+
+    /// The files of a TwinCAT project.
+    pub(crate) fn together(name: String, files: &[PathBuf]) -> Result<Self, Answer> {
+        let mut texts = Vec::new();
+        for file in files {
+            texts.push((file.display().to_string(), text(file)?));
+        }
+        let joined = Joined::of(texts).map_err(Answer::bad_files)?;
+        Ok(Self { name, text: joined.text.clone(), joined: Some(joined) })
+    }
+
+    /// The file that what has no place is said of.
+    pub(crate) fn first_file(&self) -> &str {
+        self.joined.as_ref().and_then(Joined::first).unwrap_or(&self.name)
+    }
+
+    /// What was found, file by file.
+    pub(crate) fn reports(self, diagnostics: Vec<Diagnostic>) -> Vec<Report> {
+        match self.joined {
+            Some(joined) => joined.reports(diagnostics),
+            None => vec![Report { name: self.name, text: self.text, diagnostics }],
+        }
+    }
+}
+
+/// The most files of a folder that are looked at for those of a project.
+const MAXIMUM_FILES: usize = 20_000;
+
+/// The files of a TwinCAT project, where the path is one: its file or its folder.
+fn project(path: &Path) -> Result<Option<Vec<PathBuf>>, Answer> {
+    let is_project =
+        |path: &Path| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("plcproj"));
+    if !path.is_dir() {
+        return if is_project(path) { named_by(path).map(Some) } else { Ok(None) };
+    }
+    let mut files = Vec::new();
+    let mut folders = vec![path.to_owned()];
+    let mut seen = 0;
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(&folder).into_iter().flatten().flatten() {
+            seen += 1;
+            // A link may lead back.
+            let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
+            match entry.path() {
+                _ if seen > MAXIMUM_FILES => {}
+                found if is_folder => folders.push(found),
+                found => files.push(found),
+            }
+        }
+    }
+    files.sort();
+    let mut projects = files.iter().filter(|file| is_project(file));
+    match (projects.next(), projects.next()) {
+        (Some(only), None) => named_by(only).map(Some),
+        (Some(first), Some(second)) => {
+            let message = format!(
+                "{} has several projects: name one, such as {} or {}",
+                path.display(),
+                first.display(),
+                second.display()
+            );
+            Err(Answer::failed(Status::BadInput, "U0601", message))
+        }
+        (None, _) => {
+            files.retain(|file| is_part(&file.to_string_lossy()));
+            Ok((!files.is_empty()).then_some(files))
+        }
+    }
+}
+
+/// The files that a project names.
+fn named_by(project: &Path) -> Result<Vec<PathBuf>, Answer> {
+    let text = text(project)?;
+    let folder = project.parent().unwrap_or(Path::new(""));
+    match files_of_project(&text) {
+        Ok(files) => Ok(files.iter().map(|file| folder.join(file)).collect()),
+        Err(found) => {
+            let name = project.display().to_string();
+            Err(Answer::bad_files(vec![Report { name, text, diagnostics: vec![found] }]))
+        }
+    }
 }
 
 /// A program without errors, whatever it is written in, and its file with the warnings.

@@ -10,7 +10,7 @@ use std::time::Duration;
 use clap::Args;
 use serde::Serialize;
 use understudy_cluster::{Cluster, Overrides};
-use understudy_interchange::{Source, Wanted, read_source, unknown_form};
+use understudy_interchange::{Source, Wanted, is_part, read_source, unknown_form};
 use understudy_journal::Members;
 use understudy_scenarios::read;
 use understudy_supervisor::ladder::read_map;
@@ -21,7 +21,7 @@ use understudy_text::{Diagnostic, Report, Severity, has_errors};
 use understudy_typed::{Cost, Program};
 
 use crate::answer::{Answer, Failure, Status};
-use crate::files::{self, read_cluster};
+use crate::files::{self, ProgramText, read_cluster};
 use crate::kind::Kind;
 use crate::supervisors::automata;
 use crate::supervisors::reconfigure::read_project;
@@ -34,8 +34,9 @@ Example:
   understudy check cluster.toml kill.toml
   understudy check --json robot.ladder
   understudy check model.toml net.toml map.toml SUPER.ADS
+  understudy check MAIN.TcPOU E_Mode.TcDUT
 
-The programs of a cluster are checked with it. Names in a scenario are checked against the cluster file given with it, otherwise against the
+The files of a TwinCAT project are checked as one program: several files, its .plcproj or its folder. The programs of a cluster are checked with it. Names in a scenario are checked against the cluster file given with it, otherwise against the
 cluster.toml in its folder. Ladder programs are also checked for rungs without effect, coils with conflicting values in one scan, and
 sequence steps that are passed in one scan; `understudy verify` shows example runs. Warnings do not change the exit status.")]
 pub(crate) struct Arguments {
@@ -122,7 +123,22 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     let mut found = Found::default();
     let mut scenarios = Vec::new();
     let mut clusters = Vec::new();
-    for path in &arguments.files {
+    // Types and blocks of TwinCAT stand in files of their own: several of them are one program.
+    let parts = arguments.files.iter().filter(|file| is_part(&file.to_string_lossy()));
+    let parts: Vec<PathBuf> = parts.cloned().collect();
+    let are_together = |path: &PathBuf| parts.len() > 1 && parts.contains(path);
+    let program = arguments.program.as_deref();
+    if parts.len() > 1 {
+        let name = parts[0].display().to_string();
+        let text = ProgramText::together(name, &parts);
+        found.add_joined(&parts[0], text, program, &looking);
+    }
+    for path in arguments.files.iter().filter(|path| !are_together(path)) {
+        if path.is_dir() || path.extension().is_some_and(|end| end.eq_ignore_ascii_case("plcproj"))
+        {
+            found.add_joined(path, ProgramText::of(path), program, &looking);
+            continue;
+        }
         let Some(text) = found.text(path) else {
             continue;
         };
@@ -144,23 +160,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
             Kind::Model => found.add_model(path),
             Kind::Program => {
                 let name = path.display().to_string();
-                let wanted = Wanted { period: Some(PERIOD), program: arguments.program.as_deref() };
-                let file = read_source(&name, &text, wanted);
-                let mut diagnostics = file.diagnostics;
-                match &file.source {
-                    Some(Source::Ladder(program))
-                        if looking.at_rungs(program, PERIOD, &mut diagnostics) =>
-                    {
-                        found.cut_short.push(name);
-                    }
-                    Some(Source::Typed(program)) => {
-                        found.sizes.push((name, Size::of(program)));
-                    }
-                    Some(Source::Library(units)) => {
-                        found.libraries.push((name, units.clone()));
-                    }
-                    Some(Source::Ladder(_)) | None => {}
-                }
+                let diagnostics = found.read_program(&name, &name, &text, program, &looking);
                 found.add_file(Kind::Program, path, text, diagnostics);
             }
             Kind::Unknown => {
@@ -203,6 +203,59 @@ fn members_beside(scenario: &Path) -> Option<Members> {
 }
 
 impl Found<'_> {
+    /// Reads a program; what is known of it is told beside the file `shown`.
+    fn read_program(
+        &mut self,
+        name: &str,
+        shown: &str,
+        text: &str,
+        program: Option<&str>,
+        looking: &Looking,
+    ) -> Vec<Diagnostic> {
+        let wanted = Wanted { period: Some(PERIOD), program };
+        let file = read_source(name, text, wanted);
+        let mut diagnostics = file.diagnostics;
+        let shown = shown.to_owned();
+        match &file.source {
+            Some(Source::Ladder(program))
+                if looking.at_rungs(program, PERIOD, &mut diagnostics) =>
+            {
+                self.cut_short.push(shown);
+            }
+            Some(Source::Typed(program)) => self.sizes.push((shown, Size::of(program))),
+            Some(Source::Library(units)) => self.libraries.push((shown, units.clone())),
+            Some(Source::Ladder(_)) | None => {}
+        }
+        diagnostics
+    }
+
+    /// Reports on the files of a TwinCAT project, which are one program.
+    fn add_joined(
+        &mut self,
+        path: &Path,
+        text: std::result::Result<ProgramText, Answer>,
+        program: Option<&str>,
+        looking: &Looking,
+    ) {
+        let reports = match text {
+            Ok(text) => {
+                let first = text.first_file().to_owned();
+                let found = self.read_program(&text.name, &first, &text.text, program, looking);
+                text.reports(found)
+            }
+            Err(answer) => {
+                if answer.reports.is_empty() {
+                    self.unreadable.push(path.display().to_string());
+                }
+                self.failures.extend(answer.failures);
+                answer.reports
+            }
+        };
+        for report in reports {
+            self.add(Kind::Program, report);
+        }
+    }
+
     /// Checks the rungs of the programs of a cluster and its understudy.
     fn look(&mut self, looking: &Looking, cluster: &Cluster, reports: &mut [Report]) {
         let period = cluster.agreement().schedule.period();

@@ -16,8 +16,8 @@ use understudy_text::duration::parse_positive;
 use understudy_text::{Diagnostic, Lines, MAXIMUM_SHOWN, Report, shortened};
 
 use crate::answer::{Answer, Status};
-use crate::files;
-use crate::kind::Kind;
+use crate::files::{self, ProgramText};
+use crate::kind::{self, Kind};
 
 /// Convert a program between formats
 #[derive(Debug, Args)]
@@ -81,11 +81,11 @@ impl Form {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
-    let source = match arguments.from {
-        Some(_) => files::text(&arguments.from_file)?,
-        None => files::text_of(Kind::Program, &arguments.from_file)?,
-    };
-    let name = arguments.from_file.display().to_string();
+    let joined = ProgramText::of(&arguments.from_file)?;
+    let (name, source) = (joined.name.clone(), joined.text.clone());
+    if arguments.from.is_none() {
+        kind::expect(Kind::Program, &arguments.from_file, &source)?;
+    }
     let form = arguments.from.map(Form::format);
     let reading = match form.or_else(|| Format::of(&name, &source)) {
         Some(format) => read(format, &name, &source, arguments.unit.as_deref()),
@@ -129,7 +129,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     };
     let Some(written) = written else {
         let fidelity = fidelity_value(&reading.fidelity, &report, None);
-        let mut answer = Answer::bad_files(vec![report]);
+        let mut answer = Answer::bad_files(joined.reports(report.diagnostics));
         answer.text = kept;
         answer.result = json!({ "file": null, "text": null, "fidelity": fidelity });
         return Err(answer);
@@ -138,7 +138,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         Ok(written) => written,
         Err((code, message)) => {
             let answer = Answer::failed(Status::BadInput, code, message);
-            return Err(answer.with_reports(vec![report]));
+            return Err(answer.with_reports(joined.reports(report.diagnostics)));
         }
     };
     if arguments.fidelity {
@@ -159,7 +159,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
             Answer::done(format!("written to {name}\n{kept}"), result).and_next(&[&"check", path])
         }
     };
-    Ok(answer.with_reports(vec![report]))
+    Ok(answer.with_reports(joined.reports(report.diagnostics)))
 }
 
 /// The finding on numbers that a ladder has bit by bit.

@@ -14,7 +14,7 @@ use understudy_text::{Diagnostic, Report, duration, has_errors};
 use understudy_typed::{Elementary, Fault, Point, Points, Program};
 
 use crate::answer::{Answer, Status};
-use crate::files;
+use crate::files::{self, ProgramText};
 
 /// Execute a program on inputs from a file or on random inputs
 #[derive(Debug, Args)]
@@ -104,10 +104,10 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
 }
 
 fn scan(arguments: &Arguments) -> std::result::Result<Answer, Answer> {
-    let (subject, report) = subject(&arguments.subject)?;
+    let (subject, reports) = subject(&arguments.subject)?;
     let Some(inputs) = &arguments.inputs else {
         let answer = subject.digested(arguments.digest.unwrap_or_default());
-        return Ok(answer.with_used(vec![report]));
+        return Ok(answer.with_used(reports));
     };
     let text = files::text(inputs)?;
     let lines = lines(&text, &subject.interface.inputs).map_err(|diagnostics| {
@@ -117,7 +117,7 @@ fn scan(arguments: &Arguments) -> std::result::Result<Answer, Answer> {
             diagnostics,
         }])
     })?;
-    Ok(subject.executed(&lines).with_used(vec![report]))
+    Ok(subject.executed(&lines).with_used(reports))
 }
 
 /// A program that is executed.
@@ -131,20 +131,20 @@ pub(crate) struct Subject {
 
 pub(crate) fn subject(
     arguments: &SubjectArguments,
-) -> std::result::Result<(Subject, Report), Answer> {
-    let text = files::text(&arguments.program_file)?;
-    let name = arguments.program_file.display().to_string();
+) -> std::result::Result<(Subject, Vec<Report>), Answer> {
+    let source = ProgramText::of(&arguments.program_file)?;
     let wanted = |period| Wanted { period: Some(period), program: arguments.program.as_deref() };
-    let mut read = read_source(&name, &text, wanted(arguments.period.unwrap_or(PERIOD)));
+    let read_with = |period| read_source(&source.name, &source.text, wanted(period));
+    let mut read = read_with(arguments.period.unwrap_or(PERIOD));
     // A period in the file is known only after it was read.
     let period = arguments.period.or(read.period).unwrap_or(PERIOD);
     if arguments.period.is_none() && period != PERIOD {
-        read = read_source(&name, &text, wanted(period));
+        read = read_with(period);
     }
     if let Some(Source::Library(_)) = read.source {
         read.diagnostics.push(no_program());
     }
-    let report = Report { name, text, diagnostics: read.diagnostics };
+    let reports = source.reports(read.diagnostics);
     let (name, executable, interface, typed) = match read.source {
         Some(Source::Ladder(program)) => {
             let circuit = lowered(&program, period)?;
@@ -156,10 +156,10 @@ pub(crate) fn subject(
             let name = program.name.clone();
             (name, executable, program.as_ref().into(), Some(program))
         }
-        Some(Source::Library(_)) | None => return Err(Answer::bad_files(vec![report])),
+        Some(Source::Library(_)) | None => return Err(Answer::bad_files(reports)),
     };
     let subject = Subject { name, executable, interface, period, typed };
-    Ok((subject, report))
+    Ok((subject, reports))
 }
 
 fn lowered(

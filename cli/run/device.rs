@@ -38,11 +38,11 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
-    let (subject, report) = subject(&arguments.subject)?;
+    let (subject, reports) = subject(&arguments.subject)?;
     let Subject { executable, interface, typed, .. } = subject;
     let equipment = Equipment::new(executable, interface.clone()).map_err(failed)?;
     if arguments.registers {
-        return Ok(registers(&equipment).with_used(vec![report]));
+        return Ok(registers(&equipment).with_used(reports));
     }
     let prints = !console.is_json();
     let changed: Changed = Box::new(move |equipment| {
@@ -63,7 +63,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     let ready = |address| console.note(&format!("listening on {address}"));
     let period = arguments.subject.period;
     serve_equipment(equipment, period, arguments.listen, ready, changed).map_err(failed)?;
-    Ok(Answer::done("", json!(null)).with_used(vec![report]))
+    Ok(Answer::done("", json!(null)).with_used(reports))
 }
 
 fn registers(equipment: &Equipment) -> Answer {

@@ -28,6 +28,7 @@ mod reconfigure;
 mod reliability;
 mod requirements;
 mod scan;
+mod twincat;
 mod verdicts;
 mod verify;
 mod view;
