@@ -328,6 +328,7 @@ fn the_cycle_in_which_a_run_is_interrupted_is_none_of_it() {
             }
         });
         assert!(summary.interrupted && summary.cycles_run > 100, "{teller}");
+        assert!(!summary.plants.is_empty(), "{teller}");
         assert!(summary.plants.iter().all(|plant| plant.functional));
         let missed = summary.remote_ios.iter().map(|one| one.counts.missed);
         assert_eq!(missed.sum::<u64>(), 0, "{teller}");

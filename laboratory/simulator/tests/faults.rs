@@ -346,5 +346,6 @@ fn a_cold_start_waits_for_the_operator() {
     let mut simulation = Simulation::new(parts, Network::default(), 1);
     let nobody = simulation.run(1, 100, &mut |_, _, _, _| {});
     assert!(nobody.is_err(), "nothing is driven directly yet");
+    assert!(!simulation.tallies().is_empty());
     assert!(simulation.tallies().iter().all(|it| it.fail_safe > 90 && it.direct == 0));
 }

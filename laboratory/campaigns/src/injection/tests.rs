@@ -65,6 +65,7 @@ fn nothing_wrong_is_driven() {
     assert!(findings.is_good());
     // Every row of what was asked for was struck.
     let struck = |row: &CoverageRow| row.counts.iter().sum::<u64>() > 0;
+    assert!(!findings.coverage.is_empty(), "{findings}");
     assert!(findings.coverage.iter().all(struck), "{findings}");
 }
 

@@ -32,6 +32,7 @@ fn each_station_is_seen_to_be_killed_and_repaired() {
     assert_eq!(run, RunState::Running);
     assert!(from_origin);
     assert_eq!(cycle, Some(299));
+    assert!(!stations.is_empty());
     assert!(stations.iter().all(|station| station.state == StationState::Publishing));
     // Each kill cost the protection of programs, and each return brought it back.
     assert_eq!(alarms.len(), 4, "{alarms:?}");
@@ -61,6 +62,7 @@ fn a_value_fault_is_an_alarm() {
     let mut model = model;
     let seen: Vec<_> =
         model.alarms().map(|alarm| alarm.acknowledgement("anna".to_owned(), 0)).collect();
+    assert!(!seen.is_empty(), "no alarm to acknowledge");
     for seen in seen {
         model.note(&Record::of_run(0, RunEvent::Acknowledged(seen)));
     }

@@ -120,6 +120,7 @@ fn elements_are_edges() {
         let edges: usize = graphs.iter().map(|graph| graph.edges.len()).sum();
         let coils: usize = ladder.rungs.iter().map(|rung| rung.coils.len()).sum();
         assert_eq!(edges, ladder.contact_count() + ladder.blocks().len() + coils);
+        assert!(!graphs.is_empty());
         assert!(graphs.iter().all(|graph| graph.vertices[0].number == 0));
     }
 }
