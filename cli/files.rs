@@ -119,7 +119,7 @@ impl ProgramText {
     }
 }
 
-/// The most files of a folder that are looked at for those of a project.
+/// The most files of a folder that are examined for those of a project.
 const MAXIMUM_FILES: usize = 20_000;
 
 /// The files of a TwinCAT project, where the path is one: its file or its folder.

@@ -203,7 +203,7 @@ fn members_beside(scenario: &Path) -> Option<Members> {
 }
 
 impl Found<'_> {
-    /// Reads a program; what is known of it is told beside the file `shown`.
+    /// Reads a program; what is known of it is told of the file `shown`.
     fn read_program(
         &mut self,
         name: &str,
@@ -212,8 +212,7 @@ impl Found<'_> {
         program: Option<&str>,
         looking: &Looking,
     ) -> Vec<Diagnostic> {
-        let wanted = Wanted { period: Some(PERIOD), program };
-        let file = read_source(name, text, wanted);
+        let file = read_source(name, text, Wanted { program, period: None });
         let mut diagnostics = file.diagnostics;
         let shown = shown.to_owned();
         match &file.source {

@@ -63,3 +63,84 @@ fn the_files_of_a_project_are_one_program() {
     write("other.plcproj", PROJECT);
     assert!(run(&["check", "."]).errors.contains("several projects"));
 }
+
+/// An object of a project, with the lines and the mark that TwinCAT writes.
+fn object(element: &str, name: &str, declaration: &str, body: &str) -> String {
+    let body = match body {
+        "" => String::new(),
+        body => format!(
+            "    <Implementation>\r\n      <ST><![CDATA[{body}]]></ST>\r\n    </Implementation>\r\n"
+        ),
+    };
+    format!(
+        "\u{feff}<?xml version=\"1.0\" encoding=\"utf-8\"?>\r\n<TcPlcObject Version=\"1.1.0.1\">\r\n  <{element} Name=\"{name}\" Id=\"{{0}}\">\r\n    <Declaration><![CDATA[{declaration}]]></Declaration>\r\n{body}  </{element}>\r\n</TcPlcObject>"
+    )
+}
+
+/// A project as TwinCAT writes it: folders, a list of constants, a block with its interface, a program that another calls.
+#[test]
+fn a_whole_project_runs_and_shows_every_error() {
+    let folder = empty_folder("twincat-project");
+    for name in ["POUs", "DUTs", "GVLs"] {
+        fs::create_dir(folder.join(name)).expect("a folder");
+    }
+    let objects = [
+        ("POUs/MAIN.TcPOU", object("POU", "MAIN", "PROGRAM MAIN\nVAR_INPUT up : BOOL; END_VAR\nVAR_OUTPUT high : BOOL; END_VAR\nVAR ramp : FB_Ramp; last : ARRAY [0..GVL.cLast] OF DINT; END_VAR", "ramp(up := up);\nlast[GVL.cLast] := ramp.level;\nCount(step := last[GVL.cLast]);\nhigh := Count.sum >= GVL.limit;")),
+        ("POUs/Count.TcPOU", object("POU", "Count", "PROGRAM Count\nVAR_INPUT step : DINT; END_VAR\nVAR sum : DINT; END_VAR", "sum := sum + step;")),
+        ("POUs/FB_Ramp.TcPOU", object("POU", "FB_Ramp", "FUNCTION_BLOCK FB_Ramp IMPLEMENTS I_Ramp\nVAR_INPUT up : BOOL; END_VAR\nVAR_OUTPUT level : DINT; mode : E_Mode; END_VAR", "IF up AND level < 2 THEN level := level + 1; mode := E_Mode.rising; END_IF")),
+        ("POUs/I_Ramp.TcIO", object("Itf", "I_Ramp", "INTERFACE I_Ramp", "")),
+        ("DUTs/E_Mode.TcDUT", object("DUT", "E_Mode", "{attribute 'qualified_only'}\nTYPE E_Mode :\n(\n  idle := 0,\n  rising\n);\nEND_TYPE", "")),
+        ("GVLs/GVL.TcGVL", object("GVL", "GVL", "{attribute 'qualified_only'}\nVAR_GLOBAL\n  limit : DINT := 4;\nEND_VAR\nVAR_GLOBAL CONSTANT\n  cLast : INT := 3;\nEND_VAR", "")),
+        ("Plc.TcTTO", "<?xml version=\"1.0\"?>\n<TcPlcObject><Task Name=\"Plc\" Id=\"{1}\"><CycleTime>20000</CycleTime><Priority>20</Priority><PouCall><Name>MAIN</Name></PouCall></Task></TcPlcObject>".to_owned()),
+    ];
+    let write = |name: &str, text: &str| fs::write(folder.join(name), text).expect("written");
+    let names = objects.iter().map(|(name, _)| name.replace('/', "\\"));
+    let named: String = names.map(|name| format!("<Compile Include=\"{name}\"/>")).collect();
+    write(
+        "Plc.plcproj",
+        &format!(
+            "<Project xmlns=\"http://schemas.microsoft.com/developer/msbuild/2003\"><ItemGroup>{named}</ItemGroup></Project>"
+        ),
+    );
+    for (name, text) in &objects {
+        write(name, text);
+    }
+    write("inputs.txt", "1\n1\n0\n0\n");
+    let run = |arguments: &[&str]| understudy_in(&folder, arguments);
+    for project in [".", "Plc.plcproj"] {
+        let scanned = run(&["scan", project, "--inputs", "inputs.txt"]);
+        assert_eq!(scanned.output, "1 -> 0\n1 -> 0\n0 -> 1\n0 -> 1\n", "{}", scanned.shown());
+    }
+    // One error in each of three files: all are told, each in its file.
+    write("POUs/Count.TcPOU", &objects[1].1.replace("sum + step", "sum + missing"));
+    write("POUs/FB_Ramp.TcPOU", &objects[2].1.replace("level < 2", "level < absent"));
+    write("DUTs/E_Mode.TcDUT", &objects[4].1.replace("rising\n", "falling\n"));
+    let wrong = run(&["check", "."]);
+    assert_eq!(wrong.status, 2, "{}", wrong.shown());
+    for (file, what) in
+        [("Count.TcPOU", "`missing`"), ("FB_Ramp.TcPOU", "`absent`"), ("FB_Ramp.TcPOU", "`rising`")]
+    {
+        assert!(
+            wrong.errors.contains(file) && wrong.errors.contains(what),
+            "{what}: {}",
+            wrong.errors
+        );
+    }
+    // A program that nothing runs and nothing calls is checked too.
+    for (name, text) in &objects {
+        write(name, text);
+    }
+    write(
+        "POUs/Idle.TcPOU",
+        &object("POU", "Idle", "PROGRAM Idle\nVAR x AT %QX0.0 : BOOL; END_VAR", "x := nowhere;"),
+    );
+    fs::remove_file(folder.join("Plc.plcproj")).expect("a file");
+    let wrong = run(&["check", "."]);
+    assert!(wrong.status == 2 && wrong.errors.contains("`nowhere`"), "{}", wrong.shown());
+    write(
+        "POUs/Idle.TcPOU",
+        &object("POU", "Idle", "PROGRAM Idle\nVAR x AT %QX0.0 : BOOL; END_VAR", "x := TRUE;"),
+    );
+    let scanned = run(&["scan", ".", "--inputs", "inputs.txt"]);
+    assert_eq!(scanned.output, "1 -> 0\n1 -> 0\n0 -> 1\n0 -> 1\n", "{}", scanned.shown());
+}

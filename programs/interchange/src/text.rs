@@ -12,6 +12,9 @@ use crate::format::Reading;
 use crate::ladders;
 use crate::source::no_program;
 
+/// The shortest period that tasks of different intervals may need.
+const SHORTEST: Duration = Duration::from_millis(1);
+
 /// A program in both forms.
 #[derive(Default)]
 pub(crate) struct Whole {
@@ -21,7 +24,7 @@ pub(crate) struct Whole {
     pub(crate) ladder: Option<Ladder>,
     /// The units of a library.
     pub(crate) checked: Vec<String>,
-    /// The shortest interval of a task.
+    /// The period by which the intervals of its tasks are counted.
     pub(crate) period: Option<Duration>,
     /// What was found of the program.
     pub(crate) diagnostics: Vec<Diagnostic>,
@@ -40,7 +43,8 @@ pub(crate) fn whole(
     let options = Options { text, program, period: period.map(nanoseconds) };
     let Lowered { program: typed, checked, names, diagnostics: found } = lower(&file, &options);
     diagnostics.extend(found);
-    diagnostics.extend(periods(&file));
+    let period = understudy_structured_text::lower::period(&file, program);
+    diagnostics.extend(periods(&file, period));
     diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
     let is_right = !has_errors(&diagnostics);
     let typed = typed.filter(|_| is_right);
@@ -49,19 +53,18 @@ pub(crate) fn whole(
         Some(typed) => (None, vec![several(&file, typed)]),
         None => (None, Vec::new()),
     };
-    let shortest = file.tasks.iter().filter_map(|task| task.interval).min();
     Whole {
         typed,
         ladder,
         checked: if is_right { checked } else { Vec::new() },
-        period: shortest.map(|interval| Duration::from_nanos(interval.unsigned_abs())),
+        period: period.map(|interval| Duration::from_nanos(interval.unsigned_abs())),
         diagnostics,
         reasons,
     }
 }
 
 /// The findings on intervals of tasks that no station has.
-fn periods(file: &File) -> Vec<Diagnostic> {
+fn periods(file: &File, common: Option<i64>) -> Vec<Diagnostic> {
     let wrong = file.tasks.iter().filter(|task| {
         let interval = task.interval.and_then(|interval| u64::try_from(interval).ok());
         task.interval.is_some()
@@ -73,7 +76,18 @@ fn periods(file: &File) -> Vec<Diagnostic> {
         let error = Diagnostic::error("U1084", message, task.name.span());
         error.with_help("write it as a literal such as T#20ms")
     });
-    found.collect()
+    let mut found: Vec<Diagnostic> = found.collect();
+    let common = common.and_then(|common| u64::try_from(common).ok()).map(Duration::from_nanos);
+    if let Some(common) = common.filter(|common| found.is_empty() && *common < SHORTEST)
+        && let [_, other, ..] = file.tasks.as_slice()
+    {
+        let message = format!(
+            "the intervals of the tasks are multiples of {common:?} only; no period is shorter than {SHORTEST:?}"
+        );
+        let error = Diagnostic::error("U1084", message, other.name.span());
+        found.push(error.with_help("choose intervals that are multiples of 1 ms"));
+    }
+    found
 }
 
 fn several(file: &File, typed: &Typed) -> Diagnostic {

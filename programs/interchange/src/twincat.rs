@@ -40,6 +40,7 @@ pub(crate) fn read(text: &str) -> Option<(File, Vec<Diagnostic>)> {
             "POU" => reader.unit(object),
             "GVL" | "DUT" => reader.declarations(object),
             "Task" => reader.task(object),
+            "Itf" => reader.interface(object),
             name => reader.foreign(name, object),
         }
     }
@@ -58,6 +59,19 @@ impl Reader {
         let message = format!("the element `{name}` of TwinCAT is not supported");
         let error = Diagnostic::error("U1010", message, start_tag(node));
         self.diagnostics.push(error);
+    }
+
+    /// An interface, of which the name is kept.
+    fn interface(&mut self, object: Node<'_, '_>) {
+        let Some(name) = attribute(object, "Name") else {
+            return;
+        };
+        let message = format!(
+            "INTERFACE `{}` is not checked: the methods of the blocks that implement it count",
+            name.as_str()
+        );
+        self.diagnostics.push(Diagnostic::warning("U1055", message, name.span()));
+        self.file.interfaces.push(Name::new(name.as_str(), name.span()));
     }
 
     /// A task with the programs that it calls; its cycle time is in microseconds.

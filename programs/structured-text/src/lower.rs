@@ -8,12 +8,14 @@ mod addresses;
 mod arguments;
 mod blocks;
 mod body;
+mod called;
 mod callees;
 mod calls;
 mod chains;
 mod connections;
 mod constants;
 mod convert;
+mod elements;
 mod expand;
 mod expressions;
 mod fold;
@@ -29,12 +31,14 @@ mod routines;
 mod standard;
 mod standard_blocks;
 mod statements;
+mod tasks;
 mod times;
 mod types;
 
 pub use standard::input_names;
+pub use tasks::period;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::rc::Rc;
 
@@ -42,7 +46,7 @@ use understudy_text::{Diagnostic, Lines, MAXIMUM_FINDINGS};
 use understudy_typed::{Elementary, EnumerationId, Program, Type, Variable};
 
 use crate::library;
-use crate::syntax::{File, Unit};
+use crate::syntax::{File, Name, Unit};
 
 use self::blocks::{Block, Key, Routine};
 use self::constants::ConstantState;
@@ -140,6 +144,8 @@ struct Lowering<'a> {
     types: HashMap<String, TypeState<'a>>,
     /// Bounds of the variables that are subranges, by the places of their names.
     ranges: HashMap<Range<usize>, (i128, i128)>,
+    /// Names in capitals of INTERFACEs.
+    interfaces: HashSet<String>,
     /// By the ids of the program's structures.
     structures: Vec<Rc<StructureInfo>>,
     /// Values of enumerations by their names.
@@ -150,6 +156,12 @@ struct Lowering<'a> {
     addresses: HashMap<String, Symbol>,
     /// What of the memory they take.
     extents: Vec<addresses::Extent>,
+    /// Elements of arrays at addresses, and the points that they are copied from and to.
+    elements: elements::Elements,
+    /// Programs that run by themselves; the others can be called.
+    running: HashSet<usize>,
+    /// The memory of programs that are named in others.
+    named_programs: HashMap<usize, Symbol>,
     constants: HashMap<(Option<Owner>, String), ConstantState>,
     routines: HashMap<Key, Rc<Routine>>,
     /// Bodies that are still to be lowered.
@@ -202,12 +214,16 @@ impl<'a> Lowering<'a> {
             unit_names,
             types: HashMap::new(),
             ranges: HashMap::new(),
+            interfaces: file.interfaces.iter().map(Name::key).collect(),
             structures: Vec::new(),
             enumerators: HashMap::new(),
             globals: HashMap::new(),
             global_declarations: HashMap::new(),
             addresses: HashMap::new(),
             extents: Vec::new(),
+            elements: elements::Elements::default(),
+            running: HashSet::new(),
+            named_programs: HashMap::new(),
             constants: HashMap::new(),
             routines: HashMap::new(),
             queue: Vec::new(),

@@ -77,7 +77,9 @@ pub struct File {
     pub tasks: Vec<Task>,
     /// `PROGRAM name WITH task : type`
     pub instances: Vec<ProgramInstance>,
-    /// `VAR_CONFIG` and `VAR_ACCESS`, which are read past: where they stand.
+    /// `INTERFACE`, of which only the names are kept.
+    pub interfaces: Vec<Name>,
+    /// `VAR_CONFIG`, `VAR_ACCESS` and what stands in an `INTERFACE`, which are read past: where they stand.
     pub read_past: Vec<Span>,
 }
 

@@ -37,9 +37,36 @@ impl Random {
     }
 }
 
-/// An expression as text, and what C computes for it from the variables, each as an `int`.
+/// How many bits a value has.
+#[derive(Debug, Clone, Copy)]
+enum Form {
+    /// Those of the value beside it.
+    Literal,
+    /// Those of its type.
+    Own(Elementary),
+    /// 32: it was calculated.
+    Wide,
+}
+
+impl Form {
+    /// The form of two values that are combined bit by bit.
+    fn combined(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::Own(one), Self::Own(two))
+                if one == two || !one.is_signed() && !two.is_signed() =>
+            {
+                Self::Own(if one.bits() < two.bits() { two } else { one })
+            }
+            (Self::Own(one), Self::Literal) => Self::Own(one),
+            _ => Self::Wide,
+        }
+    }
+}
+
+/// An expression as text, and what C computes for it from the variables, each as an `int`; NOT has the bits of what it is of.
 struct Tried {
     text: String,
+    form: Form,
     value: Value<i32>,
 }
 
@@ -51,17 +78,22 @@ fn cast(value: i32, to: Elementary) -> i32 {
 fn leaf(random: &mut Random) -> Tried {
     if random.below(4) == 0 {
         let value = random.below(128) as i32;
-        return Tried { text: value.to_string(), value: Box::new(move |_| value) };
+        let form = Form::Literal;
+        return Tried { text: value.to_string(), form, value: Box::new(move |_| value) };
     }
+    variable(random)
+}
+
+fn variable(random: &mut Random) -> Tried {
     let at = random.below(VARIABLES.len());
-    Tried { text: VARIABLES[at].0.to_owned(), value: Box::new(move |given| given[at]) }
+    let (name, of) = VARIABLES[at];
+    Tried { text: name.to_owned(), form: Form::Own(of), value: Box::new(move |given| given[at]) }
 }
 
 fn expression(random: &mut Random, depth: usize) -> Tried {
     if depth == 0 {
         // A literal alone would give the whole its own type.
-        let at = random.below(VARIABLES.len());
-        return Tried { text: VARIABLES[at].0.to_owned(), value: Box::new(move |given| given[at]) };
+        return variable(random);
     }
     let left = expression(random, depth - 1);
     let right = match random.below(3) {
@@ -71,6 +103,7 @@ fn expression(random: &mut Random, depth: usize) -> Tried {
             expression(random, depth)
         }
     };
+    let forms = (left.form, right.form);
     let (one, two) = (left.value, right.value);
     let (left, right) = (left.text, right.text);
     let signs: [(&str, Binary); 6] = [
@@ -81,6 +114,7 @@ fn expression(random: &mut Random, depth: usize) -> Tried {
         ("OR", |left, right| left | right),
         ("XOR", |left, right| left ^ right),
     ];
+    let mut form = Form::Wide;
     let (text, value): (String, Value<i32>) = match random.below(11) {
         6 => (
             format!("({left} / ({right} OR 1))"),
@@ -91,10 +125,18 @@ fn expression(random: &mut Random, depth: usize) -> Tried {
             Box::new(move |given| one(given).wrapping_rem(two(given) | 1)),
         ),
         8 => (format!("(-{left})"), Box::new(move |given| one(given).wrapping_neg())),
-        9 => (format!("(NOT {left})"), Box::new(move |given| !one(given))),
+        9 => {
+            form = forms.0;
+            let value: Value<i32> = match form {
+                Form::Own(of) => Box::new(move |given| cast(!one(given), of)),
+                _ => Box::new(move |given| !one(given)),
+            };
+            (format!("(NOT {left})"), value)
+        }
         // A function has a type: its inputs and its result are cut to it.
         10 => {
             let of = VARIABLES[random.below(4)].1;
+            form = Form::Own(of);
             let text = format!("MUL_{of}({left}, {right})");
             let value = move |given: &[i32]| {
                 cast(cast(one(given), of).wrapping_mul(cast(two(given), of)), of)
@@ -102,12 +144,15 @@ fn expression(random: &mut Random, depth: usize) -> Tried {
             (text, Box::new(value))
         }
         sign => {
+            if sign >= 3 {
+                form = forms.0.combined(forms.1);
+            }
             let (sign, apply) = signs[sign];
             let value = move |given: &[i32]| apply(one(given), two(given));
             (format!("({left} {sign} {right})"), Box::new(value))
         }
     };
-    Tried { text, value }
+    Tried { text, form, value }
 }
 
 #[test]
@@ -212,8 +257,41 @@ fn intermediate_results_have_32_bits() {
     once(
         "x : WORD; y : BOOL; z : BOOL;",
         "w : WORD := 16#00FF;",
-        "x := NOT w; y := NOT w = 16#FF00; z := TO_WORD(NOT w) = 16#FF00;",
-        "65280 0 1",
+        "x := NOT w; y := NOT w = 16#FF00; z := NOT (w + 0) = 16#FF00;",
+        "65280 1 0",
+    );
+}
+
+/// For every pattern of bits: NOT, shifts and rotations of a BYTE and a WORD have the bits of their type, whatever is done with the result.
+#[test]
+fn the_bits_of_a_type_are_all_that_its_inverse_has() {
+    let text = "PROGRAM main
+        VAR_INPUT w : WORD; b : BYTE; u : USINT; END_VAR
+        VAR_OUTPUT n : WORD; d : DWORD; e : BOOL; g : BOOL; m : BYTE; l : DINT; f : BOOL; v : BOOL; s : BOOL; r : BOOL; i : DINT; END_VAR
+        VAR t : ARRAY [0..255] OF DINT; k : DINT; END_VAR
+        FOR k := 0 TO 255 DO t[k] := k; END_FOR;
+        n := NOT w; d := NOT w; e := NOT w = 16#FFFF - w; g := NOT (NOT w) = w;
+        m := NOT b; l := NOT b; f := NOT b > b; v := (NOT u) + 1 = 256 - u;
+        s := SHL(b, 4) = (b AND 16#0F) * 16; r := ROL(b, 4) = SHR(b, 4) + SHL(b, 4); i := t[NOT u];
+        END_PROGRAM";
+    let mut running = Running::new(program(text));
+    for at in (0..=0xffff_u64).step_by(3).chain(0..=0x1ff) {
+        let byte = at & 0xff;
+        let (word, inverse) = (at ^ 0xffff, byte ^ 0xff);
+        let wanted =
+            [word, word, 1, 1, inverse, inverse, u64::from(inverse > byte), 1, 1, 1, inverse];
+        assert_eq!(running.scan(&[at, byte, byte]), wanted, "{at:#x}");
+    }
+}
+
+/// The ends of the ranges: what leaves its type there.
+#[test]
+fn the_least_number_of_a_type_wraps_where_it_is_stored() {
+    once(
+        "x : INT; y : DINT; z : INT; n : INT; o : DINT; p : INT; q : INT; r : BOOL; s : BOOL;",
+        "i : INT := -32768; w : WORD := 16#FFFF; one : INT := -1;",
+        "x := -i; y := -i; z := ABS(i); n := i / one; o := i / one; p := i MOD one; q := -7 MOD 4; r := one = w; s := INT#-1 = WORD#16#FFFF;",
+        "-32768 32768 -32768 -32768 32768 0 -3 0 0",
     );
 }
 
@@ -255,6 +333,8 @@ fn a_product_that_can_leave_its_type_is_warned_of_and_a_sum_is_not() {
         "d := DINT_TO_INT(n * m);",
         "w := NOT w;",
         "w := NOT w AND v OR 16#FF;",
+        "IF NOT w = 16#FF THEN n := 0; END_IF;",
+        "d := NOT u;",
         "n := ABS(n - m);",
         "r := n + m;",
         "t[n + 1] := n;",
@@ -271,8 +351,8 @@ fn a_product_that_can_leave_its_type_is_warned_of_and_a_sum_is_not() {
         ("r := INT_TO_REAL(n * 100);", "U1054"),
         ("n := LIMIT(0, n * 100, 10);", "U1054"),
         ("s := n + 1;", "U1080"),
-        ("IF NOT w = 16#FF THEN n := 0; END_IF;", "U1080"),
-        ("d := NOT u;", "U1080"),
+        ("IF NOT (w + 1) = 16#FF THEN n := 0; END_IF;", "U1080"),
+        ("d := NOT (u + 1);", "U1080"),
     ];
     for (body, code) in told {
         let found = warnings(declared, body);

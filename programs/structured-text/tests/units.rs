@@ -51,3 +51,63 @@ fn nine_of_ten_units_of_oscat_are_taken() {
     std::io::Write::write_all(&mut std::io::stdout(), table.as_bytes()).expect("an output");
     assert!(taken * 100 >= all * 95, "{taken} of {all}");
 }
+
+/// For each value: an enumeration as a number of each width and back, by the names of both types.
+#[test]
+fn an_enumeration_is_converted_by_the_names_of_its_types() {
+    let body = "TYPE COLOUR : (red, green := 5, blue, far := 300); END_TYPE TYPE A_TO_B : (low := -2, high) SINT; END_TYPE
+        PROGRAM main VAR_INPUT k : INT; END_VAR VAR_OUTPUT a, b, c, d, e, f : DINT; r : REAL; same : BOOL; END_VAR
+        VAR colour : COLOUR; other : A_TO_B; END_VAR
+        CASE k OF 0: colour := red; 1: colour := green; 2: colour := blue; ELSE colour := far; END_CASE;
+        other := SEL(k > 0, A_TO_B#low, A_TO_B#high);
+        a := COLOUR_TO_INT(colour); b := colour_to_dint(COLOUR#blue); c := COLOUR_TO_USINT(colour); d := A_TO_B_TO_INT(other);
+        e := TO_INT(colour); f := ANY_TO_DINT(colour); r := COLOUR_TO_REAL(colour);
+        same := INT_TO_COLOUR(COLOUR_TO_INT(colour)) = colour AND TO_COLOUR(e) = colour AND INT_TO_A_TO_B(DINT_TO_INT(d)) = other; END_PROGRAM";
+    let real = |value: f32| format!("{}", value.to_bits());
+    for (k, value, other) in [(0, 0, -2), (1, 5, -1), (2, 6, -1), (3, 300, -1)] {
+        let low = value & 0xff;
+        let wanted = format!("{value} 6 {low} {other} {value} {value} {} 1", real(value as f32));
+        let mut running = running::Running::new(running::program(body));
+        let found = running.scan(&[k]);
+        let found: Vec<String> = found
+            .iter()
+            .zip(running.outputs())
+            .map(|(value, point)| match point.of {
+                understudy_typed::Elementary::Real => value.to_string(),
+                of => of.signed(*value).to_string(),
+            })
+            .collect();
+        assert_eq!(found.join(" "), wanted, "{k}");
+    }
+    let errors = |line: &str| {
+        let text = body.replace("a := COLOUR_TO_INT(colour);", line);
+        running::shown(&text, &running::read(&text, None).1, Severity::Error)
+    };
+    assert!(errors("a := COLOUR_TO_INT(other);").starts_with("U1043"));
+    assert!(errors("a := COLOR_TO_INT(colour);").starts_with("U1041"));
+    assert!(errors("a := COLOUR_TO_COLOUR(colour);").starts_with("U1041"));
+}
+
+#[test]
+fn a_variable_of_an_interface_is_told_as_one() {
+    let text = "INTERFACE Moves METHOD go : BOOL END_METHOD END_INTERFACE
+        FUNCTION_BLOCK Motor IMPLEMENTS Moves METHOD PUBLIC go : BOOL go := TRUE; END_METHOD END_FUNCTION_BLOCK
+        PROGRAM main VAR m : Motor; any : Moves; END_VAR m.go(); END_PROGRAM";
+    let found = running::shown(text, &running::read(text, None).1, Severity::Error);
+    assert!(
+        found.starts_with("U1040")
+            && found.contains("INTERFACE `Moves`")
+            && found.contains("`Motor`"),
+        "{found}"
+    );
+}
+
+#[test]
+fn a_list_stands_in_front_of_its_constants_and_variables() {
+    running::check(
+        "VAR_GLOBAL CONSTANT last : INT := 3; END_VAR VAR_GLOBAL count : INT := 2; END_VAR
+        PROGRAM main VAR_OUTPUT x : INT; y : BOOL; END_VAR VAR t : ARRAY [0..GVL.last] OF INT := [3(1), 9]; END_VAR
+        x := t[GVL.last] + GVL.count; y := GVL.last.0; END_PROGRAM",
+        &[(&[], "11 1")],
+    );
+}

@@ -73,9 +73,11 @@ impl Extent {
 impl Lowering<'_> {
     /// A variable at an address: `%I` is an input point, `%Q` an output point, `%M` memory.
     pub(super) fn located(&mut self, declaration: &Declaration, resolved: &Resolved) -> Symbol {
-        let Some(address) = &declaration.address else {
-            return Symbol::Faulty;
-        };
+        self.located_at(declaration, resolved).unwrap_or(Symbol::Faulty)
+    }
+
+    fn located_at(&mut self, declaration: &Declaration, resolved: &Resolved) -> Option<Symbol> {
+        let address = declaration.address.as_ref()?;
         let name = &declaration.name;
         let key = normal(address.as_str());
         // An incomplete address is one of its own.
@@ -83,6 +85,7 @@ impl Lowering<'_> {
             true => format!("{key} {}", name.key()),
             false => key,
         };
+        self.is_no_element(name, address, &key)?;
         if let Some(known) = self.addresses.get(&key).cloned() {
             if let Symbol::Variable(first) = &known
                 && first.of != resolved.of
@@ -93,13 +96,13 @@ impl Lowering<'_> {
                 let found = understudy_text::Diagnostic::error("U1083", message, address.span());
                 let found = found.with_related(first.span.clone(), "declared here");
                 self.report(found.with_help("give both one type, or two addresses"));
-                return Symbol::Faulty;
+                return None;
             }
-            return known;
+            return Some(known);
         }
         let symbol = self.at_address(name, address, resolved).unwrap_or(Symbol::Faulty);
         self.addresses.insert(key, symbol.clone());
-        symbol
+        Some(symbol)
     }
 
     fn at_address(&mut self, name: &Name, address: &Name, resolved: &Resolved) -> Option<Symbol> {
@@ -112,6 +115,9 @@ impl Lowering<'_> {
                 "write an input such as %IX0.0, an output such as %QW3 or a memory such as %MD8";
             self.error_with("U1083", message, address.span(), help);
             return None;
+        }
+        if is_point && let Some(of) = element(&resolved.of) {
+            return self.array_at(name, address, resolved, of, is_input);
         }
         let elementary = resolved.of.elementary();
         let mut points = Vec::new();
@@ -131,25 +137,29 @@ impl Lowering<'_> {
         self.overlap(name, address, resolved)?;
         let slot = self.state(resolved.of.slots(), &name.span())?;
         self.program.initial.extend(initial(&resolved.image, slot));
-        for (mut shown, declared, offset) in points {
-            let known = match is_input {
-                true => &mut self.program.inputs,
-                false => &mut self.program.outputs,
-            };
-            if known.iter().any(|point| point.name.eq_ignore_ascii_case(&shown)) {
-                shown = format!("{shown} {address}");
-            }
-            known.push_declared(shown, declared, slot + offset);
+        for (shown, declared, offset) in points {
+            self.point_at(shown, address, declared, slot + offset, is_input);
         }
-        Some(Symbol::Variable(Rc::new(Variable {
-            name: name.as_str().to_owned(),
-            root: Root::Global(slot),
-            of: resolved.of.clone(),
-            class: Class::Local,
-            is_constant: false,
-            is_point: is_input,
-            span: name.span(),
-        })))
+        Some(at_slot(name, slot, resolved, is_input))
+    }
+
+    /// A point, which has its address in its name where another point has that name.
+    pub(super) fn point_at(
+        &mut self,
+        mut shown: String,
+        address: &Name,
+        declared: Declared,
+        slot: u32,
+        is_input: bool,
+    ) {
+        let known = match is_input {
+            true => &mut self.program.inputs,
+            false => &mut self.program.outputs,
+        };
+        if known.iter().any(|point| point.name.eq_ignore_ascii_case(&shown)) {
+            shown = format!("{shown} {address}");
+        }
+        known.push_declared(shown, declared, slot);
     }
 
     /// The points of a variable of this type and subrange: itself, or the parts of a structure and the elements of arrays of structures. Whether
@@ -224,14 +234,8 @@ impl Lowering<'_> {
 
     /// Warns where the size in an address is not that of the variable.
     fn fits_address(&mut self, name: &Name, address: &Name, of: Elementary) {
-        let size = normal(address.as_str()).chars().nth(2);
-        let bits = match size {
-            Some('X') => 1,
-            Some('B') => 8,
-            Some('W') => 16,
-            Some('D') => 32,
-            Some('L') => 64,
-            _ => return,
+        let Some(bits) = bits_of(&normal(address.as_str())) else {
+            return;
         };
         if bits != of.bits() {
             let message = format!("`{name}` is {of}, and {address} has {bits} bits");
@@ -243,6 +247,9 @@ impl Lowering<'_> {
     /// An address in a body.
     pub(super) fn direct(&mut self, address: &Name) -> Symbol {
         let key = normal(address.as_str());
+        if self.is_no_element(address, address, &key).is_none() {
+            return Symbol::Faulty;
+        }
         if let Some(known) = self.addresses.get(&key) {
             return known.clone();
         }
@@ -260,8 +267,41 @@ impl Lowering<'_> {
     }
 }
 
+/// The elements of an array of one dimension whose elements share slots.
+fn element(of: &Type) -> Option<Elementary> {
+    match of {
+        Type::Array(array) if array.ranges.len() == 1 => array.element.elementary(),
+        _ => None,
+    }
+}
+
+/// A variable at an address, in a slot of the state.
+pub(super) fn at_slot(name: &Name, slot: u32, resolved: &Resolved, is_input: bool) -> Symbol {
+    Symbol::Variable(Rc::new(Variable {
+        name: name.as_str().to_owned(),
+        root: Root::Global(slot),
+        of: resolved.of.clone(),
+        class: Class::Local,
+        is_constant: false,
+        is_point: is_input,
+        span: name.span(),
+    }))
+}
+
+/// Bits of what the letter of an address says.
+pub(super) fn bits_of(key: &str) -> Option<u32> {
+    Some(match key.chars().nth(2)? {
+        'X' => 1,
+        'B' => 8,
+        'W' => 16,
+        'D' => 32,
+        'L' => 64,
+        _ => return None,
+    })
+}
+
 /// An address in capitals, with the X that may be left out.
-fn normal(address: &str) -> String {
+pub(super) fn normal(address: &str) -> String {
     let mut key = address.to_ascii_uppercase();
     if key.chars().nth(2).is_some_and(|digit| digit.is_ascii_digit()) {
         key.insert(2, 'X');

@@ -228,7 +228,9 @@ impl<'a> Lowering<'a> {
         declaration: &'a Declaration,
         layout: &mut Layout,
     ) -> Symbol {
-        let is_program = self.units[unit].unit.kind == UnitKind::Program;
+        // One that is called is as a block is.
+        let is_program =
+            self.units[unit].unit.kind == UnitKind::Program && self.running.contains(&unit);
         if declaration.class == Class::External {
             return self.external(declaration);
         }

@@ -48,6 +48,11 @@ impl Lowering<'_> {
 
     fn named_callee(&mut self, name: &Name) -> Option<Callee> {
         let key = name.key();
+        if self.runs_by_itself(name)
+            && let Some(&unit) = self.unit_names.get(&key)
+        {
+            return self.unit_callee(unit, name);
+        }
         let symbol = self.lookup(name);
         let is_result = self.owner().is_some_and(|owner| {
             let unit = self.unit_of(owner);
@@ -76,7 +81,7 @@ impl Lowering<'_> {
         if let Some(unit) = unit.filter(is_own) {
             return self.unit_callee(unit, name);
         }
-        if super::standard::is_standard(&key) {
+        if super::standard::is_standard(&key) || self.enumerated(name).is_some() {
             return Some(Callee::Standard(key));
         }
         if let Some(unit) = unit {
@@ -110,8 +115,9 @@ impl Lowering<'_> {
                 None
             }
             _ => {
-                let message = format!("the PROGRAM `{name}` cannot be called");
-                let help = "write a FUNCTION_BLOCK in its place";
+                let message =
+                    format!("the PROGRAM `{name}` runs by itself, and cannot be called too");
+                let help = "take it from its task, or write a FUNCTION_BLOCK in its place";
                 self.error_with("U1040", message, name.span(), help);
                 None
             }

@@ -151,31 +151,24 @@ impl Lowering<'_> {
             let value = self.coerce(operand, &of, &inner.span).map(not);
             return value.map_or(Operand::Faulty, Operand::Typed);
         }
-        let (value, own) = match operand {
-            Operand::Wide(value, own) => (value, own),
-            operand => {
-                let Some(value) = self.settle(operand, hint, &inner.span) else {
-                    return Operand::Faulty;
-                };
-                let Some(of) =
-                    value.of.elementary().filter(|of| of.is_bit_string() || is_whole(*of))
-                else {
-                    let found = self.describe(&value.of);
-                    let wanted = Type::Elementary(Elementary::Bool);
-                    let _: Option<()> = self.mismatch(&found, &wanted, &inner.span);
-                    return Operand::Faulty;
-                };
-                if !is_narrow(of) || of.is_signed() {
-                    let bits = as_bits(of);
-                    let value = reinterpret(value, bits);
-                    let value = apply(Operation::Not(bits), vec![value], Type::Elementary(bits));
-                    return Operand::Typed(reinterpret(value, of));
-                }
-                (value, of)
-            }
+        if let Operand::Wide(value, own) = operand {
+            return Operand::Wide(wide_bits(Operation::Not, vec![value]), own);
+        }
+        // The bits of a variable are those of its type, as the standard says and all but C code have it.
+        let Some(value) = self.settle(operand, hint, &inner.span) else {
+            return Operand::Faulty;
         };
-        let value = convert(value, WIDE);
-        Operand::Wide(wide_bits(Operation::Not, vec![value]), own)
+        let Some(of) = value.of.elementary().filter(|of| of.is_bit_string() || is_whole(*of))
+        else {
+            let found = self.describe(&value.of);
+            let wanted = Type::Elementary(Elementary::Bool);
+            let _: Option<()> = self.mismatch(&found, &wanted, &inner.span);
+            return Operand::Faulty;
+        };
+        let bits = as_bits(of);
+        let value = reinterpret(value, bits);
+        let value = apply(Operation::Not(bits), vec![value], Type::Elementary(bits));
+        Operand::Typed(reinterpret(value, of))
     }
 
     fn minus(&mut self, inner: &syntax::Expression, hint: Option<&Type>, span: &Span) -> Operand {

@@ -112,7 +112,11 @@ impl<'a> Lowering<'a> {
         } else if let Some(symbol) = self.declared_constant(&key) {
             return Some(symbol);
         }
-        self.global(&key)
+        let global = self.global(&key);
+        if global.is_none() && self.scope.symbols.is_some() {
+            return self.named_program(&key);
+        }
+        global
     }
 
     fn declared_constant(&mut self, key: &str) -> Option<Symbol> {

@@ -54,8 +54,16 @@ pub(super) fn place(root: Root, of: Type) -> Place {
 impl Lowering<'_> {
     /// The value of a path: a variable, a constant or a value of an enumeration.
     pub(super) fn variable(&mut self, path: &Path, hint: Option<&Type>) -> Option<Expression> {
-        let symbol = self.root_symbol(&path.root);
-        match (&symbol, path.steps.as_slice()) {
+        let mut symbol = self.root_symbol(&path.root);
+        let mut steps = path.steps.as_slice();
+        // A list of global variables may stand in front of a constant.
+        if let (None, [Step::Field(name), rest @ ..]) = (&symbol, steps)
+            && self.enumeration_named(&path.root).is_none()
+            && let Some(found @ Symbol::Constant(_)) = self.global(&name.key())
+        {
+            (symbol, steps) = (Some(found), rest);
+        }
+        match (&symbol, steps) {
             (Some(Symbol::Constant(constant)), []) => return Some(constant.expression()),
             (Some(Symbol::Constant(constant)), [Step::Bits { width, number, span }]) => {
                 let value = constant.expression();

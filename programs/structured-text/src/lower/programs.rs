@@ -8,8 +8,10 @@ use understudy_typed::{Root, Task, Type, Variable as Shown};
 use crate::syntax::{Argument, Class, Declaration, Expression, File, Name, Span, Unit, UnitKind};
 
 use super::blocks::{Block, Key};
+use super::called::called;
 use super::images::initial;
 use super::names::{Owner, Symbol, Variable};
+use super::tasks::interval;
 use super::types::TypeState;
 use super::{DEFAULT_PERIOD, Lowering, Options};
 
@@ -18,7 +20,7 @@ pub(super) struct Instance<'a> {
     pub(super) name: &'a Name,
     unit: usize,
     /// Nanoseconds, and how urgent it is.
-    interval: Option<i64>,
+    pub(super) interval: Option<i64>,
     priority: i64,
     /// What its inputs and outputs are connected to.
     pub(super) connections: &'a [Argument],
@@ -126,7 +128,8 @@ impl<'a> Lowering<'a> {
         if instances.is_empty() {
             return Vec::new();
         }
-        let base = instances.iter().filter_map(|instance| instance.interval).min();
+        self.running = instances.iter().map(|instance| instance.unit).collect();
+        let base = self.base(&instances, options.period);
         self.program.period = options.period.or(base).unwrap_or(DEFAULT_PERIOD);
         let name = instances[0].name;
         self.program.name = match instances.len() {
@@ -136,12 +139,17 @@ impl<'a> Lowering<'a> {
         let are_several = instances.len() > 1;
         for instance in &instances {
             let every = match (instance.interval, base) {
-                (Some(interval), Some(base)) => self.every(instance.name, interval, base),
+                (Some(interval), Some(base)) => u32::try_from(interval / base).unwrap_or(u32::MAX),
                 _ => 1,
             };
-            self.run(instance, every, are_several);
+            let is_only = instances.iter().filter(|other| other.unit == instance.unit).count() == 1;
+            self.run(instance, every.max(1), are_several, is_only);
         }
         self.bodies();
+        self.copy_elements();
+        if options.program.is_none() {
+            self.check_idle(&programs);
+        }
         self.recursion();
         self.program.initial.sort_by_key(|initial| initial.slot);
         Vec::new()
@@ -175,27 +183,36 @@ impl<'a> Lowering<'a> {
             let declared = file.instances.iter().find(|found| found.of.is(chosen));
             if let Some(task) = declared.and_then(|found| found.task.as_ref()) {
                 let task = file.tasks.iter().find(|found| found.name == *task);
-                instance.interval = task.and_then(|task| task.interval);
+                instance.interval = task.and_then(interval);
             }
             return vec![instance];
         }
         if file.instances.is_empty() {
-            if let [unit] = programs {
-                let mut instance = whole(unit, self.unit_names[&unit.name.key()]);
-                if let [task] = file.tasks.as_slice() {
-                    instance.interval = task.interval;
-                }
-                return vec![instance];
+            // What others call does not run by itself.
+            let called = called(&file.units);
+            let mut roots: Vec<&Unit> = programs.to_vec();
+            roots.retain(|unit| !called.contains(&unit.name.key()));
+            if roots.is_empty() {
+                roots = programs.to_vec();
             }
-            let list: Vec<&str> = names().collect();
-            let message = format!(
-                "the file has {} programs and no CONFIGURATION that says which of them run",
-                programs.len()
-            );
-            let help = format!("choose one with --program, of {}", list.join(", "));
-            let span = programs[1].name.span();
-            self.error_with("U1013", message, span, help);
-            return Vec::new();
+            if let [_, second, ..] = roots.as_slice() {
+                let list: Vec<&str> = roots.iter().map(|unit| unit.name.as_str()).collect();
+                let message = format!(
+                    "the file has {} programs and no CONFIGURATION that says which of them run: each scan runs all, in this order",
+                    roots.len()
+                );
+                let help = format!("choose one with --program, of {}", list.join(", "));
+                self.warn("U1013", message, second.name.span(), help);
+            }
+            let only = match file.tasks.as_slice() {
+                [task] => interval(task),
+                _ => None,
+            };
+            let runs = roots.into_iter().map(|unit| Instance {
+                interval: only,
+                ..whole(unit, self.unit_names[&unit.name.key()])
+            });
+            return runs.collect();
         }
         let mut instances = Vec::new();
         for declared in &file.instances {
@@ -225,7 +242,7 @@ impl<'a> Lowering<'a> {
                     continue;
                 }
                 instance.event = task.single.as_ref();
-                instance.interval = task.interval.filter(|_| instance.event.is_none());
+                instance.interval = interval(task);
                 instance.priority = task.priority.unwrap_or(i64::MAX);
             }
             instances.push(instance);
@@ -234,27 +251,7 @@ impl<'a> Lowering<'a> {
         instances
     }
 
-    /// In every so many-th scan a task runs.
-    fn every(&mut self, name: &Name, interval: i64, base: i64) -> u32 {
-        let times = interval.checked_div(base).unwrap_or(0);
-        if base > 0
-            && interval % base == 0
-            && let Ok(times) = u32::try_from(times)
-        {
-            return times.max(1);
-        }
-        let shown = |nanoseconds: i64| format!("{} ms", nanoseconds as f64 / 1e6);
-        let message = format!(
-            "the interval of `{name}` is {}, which is not a multiple of the fastest one, {}",
-            shown(interval),
-            shown(base)
-        );
-        let help = "choose intervals that are multiples of the fastest one";
-        self.error_with("U1084", message, name.span(), help);
-        1
-    }
-
-    fn run(&mut self, instance: &Instance<'a>, every: u32, are_several: bool) {
+    fn run(&mut self, instance: &Instance<'a>, every: u32, are_several: bool, is_only: bool) {
         let span = instance.name.span();
         let Some(block) = self.block(instance.unit, &span) else {
             return;
@@ -271,6 +268,9 @@ impl<'a> Lowering<'a> {
             return;
         };
         self.program.initial.extend(initial(&block.image, own));
+        if is_only {
+            self.name_program(instance.unit, own, &block.of);
+        }
         let connected = self.connected(instance, &routine, &block);
         self.program.tasks.push(Task { routine: connected.unwrap_or(routine.id), own, every });
         let prefix = match are_several {
@@ -383,7 +383,13 @@ impl<'a> Lowering<'a> {
         checked
     }
 
-    fn check(&mut self, index: usize, method: Option<usize>, class: Option<usize>, unit: &'a Unit) {
+    pub(super) fn check(
+        &mut self,
+        index: usize,
+        method: Option<usize>,
+        class: Option<usize>,
+        unit: &'a Unit,
+    ) {
         let owner = Owner { unit: index, method };
         let mut open = Vec::new();
         let outside = self.leave_unit();

@@ -1,7 +1,8 @@
 //! Operators on numbers of fewer than 32 bits: they are computed as DINT, and what is stored is cut to its type.
 //!
 //! So do the C code of matiec, RuSTy and CODESYS; `raw * 100 / 4095` of an INT has no overflow between its operators. Functions and
-//! boxes (`MUL`, `DIV`) keep the type of their inputs.
+//! boxes (`MUL`, `DIV`) keep the type of their inputs. `NOT` of a value that has a type keeps it too: `NOT w` of a WORD has 16 bits in
+//! the standard, in RuSTy, STruC++ and IronPLC; only the C code of matiec has 32.
 
 use understudy_typed::{Elementary, Expression, ExpressionKind, Operation, Type};
 
@@ -151,7 +152,7 @@ impl Lowering<'_> {
         }
         if has_not(value) {
             let message = format!(
-                "NOT of {own} sets the bits above it too: operators have {} bits",
+                "NOT of a calculated {own} sets the bits above it too: operators have {} bits",
                 WIDE.bits()
             );
             let help = format!("write TO_{own}(…) around it if only its own bits are meant");

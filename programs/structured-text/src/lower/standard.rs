@@ -227,6 +227,8 @@ impl Lowering<'_> {
             self.real_call(function, values[0], hint)
         } else if let Some(conversion) = conversions::Conversion::of(key) {
             self.conversion(&conversion, values[0], hint)
+        } else if let Some(conversion) = self.enumerated(&syntax::Name::new(key, span.clone())) {
+            self.enumerated_value(conversion, values[0])
         } else {
             match key {
                 "MOVE" => return self.stored(values[0], hint),

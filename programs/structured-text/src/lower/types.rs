@@ -168,6 +168,19 @@ impl<'a> Lowering<'a> {
             _ if key.starts_with("ANY_") => Some("use a type of constant size"),
             _ => None,
         };
+        if self.interfaces.contains(&key) {
+            let blocks = self.units.iter().map(|entry| entry.unit);
+            let mut blocks = blocks.filter(|unit| unit.implements.contains(name));
+            let help = match blocks.next() {
+                Some(block) => {
+                    format!("declare it as a block that has it, such as `{}`", block.name)
+                }
+                None => "declare it as a block that has its methods".to_owned(),
+            };
+            let message = format!("a variable of the INTERFACE `{name}` is not supported");
+            self.error_with("U1040", message, name.span(), help);
+            return;
+        }
         if let Some(help) = unsupported {
             let message = format!("the type {key} is not supported");
             self.error_with("U1040", message, name.span(), help);

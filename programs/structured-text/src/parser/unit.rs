@@ -64,7 +64,7 @@ impl Parser<'_> {
                 let span = self.access_paths();
                 file.read_past.push(span);
             } else if self.at_word("INTERFACE") {
-                let span = self.interface();
+                let span = self.interface(&mut file.interfaces);
                 file.read_past.push(span);
             } else if self.at_word("DATA_BLOCK") {
                 self.data_block(&mut file);
@@ -300,7 +300,7 @@ impl Parser<'_> {
     }
 
     /// Reads past an interface; answers its place.
-    fn interface(&mut self) -> crate::syntax::Span {
+    fn interface(&mut self, interfaces: &mut Vec<Name>) -> crate::syntax::Span {
         let start = self.span().start;
         self.skip();
         self.access_words();
@@ -319,6 +319,7 @@ impl Parser<'_> {
                 "INTERFACE `{name}` is not checked: the methods of the blocks that implement it count"
             );
             self.read_past(message, span);
+            interfaces.push(name);
         }
         self.since(start)
     }

@@ -20,7 +20,7 @@ const NUMBER_CAPACITY: u16 = 80;
 
 /// One end of a conversion.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum End {
+pub(in crate::lower) enum End {
     /// A type, and how many nanoseconds its numbers count where it is a time.
     Elementary(Elementary, i64),
     Text,
@@ -74,7 +74,7 @@ impl Conversion {
             };
             return Some(Self::ToBcd(Some(elementary(from)?), to));
         }
-        if let Some(to) = key.strip_prefix("TO_") {
+        if let Some(to) = key.strip_prefix("ANY_TO_").or_else(|| key.strip_prefix("TO_")) {
             if let Some(to) = to.strip_prefix("BCD_") {
                 return Some(Self::ToBcd(None, Some(elementary(to)?)));
             }
@@ -85,7 +85,53 @@ impl Conversion {
     }
 }
 
+/// A conversion between an enumeration and a number, as its name says.
+pub(in crate::lower) enum Enumerated {
+    From(Type, End),
+    To(Option<End>, Type),
+}
+
 impl Lowering<'_> {
+    /// The conversion of a name in which a type of the file is an enumeration: `COLOUR_TO_INT`, `INT_TO_COLOUR`, `TO_COLOUR`.
+    pub(in crate::lower) fn enumerated(&mut self, name: &syntax::Name) -> Option<Enumerated> {
+        let is_number = |end: &End| matches!(end, End::Elementary(of, _) if !of.is_time());
+        let key = name.key();
+        let mut of = |part: &str| self.enumeration_named(&syntax::Name::new(part, name.span()));
+        if let Some(to) = key.strip_prefix("TO_")
+            && let Some(to) = of(to)
+        {
+            return Some(Enumerated::To(None, to));
+        }
+        // A name of a type may have the word itself.
+        key.match_indices("_TO_").find_map(|(at, word)| {
+            let (from, to) = (&key[..at], &key[at + word.len()..]);
+            match (end(from).filter(is_number), end(to).filter(is_number)) {
+                (None, Some(end)) => of(from).map(|from| Enumerated::From(from, end)),
+                (Some(end), None) => of(to).map(|to| Enumerated::To(Some(end), to)),
+                _ => None,
+            }
+        })
+    }
+
+    pub(super) fn enumerated_value(
+        &mut self,
+        conversion: Enumerated,
+        value: &syntax::Expression,
+    ) -> Option<Expression> {
+        match conversion {
+            Enumerated::From(from, to) => {
+                let value = self.expression(value, &from)?;
+                self.converted_to(value, 1, to)
+            }
+            Enumerated::To(from, to) => {
+                let base = End::Elementary(to.elementary()?, 1);
+                let (value, unit) = self.converted_from(from, base, value)?;
+                let value = self.converted_to(value, unit, base)?;
+                Some(Expression { of: to, ..value })
+            }
+        }
+    }
+
     pub(super) fn conversion(
         &mut self,
         conversion: &Conversion,

@@ -1,0 +1,133 @@
+//! Programs that others name: in TwinCAT and CODESYS a PROGRAM has one memory, and one that no task runs is called like an instance.
+
+use std::collections::HashSet;
+use std::rc::Rc;
+
+use understudy_typed::{Root, Type, Variable as Shown};
+
+use crate::syntax::{Body, Class, Name, Statement, StatementKind, Unit, UnitKind};
+
+use super::Lowering;
+use super::images::initial;
+use super::names::{Symbol, Variable};
+
+/// Names in capitals of what the bodies of units call by one name alone.
+pub(super) fn called(units: &[Unit]) -> HashSet<String> {
+    let mut found = HashSet::new();
+    for unit in units {
+        for body in unit.methods.iter().map(|method| &method.body).chain([&unit.body]) {
+            if let Body::Statements(statements) = body {
+                calls(statements, &mut found);
+            }
+        }
+    }
+    found
+}
+
+fn calls(statements: &[Statement], found: &mut HashSet<String>) {
+    for statement in statements {
+        match &statement.kind {
+            StatementKind::Call(path, _) if path.steps.is_empty() => {
+                found.insert(path.root.key());
+            }
+            StatementKind::If(branches, otherwise) => {
+                branches.iter().for_each(|(_, body)| calls(body, found));
+                calls(otherwise, found);
+            }
+            StatementKind::Case(_, branches, otherwise) => {
+                branches.iter().for_each(|(_, body)| calls(body, found));
+                calls(otherwise, found);
+            }
+            StatementKind::For(of) => calls(&of.body, found),
+            StatementKind::While(_, body) | StatementKind::Repeat(body, _) => calls(body, found),
+            _ => {}
+        }
+    }
+}
+
+impl<'a> Lowering<'a> {
+    /// The only instance of a program that runs has its memory under its name too.
+    pub(super) fn name_program(&mut self, unit: usize, own: u32, of: &Type) {
+        let symbol = self.program_variable(unit, own, of);
+        self.named_programs.insert(unit, symbol);
+    }
+
+    fn program_variable(&self, unit: usize, slot: u32, of: &Type) -> Symbol {
+        let name = &self.units[unit].unit.name;
+        Symbol::Variable(Rc::new(Variable {
+            name: name.as_str().to_owned(),
+            root: Root::Global(slot),
+            of: of.clone(),
+            class: Class::Local,
+            is_constant: false,
+            is_point: self.running.contains(&unit),
+            span: name.span(),
+        }))
+    }
+
+    /// The memory of the program of a name in capitals, where it has one.
+    pub(super) fn named_program(&mut self, key: &str) -> Option<Symbol> {
+        let unit = *self.unit_names.get(key)?;
+        if self.units[unit].unit.kind != UnitKind::Program || self.is_library {
+            return None;
+        }
+        if let Some(known) = self.named_programs.get(&unit) {
+            return Some(known.clone());
+        }
+        if self.running.contains(&unit) {
+            return None;
+        }
+        let name = &self.units[unit].unit.name;
+        let symbol = match self.block(unit, &name.span()) {
+            Some(block) => self.state(block.of.slots(), &name.span()).map(|slot| {
+                self.program.initial.extend(initial(&block.image, slot));
+                self.program.variables.push(Shown {
+                    name: name.as_str().to_owned(),
+                    of: block.of.clone(),
+                    slot,
+                    address: None,
+                    description: None,
+                    is_retained: false,
+                });
+                self.program_variable(unit, slot, &block.of)
+            }),
+            None => None,
+        };
+        let symbol = symbol.unwrap_or(Symbol::Faulty);
+        self.named_programs.insert(unit, symbol.clone());
+        Some(symbol)
+    }
+
+    /// Looks for errors in programs that nothing runs and nothing calls. Nothing of them is kept.
+    pub(super) fn check_idle(&mut self, programs: &[&'a Unit]) {
+        for program in programs {
+            let Some(&unit) = self.unit_names.get(&program.name.key()) else {
+                continue;
+            };
+            if self.running.contains(&unit) || self.named_programs.contains_key(&unit) {
+                continue;
+            }
+            let message = format!("nothing runs the PROGRAM `{}`: it is not kept", program.name);
+            let help = "name it in a CONFIGURATION, call it, or remove it";
+            self.warn("U1055", message, program.name.span(), help);
+            let kept = (self.program.clone(), self.names.clone(), self.calls.clone());
+            let at = (std::mem::take(&mut self.addresses), std::mem::take(&mut self.extents));
+            self.check(unit, None, Some(unit), program);
+            self.bodies();
+            self.recursion();
+            (self.program, self.names, self.calls) = kept;
+            (self.addresses, self.extents) = at;
+            self.elements = Default::default();
+        }
+    }
+
+    /// Whether a name that is called is that of a program which runs by itself.
+    pub(super) fn runs_by_itself(&self, name: &Name) -> bool {
+        let unit = self.unit_names.get(&name.key());
+        let is_variable = |key: &String| {
+            let own = self.scope.symbols.as_ref();
+            own.is_some_and(|own| own.contains_key(key)) || self.globals.contains_key(key)
+        };
+        unit.is_some_and(|unit| self.running.contains(unit)) && !is_variable(&name.key())
+    }
+}
