@@ -5,5 +5,5 @@ mod network;
 mod picture;
 
 pub(crate) use chart::chart;
-pub(crate) use network::{Style, networks};
+pub(crate) use network::{Style, Widths, networks};
 pub use picture::{DrawnBody, DrawnUnit, draw_typed, drawn_units, listing};

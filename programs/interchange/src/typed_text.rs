@@ -50,36 +50,61 @@ pub fn typed_text(
     let file = with_library(file);
     let as_text = print::file(&file);
     let mut losses = Vec::new();
-    let printed = match to {
-        Format::StructuredText => as_text.clone(),
+    let (printed, scans) = match to {
+        Format::StructuredText => {
+            let printed = with_written_names(&file, as_text.clone());
+            let again = whole(&printed, parse(&printed), wanted.program, None);
+            let scans = compare(&read, &again)?;
+            (printed, scans)
+        }
         Format::PlcOpen => {
-            let main = file.instances.first().map(|instance| &instance.of);
-            let main = main.or_else(|| Some(&file.units.last()?.name));
-            let title = main.map_or("project", Name::as_str);
             let drawn = match format {
                 Some(Format::PlcOpen) => plcopen::drawn_units(text),
                 _ => HashMap::new(),
             };
             let style = |unit: &Unit| bodies.style(drawn.get(&unit.name.key()).copied());
-            let document = plcopen::write_typed(&file, title, &style);
-            let document = document.map_err(WriteError::NotHeld)?;
-            losses.extend(in_text(&document.as_text));
-            document.text
+            let document = match document(&file, &read, wanted, &style) {
+                // Networks that are not the statements are none: a text is.
+                Err(WriteError::Different(_)) => {
+                    document(&file, &read, wanted, &|_| None).map(|(printed, _, scans)| {
+                        let units = file.units.iter().filter(|unit| style(unit).is_some());
+                        let reasons =
+                            units.map(|unit| format!("`{}` is not its networks", unit.name));
+                        (printed, reasons.collect(), scans)
+                    })
+                }
+                document => document,
+            };
+            let (printed, reasons, scans) = document?;
+            losses.extend(in_text(&reasons));
+            (printed, scans)
         }
         _ => return Err(WriteError::ReadOnly),
     };
-    let printed = with_written_names(&file, printed);
-    let again = match to {
-        Format::PlcOpen => plcopen::read_typed(&printed),
-        _ => parse(&printed),
-    };
-    let again = whole(&printed, again, wanted.program, None);
-    let compared = Compared { scans: compare(&read, &again)?, ..Compared::default() };
+    let compared = Compared { scans, ..Compared::default() };
     if format == Some(Format::StructuredText) {
         losses.extend(lost_comments(text, &as_text));
     }
     let written = Written { losses, text: printed, compared };
     Ok((Some(written), diagnostics))
+}
+
+/// A document, which bodies of it are text and why, and in how many scans it was the program that was read.
+fn document(
+    file: &File,
+    read: &Whole,
+    wanted: Wanted<'_>,
+    style: &dyn Fn(&Unit) -> Option<Style>,
+) -> Result<(String, Vec<String>, usize), WriteError> {
+    let main = file.instances.first().map(|instance| &instance.of);
+    let main = main.or_else(|| Some(&file.units.last()?.name));
+    let title = main.map_or("project", Name::as_str);
+    let document = plcopen::write_typed(file, title, style).map_err(WriteError::NotHeld)?;
+    plcopen::confirm_order(&document.text, file).map_err(WriteError::Different)?;
+    let printed = with_written_names(file, document.text);
+    let again = whole(&printed, plcopen::read_typed(&printed), wanted.program, None);
+    let scans = compare(read, &again)?;
+    Ok((printed, document.as_text, scans))
 }
 
 /// The syntax of the file `name`, and what was found in it; nothing for a form that has no programs with numbers.
@@ -143,8 +168,10 @@ fn configure(file: &mut File, wanted: Wanted<'_>, period: Option<Duration>) {
         priority: Some(0),
         single: None,
     }];
-    let instances = chosen.into_iter().enumerate().map(|(place, of)| ProgramInstance {
-        name: name(&format!("Instance{place}")),
+    // The points of several programs have the names of the programs in front.
+    let are_several = chosen.len() > 1;
+    let instances = chosen.into_iter().map(|of| ProgramInstance {
+        name: if are_several { of.clone() } else { name("Instance0") },
         task: Some(name("Task0")),
         of,
         connections: Vec::new(),

@@ -5,6 +5,7 @@
 
 mod expression;
 mod rung;
+mod widths;
 
 use std::cell::RefCell;
 
@@ -12,7 +13,7 @@ use understudy_diagram::blocks::{Coil, Input, Kind, Network, Output};
 use understudy_structured_text::print;
 use understudy_structured_text::syntax::{
     Argument, Class, Declaration, Expression, ExpressionKind, File, Literal, Operator, Path,
-    Statement, StatementKind, Step, TypeKind, Unit, UnitKind,
+    Statement, StatementKind, Step, TypeKind, TypeName, Unit, UnitKind,
 };
 
 use crate::plcopen::typed::make;
@@ -33,6 +34,15 @@ pub enum Style {
     Ladder,
 }
 
+/// What is drawn of an operator on numbers of fewer than 32 bits, which has more bits than its box.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Widths {
+    /// The box: it is looked at, not executed.
+    Shown,
+    /// The expression as it is written, where the box would give another result.
+    Exact,
+}
+
 /// The networks of a body, in the order in which they are executed.
 ///
 /// # Errors
@@ -42,11 +52,13 @@ pub(crate) fn networks(
     of: &Unit,
     statements: &[Statement],
     style: Style,
+    widths: Widths,
 ) -> Result<Vec<Network>, String> {
     let mut maker = Maker {
         file,
         unit: of,
         style,
+        widths,
         networks: Vec::new(),
         open: Vec::new(),
         taken: RefCell::default(),
@@ -78,6 +90,7 @@ struct Maker<'a> {
     file: &'a File,
     unit: &'a Unit,
     style: Style,
+    widths: Widths,
     networks: Vec<Network>,
     open: Vec<Open>,
     /// Outputs that parts of this statement are connected to.
@@ -210,7 +223,8 @@ impl Maker<'_> {
                     self.coil(path, value, network);
                     return Ok(None);
                 }
-                let value = self.source(value, network);
+                let of = self.type_of(&make::read(path.clone()));
+                let value = self.stored(value, of.as_ref(), network);
                 let from = match enable {
                     Some(enable) => enabled(value, enable, network),
                     None if value.negated => {
@@ -260,7 +274,9 @@ impl Maker<'_> {
         let mut inputs = Vec::new();
         inputs.extend(enable.map(|enable| pin("EN", enable)));
         for (name, value) in pins {
-            let value = self.source(value, network);
+            let mut declared = called.declarations.iter();
+            let of = declared.find(|it| it.name.is(name)).map(|it| self.resolved(&it.of));
+            let value = self.stored(value, of.as_ref(), network);
             inputs.push(pin(name, value));
         }
         let kind = Kind::Block { of: called.name.to_string(), instance: Some(name.clone()) };
@@ -288,8 +304,33 @@ impl Maker<'_> {
 
     /// The type of a value, where something in it has one.
     fn type_of(&self, value: &Expression) -> Option<TypeKind> {
-        let values = Values { file: self.file, declarations: &self.unit.declarations, made: &[] };
-        values.strong(value).map(|of| of.kind)
+        self.values().strong(value).map(|of| of.kind)
+    }
+
+    fn values(&self) -> Values<'_> {
+        Values { file: self.file, declarations: &self.unit.declarations, made: &[] }
+    }
+
+    fn resolved(&self, of: &TypeName) -> TypeKind {
+        self.values().resolved(of.clone()).kind
+    }
+
+    /// Whether boxes would give another result than a value that is stored as a type, or is used at once.
+    fn is_narrower(&self, value: &Expression, stored: Option<&TypeKind>) -> bool {
+        self.widths == Widths::Exact && widths::is_narrower(self.file, self.unit, value, stored)
+    }
+
+    /// What a value comes from that is stored as a type.
+    fn stored(&self, value: &Expression, of: Option<&TypeKind>, network: &mut Network) -> Value {
+        let of = of.map(|of| self.resolved(&TypeName { kind: of.clone(), span: 0..0 }));
+        match self.is_bool(of.as_ref()) || !self.is_narrower(value, of.as_ref()) {
+            true => self.source(value, network),
+            false => expression::written(value, network),
+        }
+    }
+
+    fn is_bool(&self, of: Option<&TypeKind>) -> bool {
+        matches!(of, Some(TypeKind::Named(name)) if name.is("BOOL"))
     }
 
     /// What is given, by the names of the inputs.

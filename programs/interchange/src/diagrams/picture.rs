@@ -7,7 +7,7 @@ use understudy_structured_text::print;
 use understudy_structured_text::syntax::{Body, File, Statement, Unit, UnitKind};
 use understudy_text::{Diagnostic, has_errors};
 
-use super::{Style, chart, networks};
+use super::{Style, Widths, chart, networks};
 use crate::format::Format;
 use crate::plcopen;
 use crate::source::Wanted;
@@ -168,7 +168,7 @@ fn drawn_unit(file: &File, unit: &Unit, style: Option<Style>) -> DrawnUnit {
 }
 
 fn statements(file: &File, unit: &Unit, list: &[Statement], style: Option<Style>) -> DrawnBody {
-    match style.map(|style| networks(file, unit, list, style)) {
+    match style.map(|style| networks(file, unit, list, style, Widths::Shown)) {
         Some(Ok(networks)) => DrawnBody::Networks(networks),
         Some(Err(reason)) => DrawnBody::Text(print::statements(list), Some(reason)),
         None => DrawnBody::Text(print::statements(list), None),

@@ -7,6 +7,7 @@
 
 mod blocks;
 mod chart;
+mod order;
 mod sheet;
 mod tree;
 mod typed;
@@ -18,6 +19,7 @@ use understudy_ladder::{
     standard_time, visit,
 };
 
+pub(crate) use self::order::confirm as confirm_order;
 use self::sheet::Sheet;
 use self::tree::Tree;
 pub use self::typed::{TypedDocument, write_typed};

@@ -95,6 +95,35 @@ END_PROGRAM";
     assert!(messages[0].contains("`main` has a loop"), "{messages:?}");
 }
 
+/// A value whose operators have more bits than their boxes is written as it is; all else of the body stays boxes.
+#[test]
+fn an_intermediate_result_keeps_its_bits() {
+    let cases = [
+        ("x := raw * 100 / 4095;", false),
+        ("d := raw * 100;", false),
+        ("y := raw + raw > 20000;", false),
+        ("r := raw * 3;", false),
+        ("x := -raw MOD 5;", false),
+        ("c(CU := raw + raw > 0, PV := 3);", false),
+        ("IF raw * 2 > 20000 THEN x := 1; END_IF;", false),
+        ("x := raw * 2 - x;", true),
+        ("x := MAX(raw + x, 3);", true),
+        ("d := d * 3 / 4;", true),
+        ("y := raw MOD 3 = 0;", true),
+    ];
+    for (at, (statement, is_drawn)) in cases.into_iter().enumerate() {
+        let text = format!(
+            "PROGRAM main\n  VAR_INPUT raw AT %IW0 : INT; END_VAR\n  VAR_OUTPUT x AT %QW0 : INT; d AT %QD1 : DINT; r AT %QD2 : REAL; y AT %QX0.0 : BOOL; z AT %QX0.1 : BOOL; END_VAR\n  VAR c : CTU; END_VAR\n  {statement}\n  z := y AND raw > 0;\nEND_PROGRAM"
+        );
+        let found = document(&format!("bits-{at}"), "bits.st", &text, Bodies::Blocks);
+        assert!(found.text.contains("<FBD>") && found.losses.is_empty(), "{statement}");
+        let has_box = ["ADD", "SUB", "MUL", "DIV", "MOD", "MAX"]
+            .iter()
+            .any(|word| found.text.contains(&format!("typeName=\"{word}\"")));
+        assert_eq!(has_box, is_drawn, "{statement}\n{}", found.text);
+    }
+}
+
 const BATCH: &str = "
 PROGRAM batch
   VAR_INPUT start AT %IX0.0 : BOOL; stop AT %IX0.1 : BOOL; level AT %IW0 : INT; END_VAR

@@ -35,6 +35,13 @@ impl Maker<'_> {
                 }
                 None => written(value, network),
             },
+            ExpressionKind::Chain(_, rest)
+                if rest.iter().any(|(operator, _)| matches!(operator, Operator::Compare(_)))
+                    && self.is_narrower(value, None) =>
+            {
+                written(value, network)
+            }
+            ExpressionKind::Call(..) if self.is_narrower(value, None) => written(value, network),
             ExpressionKind::Chain(first, rest)
                 if rest.iter().all(|(operator, _)| word(*operator).is_some()) =>
             {
@@ -175,7 +182,7 @@ fn made(from: Source) -> Value {
 }
 
 /// An expression as it is written.
-fn written(value: &Expression, network: &mut Network) -> Value {
+pub(super) fn written(value: &Expression, network: &mut Network) -> Value {
     plain((network.value(print::expression(value)), 0))
 }
 

@@ -199,7 +199,7 @@ impl<'a> Values<'a> {
     }
 
     /// A type behind its names.
-    fn resolved(&self, mut of: TypeName) -> TypeName {
+    pub(crate) fn resolved(&self, mut of: TypeName) -> TypeName {
         for _ in 0..MAXIMUM_ALIASES {
             let TypeKind::Named(name) = &of.kind else {
                 break;

@@ -15,7 +15,7 @@ use understudy_structured_text::syntax::{
 use super::blocks;
 use super::sheet::position;
 use super::tree::Tree;
-use crate::diagrams::{Style, chart as drawn, networks};
+use crate::diagrams::{Style, Widths, chart as drawn, networks};
 
 /// Height of the row of an action.
 const ACTION: i64 = 22;
@@ -112,7 +112,7 @@ fn condition(tree: &mut Tree, file: &File, unit: &Unit, method: &Unit) -> Result
         None => (statements.as_slice(), "FALSE".to_owned()),
     };
     let name = method.name.as_str();
-    let mut made = networks(file, unit, before, Style::Blocks)
+    let mut made = networks(file, unit, before, Style::Blocks, Widths::Exact)
         .map_err(|reason| format!("a condition that is a network with {reason}"))?;
     let mut is_written = false;
     for object in made.iter_mut().flat_map(|network| &mut network.objects) {

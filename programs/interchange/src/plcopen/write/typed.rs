@@ -7,7 +7,7 @@ use understudy_structured_text::syntax::{
 
 use super::tree::Tree;
 use super::{blocks, chart, document, standard_time};
-use crate::diagrams::{Style, networks};
+use crate::diagrams::{Style, Widths, networks};
 
 /// Elements that the format has for types; of two names the one of the format.
 const ELEMENTARY: [(&str, &str); 23] = [
@@ -128,7 +128,8 @@ fn pou(
         Body::Chart(of) => chart::body(tree, unit, of).map_err(|what| not_held(unit, &what))?,
         Body::Instructions(list) => tree.formatted("IL", print::instructions(list).trim_end()),
         Body::Statements(statements) => {
-            let drawn = style.map(|style| (style, networks(file, unit, statements, style)));
+            let drawn =
+                style.map(|style| (style, networks(file, unit, statements, style, Widths::Exact)));
             match drawn {
                 Some((style, Ok(networks))) => blocks::write(tree, file, &networks, style),
                 other => {
