@@ -6,7 +6,8 @@
 use std::collections::HashMap;
 
 use understudy_typed::{
-    Declared, Elementary, Place, Root, Routine, RoutineId, RoutineKind, Statement, StatementKind, Task, Type,
+    Declared, Elementary, Place, Root, Routine, RoutineId, RoutineKind, Statement, StatementKind,
+    Task, Type,
 };
 
 use crate::syntax::{Name, Span};
