@@ -205,6 +205,8 @@ mod tests {
             "w := NOT w AND w;",
             "d := d + n;",
             "n := MAX(n + 1, m);",
+            // The input of a function is cut to its type.
+            "d := MAX(d, n / m);",
             "n := Fun(n + 1, d + 1);",
             "t := t + t;",
             "r := INT_TO_REAL(n + 1);",
@@ -226,7 +228,6 @@ mod tests {
             "n := (n + m) MOD 3;",
             "n := Fun(n, n * 2);",
             "r := DINT_TO_REAL(n * 100);",
-            "d := MAX(d, n / m);",
             "d := d + n * n;",
             "s := s * 2 / 3;",
             "q := NOT (w + 1) = 5;",
