@@ -201,7 +201,7 @@ fn push_remote_io(text: &mut String, program: &DraftProgram) {
     let outputs = &program.signals.outputs;
     let now = match outputs.iter().all(Signal::is_bit) {
         true => "All are off now.",
-        false => "Each is off, 0 or the value of its range that is nearest to 0 now.",
+        false => "Each is off or nearest to 0 now.",
     };
     let _ = write!(
         text,
