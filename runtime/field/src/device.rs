@@ -4,8 +4,10 @@
 //!   connecting ── there ──► exchanging ── one went well ──► good
 //!       ▲                      │  ▲                          │
 //!       │                      │  └── an exception: bad ◄────┤
-//!       └──── bad: no answer in time, or the connection broke ┘
+//!       └── bad: no answer in time, or a new connection broke ┘
 //! ```
+//!
+//! A device that ends its connection after some answers is served over a new one at once.
 //!
 //! When the remote I/O ends in order, the device is driven to the fail-safe values; when it dies, that is for the device's own
 //! watchdog to do.
@@ -26,7 +28,7 @@ use understudy_cluster::FieldDevice;
 use understudy_wire::Image;
 
 use crate::contest::{Contest, READ_BACK_EVERY};
-use crate::exchange::{Link, Trouble, connect, exchange, read_back};
+use crate::exchange::{Link, Trouble, exchange, read_back};
 use crate::plan::Plan;
 
 /// Of SCHED_FIFO: behind the cycle and the link, before programs that are not in real time.
@@ -225,7 +227,7 @@ impl Worker {
         let mut pause = FIRST_PAUSE;
         while !self.shared.lock().ending {
             let patience = self.settings.timeout;
-            match timeout(patience, connect(address, self.settings.unit)).await {
+            match timeout(patience, Link::connect(address, self.settings.unit)).await {
                 Ok(Ok(device)) => {
                     if self.serve(device).await {
                         pause = FIRST_PAUSE;
@@ -244,7 +246,7 @@ impl Worker {
     }
 
     /// Exchanges until the connection is of no use, or it is over; whether it was of use before.
-    async fn serve(&self, mut device: Link) -> bool {
+    async fn serve(&self, mut device: Link<'_>) -> bool {
         let mut was_of_use = false;
         // What this connection wrote last: what was there before may be what the device starts with.
         let mut written: Option<Image> = None;
@@ -323,3 +325,6 @@ impl Worker {
         self.shared.see(Look::Lost(reason));
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,11 +1,10 @@
 //! One exchange with the device: all outputs go out, all inputs come in.
 
 use std::io;
-use std::time::Duration;
 
 use tokio::net::TcpStream;
 use tokio::time::sleep;
-use tokio_modbus::client::{Context, Reader, Writer, rtu, tcp};
+use tokio_modbus::client::{Client as _, Context, Reader, Writer, rtu, tcp};
 use tokio_modbus::{Error, ExceptionCode, Slave};
 use understudy_cluster::Connection;
 use understudy_wire::Image;
@@ -37,41 +36,74 @@ impl Trouble {
     }
 }
 
-/// An open connection to the device.
-pub(crate) struct Link {
+/// A connection to the device.
+///
+/// A device may end its connection after each answer, after some answers, or when it was idle. Its connection is then opened again at once, and
+/// the request is repeated; only a request that fails on a new connection is a failure. A request to write carries whole values, so a
+/// repetition has no other effect.
+pub(crate) struct Link<'a> {
+    connection: &'a Connection,
+    unit: Slave,
     device: Context,
-    /// Before each request; only serial lines need it.
-    silence: Option<Duration>,
+    /// Whether a request was answered over this connection.
+    has_answered: bool,
 }
 
-pub(crate) async fn connect(connection: &Connection, unit: u8) -> io::Result<Link> {
+/// An answer of the device, or its exception.
+type Answered<T> = Result<T, ExceptionCode>;
+
+async fn open(connection: &Connection, unit: Slave) -> io::Result<Context> {
     match connection {
         Connection::Tcp(address) => {
             let stream = TcpStream::connect(address).await?;
             // An exchange is many small requests, each of which is waited for.
             stream.set_nodelay(true)?;
-            Ok(Link { device: tcp::attach_slave(stream, Slave(unit)), silence: None })
+            Ok(tcp::attach_slave(stream, unit))
         }
-        Connection::Rtu(line) => Ok(Link {
-            device: rtu::attach_slave(serial::open(line)?, Slave(unit)),
-            silence: Some(serial::silence(line)),
-        }),
+        Connection::Rtu(line) => Ok(rtu::attach_slave(serial::open(line)?, unit)),
     }
 }
 
-impl Link {
-    /// The device, when it may be asked: frames on a serial line are told apart by the silence between them.
-    async fn ready(&mut self) -> &mut Context {
-        if let Some(silence) = self.silence {
-            sleep(silence).await;
+impl<'a> Link<'a> {
+    pub(crate) async fn connect(connection: &'a Connection, unit: u8) -> io::Result<Self> {
+        let unit = Slave(unit);
+        let device = open(connection, unit).await?;
+        Ok(Self { connection, unit, device, has_answered: false })
+    }
+
+    /// The answer to a request.
+    async fn ask<T>(
+        &mut self,
+        request: impl AsyncFn(&mut Context) -> Result<Answered<T>, Error>,
+    ) -> Result<Answered<T>, Error> {
+        self.await_silence().await;
+        let answer = request(&mut self.device).await;
+        let answer = match answer {
+            Err(Error::Transport(_)) if self.has_answered => {
+                // A device may accept one connection at a time: the old one ends first.
+                let _ = self.device.disconnect().await;
+                self.has_answered = false;
+                self.device = open(self.connection, self.unit).await?;
+                self.await_silence().await;
+                request(&mut self.device).await
+            }
+            answer => answer,
+        };
+        self.has_answered |= answer.is_ok();
+        answer
+    }
+
+    /// Frames on a serial line are told apart by the silence between them.
+    async fn await_silence(&self) {
+        if let Connection::Rtu(line) = self.connection {
+            sleep(serial::silence(line)).await;
         }
-        &mut self.device
     }
 }
 
 /// u(i), once `outputs` are driven.
 pub(crate) async fn exchange(
-    device: &mut Link,
+    device: &mut Link<'_>,
     outputs: Option<(&Plan, &Image)>,
     inputs: &Plan,
 ) -> Result<Image, Trouble> {
@@ -89,7 +121,7 @@ pub(crate) async fn exchange(
 
 /// The words of y(i), as the device holds them; nothing where it does not let its outputs be read.
 pub(crate) async fn read_back(
-    device: &mut Link,
+    device: &mut Link<'_>,
     outputs: &Plan,
 ) -> Result<Option<Vec<Vec<u16>>>, Trouble> {
     let mut answers = Vec::with_capacity(outputs.runs.len());
@@ -103,16 +135,10 @@ pub(crate) async fn read_back(
     Ok(Some(outputs.named(answers)))
 }
 
-async fn read(device: &mut Link, run: Run) -> Result<Vec<u16>, Trouble> {
+async fn read(device: &mut Link<'_>, run: Run) -> Result<Vec<u16>, Trouble> {
     let Run { table, start, count } = run;
-    let device = device.ready().await;
-    let bits = |bits: Vec<bool>| bits.into_iter().map(u16::from).collect();
-    let answer: Result<Vec<u16>, ExceptionCode> = match table {
-        Table::Discrete => device.read_discrete_inputs(start, count).await?.map(bits),
-        Table::Coil => device.read_coils(start, count).await?.map(bits),
-        Table::Input => device.read_input_registers(start, count).await?,
-        Table::Holding => device.read_holding_registers(start, count).await?,
-    };
+    let request = async |device: &mut Context| read_table(device, table, start, count).await;
+    let answer = device.ask(request).await?;
     let what = || format!("to read {run}");
     let words = answer.map_err(|code| Trouble::Exception { what: what(), code })?;
     if words.len() < usize::from(count) {
@@ -121,19 +147,43 @@ async fn read(device: &mut Link, run: Run) -> Result<Vec<u16>, Trouble> {
     Ok(words)
 }
 
-async fn write(device: &mut Link, run: Run, words: &[u16]) -> Result<(), Trouble> {
+async fn read_table(
+    device: &mut Context,
+    table: Table,
+    start: u16,
+    count: u16,
+) -> Result<Answered<Vec<u16>>, Error> {
+    let bits = |bits: Vec<bool>| bits.into_iter().map(u16::from).collect();
+    Ok(match table {
+        Table::Discrete => device.read_discrete_inputs(start, count).await?.map(bits),
+        Table::Coil => device.read_coils(start, count).await?.map(bits),
+        Table::Input => device.read_input_registers(start, count).await?,
+        Table::Holding => device.read_holding_registers(start, count).await?,
+    })
+}
+
+async fn write(device: &mut Link<'_>, run: Run, words: &[u16]) -> Result<(), Trouble> {
     let Run { table, start, .. } = run;
-    let device = device.ready().await;
-    let answer = match (table, words) {
-        (Table::Holding, [word]) => device.write_single_register(start, *word).await?,
-        (Table::Holding, words) => device.write_multiple_registers(start, words).await?,
-        (_, [word]) => device.write_single_coil(start, *word != 0).await?,
-        (_, words) => {
-            let coils: Vec<bool> = words.iter().map(|word| *word != 0).collect();
-            device.write_multiple_coils(start, &coils).await?
-        }
-    };
+    let coils: Vec<bool> = words.iter().map(|word| *word != 0).collect();
+    let request =
+        async |device: &mut Context| write_table(device, table, start, words, &coils).await;
+    let answer = device.ask(request).await?;
     answer.map_err(|code| Trouble::Exception { what: format!("to write {run}"), code })
+}
+
+async fn write_table(
+    device: &mut Context,
+    table: Table,
+    start: u16,
+    words: &[u16],
+    coils: &[bool],
+) -> Result<Answered<()>, Error> {
+    match (table, words, coils) {
+        (Table::Holding, [word], _) => device.write_single_register(start, *word).await,
+        (Table::Holding, words, _) => device.write_multiple_registers(start, words).await,
+        (_, _, [coil]) => device.write_single_coil(start, *coil).await,
+        (_, _, coils) => device.write_multiple_coils(start, coils).await,
+    }
 }
 
 impl std::fmt::Display for Run {

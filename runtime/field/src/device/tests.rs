@@ -1,0 +1,191 @@
+//! Devices that end their connections, each a TCP server of its own that answers as Modbus TCP wants it.
+
+use std::collections::BTreeMap;
+use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use understudy_cluster::{Cluster, FieldDevice};
+
+use super::*;
+
+/// What the tests wait for, at most.
+const DEADLINE: Duration = Duration::from_secs(60);
+
+/// When the device ends its connection.
+#[derive(Debug, Clone, Copy)]
+enum Ends {
+    /// After this number of answers.
+    After(u64),
+    /// Where no request comes for this time.
+    Idle(Duration),
+    /// In place of an answer, from the request with this number on.
+    Unanswered(u64),
+}
+
+/// The coils that were written, and what the device has counted.
+#[derive(Default)]
+struct Held {
+    coils: Mutex<BTreeMap<u16, bool>>,
+    connections: AtomicU64,
+    requests: AtomicU64,
+}
+
+/// Answers one request; false where the caller has gone or was idle for too long.
+fn answer(stream: &mut TcpStream, held: &Held, ends: Ends) -> bool {
+    let mut head = [0; 8];
+    if stream.read_exact(&mut head).is_err() {
+        return false;
+    }
+    let number = held.requests.fetch_add(1, Ordering::SeqCst);
+    if matches!(ends, Ends::Unanswered(from) if number >= from) {
+        return false;
+    }
+    let length = usize::from(u16::from_be_bytes([head[4], head[5]]));
+    let mut body = vec![0; length - 2];
+    if stream.read_exact(&mut body).is_err() {
+        return false;
+    }
+    let word = |place: usize| u16::from_be_bytes([body[place], body[place + 1]]);
+    let (start, second) = (word(0), word(2));
+    let mut coils = held.coils.lock().expect("no panic");
+    let pdu = match head[7] {
+        // Discrete inputs and coils: as many zeros, and what was written.
+        function @ (1 | 2) => {
+            let mut bytes = vec![0_u8; usize::from(second).div_ceil(8)];
+            for place in 0..second {
+                let is_set = coils.get(&(start + place)).copied().unwrap_or(false);
+                bytes[usize::from(place / 8)] |= u8::from(is_set) << (place % 8);
+            }
+            [vec![function, bytes.len() as u8], bytes].concat()
+        }
+        5 => {
+            coils.insert(start, second != 0);
+            [vec![5], body[..4].to_vec()].concat()
+        }
+        15 => {
+            for place in 0..second {
+                let byte = body[5 + usize::from(place / 8)];
+                coils.insert(start + place, byte >> (place % 8) & 1 != 0);
+            }
+            [vec![15], body[..4].to_vec()].concat()
+        }
+        function => vec![function | 0x80, 1],
+    };
+    let length = (pdu.len() + 1) as u16;
+    let bytes = [&head[..4], &length.to_be_bytes(), &head[6..7], &pdu].concat();
+    stream.write_all(&bytes).is_ok()
+}
+
+/// Serves one connection after the other, as small devices do, while the test runs.
+fn serve(ends: Ends) -> (SocketAddr, Arc<Held>) {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let address = listener.local_addr().expect("bound");
+    let held = Arc::new(Held::default());
+    let served = Arc::clone(&held);
+    std::thread::spawn(move || {
+        for stream in listener.incoming() {
+            let mut stream = stream.expect("a connection");
+            served.connections.fetch_add(1, Ordering::SeqCst);
+            if let Ends::Idle(patience) = ends {
+                stream.set_read_timeout(Some(patience)).expect("a time");
+            }
+            let most = if let Ends::After(most) = ends { most } else { u64::MAX };
+            let mut answered = 0;
+            while answered < most && answer(&mut stream, &served, ends) {
+                answered += 1;
+            }
+        }
+    });
+    (address, held)
+}
+
+/// A device with two inputs apart and two outputs apart: four requests in one exchange.
+fn settings(address: SocketAddr) -> FieldDevice {
+    let text = format!(
+        "[cluster]\nname = \"line\"\nsecurity = \"off\"\n\
+         [[controller]]\nname = \"tank\"\nladder = \"tank.ladder\"\n\
+         [[remote_io]]\nname = \"tank-io\"\ncontroller = \"tank\"\n\
+         [remote_io.field]\nmodbus = \"{address}\"\ntimeout = \"5s\"\nstale_after = \"10s\"\n\
+         inputs = {{ low = \"discrete:0\", high = \"discrete:900\" }}\n\
+         outputs = {{ valve = \"coil:3\", pump = \"coil:800\" }}\n"
+    );
+    let ladder = "program tank\ninput low\ninput high\noutput valve\noutput pump\n\
+                  rung\n    low ( valve )\nrung\n    high ( pump )\n";
+    let mut open = |_: &str| Ok(ladder.to_owned());
+    let loaded = understudy_cluster::read("cluster.toml", &text, &mut open);
+    let cluster: Cluster = loaded.cluster.unwrap_or_else(|| panic!("{:?}", loaded.reports));
+    cluster.remote_ios()[0].field.clone().expect("it has one")
+}
+
+fn started(ends: Ends, period: Duration) -> (Device, Arc<Held>) {
+    let (address, held) = serve(ends);
+    let fail_safe = Image::from_bits([false, false]);
+    let device = Device::start(settings(address), fail_safe, period, false).expect("a thread");
+    (device, held)
+}
+
+/// The states that the cycle sees until `enough` good ones were seen.
+fn looks(device: &mut Device, enough: usize) -> Vec<Look> {
+    let started = Instant::now();
+    let mut seen = Vec::new();
+    let is_good = |look: &&Look| matches!(look, Look::Sensors(_));
+    while seen.iter().filter(is_good).count() < enough {
+        assert!(started.elapsed() < DEADLINE, "{seen:?}");
+        seen.extend(device.look());
+        std::thread::yield_now();
+    }
+    seen
+}
+
+#[test]
+fn a_device_that_ends_its_connections_is_served_without_a_gap() {
+    let idle = Duration::from_millis(5);
+    let cases = [
+        (Ends::After(1), Duration::from_millis(2)),
+        (Ends::After(2), Duration::from_millis(2)),
+        (Ends::After(3), Duration::from_millis(2)),
+        (Ends::After(5), Duration::from_millis(2)),
+        (Ends::After(7), Duration::from_millis(2)),
+        (Ends::Idle(idle), 4 * idle),
+    ];
+    for (ends, period) in cases {
+        let (mut device, held) = started(ends, period);
+        device.drive(&Image::from_bits([true, true]));
+        let seen = looks(&mut device, 40);
+        let lost: Vec<&Look> = seen.iter().filter(|look| matches!(look, Look::Lost(_))).collect();
+        let first = Look::Lost("no answer yet".into());
+        assert!(lost.iter().all(|look| **look == first), "{ends:?}: {lost:?}");
+        assert!(held.connections.load(Ordering::SeqCst) > 8, "{ends:?}: it ends connections");
+        let coils = held.coils.lock().expect("no panic").clone();
+        assert_eq!(coils, BTreeMap::from([(3, true), (800, true)]), "{ends:?}");
+        assert_eq!(device.contested(), None, "{ends:?}");
+        // It is driven to the fail-safe values over a new connection, too.
+        drop(device);
+        let coils = held.coils.lock().expect("no panic").clone();
+        assert_eq!(coils, BTreeMap::from([(3, false), (800, false)]), "{ends:?}");
+    }
+}
+
+#[test]
+fn a_device_that_ends_new_connections_unanswered_is_lost_and_not_besieged() {
+    let (mut device, held) = started(Ends::Unanswered(9), Duration::from_millis(2));
+    let started = Instant::now();
+    let mut reason = String::new();
+    while !reason.contains("127.0.0.1") {
+        assert!(started.elapsed() < DEADLINE, "never lost");
+        if let Some(Look::Lost(lost)) = device.look() {
+            reason = lost;
+        }
+    }
+    let before = held.connections.load(Ordering::SeqCst);
+    let begun = Instant::now();
+    while begun.elapsed() < Duration::from_millis(200) {
+        assert!(!matches!(device.look(), Some(Look::Sensors(_))), "unanswered");
+        std::thread::yield_now();
+    }
+    let most = begun.elapsed().as_millis() / FIRST_PAUSE.as_millis() + 2;
+    let connections = held.connections.load(Ordering::SeqCst) - before;
+    assert!(u128::from(connections) <= most, "{connections} connections in {:?}", begun.elapsed());
+}
