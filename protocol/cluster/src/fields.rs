@@ -214,7 +214,7 @@ impl<'a, 't> Fields<'a, 't> {
                 diagnostics.push(
                     Diagnostic::error("U0210", message, span)
                         .with_label(format!("expected {expected}"))
-                        .with_help("a numeric host, a colon and a port"),
+                        .with_help("a numeric host, a colon and a port; an IPv6 host is in brackets, as in [fd00::1]:7450"),
                 );
                 None
             }

@@ -11,7 +11,7 @@
 //! | U0207 | a word that is none of those allowed |
 //! | U0208 | a name, or the place of a remote I/O or of a plant, that is taken |
 //! | U0209 | a name that nothing has |
-//! | U0210 | an address that is none, at which nothing can be reached, or that is taken |
+//! | U0210 | an address that is none, at which nothing can be reached, that is taken, or that the link cannot use |
 //! | U0211 | a ladder that cannot be read |
 //! | U0212 | a program that does not become a circuit |
 //! | U0213 | more stations, or wider images, than there may be |
@@ -152,7 +152,8 @@ fn build(
         diagnostics.push(Diagnostic::error("U0213", error.to_string(), span));
     }
     file.controllers.truncate(MAXIMUM_PROGRAMS);
-    let mut names = Names::default();
+    let link = overrides.link.unwrap_or([Link::Udp, Link::Zenoh][cluster.link]);
+    let mut names = Names::new(link, cluster.multicast.is_some());
     let members = members(file.controllers, period, ladders, &mut names, diagnostics);
     let understudies = understudies(file.understudies, &mut names, diagnostics);
     let remote_ios =
@@ -170,7 +171,6 @@ fn build(
     limits::check(&members, &remote_ios, cluster.history, diagnostics);
     let mode = overrides.mode.unwrap_or([Mode::Full, Mode::Paper][cluster.mode]);
     check_understudies(understudy_count, mode, &cluster.span, diagnostics);
-    let link = overrides.link.unwrap_or([Link::Udp, Link::Zenoh][cluster.link]);
 
     let controllers: Option<Vec<Controller>> = members.into_iter().map(controller).collect();
     let (controllers, name) = (controllers?, cluster.name.as_ref()?.value.clone());

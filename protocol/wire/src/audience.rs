@@ -19,6 +19,10 @@ use crate::frame::{Body, Frame};
 use crate::identifier::{Member, StationId};
 use crate::set::{ProgramSet, StationSet};
 
+/// Distance from the port of a member's address to the TCP port of its frames over Zenoh, because operators use the TCP
+/// port of the address.
+pub const ZENOH_PORT_OFFSET: u16 = 8192;
+
 /// Controllers after a controller that receive its turns.
 const FOLLOWERS: usize = 2;
 

@@ -16,7 +16,7 @@ mod state_choice;
 mod time;
 mod write;
 
-pub use audience::{Audience, Roster, Topic};
+pub use audience::{Audience, Roster, Topic, ZENOH_PORT_OFFSET};
 pub use codec::{FrameError, MAXIMUM_FRAME_BYTES, decode, encode};
 pub use force::{
     Force, ForceError, MAXIMUM_FORCE_SECONDS, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH,

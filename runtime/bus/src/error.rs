@@ -4,9 +4,7 @@ use std::io;
 use std::net::SocketAddr;
 
 use understudy_cycle::Outvoted;
-use understudy_wire::Member;
-
-use crate::link::ZENOH_PORT_OFFSET;
+use understudy_wire::{Member, ZENOH_PORT_OFFSET};
 
 /// What stops a member before or while it runs. The codes are stable.
 #[derive(Debug, thiserror::Error)]

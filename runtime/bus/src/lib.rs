@@ -56,7 +56,7 @@ pub use interruption::interruption;
 pub use journal::{
     EventSink, HostEvent, JOURNAL_RECORDS, JOURNAL_VERSION, Journal, JournalSender, Noted, Record,
 };
-pub use link::{Link, LinkCounters, LinkKind, NoSuchLink, Reopening, ZENOH_PORT_OFFSET};
+pub use link::{Link, LinkCounters, LinkKind, NoSuchLink, Reopening};
 pub use log::{Line, Log, LogFilter, LogFormat, LogSettings, log_environment};
 pub use member::{MemberSettings, run_member};
 pub use multicast::loopback_groups;

@@ -7,15 +7,12 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
-use understudy_wire::{Frame, Member};
+use understudy_wire::{Frame, Member, ZENOH_PORT_OFFSET};
 
 use crate::endpoints::Endpoints;
 use crate::error::BusError;
 use crate::udp::UdpLink;
 use crate::zenoh_link::ZenohLink;
-
-/// From the port of a member's address to the TCP port of its frames over Zenoh.
-pub const ZENOH_PORT_OFFSET: u16 = 8192;
 
 /// Carries frames between this member and its peers. Any frame may be lost, doubled, late or changed; nothing blocks.
 pub trait Link: Send {

@@ -5,7 +5,7 @@ use std::net::{Ipv4Addr, SocketAddr, TcpListener, UdpSocket};
 use std::ops::Range;
 use std::sync::atomic::{AtomicU16, Ordering};
 
-use crate::link::ZENOH_PORT_OFFSET;
+use understudy_wire::ZENOH_PORT_OFFSET;
 
 /// Ports that no system gives to outgoing connections of its own accord, so that a member that is restarted finds its port
 /// again: Linux begins at 32768, others at 49152. So do the ports of their frames over Zenoh.

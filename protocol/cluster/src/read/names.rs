@@ -6,18 +6,26 @@ use std::ops::Range;
 
 use understudy_text::Diagnostic;
 use understudy_text::spelling::suggestion;
+use understudy_wire::ZENOH_PORT_OFFSET;
 
 use super::Member;
+use crate::cluster::Link;
 use crate::fields::Placed;
 
 /// All that were given so far, each with its place.
-#[derive(Default)]
 pub(crate) struct Names {
     members: BTreeMap<String, Range<usize>>,
     addresses: BTreeMap<SocketAddr, Range<usize>>,
+    link: Link,
+    has_multicast: bool,
 }
 
 impl Names {
+    /// None, in a cluster with this link.
+    pub(crate) fn new(link: Link, has_multicast: bool) -> Self {
+        Self { members: BTreeMap::new(), addresses: BTreeMap::new(), link, has_multicast }
+    }
+
     /// Reports a name that another member has.
     pub(crate) fn declare(
         &mut self,
@@ -37,7 +45,7 @@ impl Names {
         }
     }
 
-    /// Reports an address that another member has.
+    /// Reports an address at which a member cannot listen: another member has it, or the link cannot use it.
     pub(crate) fn listen(
         &mut self,
         address: Option<&Placed<SocketAddr>>,
@@ -52,8 +60,52 @@ impl Names {
                 Diagnostic::error("U0210", message, span.clone())
                     .with_related(first.clone(), "the first is here"),
             );
-        } else {
-            self.addresses.insert(*value, span.clone());
+            return;
+        }
+        if self.has_multicast && value.is_ipv6() {
+            let message = format!("{value} is an IPv6 address, and `multicast` is a group of IPv4");
+            let help = "use IPv4 addresses, or leave `multicast` out";
+            diagnostics.push(Diagnostic::error("U0210", message, span.clone()).with_help(help));
+        }
+        if self.link == Link::Zenoh {
+            self.listen_for_frames(*value, span, diagnostics);
+        }
+        self.addresses.insert(*value, span.clone());
+    }
+
+    /// Reports an address whose frames over Zenoh have no port of their own.
+    fn listen_for_frames(
+        &self,
+        address: SocketAddr,
+        span: &Range<usize>,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) {
+        let port = address.port();
+        let highest = u16::MAX - ZENOH_PORT_OFFSET;
+        if port > highest {
+            let message = format!(
+                "{address} cannot be used over Zenoh: its frames need the TCP port {ZENOH_PORT_OFFSET} higher, and ports end at {}",
+                u16::MAX
+            );
+            let help = format!("use a port up to {highest}, or `link = \"udp\"`");
+            diagnostics.push(Diagnostic::error("U0580", message, span.clone()).with_help(help));
+        }
+        let above = port.checked_add(ZENOH_PORT_OFFSET);
+        let below = port.checked_sub(ZENOH_PORT_OFFSET);
+        for other in [above, below].into_iter().flatten() {
+            let other = SocketAddr::new(address.ip(), other);
+            let Some(first) = self.addresses.get(&other) else {
+                continue;
+            };
+            let (lower, higher) = (other.min(address), other.max(address));
+            let message = format!(
+                "{lower} and {higher} need the same TCP port: the frames of {lower} over Zenoh use the port {ZENOH_PORT_OFFSET} higher"
+            );
+            diagnostics.push(
+                Diagnostic::error("U0210", message, span.clone())
+                    .with_related(first.clone(), "the other is here")
+                    .with_help("use another port, or `link = \"udp\"`"),
+            );
         }
     }
 }

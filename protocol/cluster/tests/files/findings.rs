@@ -445,3 +445,45 @@ fn addresses_at_which_nothing_can_be_reached() {
     let right = member("192.168.1.11:7450");
     assert!(!right.contains("U0210"), "{right}");
 }
+
+/// A cluster of a controller and an understudy with these addresses.
+fn at_addresses(cluster: &str, first: &str, second: &str) -> String {
+    check(&format!(
+        "[cluster]\nname = \"line\"\n{cluster}\n\
+         [[controller]]\nname = \"robot\"\nladder = \"robot.ladder\"\naddress = \"{first}\"\n\
+         [[understudy]]\nname = \"understudy\"\naddress = \"{second}\"\n"
+    ))
+}
+
+/// Frames over Zenoh need a port of their own, 8192 above that of the address.
+#[test]
+fn addresses_that_the_link_cannot_use() {
+    for (port, is_right) in
+        [(1, true), (7450, true), (57_343, true), (57_344, false), (65_535, false)]
+    {
+        for host in ["192.168.1.11", "[fd00::11]"] {
+            let check =
+                |cluster| at_addresses(cluster, &format!("{host}:{port}"), "192.168.1.12:9");
+            let found = check("link = \"zenoh\"");
+            assert_eq!(!found.contains("U0580"), is_right, "{host}:{port}: {found}");
+            let found = check("link = \"udp\"");
+            assert!(!found.contains("U0580"), "{host}:{port}: {found}");
+        }
+    }
+    for (first, second, is_right) in [
+        ("10.0.0.1:7450", "10.0.0.1:15642", false),
+        ("10.0.0.1:15642", "10.0.0.1:7450", false),
+        ("[fd00::1]:7450", "[fd00::1]:15642", false),
+        ("10.0.0.1:7450", "10.0.0.1:15643", true),
+        ("10.0.0.1:7450", "10.0.0.2:15642", true),
+    ] {
+        for (link, is_right) in [("zenoh", is_right), ("udp", true)] {
+            let found = at_addresses(&format!("link = \"{link}\""), first, second);
+            assert_eq!(!found.contains("U0210"), is_right, "{link} {first} {second}: {found}");
+        }
+    }
+    for (first, is_right) in [("10.0.0.1:7450", true), ("[fd00::1]:7450", false)] {
+        let found = at_addresses("multicast = \"239.255.68.0:7400\"", first, "10.0.0.2:7450");
+        assert_eq!(!found.contains("U0210"), is_right, "{first}: {found}");
+    }
+}
