@@ -27,6 +27,7 @@ mod mirror;
 mod modbus;
 mod questions;
 mod register_map;
+mod requests;
 mod writing;
 
 pub use equipment::{Changed, Equipment, serve_equipment};

@@ -20,6 +20,7 @@ use crate::error::GatewayError;
 use crate::feed::Feed;
 use crate::followed::Followed;
 use crate::register_map::{ProcessImage, RegisterMap, Target};
+use crate::requests::Checked;
 use crate::serve_until_asked;
 use crate::writing::WriteGate;
 
@@ -93,12 +94,12 @@ where
     let relayed = relay_known(listener, address, callers.clone());
     let connected = move |stream: TcpStream, seen: SocketAddr| {
         let client = client(callers.of(seen).unwrap_or(seen).ip());
-        async move { Ok(Some((client, stream))) }
+        async move { Ok(Some((client, Checked::new(stream)))) }
     };
     // The library ends with the first connection that the system refuses, so it only gets admitted connections.
     let server = Server::new(inner);
     tokio::select! {
-        // A client that closes its connection, or sends an invalid request, is disconnected; the others stay.
+        // A client that closes its connection, or sends what is not Modbus TCP, is disconnected; the others stay.
         ended = server.serve(&connected, |_| {}) => ended,
         never = relayed => match never {},
     }
