@@ -88,26 +88,44 @@ fn status_of(refusal: &Refusal) -> StatusCode {
     }
 }
 
-/// A value as an input of that type stores it. Times are nanoseconds.
+/// A value as an input of that type stores it. Times are nanoseconds. A client may write a shorter type of the same kind, such as a Float for a
+/// REAL or an Int32 for an INT.
 fn stored_of(of: Elementary, value: &Variant) -> Result<u64, StatusCode> {
-    let fits = |stored: u64, number: i128| {
-        let is_whole = of.signed(stored) == number;
-        is_whole.then_some(stored).ok_or(StatusCode::BadOutOfRange)
-    };
-    match value {
-        Variant::Boolean(value) if of == Elementary::Bool => Ok(u64::from(*value)),
-        Variant::Double(value) if of == Elementary::Real => {
-            Ok(u64::from((*value as f32).to_bits()))
+    let is_whole = of != Elementary::Bool && !of.is_real();
+    match (value, whole_of(value)) {
+        (Variant::Boolean(value), _) if of == Elementary::Bool => Ok(u64::from(*value)),
+        (Variant::Float(value), _) if of == Elementary::Real => Ok(u64::from(value.to_bits())),
+        (Variant::Float(value), _) if of.is_real() => Ok(f64::from(*value).to_bits()),
+        (Variant::Double(value), _) if of == Elementary::Real => {
+            let shorter = *value as f32;
+            // A number that no REAL holds is out of its range, and not infinite.
+            let fits = shorter.is_finite() || !value.is_finite();
+            let stored = u64::from(shorter.to_bits());
+            fits.then_some(stored).ok_or(StatusCode::BadOutOfRange)
         }
-        Variant::Double(value) if of.is_real() => Ok(value.to_bits()),
-        Variant::Int64(value) if of.is_signed() => {
-            fits(*value as u64 & of.mask(), i128::from(*value))
-        }
-        Variant::UInt64(value) if of != Elementary::Bool && !of.is_signed() && !of.is_real() => {
-            fits(*value & of.mask(), i128::from(*value))
+        (Variant::Double(value), _) if of.is_real() => Ok(value.to_bits()),
+        (_, Some(number)) if is_whole => {
+            let stored = number as u64 & of.mask();
+            let is_same = of.signed(stored) == number;
+            is_same.then_some(stored).ok_or(StatusCode::BadOutOfRange)
         }
         _ => Err(StatusCode::BadTypeMismatch),
     }
+}
+
+/// The number of a variant that has a whole one.
+fn whole_of(value: &Variant) -> Option<i128> {
+    Some(match value {
+        Variant::SByte(value) => i128::from(*value),
+        Variant::Byte(value) => i128::from(*value),
+        Variant::Int16(value) => i128::from(*value),
+        Variant::UInt16(value) => i128::from(*value),
+        Variant::Int32(value) => i128::from(*value),
+        Variant::UInt32(value) => i128::from(*value),
+        Variant::Int64(value) => i128::from(*value),
+        Variant::UInt64(value) => i128::from(*value),
+        _ => return None,
+    })
 }
 
 /// Keeps the nodes in memory.
@@ -215,5 +233,51 @@ mod tests {
         check(Elementary::Sint, 128_i64.into(), Err(StatusCode::BadOutOfRange));
         check(Elementary::Usint, 256_u64.into(), Err(StatusCode::BadOutOfRange));
         check(Elementary::Uint, 65_535_u64.into(), Ok(65_535));
+        check(Elementary::Real, 1e300.into(), Err(StatusCode::BadOutOfRange));
+        check(Elementary::Real, 1_i32.into(), Err(StatusCode::BadTypeMismatch));
+        check(Elementary::Int, 1.0.into(), Err(StatusCode::BadTypeMismatch));
+        check(Elementary::Bool, 1.0_f32.into(), Err(StatusCode::BadTypeMismatch));
+        check(Elementary::Int, true.into(), Err(StatusCode::BadTypeMismatch));
+    }
+
+    /// Every value of a shorter type is stored as that of the type that the server shows.
+    #[test]
+    fn a_shorter_type_of_the_same_kind_is_stored_alike() {
+        for number in [0.0_f32, -0.5, 42.5, f32::MAX, f32::MIN_POSITIVE] {
+            for of in [Elementary::Real, Elementary::Lreal] {
+                let longer = stored_of(of, &f64::from(number).into());
+                assert!(longer.is_ok());
+                assert_eq!(stored_of(of, &number.into()), longer, "{of} {number}");
+            }
+        }
+        let whole = [
+            Elementary::Sint,
+            Elementary::Usint,
+            Elementary::Int,
+            Elementary::Uint,
+            Elementary::Dint,
+            Elementary::Udint,
+            Elementary::Lint,
+            Elementary::Ulint,
+            Elementary::Word,
+            Elementary::Time,
+        ];
+        for of in whole {
+            for number in [-40_000_i64, -129, -128, -1, 0, 1, 127, 128, 255, 256, 32_767, 65_536] {
+                let expected = stored_of(of, &number.into());
+                let shorter = [
+                    i8::try_from(number).map(Variant::from).ok(),
+                    u8::try_from(number).map(Variant::from).ok(),
+                    i16::try_from(number).map(Variant::from).ok(),
+                    u16::try_from(number).map(Variant::from).ok(),
+                    i32::try_from(number).map(Variant::from).ok(),
+                    u32::try_from(number).map(Variant::from).ok(),
+                    u64::try_from(number).map(Variant::from).ok(),
+                ];
+                for value in shorter.into_iter().flatten() {
+                    assert_eq!(stored_of(of, &value), expected, "{of} {value:?}");
+                }
+            }
+        }
     }
 }
