@@ -5,11 +5,13 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use codespan_reporting::diagnostic::Diagnostic as Drawn;
-use codespan_reporting::term::termcolor::{BufferedStandardStream, ColorChoice};
+use codespan_reporting::term::termcolor::{
+    BufferedStandardStream, ColorChoice, ColorSpec, WriteColor,
+};
 use codespan_reporting::term::{self, Config};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use understudy_processes::Progress;
-use understudy_text::{Diagnostic, Lines, Report, Severity};
+use understudy_text::{Diagnostic, Lines, Report, Severity, visible, visible_json};
 
 use crate::answer::{Answer, Envelope, Status, shown};
 use crate::excerpt::Shown;
@@ -113,8 +115,9 @@ impl Console {
             return;
         }
         line.clone_into(&mut self.said);
+        let line = visible(line);
         match &self.progress {
-            Some(bar) => bar.println(line),
+            Some(bar) => bar.println(line.as_ref()),
             None => {
                 let _ = writeln!(io::stderr(), "{line}");
             }
@@ -132,9 +135,8 @@ fn progress_bar(length: u64, words: &str) -> ProgressBar {
 }
 
 fn print_json(command: &str, answer: &Answer) -> io::Result<()> {
-    let mut output = io::stdout().lock();
-    serde_json::to_writer(&mut output, &Envelope::new(command, answer))?;
-    writeln!(output)
+    let text = serde_json::to_string(&Envelope::new(command, answer))?;
+    writeln!(io::stdout(), "{}", visible_json(&text))
 }
 
 fn print_text(answer: &Answer) -> io::Result<()> {
@@ -147,7 +149,7 @@ fn print_text(answer: &Answer) -> io::Result<()> {
         }
     }
     let mut output = io::stdout().lock();
-    output.write_all(answer.text.as_bytes())?;
+    output.write_all(visible(&answer.text).as_bytes())?;
     if !answer.text.is_empty() && !answer.text.ends_with('\n') {
         writeln!(output)?;
     }
@@ -155,13 +157,13 @@ fn print_text(answer: &Answer) -> io::Result<()> {
     let mut errors = io::stderr().lock();
     for failure in &answer.failures {
         // Messages of other crates begin with their code.
-        let message = without_code(&failure.message);
+        let message = visible(without_code(&failure.message));
         writeln!(errors, "error[{}]: {message}", failure.code)?;
     }
     if answer.status == Status::Done {
         for (count, line) in answer.about.next.iter().enumerate() {
             let head = if count == 0 { "next:" } else { "     " };
-            writeln!(errors, "{head} {line}")?;
+            writeln!(errors, "{head} {}", visible(line))?;
         }
     }
     if let Some(failure) = answer.failures.first()
@@ -202,6 +204,7 @@ fn print_count(reports: &[Report]) -> io::Result<()> {
         }
     };
     let files = files.join(" ");
+    let files = visible(&files);
     writeln!(io::stderr(), "{warnings}; `understudy check {files}` lists {them}")
 }
 
@@ -213,7 +216,7 @@ fn print_report(report: &Report, found: &[Diagnostic]) -> io::Result<()> {
     let choice = if io::stderr().is_terminal() { ColorChoice::Auto } else { ColorChoice::Never };
     let lines = Lines::new(&report.text);
     let config = Config::default();
-    let mut errors = BufferedStandardStream::stderr(choice);
+    let mut errors = VisibleStream(BufferedStandardStream::stderr(choice));
     for diagnostic in found {
         let shown = Shown::new(&report.name, &report.text, &lines, diagnostic);
         let drawn = match diagnostic.severity {
@@ -230,4 +233,33 @@ fn print_report(report: &Report, found: &[Diagnostic]) -> io::Result<()> {
             .map_err(io::Error::other)?;
     }
     errors.flush()
+}
+
+/// A stream with colours whose text is made [`visible`].
+struct VisibleStream(BufferedStandardStream);
+
+impl Write for VisibleStream {
+    /// Takes whole texts, as formatting writes them.
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.write_all(visible(&String::from_utf8_lossy(bytes)).as_bytes())?;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.flush()
+    }
+}
+
+impl WriteColor for VisibleStream {
+    fn supports_color(&self) -> bool {
+        self.0.supports_color()
+    }
+
+    fn set_color(&mut self, colour: &ColorSpec) -> io::Result<()> {
+        self.0.set_color(colour)
+    }
+
+    fn reset(&mut self) -> io::Result<()> {
+        self.0.reset()
+    }
 }

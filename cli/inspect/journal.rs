@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::Args;
 use serde_json::json;
-use understudy_text::MAXIMUM_SHOWN;
+use understudy_text::{MAXIMUM_SHOWN, visible, visible_json};
 use understudy_view::{Filter, JournalLine, Listing, Run, Source, Trouble};
 
 use crate::answer::{Answer, Status};
@@ -121,6 +121,7 @@ fn followed(run: &Run, mut listing: Listing, mut source: Source, json: bool) -> 
                 Err(trouble) => vec![format!("       -  {trouble}")],
             };
             for line in lines {
+                let line = if json { visible_json(&line) } else { visible(&line) };
                 reader_is_there &= writeln!(output, "{line}").is_ok();
             }
         });

@@ -28,6 +28,7 @@ mod reconfigure;
 mod reliability;
 mod requirements;
 mod scan;
+mod terminal;
 mod twincat;
 mod verdicts;
 mod verify;

@@ -17,6 +17,7 @@ use tokio::time::Instant;
 use understudy_bus::WriteLimiter;
 use understudy_cluster::Cluster;
 use understudy_journal::{Commander, Done, Refusal, WriteRequest, WriteSessions, new_write};
+use understudy_text::visible;
 use understudy_view::Run;
 use understudy_wire::{Member, Write, WriteId, WriteRefusal};
 
@@ -142,6 +143,7 @@ impl WriteGate {
     fn log(&self, member: Member, owner: &str, refusal: &Refusal) {
         let name = self.cluster.member_name(member).unwrap_or_default();
         // The reader of the log may have ended.
-        let _ = writeln!(std::io::stderr(), "write to {name} by {owner:?} refused: {refusal}");
+        let line = format!("write to {name} by {owner:?} refused: {refusal}");
+        let _ = writeln!(std::io::stderr(), "{}", visible(&line));
     }
 }

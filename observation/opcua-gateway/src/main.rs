@@ -10,6 +10,7 @@ use clap_complete::Shell;
 use serde_json::json;
 use understudy_bus::{LogFilter, LogFormat, LogSettings};
 use understudy_opcua_gateway::{Login, OpcuaError, Settings, Variable, serve, variables};
+use understudy_text::visible;
 use understudy_view::Run;
 
 /// Show a run as an OPC UA server.
@@ -211,5 +212,5 @@ fn print(bytes: &[u8]) {
 }
 
 fn say(text: &str) {
-    let _ = writeln!(std::io::stderr(), "{text}");
+    let _ = writeln!(std::io::stderr(), "{}", visible(text));
 }

@@ -14,6 +14,7 @@ pub mod shell;
 mod shown;
 pub mod spelling;
 pub mod tables;
+mod visible;
 mod words;
 
 use std::fmt;
@@ -26,6 +27,7 @@ pub use lines::Lines;
 #[doc(hidden)]
 pub use serde;
 pub use shown::{MAXIMUM_FINDINGS, MAXIMUM_MESSAGE, MAXIMUM_SHOWN, shortened};
+pub use visible::{visible, visible_json};
 
 /// How bad it is: an error stops whatever was asked for, a warning does not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
