@@ -37,9 +37,41 @@ pub(super) struct Follower {
     failure: Option<Trouble>,
     /// Bytes read so far, of all segments.
     read: u64,
-    /// Bytes of the text of closed segments, by number: they do not change.
-    lengths: BTreeMap<u64, u64>,
+    listed: Listed,
     progress: Progress,
+}
+
+/// The closed segments after the open one, as they were listed last. A folder can have thousands, so it is listed again only when they are read.
+#[derive(Debug, Default)]
+struct Listed {
+    /// By number, with the bytes of the text; these do not change.
+    segments: BTreeMap<u64, (PathBuf, u64)>,
+    bytes: u64,
+}
+
+impl Listed {
+    /// Drops the segments up to the one with this number.
+    fn pass(&mut self, number: u64) {
+        while let Some(first) = self.segments.first_entry()
+            && *first.key() <= number
+        {
+            self.bytes -= first.remove().1;
+        }
+    }
+
+    /// Takes a new listing of the segments.
+    fn replace<'c>(&mut self, closed: impl Iterator<Item = &'c (u64, PathBuf)>) {
+        let mut known = std::mem::take(&mut self.segments);
+        for (number, path) in closed {
+            let segment = known.remove(number).or_else(|| {
+                let length = SegmentFile::open(path).and_then(|file| file.text_bytes());
+                // One that is gone is none of what is ahead.
+                Some((path.clone(), length.ok()?))
+            });
+            self.segments.extend(segment.map(|segment| (*number, segment)));
+        }
+        self.bytes = self.segments.values().map(|(_, bytes)| bytes).sum();
+    }
 }
 
 #[derive(Debug)]
@@ -86,7 +118,7 @@ impl Follower {
             piece: vec![0; PIECE],
             failure: None,
             read: 0,
-            lengths: BTreeMap::new(),
+            listed: Listed::default(),
             progress: Progress::default(),
         }
     }
@@ -154,24 +186,22 @@ impl Follower {
                 return Ok(ahead);
             }
         }
-        let closed = match closed_segments(&self.path) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound && self.open.is_none() => {
-                return Ok(0);
-            }
-            closed => closed?,
-        };
-        let own = self.open.as_ref();
-        let own = own.and_then(|open| open.number_among(&closed));
-        let length = |path: &Path| SegmentFile::open(path).and_then(|file| file.text_bytes());
-        for (number, path) in closed.iter().filter(|(number, _)| Some(*number) > own) {
-            let known = self.lengths.get(number).copied();
-            // One that is gone is none of what is ahead.
-            if let Some(bytes) = known.or_else(|| length(path).ok()) {
-                self.lengths.insert(*number, bytes);
-                ahead += bytes;
-            }
+        if let Some(number) = self.open.as_ref().and_then(|open| open.number) {
+            self.listed.pass(number);
         }
-        Ok(ahead + length(&self.path).unwrap_or(0))
+        if self.listed.segments.is_empty() {
+            let closed = match closed_segments(&self.path) {
+                Err(error) if error.kind() == io::ErrorKind::NotFound && self.open.is_none() => {
+                    return Ok(0);
+                }
+                closed => closed?,
+            };
+            let own = self.open.as_ref();
+            let own = own.and_then(|open| open.number_among(&closed));
+            self.listed.replace(closed.iter().filter(|(number, _)| Some(*number) > own));
+        }
+        let newest = SegmentFile::open(&self.path).and_then(|file| file.text_bytes());
+        Ok(ahead + self.listed.bytes + newest.unwrap_or(0))
     }
 
     /// For how long the open file has not been written to.
@@ -265,13 +295,7 @@ impl Follower {
         let Some(open) = &self.open else {
             return Ok(false);
         };
-        let closed = closed_segments(&self.path)?;
-        let number = open.number_among(&closed);
-        let next = match number {
-            Some(number) => closed.iter().find(|(other, _)| *other > number),
-            // Ours is gone already: all that is left follows it.
-            None => closed.first(),
-        };
+        let number = open.number;
         if !self.line.is_empty() || self.skipping {
             // Its writer was killed within a line.
             (self.line, self.skipping) = (Vec::new(), false);
@@ -279,6 +303,24 @@ impl Follower {
             take(Err(Trouble::Line { reason }));
             *taken += 1;
         }
+        // Where it is gone, the others are listed.
+        if let Some(next) = number.and_then(|number| number.checked_add(1))
+            && let Some((path, _)) = self.listed.segments.get(&next).cloned()
+            && self.open(&path, Some(next))?
+        {
+            return Ok(true);
+        }
+        let Some(open) = &self.open else {
+            return Ok(false);
+        };
+        let closed = closed_segments(&self.path)?;
+        let number = open.number_among(&closed);
+        let next = match number {
+            Some(number) => closed.iter().find(|(other, _)| *other > number),
+            // Ours is gone already: all that is left follows it.
+            None => closed.first(),
+        };
+        self.listed.replace(closed.iter().filter(|(other, _)| Some(*other) > number));
         let gap = match (number, next) {
             (Some(number), Some((next, _))) => *next > number + 1,
             (None, _) => true,

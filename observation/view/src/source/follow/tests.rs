@@ -166,3 +166,24 @@ fn only_the_end_is_taken_for_the_end() {
         }
     }
 }
+
+/// A folder of thousands of segments is listed a few times, and not once for each of them: that would take hours.
+#[test]
+#[allow(clippy::disallowed_methods, reason = "the duration is counted on the real clock")]
+fn thousands_of_segments_are_read_in_seconds() {
+    const SEGMENTS: u64 = 20_000;
+    let folder = Folder::new("follow-thousands");
+    let path = folder.join("journal.jsonl");
+    for number in 1..=SEGMENTS {
+        let closed = folder.join(&format!("journal.{number:06}.jsonl"));
+        fs::write(closed, [journal_header(number), line(number)].concat()).expect("written");
+    }
+    let text = [journal_header(SEGMENTS + 1), line(SEGMENTS + 1)].concat();
+    fs::write(&path, text).expect("written");
+    let begun = Instant::now();
+    let mut follower = Follower::new(&path);
+    let seen = taken(&mut follower);
+    assert_eq!(seen, (1..=SEGMENTS + 1).map(Some).collect::<Vec<_>>());
+    assert!(begun.elapsed() < Duration::from_secs(60), "{:?}", begun.elapsed());
+    assert_eq!(follower.ahead().expect("readable"), 0);
+}
