@@ -8,7 +8,7 @@ use std::time::{Duration, SystemTime};
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
-use understudy_bus::{BusError, Call, Request};
+use understudy_bus::{BusError, Call, DONE, Request};
 use understudy_cluster::{Cluster, Overrides};
 use understudy_executable::Interface;
 use understudy_journal::{
@@ -17,6 +17,7 @@ use understudy_journal::{
 };
 use understudy_keys::{Date, OperatorKeys};
 use understudy_member::tls_keys;
+use understudy_text::visible_json;
 use understudy_typed::Elementary;
 use understudy_view::{Run, find_running_of};
 use understudy_wire::{Cycle, Force, Member, Role, SignalPlace, StateChoice, Write, WriteAnswer};
@@ -280,8 +281,14 @@ fn write_elsewhere(
     call: impl Fn() -> Result<Call, BusError>,
 ) -> Result<Answer, Answer> {
     let said = |error: BusError| Refusal::Said(error.to_string());
+    let ask = || call()?.ask(request);
     let done = attempt_until_decided(|| {
-        let text = match call().map_err(said)?.ask(request) {
+        // A connection that is lost and restored at once looks like a refusal: it is one where the next call has it too.
+        let answer = match ask() {
+            Err(BusError::Unanswered { .. }) => ask(),
+            answer => answer,
+        };
+        let text = match answer {
             Err(BusError::AnswerLost { .. }) => return Err(Refusal::Undecided),
             answer => answer.map_err(said)?,
         };
@@ -341,12 +348,15 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
             }
             left = left.saturating_sub(1);
             // The reader closed the pipe.
-            writeln!(std::io::stdout(), "{line}").is_ok() && left > 0
+            writeln!(std::io::stdout(), "{}", visible_json(line)).is_ok() && left > 0
         };
         call.follow(SILENCE, take)?;
         return Ok(Answer::done("", json!(null)));
     };
     let text = call.ask(&request)?;
+    if request.is_command() && text != DONE {
+        return Err(refused(&Refusal::Force(text)));
+    }
     let result = serde_json::from_str(&text).unwrap_or_else(|_| json!({ "text": text }));
     Ok(Answer::done(text, result))
 }

@@ -9,6 +9,7 @@ mod crowd;
 mod deployment;
 mod duplicates;
 mod keys;
+mod lost_answers;
 mod members;
 #[allow(dead_code, reason = "each test uses its part")]
 #[path = "../shared/mod.rs"]

@@ -129,9 +129,11 @@ impl Line {
         // Asked of the system first: Zenoh says the same of a machine that is not there and of a key that is not believed.
         TcpStream::connect_timeout(&peer.address, REACH)
             .map_err(|error| Vain::Nobody(words_of(&error)))?;
-        let not_admitted = |_: BusError| {
-            let reason = "it listens, and either side does not believe the other's certificate";
-            Vain::NotAdmitted(reason.to_owned())
+        let not_admitted = |error: BusError| {
+            Vain::NotAdmitted(match error {
+                BusError::Uncalled { reason, .. } => reason,
+                error => error.to_string(),
+            })
         };
         let call = Call::to(peer.address, self.cluster, &peer.name, &self.keys);
         let call = call.map_err(not_admitted)?;

@@ -344,10 +344,7 @@ impl<E: Send + 'static> Channel<E> {
         let key = hash_key(&self.name);
         answers.push(answer(&session, key, move |_| hash.clone())?);
         let control = self.control.clone();
-        let release = move |_: &Query| {
-            control.give(Order::Release);
-            DONE.to_owned()
-        };
+        let release = move |_: &Query| given(&control, Order::Release);
         let key = format!("{}/command/release", self.prefix);
         answers.push(answer(&session, key, release)?);
         let wanted = Arc::clone(&self.stop_wanted);
@@ -360,10 +357,7 @@ impl<E: Send + 'static> Channel<E> {
         for word in ["force", "unforce", "choose"] {
             let control = self.control.clone();
             let force = move |query: &Query| match with_value(word, query) {
-                Ok(order) => {
-                    control.give(order);
-                    DONE.to_owned()
-                }
+                Ok(order) => given(&control, order),
                 Err(reason) => reason,
             };
             let key = format!("{}/command/{word}", self.prefix);
@@ -414,6 +408,14 @@ impl<E> Channel<E> {
             })
             .wait()
     }
+}
+
+/// The answer to a command.
+fn given(control: &Control, order: Order) -> String {
+    if control.give(order) {
+        return DONE.to_owned();
+    }
+    "too many commands wait at this member; repeat the command".to_owned()
 }
 
 /// A command that comes with a value.

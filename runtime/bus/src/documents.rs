@@ -6,8 +6,9 @@ use std::time::Duration;
 use serde_json::json;
 use zenoh::Wait;
 
-use crate::channel::{TlsKeys, insert, tls_config};
+use crate::channel::{TlsKeys, endpoint, insert, tls_config};
 use crate::error::{BusError, reason};
+use crate::operator::not_opened;
 
 /// Time within which a session opens.
 const PATIENCE: Duration = Duration::from_secs(3);
@@ -33,8 +34,8 @@ impl Documents {
     /// Nobody listens there, or one side does not accept the other's certificate.
     pub fn open(address: SocketAddr, keys: Option<&TlsKeys>) -> Result<Self, BusError> {
         let config = || -> zenoh::Result<zenoh::Config> {
-            let (mut config, scheme) = match keys {
-                Some(keys) => (tls_config("client", keys)?, "tls"),
+            let (mut config, endpoint) = match keys {
+                Some(keys) => (tls_config("client", keys)?, endpoint(address)),
                 None => {
                     let mut config = zenoh::Config::default();
                     for (setting, value) in [
@@ -44,11 +45,11 @@ impl Documents {
                     ] {
                         insert(&mut config, setting, &value)?;
                     }
-                    (config, "tcp")
+                    (config, format!("tcp/{address}"))
                 }
             };
             for (setting, value) in [
-                ("connect/endpoints", json!([format!("{scheme}/{address}")])),
+                ("connect/endpoints", json!([endpoint])),
                 ("connect/timeout_ms", json!(PATIENCE.as_millis() as u64)),
                 ("connect/exit_on_failure", json!(true)),
             ] {
@@ -58,7 +59,10 @@ impl Documents {
         };
         let failed = |error: zenoh::Error| BusError::Zenoh { address, reason: reason(&error) };
         let session = zenoh::open(config().map_err(failed)?).wait();
-        session.map(|session| Self { session }).map_err(failed)
+        session.map(|session| Self { session }).map_err(|error| match keys {
+            Some(_) => BusError::Zenoh { address, reason: not_opened(address, &error) },
+            None => failed(error),
+        })
     }
 
     /// The document under a key; nothing where there is none within a second.

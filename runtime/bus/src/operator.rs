@@ -1,6 +1,7 @@
 //! The operator's end of the channel.
 
-use std::net::SocketAddr;
+use std::io;
+use std::net::{SocketAddr, TcpStream};
 use std::time::Duration;
 
 use serde_json::json;
@@ -12,6 +13,9 @@ use crate::error::{BusError, reason};
 
 /// Longer than it takes a member on a network that works.
 const PATIENCE: Duration = Duration::from_secs(5);
+
+/// Time limit for a connection to an address that does not answer.
+const REACH: Duration = Duration::from_secs(2);
 
 /// Lines of a journal that wait to be taken.
 const WAITING_LINES: usize = 4096;
@@ -53,6 +57,11 @@ impl Request {
             Self::Write(_) => WRITE_KEYS[0].1,
             Self::Stop => "command/stop",
         }
+    }
+
+    /// Whether it is answered by [`DONE`](crate::DONE), or with the reason why it is not done.
+    pub fn is_command(&self) -> bool {
+        self.key().starts_with("command/") && !matches!(self, Self::Write(_))
     }
 
     /// What it comes with.
@@ -101,7 +110,11 @@ impl Call {
         };
         let session = zenoh::open(config().map_err(uncalled)?).wait();
         Ok(Self {
-            session: session.map_err(uncalled)?,
+            session: session.map_err(|error| BusError::Uncalled {
+                name: name.to_owned(),
+                address,
+                reason: not_opened(address, &error),
+            })?,
             prefix: prefix(cluster, name),
             address,
             name: name.to_owned(),
@@ -188,6 +201,25 @@ impl Call {
                 Ok(None) | Err(_) => return Err(unanswered()),
             }
         }
+    }
+}
+
+/// Why no TLS connection to an address is opened. Zenoh says the same of a machine that is not there, of a key that is not accepted and of a clock
+/// that is wrong.
+pub(crate) fn not_opened(address: SocketAddr, error: &zenoh::Error) -> String {
+    tracing::debug!(%error, %address, "no TLS connection");
+    match TcpStream::connect_timeout(&address, REACH) {
+        Ok(_) => "it listens there, and one side refuses the certificate of the other: it is of another authority or revoked, \
+                  or the clock of one machine is outside its validity; compare `date -u` on both machines with \
+                  `understudy keys list`"
+            .to_owned(),
+        Err(source) => match source.kind() {
+            io::ErrorKind::ConnectionRefused => "nothing listens there".to_owned(),
+            io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock => {
+                "no answer from that address".to_owned()
+            }
+            _ => source.to_string(),
+        },
     }
 }
 

@@ -81,42 +81,63 @@ impl Commander {
 
 /// Attempts to write under one identifier until the outcome is known, for [`DECIDED_WITHIN`]. A write that may have been
 /// taken is never refused: its outcome is then not known.
-///
-/// # Errors
-/// [`Refusal`].
-async fn until_decided<A: Future<Output = Result<Done, Refusal>>>(
-    mut is_sent: bool,
-    mut attempt: impl FnMut() -> A,
-) -> Result<Done, Refusal> {
-    let until = Instant::now() + DECIDED_WITHIN;
-    loop {
-        let refusal = match attempt().await {
-            Ok(done) => return Ok(done),
+struct Attempts {
+    is_sent: bool,
+    until: Instant,
+}
+
+impl Attempts {
+    fn new(is_sent: bool) -> Self {
+        Self { is_sent, until: Instant::now() + DECIDED_WITHIN }
+    }
+
+    /// The outcome of the write after one more attempt; nothing where it is to be attempted again.
+    fn settle(&mut self, attempt: Result<Done, Refusal>) -> Option<Result<Done, Refusal>> {
+        let refusal = match attempt {
+            Ok(done) => return Some(Ok(done)),
             Err(refusal) => refusal,
         };
         // A remote I/O that refuses the second attempt for now may have taken the first.
-        is_sent |= refusal.is_undecided();
+        self.is_sent |= refusal.is_undecided();
         let code = refusal.code();
-        if !is_sent || FINAL.contains(&code.as_str()) {
-            return Err(refusal);
+        if !self.is_sent || FINAL.contains(&code.as_str()) {
+            return Some(Err(refusal));
         }
         // The remote I/O has forgotten the session, so the outcome will not be known.
         let is_forgotten = code == WriteRefusal::Order { expected: 1 }.code();
-        if is_forgotten || Instant::now() >= until {
-            return Err(Refusal::Undecided);
+        let is_over = is_forgotten || Instant::now() >= self.until;
+        is_over.then_some(Err(Refusal::Undecided))
+    }
+}
+
+async fn until_decided<A: Future<Output = Result<Done, Refusal>>>(
+    is_sent: bool,
+    mut attempt: impl FnMut() -> A,
+) -> Result<Done, Refusal> {
+    let mut attempts = Attempts::new(is_sent);
+    loop {
+        if let Some(outcome) = attempts.settle(attempt().await) {
+            return outcome;
         }
         tokio::time::sleep(PAUSE).await;
     }
 }
 
-/// As [`until_decided`], from a thread that has nothing else to do.
+/// Attempts a write under one identifier until its outcome is known, from a thread that has nothing else to do and is in no
+/// runtime.
 ///
 /// # Errors
-/// [`Refusal`].
+/// [`Refusal`]; only where it [is undecided](Refusal::is_undecided), the write may have an effect.
 pub fn attempt_until_decided(
     mut attempt: impl FnMut() -> Result<Done, Refusal>,
 ) -> Result<Done, Refusal> {
-    super::block_on(until_decided(false, || std::future::ready(attempt())))?
+    let mut attempts = Attempts::new(false);
+    loop {
+        if let Some(outcome) = attempts.settle(attempt()) {
+            return outcome;
+        }
+        super::block_on(async { tokio::time::sleep(PAUSE).await })?;
+    }
 }
 
 /// Next identifier of a session, and the time of its last write.
