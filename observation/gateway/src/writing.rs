@@ -47,10 +47,14 @@ const REMEMBERED_FOR: Duration = Duration::from_secs(60);
 impl WriteGate {
     /// The operator inputs of `run`.
     pub fn new(run: &Run) -> Self {
+        Self::of(Arc::clone(run.cluster()), run.commander())
+    }
+
+    fn of(cluster: Arc<Cluster>, commander: Commander) -> Self {
         Self {
-            cluster: Arc::clone(run.cluster()),
-            commander: run.commander(),
-            sessions: WriteSessions::new(run.commander()),
+            cluster,
+            sessions: WriteSessions::new(commander.clone()),
+            commander,
             limiter: WriteLimiter::new(WRITES_PER_SECOND),
             places: Semaphore::new(MAXIMUM_WRITES),
             numbered: Mutex::default(),
@@ -145,5 +149,59 @@ impl WriteGate {
         // The reader of the log may have ended.
         let line = format!("write to {name} by {owner:?} refused: {refusal}");
         let _ = writeln!(std::io::stderr(), "{}", visible(&line));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use understudy_cycle::Mode;
+    use understudy_journal::commands;
+    use understudy_wire::{ProgramId, Role};
+
+    use super::*;
+
+    const MEMBER: Member = Member::RemoteIo(ProgramId(0));
+
+    fn write(number: u32) -> (Write, Option<WriteId>) {
+        let id = WriteId { session: 1, number };
+        let write = Write {
+            id,
+            input: 0,
+            value: true.into(),
+            role: Role::Operator,
+            owner: format!("client {number}"),
+            reason: "a test".to_owned(),
+        };
+        (write, Some(id))
+    }
+
+    #[test]
+    fn a_repeated_number_is_answered_with_its_effect_and_never_refused() {
+        let (commander, mut commands) = commands();
+        let cluster = understudy_testing::press_cell(Mode::Full);
+        let gate = Arc::new(WriteGate::of(Arc::new(cluster), commander));
+        let send = |number| {
+            let (gate, (write, id)) = (Arc::clone(&gate), write(number));
+            async move { gate.send(MEMBER, write, id).await }
+        };
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+        runtime.expect("a runtime").block_on(async {
+            let answered = async {
+                let done = Done { cycle: Some(7) };
+                commands.next().await.answer(Ok(done));
+            };
+            let (done, ()) = tokio::join!(send(1), answered);
+            assert_eq!(done, Ok(7));
+            // As many as may be under way, none of which is answered.
+            let mut under_way = Vec::new();
+            for number in 2..2 + MAXIMUM_WRITES as u32 {
+                tokio::spawn(send(number));
+                under_way.push(commands.next().await);
+            }
+            assert_eq!(send(1).await, Ok(7), "it is in effect");
+            assert_eq!(send(2).await, Err(Refusal::Undecided), "it may be in effect");
+            let refusal = WriteRefusal::Busy;
+            assert_eq!(send(99).await, Err(Refusal::Write { refusal }), "it was never sent");
+        });
     }
 }
