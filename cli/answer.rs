@@ -29,6 +29,8 @@ pub enum Status {
     BadInput,
     /// Exit status 3: the host was too slow for a verdict.
     Inconclusive,
+    /// Exit status 4: a campaign ran, and found runs that fail.
+    Found,
 }
 
 impl Status {
@@ -38,6 +40,7 @@ impl Status {
             Self::Failed => 1,
             Self::BadInput => 2,
             Self::Inconclusive => 3,
+            Self::Found => 4,
         }
     }
 }
@@ -206,7 +209,8 @@ pub(crate) struct Envelope<'a> {
     understudy: &'a str,
     /// Command.
     command: &'a str,
-    /// Exit status: 0 success, 1 failed, 2 invalid input and nothing was started, 3 inconclusive.
+    /// Exit status: 0 success, 1 failed, 2 invalid input and nothing was started, 3 inconclusive, 4 a campaign found
+    /// runs that fail.
     status: u8,
     /// Findings in the files that were read.
     diagnostics: Vec<PlacedDiagnostic<'a>>,

@@ -88,7 +88,7 @@ pub(crate) fn groups() -> [Group; 7] {
 /// # Errors
 /// Where the arguments are wrong, and where help or the version was asked for.
 pub(crate) fn parse(parser: Command, groups: &[Group]) -> Result<Call, clap::Error> {
-    let matches = parser.try_get_matches()?;
+    let matches = whole_examples(parser).try_get_matches()?;
     let json = matches.get_flag("json");
     let log = LogSettings {
         filter: matches.get_one("log").cloned(),
@@ -110,6 +110,7 @@ pub(crate) const EXIT_STATUS: &str = "  0  success
   1  a run or a check failed
   2  invalid input, nothing was started
   3  inconclusive: the host was too slow
+  4  a campaign found runs that fail
 ";
 
 /// The command line of `understudy`.
@@ -207,6 +208,34 @@ fn flowing(command: Command) -> Command {
     command.mut_subcommands(flowing)
 }
 
+/// The heading of the examples of a command, which its text after the options begins with.
+const EXAMPLES: &str = "Example:\n";
+
+/// The command, and all below it, with examples that keep their lines however narrow the terminal is, so that they can be pasted: text of a template
+/// is not wrapped.
+fn whole_examples(command: Command) -> Command {
+    command.mut_subcommands(|command| {
+        let text = command.get_after_help().map(ToString::to_string);
+        let text = text.filter(|text| text.starts_with(EXAMPLES));
+        let command = match text {
+            Some(text) => {
+                let (examples, prose) = text.split_once("\n\n").unwrap_or((&text, ""));
+                let template = format!(
+                    "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{{all-args}}\n\n{examples}{{after-help}}"
+                );
+                let command = command.help_template(template);
+                if prose.is_empty() {
+                    command.after_help(None::<&str>)
+                } else {
+                    command.after_help(prose.to_owned())
+                }
+            }
+            None => command,
+        };
+        whole_examples(command)
+    })
+}
+
 /// Joins each line to the one before, except indented lines, such as examples, and the lines next to them.
 fn paragraphs(text: &str) -> String {
     let mut joined = String::new();
@@ -233,6 +262,69 @@ mod tests {
         let expected =
             "Example:\n  understudy demo\n  understudy init cell\n\nAll is well.\n\nThe end.";
         assert_eq!(paragraphs(text), expected);
+    }
+
+    /// The words of a command line, as a shell reads them.
+    fn words(line: &str) -> Vec<String> {
+        let mut words = vec![String::new()];
+        let mut is_quoted = false;
+        for letter in line.chars() {
+            match letter {
+                '"' => is_quoted = !is_quoted,
+                ' ' if !is_quoted => words.push(String::new()),
+                _ => words.last_mut().expect("a word").push(letter),
+            }
+        }
+        words.retain(|word| !word.is_empty());
+        words
+    }
+
+    fn check_examples(command: &Command, name: &str) -> usize {
+        let text = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+        let examples =
+            text.strip_prefix(EXAMPLES).unwrap_or_else(|| panic!("{name} has no example"));
+        let examples = examples.split("\n\n").next().unwrap_or_default();
+        assert!(!examples.contains(['{', '\\']), "{name}: {examples}");
+        let mut count = 0;
+        for line in examples.lines() {
+            let line = line.strip_prefix("  ").unwrap_or_else(|| panic!("{name}: {line}"));
+            // An explanation follows several blanks; a pipe and a file follow the command.
+            let line = line.split("   ").next().unwrap_or_default();
+            let line =
+                line.split(['|', '>']).next().filter(|_| !line.contains(">=")).unwrap_or(line);
+            let line = line.strip_prefix("sudo ").unwrap_or(line);
+            let parsed = parser(&groups()).try_get_matches_from(words(line));
+            assert!(parsed.is_ok(), "{name}: {line}: {}", parsed.expect_err("wrong"));
+            count += 1;
+        }
+        for below in command.get_subcommands().filter(|below| below.get_name() != "help") {
+            count += check_examples(below, &format!("{name} {}", below.get_name()));
+        }
+        count
+    }
+
+    #[test]
+    fn every_command_has_examples_that_it_understands() {
+        let whole = parser(&groups());
+        let mut count = 0;
+        for command in whole.get_subcommands() {
+            count += check_examples(command, command.get_name());
+        }
+        assert!(count > 120, "{count}");
+    }
+
+    #[test]
+    fn examples_keep_their_lines_in_a_narrow_terminal() {
+        for command in whole_examples(parser(&groups())).get_subcommands_mut() {
+            let examples = |text: &str| -> Vec<String> {
+                let lines = text.lines().filter(|line| line.starts_with("  understudy "));
+                lines.map(str::to_owned).collect()
+            };
+            let wide = examples(&command.clone().term_width(400).render_long_help().to_string());
+            let narrow = examples(&command.clone().term_width(40).render_long_help().to_string());
+            assert!(!wide.is_empty(), "{}", command.get_name());
+            assert_eq!(wide, narrow);
+        }
     }
 
     #[test]

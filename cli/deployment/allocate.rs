@@ -29,9 +29,9 @@ use programs::Programs;
 Example:
   understudy allocate examples/press-cell/cluster.toml
   understudy allocate examples/press-cell/cluster.toml --reserve 20% --prefer speed --report plan
-  understudy allocate a.ladder b.ladder c.ladder --io local --stock \"CPU 224=2\" --assume program_bytes_per_instruction=8
+  understudy allocate examples/press-cell/robot.ladder examples/press-cell/press.ladder --io local --stock \"CPU 1214C=2\"
   understudy allocate examples/boiler/complete.ladder --budget 20s
-  understudy allocate pump.ladder --require \"vendor=Siemens\" --require \"inputs>=12\"
+  understudy allocate examples/press-cell/press.ladder --require \"vendor=Siemens\" --require \"inputs>=12\"
 
 A controller is suitable, unsuitable or unknown: an unknown figure never counts as sufficient. Programs are placed only after they have been
 verified. Calculation of requirements and placement: docs/how-to/allocation.md.

@@ -38,6 +38,9 @@ pub(crate) struct Arguments {
 #[derive(Debug, Subcommand)]
 enum What {
     /// List controllers
+    #[command(
+        after_help = "Example:\n  understudy catalogue list --family S7-1200\n  understudy catalogue list --vendor Z-World --require \"data_memory>=256KiB\""
+    )]
     List {
         /// Show only this vendor
         #[arg(long, value_name = "NAME")]
@@ -52,6 +55,7 @@ enum What {
         file: FileArgument,
     },
     /// Show all figures of a controller with their sources, and the unknown figures
+    #[command(after_help = "Example:\n  understudy catalogue show \"CPU 1214C\"")]
     Show {
         /// Model, or vendor and model
         #[arg(value_name = "MODEL")]
@@ -60,6 +64,9 @@ enum What {
         file: FileArgument,
     },
     /// Add a controller
+    #[command(
+        after_help = "Example:\n  understudy catalogue add --catalogue ours.csv --vendor Works --model A1 --family A --source \"data sheet of 2026\" digital_inputs=8"
+    )]
     Add {
         #[command(flatten)]
         entry: Box<Entry>,
@@ -67,6 +74,9 @@ enum What {
         file: WrittenFile,
     },
     /// Remove a controller
+    #[command(
+        after_help = "Example:\n  understudy catalogue add --catalogue ours.csv --vendor Works --model A1 --family A --source \"data sheet of 2026\" digital_inputs=8\n  understudy catalogue remove \"Works A1\" --catalogue ours.csv"
+    )]
     Remove {
         /// Model, or vendor and model
         #[arg(value_name = "MODEL")]
@@ -76,6 +86,9 @@ enum What {
         catalogue: PathBuf,
     },
     /// Import the controllers of a file
+    #[command(
+        after_help = "Example:\n  understudy catalogue import prices.csv --catalogue ours.csv --update"
+    )]
     Import {
         /// Input file (formats: docs/reference/catalogue.md)
         #[arg(value_name = "FILE.csv")]
@@ -90,6 +103,7 @@ enum What {
         file: WrittenFile,
     },
     /// Export all figures with their sources, one line each
+    #[command(after_help = "Example:\n  understudy catalogue export --output controllers.csv")]
     Export {
         /// Output file; default: standard output
         #[arg(long, short, value_name = "FILE.csv")]

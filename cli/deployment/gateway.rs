@@ -42,6 +42,9 @@ pub(crate) struct Arguments {
 #[derive(Debug, Subcommand)]
 enum What {
     /// Prometheus metrics at http://ADDRESS/metrics
+    #[command(
+        after_help = "Example:\n  understudy gateway metrics runs/latest --once\n  understudy gateway metrics runs/latest --listen 127.0.0.1:9464"
+    )]
     Metrics {
         #[command(flatten)]
         run: RunArgument,
@@ -53,6 +56,9 @@ enum What {
         once: bool,
     },
     /// Process image as a Modbus TCP server
+    #[command(
+        after_help = "Example:\n  understudy gateway modbus runs/latest --listen 127.0.0.1:1502\n  understudy gateway modbus runs/latest --allow-writes"
+    )]
     Modbus {
         #[command(flatten)]
         run: RunArgument,
@@ -64,11 +70,15 @@ enum What {
         allow_writes: bool,
     },
     /// Print the register map of the Modbus TCP server
+    #[command(after_help = "Example:\n  understudy gateway registers runs/latest")]
     Registers {
         #[command(flatten)]
         run: RunArgument,
     },
     /// Write the signals of other groups to the inputs of a run
+    #[command(
+        after_help = "Example:\n  understudy gateway signals runs/latest --from 192.168.20.1:7447"
+    )]
     Signals {
         #[command(flatten)]
         run: RunArgument,
@@ -80,6 +90,9 @@ enum What {
         keys: Option<PathBuf>,
     },
     /// States, values, remaining redundancy and events as JSON under Zenoh keys
+    #[command(
+        after_help = "Example:\n  understudy gateway zenoh runs/latest --listen 127.0.0.1:7447 --mirror 5/s"
+    )]
     Zenoh {
         #[command(flatten)]
         run: RunArgument,

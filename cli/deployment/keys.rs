@@ -33,6 +33,7 @@ pub(crate) struct Arguments {
 #[derive(Debug, Subcommand)]
 enum What {
     /// Create the authority, and keys for all members and one engineer
+    #[command(after_help = "Example:\n  understudy keys init cell/cluster.toml --folder cell/keys")]
     Init {
         /// Cluster file
         #[arg(value_name = "CLUSTER.toml")]
@@ -43,6 +44,9 @@ enum What {
         days: DaysArgument,
     },
     /// Issue keys to new members, or instead of expired or revoked ones
+    #[command(
+        after_help = "Example:\n  understudy keys issue cell/cluster.toml tank --folder cell/keys\n  understudy keys issue cell/cluster.toml --operator anna --folder cell/keys"
+    )]
     Issue {
         /// Cluster file
         #[arg(value_name = "CLUSTER.toml")]
@@ -58,11 +62,13 @@ enum What {
         days: DaysArgument,
     },
     /// List issued keys, their expiry and revoked keys
+    #[command(after_help = "Example:\n  understudy keys list --folder cell/keys")]
     List {
         #[command(flatten)]
         folder: FolderArgument,
     },
     /// Revoke keys; running members apply it when their revoked.toml is replaced
+    #[command(after_help = "Example:\n  understudy keys revoke tank --folder cell/keys")]
     Revoke {
         /// Members or persons
         #[arg(value_name = "NAME", required = true)]

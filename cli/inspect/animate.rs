@@ -16,7 +16,7 @@ use crate::inspect::view::RunArgument;
 Example:
   understudy animate
   understudy animate runs/latest --output kill.svg
-  understudy animate runs/latest --program press --from 390 --to 560 --output press.svg
+  understudy animate runs/latest --program press --from 120 --to 260 --output press.svg
 
 Without a range of cycles the picture shows the first kill of a controller, until its outputs are direct again. Browsers and GitHub play
 the animation.")]

@@ -31,9 +31,9 @@ use remarks::Looking;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
-  understudy check cluster.toml kill.toml
-  understudy check --json robot.ladder
-  understudy check model.toml net.toml map.toml SUPER.ADS
+  understudy check examples/press-cell/cluster.toml scenarios/kill-each.toml
+  understudy check --json examples/press-cell/robot.ladder
+  understudy check examples/assembly-cell/model.toml examples/assembly-cell/net.toml examples/boiler/main-map.toml
   understudy check MAIN.TcPOU E_Mode.TcDUT
 
 The files of a TwinCAT project are checked as one program: several files, its .plcproj or its folder. The programs of a cluster are checked with it. Names in a scenario are checked against the cluster file given with it, otherwise against the

@@ -16,9 +16,9 @@ use crate::files;
 #[command(after_help = "\
 Example:
   understudy draw examples/press-cell/robot.ladder
-  understudy draw robot.ladder --as svg --output robot.svg
-  understudy draw level.xml --as svg --output level.svg
-  understudy draw level.st --as fbd --output level.svg
+  understudy draw examples/press-cell/robot.ladder --as svg --output robot.svg
+  understudy draw examples/plcopen/pump.xml --as svg --output pump.svg
+  understudy draw examples/heated-tank/level.st --as fbd --output level.svg
 
 A program with numbers is drawn in its own language: a ladder with its boxes, function blocks as networks, a sequence as a chart. Structured Text and instruction lists are listed; `--as fbd` draws statements as function blocks. As text, a program with numbers is Structured Text.")]
 pub(crate) struct Arguments {

@@ -16,9 +16,9 @@ use crate::files;
 #[command(after_help = "\
 Example:
   understudy init cell
-  understudy init cell --template modbus
-  understudy init cell --from plc.xml tank.st conveyor.ladder
-  understudy init cell --from north=north/plc.xml south=south/plc.xml
+  understudy init level --template modbus
+  understudy init line --from examples/plcopen/pump.xml examples/press-cell/press.ladder
+  understudy init sites --from north=examples/plcopen/pump.xml south=examples/plcopen/pump.xml
 
 --from takes every program that `understudy check` finds right. Each program gets a controller, a remote I/O and a placeholder for its plant;
 a file with several programs gives one controller per program, unless they share variables. NAME= sets the name of the controller.")]

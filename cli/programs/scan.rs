@@ -20,9 +20,9 @@ use crate::files::{self, ProgramText};
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
-  understudy scan pid.st --inputs steps.txt --period 10ms
-  understudy scan --json robot.ladder --inputs part-arrives.txt
-  understudy scan pid.st --digest 1000000
+  understudy scan examples/press-cell/robot.ladder --inputs examples/press-cell/part-arrives.txt
+  understudy scan --json examples/press-cell/robot.ladder --inputs examples/press-cell/part-arrives.txt
+  understudy scan examples/heated-tank/level.st --digest 100000
 
 A line of the file holds the values of all inputs in the order of their declaration, with blanks between: BOOL as 0 or 1, integers and bit
 strings in decimal, REAL and LREAL as their hexadecimal bit patterns of 8 and 16 digits or as numbers with a point, times in nanoseconds.

@@ -32,11 +32,11 @@ use answer::{Finding, ProgramAnswer};
 #[command(after_help = "\
 Example:
   understudy verify examples/press-cell/press.ladder
-  understudy verify press.ladder --property \"never ram_down and ram_up\" --property \"AG EF ram_down\"
-  understudy verify press.ladder --properties press.properties --period 20ms
-  understudy verify press.ladder --property \"never ram_down and ram_up\" --draw runs.html
-  understudy verify press.ladder --smv scan --output press.smv
-  understudy verify examples/heated-tank/tank.st --property \"never program.fault\"
+  understudy verify examples/press-cell/press.ladder --property \"never move_down and stop\" --property \"AG EF move_down\"
+  understudy verify examples/boiler/pilot.ladder --properties examples/boiler/pilot.properties --period 100ms
+  understudy verify examples/press-cell/press.ladder --property \"never move_down and stop\" --draw runs.html
+  understudy verify examples/press-cell/press.ladder --smv scan --output press.smv
+  understudy verify examples/two-shuttles/left.st --property \"never program.fault\"
   understudy verify examples/press-cell/cluster.toml
   understudy verify examples/two-shuttles/cluster.toml --property \"never left.inside and right.inside\"
   understudy verify examples/boiler/complete.ladder --period 100ms --budget 60s

@@ -26,13 +26,14 @@ use crate::run::simulate::seed_of_the_clock;
     after_help = "\
 Example:
   understudy campaign examples/press-cell/cluster.toml --runs 2000 --seed 1 --out campaign
-  understudy campaign examples/press-cell/cluster.toml --runs 1000000 --seed 1 --shard 3/8 --out shard-3
+  understudy campaign examples/press-cell/cluster.toml --runs 20 --seed 1 --shard 1/2 --out shard-1
+  understudy campaign examples/press-cell/cluster.toml --runs 20 --seed 1 --shard 2/2 --out shard-2
   understudy campaign merge shard-* --out campaign
 
 Equal seeds and numbers of runs give equal findings on any number of processors and shards. DIR receives campaign.json, campaign.html and
 a scenario for each failure, which `understudy simulate` replays. Ctrl-C ends the campaign with partial findings.
 
-Exit status: 1 if a run failed or the campaign is incomplete."
+Exit status: 4 if a run failed, 1 if none failed and the campaign is incomplete."
 )]
 pub(crate) struct Arguments {
     #[command(subcommand)]
@@ -74,7 +75,11 @@ pub(crate) struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Merge {
     /// Combine the shards of a campaign
-    #[command(after_help = "Example:\n  understudy campaign merge shard-* --out campaign")]
+    #[command(after_help = "\
+Example:
+  understudy campaign examples/press-cell/cluster.toml --runs 20 --seed 1 --shard 1/2 --out shard-1
+  understudy campaign examples/press-cell/cluster.toml --runs 20 --seed 1 --shard 2/2 --out shard-2
+  understudy campaign merge shard-* --out campaign")]
     Merge {
         /// Directories of the shards
         #[arg(value_name = "DIR", required = true)]
@@ -227,7 +232,11 @@ fn kept(findings: &Findings, out: Option<&Path>) -> Result<Answer, Answer> {
     } else if let Some(failure) = findings.failures.first() {
         text.push_str(&format!("\nFirst failure:\n\n{}", failure.scenario));
     }
-    let status = if findings.is_good() { Status::Done } else { Status::Failed };
+    let status = match findings.is_good() {
+        true => Status::Done,
+        false if findings.runs_failed > 0 => Status::Found,
+        false => Status::Failed,
+    };
     let found = Found { directory: out.map(|out| out.display().to_string()), scenarios, findings };
     Ok(Answer::done(text, found).with_status(status))
 }

@@ -25,8 +25,8 @@ use crate::supervisors::reduction::{BUDGET, reduced};
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
-  understudy des sync MACH1.ADS MACH2.ADS -o PLANT.ADS
-  understudy des supcon PLANT.ADS SPEC.ADS --lift -o SUPER.ADS
+  understudy des sync examples/agv/AGV1.ADS examples/agv/AGV2.ADS -o PLANT.ADS
+  understudy des supcon PLANT.ADS examples/agv/Z1SPEC.ADS --lift -o SUPER.ADS
   understudy des condat PLANT.ADS SUPER.ADS --json
 
 Files are TCT automata (.ADS) or models of one automaton (.toml). Results are written as .ADS, .toml, .dot or .svg. supcon uses the meet
@@ -46,23 +46,38 @@ pub(crate) struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Operation {
     /// Check files and describe the automata in them
+    #[command(
+        after_help = "Example:\n  understudy des check examples/agv/AGV1.ADS examples/agv/AGV2.ADS"
+    )]
     Check {
         #[arg(value_name = "FILE", required = true)]
         files: Vec<PathBuf>,
     },
     /// Synchronous product: an automaton ignores events outside of its alphabet
+    #[command(
+        after_help = "Example:\n  understudy des sync examples/agv/AGV1.ADS examples/agv/AGV2.ADS -o both.ADS"
+    )]
     Sync {
         #[arg(value_name = "FILE", required = true)]
         files: Vec<PathBuf>,
     },
     /// Product that forbids events outside of either alphabet
+    #[command(
+        after_help = "Example:\n  understudy des meet examples/agv/AGV1.ADS examples/agv/AGV2.ADS -o meet.ADS"
+    )]
     Meet {
         #[arg(value_name = "FILE", required = true)]
         files: Vec<PathBuf>,
     },
     /// Reachable and coreachable part
+    #[command(
+        after_help = "Example:\n  understudy des trim examples/agv/Z1SPEC.ADS -o trimmed.ADS"
+    )]
     Trim { file: PathBuf },
     /// Supremal controllable and nonblocking supervisor
+    #[command(
+        after_help = "Example:\n  understudy des supcon examples/agv/AGV1.ADS examples/agv/Z1SPEC.ADS --lift -o supervisor.ADS"
+    )]
     Supcon {
         plant: PathBuf,
         specification: PathBuf,
@@ -71,8 +86,14 @@ enum Operation {
         lift: bool,
     },
     /// Controllable events that a supervisor disables in each state
+    #[command(
+        after_help = "Example:\n  understudy des condat examples/agv/AGV1.ADS examples/agv/AGV1.ADS"
+    )]
     Condat { plant: PathBuf, supervisor: PathBuf },
     /// Reduced supervisor with the same effect on the plant
+    #[command(
+        after_help = "Example:\n  understudy des supreduce examples/agv/AGV1.ADS examples/agv/AGV1.ADS -o reduced.ADS"
+    )]
     Supreduce {
         plant: PathBuf,
         supervisor: PathBuf,
@@ -81,12 +102,24 @@ enum Operation {
         budget: Duration,
     },
     /// Minimal automaton with the same languages
+    #[command(
+        after_help = "Example:\n  understudy des minstate examples/agv/AGV1.ADS -o minimal.ADS"
+    )]
     Minstate { file: PathBuf },
     /// Whether two automata are isomorphic
+    #[command(
+        after_help = "Example:\n  understudy des isomorph examples/agv/AGV1.ADS examples/agv/AGV1.ADS"
+    )]
     Isomorph { left: PathBuf, right: PathBuf },
     /// Automaton of one state that allows all events
+    #[command(
+        after_help = "Example:\n  understudy des allevents examples/agv/AGV1.ADS -o events.ADS"
+    )]
     Allevents { file: PathBuf },
     /// Self-loops for events in every state
+    #[command(
+        after_help = "Example:\n  understudy des selfloop examples/agv/AGV1.ADS --events 90,92 -o loops.ADS"
+    )]
     Selfloop {
         file: PathBuf,
         /// Event labels
@@ -94,6 +127,9 @@ enum Operation {
         events: Vec<u32>,
     },
     /// Synchronous product without mutually exclusive pairs of states
+    #[command(
+        after_help = "Example:\n  understudy des mutex examples/agv/AGV1.ADS examples/agv/AGV2.ADS --exclude 1:1,2:2 -o exclusive.ADS"
+    )]
     Mutex {
         left: PathBuf,
         right: PathBuf,
@@ -102,11 +138,17 @@ enum Operation {
         exclude: Vec<(State, State)>,
     },
     /// Whether automata can always reach marked states together
+    #[command(
+        after_help = "Example:\n  understudy des nonconflict examples/agv/AGV1.ADS examples/agv/AGV2.ADS"
+    )]
     Nonconflict {
         #[arg(value_name = "FILE", required = true)]
         files: Vec<PathBuf>,
     },
     /// Natural projection that hides events
+    #[command(
+        after_help = "Example:\n  understudy des project examples/agv/AGV1.ADS --hide 10 -o projected.ADS"
+    )]
     Project {
         file: PathBuf,
         /// Labels of the hidden events
@@ -114,9 +156,13 @@ enum Operation {
         hide: Vec<u32>,
     },
     /// Convert an automaton file to another format
+    #[command(
+        after_help = "Example:\n  understudy des convert examples/agv/AGV1.ADS -o vehicle.svg"
+    )]
     #[command(visible_alias = "create")]
     Convert { file: PathBuf },
     /// Events that cause the avalanche effect in a ladder
+    #[command(after_help = "Example:\n  understudy des avalanche examples/avalanche/TEST.ADS")]
     Avalanche { file: PathBuf },
 }
 

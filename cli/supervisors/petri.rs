@@ -45,21 +45,31 @@ pub(crate) struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Operation {
     /// Bound of each place, or a run that shows that a place is unbounded
+    #[command(after_help = "Example:\n  understudy petri bounds examples/assembly-cell/net.toml")]
     Bounds {
         #[arg(value_name = "NET.toml")]
         net: PathBuf,
     },
     /// Reachability graph as an automaton: .ADS, .toml, .dot or .svg
+    #[command(
+        after_help = "Example:\n  understudy petri automaton examples/assembly-cell/net.toml -o net.ADS"
+    )]
     Automaton {
         #[arg(value_name = "NET.toml")]
         net: PathBuf,
     },
     /// Smaller equivalent net (.toml)
+    #[command(
+        after_help = "Example:\n  understudy petri reduce examples/assembly-cell/net.toml -o smaller.toml"
+    )]
     Reduce {
         #[arg(value_name = "NET.toml")]
         net: PathBuf,
     },
     /// Proved ladder program of the net with its supervisors
+    #[command(
+        after_help = "Example:\n  understudy synth examples/assembly-cell/model.toml --reduce --name keeper -o keeper.toml\n  understudy petri ladder examples/assembly-cell/net.toml --supervisor keeper.toml -o cell.ladder"
+    )]
     Ladder {
         #[arg(value_name = "NET.toml")]
         net: PathBuf,
@@ -68,6 +78,9 @@ enum Operation {
         supervisors: Vec<PathBuf>,
     },
     /// Drawing of the net
+    #[command(
+        after_help = "Example:\n  understudy petri draw examples/assembly-cell/net.toml -o net.svg"
+    )]
     Draw {
         #[arg(value_name = "NET.toml")]
         net: PathBuf,

@@ -24,8 +24,7 @@ use crate::supervisors::automata::{self, Sources};
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
-  understudy supervisor-to-ladder examples/motivating-example/supervisor.ADS \\
-      --io examples/motivating-example/map.toml --mode manual -o motivating.ladder
+  understudy supervisor-to-ladder examples/motivating-example/supervisor.ADS --io examples/motivating-example/map.toml --mode manual -o motivating.ladder
 
 The supervisor is a TCT automaton (.ADS) or a model (.toml) with supervisors. A reduced supervisor does not track the state of its plant;
 supply the plants by --plant. Findings about the supervisor are warnings, unless no ladder program can implement it. The ladder is written

@@ -22,6 +22,7 @@ mod named_files;
 mod next;
 mod others;
 mod papers;
+mod pasted;
 mod petri;
 mod program_faults;
 mod reconfigure;

@@ -26,6 +26,22 @@ async function textView() {
   await accessible("text", axe);
 }
 
+async function declarations() {
+  await open("ladder?program=1");
+  await until("the text of the other program", `document.querySelector(".program-text")?.textContent.includes("recipe : ARRAY")`);
+  // Only declared names have values in a declaration: no type, and no part of an initial value.
+  const line = (words) => `[...document.querySelectorAll(".program-text tbody tr")].find((row) => row.querySelector("code").textContent.includes(${JSON.stringify(words)})).querySelector(".values").textContent`;
+  const beside = await evaluate(`[${line("recipe : ARRAY")}, ${line("temperature := 30.0")}, ${line("current : INT")}]`);
+  if (beside[0] !== "" || beside[1] !== "" || !/^current = \d$/.test(beside[2])) {
+    problems.push(`the values beside declarations are ${JSON.stringify(beside)}`);
+  }
+  // A TIME has its units, as in the terminal.
+  await open("ladder?program=1&why=1/holding.PT@60");
+  await until("a reason with a time", `/holding\\.PT = [1245]+s\\b/.test(document.querySelector("#why").textContent)`);
+  await click("#why button");
+  await open("ladder?program=0");
+}
+
 async function drawing() {
   await change("#ladder-view", "drawing");
   await until("a drawing", `document.querySelector("#ladder-picture svg") !== null && document.querySelector(".program-text") === null`);
@@ -46,6 +62,7 @@ async function drive() {
   await size(1360, 1000, false);
   await until("some cycles", `${shown}.then((cycle) => cycle > 60)`);
   await textView();
+  await declarations();
   await drawing();
   await change("#ladder-view", "text");
   await until("the text again", `document.querySelectorAll(".program-text tbody tr").length > 3`);

@@ -56,7 +56,7 @@ pub use process_alarm::{ProcessAlarm, Shelved};
 pub use protection::{LackingStation, LostState, Protection};
 pub use run::{Run, find_run, find_run_of, find_running, find_running_of};
 pub use series::Series;
-pub use shown_text::{ShownLine, Uses};
+pub use shown_text::{NamedValue, ShownLine, Uses};
 pub use snapshot::{
     LinkSnapshot, MarginSnapshot, OutcomeSnapshot, PlantSnapshot, PlantState, ProgramSnapshot,
     RemoteIoSnapshot, RemoteIoState, RunState, Snapshot, StationSnapshot, TimingSnapshot,

@@ -24,7 +24,19 @@ pub struct ShownLine {
     /// Whether the program fault of this scan occurred in it.
     pub failed: bool,
     /// The variables that it names, with their values after the scan; in the order of the text.
-    pub values: Vec<(String, Value)>,
+    pub values: Vec<NamedValue>,
+}
+
+/// A variable and its value.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct NamedValue {
+    /// Its name, or a part of it, as the text has it.
+    pub name: String,
+    /// A BOOL as true or false, a number as a number, null where it is not finite, a time in nanoseconds.
+    pub value: Value,
+    /// Its type, such as `TIME`.
+    #[serde(rename = "type")]
+    pub of: &'static str,
 }
 
 /// Where a variable is assigned and read.
@@ -115,7 +127,7 @@ fn lines(typed: &Program, source: &SourceText<'_>, trace: Option<&Trace>) -> Vec
             && let Some((target, _)) = source.line(done.line).and_then(|it| it.split_once(":="))
         {
             let key = (routine.to_lowercase(), target.trim().to_lowercase());
-            temporary.insert(key, elementary(of, stored));
+            temporary.insert(key, (of, stored));
         }
     }
     let failed = trace.and_then(|trace| trace.fault);
@@ -130,15 +142,16 @@ fn lines(typed: &Program, source: &SourceText<'_>, trace: Option<&Trace>) -> Vec
         let part = typed.part(&behind_program).or_else(|| typed.part(name));
         let stored = part.and_then(|part| part.stored(memory));
         let key = (unit.to_lowercase(), name.to_lowercase());
-        stored.map(|(of, stored)| elementary(of, stored)).or_else(|| temporary.get(&key).cloned())
+        stored.or_else(|| temporary.get(&key).copied())
     };
     let shown = (1..).zip(source.lines()).map(|(number, line)| {
-        let mut values: Vec<(String, Value)> = Vec::new();
-        let shown = |kind| !matches!(kind, Use::Unit | Use::Parameter);
+        let mut values: Vec<NamedValue> = Vec::new();
+        let shown = |kind| !matches!(kind, Use::Unit | Use::Parameter | Use::Typed);
         for (name, _) in line.names.iter().filter(|(_, kind)| shown(*kind)) {
-            let known = values.iter().any(|(known, _)| known == name);
-            if let Some(value) = value(line, name).filter(|_| !known) {
-                values.push(((*name).to_owned(), value));
+            let known = values.iter().any(|known| known.name == *name);
+            if let Some((of, stored)) = value(line, name).filter(|_| !known) {
+                let value = elementary(of, stored);
+                values.push(NamedValue { name: (*name).to_owned(), value, of: of.name() });
             }
         }
         ShownLine {

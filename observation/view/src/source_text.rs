@@ -22,8 +22,10 @@ pub(crate) struct Line<'t> {
 /// What a name does where it stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Use {
-    /// It is declared, or names a type in a declaration.
+    /// It is declared.
     Declared,
+    /// It stands in a declaration behind the declared names: a type, or a part of an initial value; or it is a word of the section.
+    Typed,
     /// It names a unit.
     Unit,
     /// It names a parameter in a call: `PV` in `regulator(PV := level)`.
@@ -51,12 +53,17 @@ const SECTIONS: [&str; 10] = [
     "VAR_ACCESS",
 ];
 
+/// Words of a section that are no names.
+const QUALIFIERS: [&str; 8] =
+    ["AT", "CONSTANT", "RETAIN", "NON_RETAIN", "PERSISTENT", "R_EDGE", "F_EDGE", "PUBLIC"];
+
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 enum Comment {
     #[default]
     None,
     Round,
     Slash,
+    Pragma,
 }
 
 impl<'t> SourceText<'t> {
@@ -119,6 +126,8 @@ struct Reader {
     comment: Comment,
     /// Between VAR and END_VAR.
     in_declaration: bool,
+    /// Behind the colon of a declaration.
+    is_typed: bool,
     /// Parentheses that are open.
     depth: usize,
     /// Behind `=>`: the variable that takes an output.
@@ -134,6 +143,7 @@ impl Reader {
             let end = match self.comment {
                 Comment::Round => Some("*)"),
                 Comment::Slash => Some("*/"),
+                Comment::Pragma => Some("}"),
                 Comment::None => None,
             };
             if let Some(end) = end {
@@ -148,9 +158,10 @@ impl Reader {
                 (self.comment, rest) = (Comment::Slash, behind);
             } else if rest.starts_with("//") {
                 return names;
+            } else if let Some(behind) = rest.strip_prefix('{') {
+                (self.comment, rest) = (Comment::Pragma, behind);
             } else if first == '\'' || first == '"' {
-                let inside = &rest[1..];
-                rest = inside.find(first).map_or("", |end| &inside[end + 1..]);
+                rest = behind_text(&rest[1..], first);
             } else if first.is_ascii_alphanumeric() || first == '_' || first == '%' {
                 let is_part = |letter: char| letter.is_alphanumeric() || "_.#%".contains(letter);
                 let end = rest.find(|letter| !is_part(letter)).unwrap_or(rest.len());
@@ -163,7 +174,8 @@ impl Reader {
                 match first {
                     '(' => self.depth += 1,
                     ')' => self.depth = self.depth.saturating_sub(1),
-                    ';' => self.depth = 0,
+                    ';' => (self.depth, self.is_typed) = (0, false),
+                    ':' => self.is_typed = self.in_declaration,
                     _ => {}
                 }
                 self.is_taking = rest.starts_with("=>") || self.is_taking && !";,)".contains(first);
@@ -180,20 +192,38 @@ impl Reader {
     }
 
     fn use_of(&mut self, name: &str, behind: &str) -> Use {
-        if SECTIONS.contains(&&*name.to_ascii_uppercase()) {
-            self.in_declaration = true;
+        let is = |word: &str| name.eq_ignore_ascii_case(word);
+        if SECTIONS.into_iter().any(is) {
+            (self.in_declaration, self.is_typed) = (true, false);
+            return Use::Typed;
         } else if name.eq_ignore_ascii_case("END_VAR") {
             self.in_declaration = false;
         }
         let assigned = behind_parts(behind);
         let (is_assigned, is_taken) = (assigned.starts_with(":="), assigned.starts_with("=>"));
         match () {
+            () if self.in_declaration && (self.is_typed || QUALIFIERS.into_iter().any(is)) => {
+                Use::Typed
+            }
             () if self.in_declaration => Use::Declared,
             () if self.depth > 0 && (is_assigned || is_taken) => Use::Parameter,
             () if is_assigned || std::mem::take(&mut self.is_taking) => Use::Written,
             () => Use::Read,
         }
     }
+}
+
+/// What follows a text in quotes, from behind the first one on: a quote behind `$` is part of the text.
+fn behind_text(inside: &str, quote: char) -> &str {
+    let mut letters = inside.char_indices();
+    while let Some((place, letter)) = letters.next() {
+        if letter == '$' {
+            letters.next();
+        } else if letter == quote {
+            return &inside[place + 1..];
+        }
+    }
+    ""
 }
 
 /// What stands behind the indices and parts that follow a name: ` := 1` behind `a` in `a[2].b := 1`.
@@ -217,6 +247,8 @@ fn behind_parts(mut behind: &str) -> &str {
 
 #[cfg(test)]
 mod tests {
+    use understudy_cluster::{Overrides, read_with};
+
     use super::*;
 
     #[test]
@@ -237,6 +269,59 @@ mod tests {
         assert_eq!(source.line(0), None);
     }
 
+    /// Every declared name of the examples, once: no type and no part of an initial value is one.
+    #[test]
+    fn a_name_is_declared_where_the_language_declares_it() {
+        let mut programs = 0;
+        for example in ["heated-tank", "two-shuttles", "tennessee-eastman"] {
+            let folder = format!("{}/../../examples/{example}", env!("CARGO_MANIFEST_DIR"));
+            let file = |name: &str| {
+                std::fs::read_to_string(format!("{folder}/{name}"))
+                    .map_err(|error| error.to_string())
+            };
+            let text = file("cluster.toml").expect("the example is whole");
+            let read =
+                read_with("cluster.toml", &text, Overrides::default(), &mut |name| file(name));
+            for controller in read.cluster.expect("right").controllers() {
+                let code = &controller.code;
+                let (Some(typed), Some(text)) = (code.typed(), code.source_text()) else {
+                    continue;
+                };
+                let source = SourceText::new(text);
+                let lines = source.lines().iter().filter(|line| line.is_program);
+                let declared = lines
+                    .flat_map(|line| &line.names)
+                    .filter(|(name, kind)| *kind == Use::Declared && !name.starts_with('%'));
+                let mut declared: Vec<String> =
+                    declared.map(|(name, _)| name.to_lowercase()).collect();
+                declared.sort();
+                let variables = typed.variables.iter().map(|of| of.name.to_lowercase());
+                let mut variables: Vec<String> =
+                    variables.filter(|name| !name.starts_with("program.")).collect();
+                variables.sort();
+                // Constants are declared and no variables.
+                let lines: Vec<String> =
+                    text.lines().map(|line| line.trim().to_lowercase()).collect();
+                declared.retain(|name| {
+                    let begins = format!("{name} : ");
+                    variables.contains(name) || !lines.iter().any(|line| line.starts_with(&begins))
+                });
+                assert_eq!(declared, variables, "{example}");
+                programs += 1;
+            }
+        }
+        assert!(programs > 6, "{programs}");
+        let text = "PROGRAM p\nVAR RETAIN\n  {attribute 'hidden'} recipe : ARRAY [1..2] OF stage := [\n\
+            (temperature := 30.0, name := 'it$'s stage', pause := T#2s),\n  (temperature := low)];\n  stage, low : INT := top; t : ton;\n\
+            END_VAR\n  stage := low;\nEND_PROGRAM\n";
+        let source = SourceText::new(text);
+        let names = source.lines().iter().flat_map(|line| &line.names);
+        let declared = names.filter(|(_, kind)| *kind == Use::Declared);
+        let declared: Vec<&str> = declared.map(|(name, _)| *name).collect();
+        assert_eq!(declared, ["recipe", "stage", "low", "t"]);
+        assert_eq!(source.lines()[7].names, [("stage", Use::Written), ("low", Use::Read)]);
+    }
+
     #[test]
     fn a_name_is_declared_given_written_or_read() {
         let text = "PROGRAM level\nVAR_INPUT\n  level AT %ID0, SP : REAL := top;\nEND_VAR\n\
@@ -245,7 +330,15 @@ mod tests {
         let source = SourceText::new(text);
         let uses = |line: usize| source.lines()[line - 1].names.clone();
         assert_eq!(uses(1)[1], ("level", Use::Unit));
-        assert!(uses(3).iter().all(|(_, kind)| *kind == Use::Declared));
+        let expected = [
+            ("level", Use::Declared),
+            ("AT", Use::Typed),
+            ("%ID0", Use::Declared),
+            ("SP", Use::Declared),
+            ("REAL", Use::Typed),
+            ("top", Use::Typed),
+        ];
+        assert_eq!(uses(3), expected);
         let expected = [
             ("pid", Use::Read),
             ("SP", Use::Parameter),

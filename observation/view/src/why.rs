@@ -9,7 +9,7 @@ mod text;
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use serde_json::Value;
 use understudy_cluster::Code;
 use understudy_journal::source_word;
@@ -53,7 +53,12 @@ pub struct Why {
     #[serde(skip)]
     pub inputs_text: Option<String>,
     /// Type of the signal, of a program with numbers.
-    #[serde(skip)]
+    #[serde(
+        rename = "type",
+        skip_serializing_if = "Option::is_none",
+        serialize_with = "type_name"
+    )]
+    #[schemars(with = "Option<String>")]
     pub of: Option<Elementary>,
     /// How it was reconstructed.
     pub reconstructed: Option<Reconstructed>,
@@ -62,6 +67,10 @@ pub struct Why {
     pub ramp_to: Option<Value>,
     /// The chain of contacts or statements; nothing for a fail-safe value, unless a program fault led to it.
     pub because: Option<Reason>,
+}
+
+fn type_name<S: Serializer>(of: &Option<Elementary>, serializer: S) -> Result<S::Ok, S::Error> {
+    of.map(Elementary::name).serialize(serializer)
 }
 
 /// How an output was reconstructed: equation (12) with its numbers.
@@ -112,7 +121,12 @@ pub struct Reason {
     /// Its value at that place of the scan.
     pub value: Value,
     /// Its type, of a program with numbers.
-    #[serde(skip)]
+    #[serde(
+        rename = "type",
+        skip_serializing_if = "Option::is_none",
+        serialize_with = "type_name"
+    )]
+    #[schemars(with = "Option<String>")]
     pub of: Option<Elementary>,
     /// From the origin of the run.
     pub cycle: i64,

@@ -19,7 +19,7 @@ async function answered(answer) {
     return content;
   }
   if (answer.status === 401) {
-    location.assign("/login.html");
+    location.assign(`/login.html${location.hash}`);
   }
   const error = content?.error;
   throw new Error(error ? `${error.message} (${error.code})` : `the page answered ${answer.status}`);

@@ -153,7 +153,8 @@ function signals(state) {
         const { kind, index } = button.dataset;
         const values = kind === "input" ? program.input_values : program.output_values;
         const forced = program.forced.find((force) => force.kind === kind && String(force.index) === index);
-        const value = forced && kind === "output" ? valueText(forced.value) : valueText(values?.[index]);
+        const { type } = run.programs[program.index][`${kind}s`][index];
+        const value = valueText(forced && kind === "output" ? forced.value : values?.[index], type);
         setText(button.querySelector(".signal-value"), value);
         setText(button.querySelector(".signal-forced"), forced ? `forced by ${forced.owner}` : "");
         setAttribute(button, "data-value", value);

@@ -178,7 +178,7 @@ function forcing(member, signal, because, give) {
   const forces = state().programs[member.program].forced;
   const nameOf = (held) => facts[`${held.kind}s`][held.index]?.name ?? `at bit ${held.bit}`;
   const held = forces.map((force) =>
-    el("li", {}, `${force.kind} ${nameOf(force)} = ${valueText(force.value)}, by ${force.owner}: ${force.reason} `,
+    el("li", {}, `${force.kind} ${nameOf(force)} = ${valueText(force.value, facts[`${force.kind}s`][force.index]?.type)}, by ${force.owner}: ${force.reason} `,
       el("button", { type: "button", disabled: Boolean(down), "data-command": "unforce", click: () => give({ command: "unforce", signal: { [force.kind]: force.bit } }, `force of ${force.kind} ${nameOf(force)} taken back`) }, "Take back")));
   return el("fieldset", {},
     el("legend", {}, "Force a signal"),

@@ -69,8 +69,28 @@ export function keyed(parent, items, keyOf, make, show) {
   }
 }
 
+// Types whose values are nanoseconds.
+const TIMES = new Set(["TIME", "DATE", "TIME_OF_DAY", "DATE_AND_TIME"]);
+
+const UNITS = [["d", 86_400_000_000_000], ["h", 3_600_000_000_000], ["m", 60_000_000_000], ["s", 1_000_000_000], ["ms", 1_000_000], ["us", 1_000], ["ns", 1]];
+
+// A duration in nanoseconds as the terminal writes it: `2s20ms`.
+function durationText(nanoseconds) {
+  let rest = Math.round(Math.abs(nanoseconds));
+  let text = "";
+  for (const [unit, length] of UNITS) {
+    const count = Math.floor(rest / length);
+    text += count ? `${count}${unit}` : "";
+    rest -= count * length;
+  }
+  return `${nanoseconds < 0 ? "-" : ""}${text || "0ms"}`;
+}
+
 // A value as people read it: a BOOL as 0 or 1, a number with at most seven digits.
-export function valueText(value) {
+export function valueText(value, type) {
+  if (TIMES.has(type) && typeof value === "number") {
+    return durationText(value);
+  }
   if (typeof value === "boolean") {
     return value ? "1" : "0";
   }

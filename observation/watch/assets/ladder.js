@@ -223,7 +223,7 @@ function forcesOf() {
   const forces = state().programs[program]?.forced ?? [];
   return forces.flatMap(({ kind, index, value, owner, reason }) => {
     const signal = facts[`${kind}s`][index];
-    return signal ? [{ name: signal.name, address: signal.address, words: `${kind} ${signal.name} = ${valueText(value)}, forced by ${owner}: ${reason}` }] : [];
+    return signal ? [{ name: signal.name, address: signal.address, words: `${kind} ${signal.name} = ${valueText(value, signal.type)}, forced by ${owner}: ${reason}` }] : [];
   });
 }
 
@@ -274,11 +274,11 @@ function showText(lines, forced) {
       keyed(
         row.querySelector(".values"),
         line.values,
-        ([name]) => name,
-        ([name]) => el("button", { type: "button", class: "link", click: () => askWhy(name) }),
-        (button, [name, value]) => {
+        ({ name }) => name,
+        ({ name }) => el("button", { type: "button", class: "link", click: () => askWhy(name) }),
+        (button, { name, value, type }) => {
           const force = forced.find((force) => force.name.toLowerCase() === name.toLowerCase());
-          setText(button, `${name} = ${typeof value === "boolean" ? String(value).toUpperCase() : valueText(value)}${force ? " F" : ""}`);
+          setText(button, `${name} = ${typeof value === "boolean" ? String(value).toUpperCase() : valueText(value, type)}${force ? " F" : ""}`);
           button.classList.toggle("forced", Boolean(force));
           setAttribute(button, "title", force?.words ?? "");
         },
@@ -349,7 +349,7 @@ function sum() {
   const column = (item, place) => {
     const output = item.outputs[place];
     const value = now.programs[item.index].published_values?.[place];
-    return el("td", {}, output ? `${output.name} = ${valueText(value)}` : "");
+    return el("td", {}, output ? `${output.name} = ${valueText(value, output.type)}` : "");
   };
   const rows = [...Array(width).keys()].map((place) =>
     el("tr", {}, el("th", { scope: "row" }, `y${place + 1}`), members.map((item) => column(item, place)), words.map((word) => el("td", { class: "sum" }, areBits ? (word.sum[place] ?? "") : ""))));

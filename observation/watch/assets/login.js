@@ -12,7 +12,8 @@ document.getElementById("form").addEventListener("submit", async (event) => {
     body: JSON.stringify({ token }),
   });
   if (answer.ok) {
-    location.assign("/");
+    // A link shows what it names after the login too.
+    location.assign(`/${location.hash}`);
     return;
   }
   const content = await answer.json().catch(() => null);

@@ -36,7 +36,7 @@ export function makeReads(run) {
   const show = (state) => signals.forEach((signal, row) => {
     const own = state.programs[signal.reader.index];
     const valid = own.signals.find(({ input }) => input === signal.index)?.valid ?? null;
-    const value = valueText(own.input_values?.[signal.index]);
+    const value = valueText(own.input_values?.[signal.index], signal.input.type);
     const words = valid === null ? "validity not known" : valid ? "valid" : "not valid: default value";
     arrows[row].show(value, valid);
     setAttribute(items[row], "data-valid", String(valid));

@@ -1,7 +1,7 @@
 // The signals of all programs: inputs, outputs, and what is in their states. Each has an identifier such as `0.input.3` or `1.state.pressing`.
 
 import { act, ask } from "/ask.js";
-import { el, keyed, setText, valueText } from "/element.js";
+import { el, keyed, setText } from "/element.js";
 
 // Signals in a list, at most; a search finds the others.
 const LISTED = 120;
@@ -40,14 +40,6 @@ export function load() {
 export const find = (id) => byId.get(id);
 
 export const fullName = (signal) => `${programs[signal.program]}.${signal.name}`;
-
-// A value as people read it: a TIME is stored in nanoseconds.
-export function typedText(type, value) {
-  if (type === "TIME" && typeof value === "number") {
-    return Math.abs(value) >= 1e9 ? `${valueText(value / 1e9)} s` : `${valueText(value / 1e6)} ms`;
-  }
-  return valueText(value);
-}
 
 // A list of all signals with a search; `isChosen` and `toggle` take an identifier.
 export function chooser(name, isChosen, toggle) {

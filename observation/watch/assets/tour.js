@@ -1,5 +1,5 @@
-// A tour of three steps over the first view. It does not block the page. A browser that has ended or skipped it shows it again only on
-// request (button with the question mark).
+// A tour of three steps over the first view. It does not block the page. A browser that was opened by a link to a view, or that has ended or
+// skipped the tour, shows it only on request (button with the question mark).
 
 import { el, setText } from "/element.js";
 
@@ -35,8 +35,8 @@ export function prepare(run) {
       end();
     }
   });
-  if (localStorage.getItem(KEY) !== "seen") {
-    // The tour was not requested, so the focus stays.
+  // A link shows what it names, to a first visitor too. The tour was not requested, so the focus stays.
+  if (localStorage.getItem(KEY) !== "seen" && !location.hash) {
     show(0, false);
   }
 }

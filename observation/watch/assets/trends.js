@@ -3,9 +3,9 @@
 import { changed } from "/address.js";
 import { act, ask, toast } from "/ask.js";
 import { csvOf, reader, saveCsv, savePng } from "/download.js";
-import { el, setText, shorten } from "/element.js";
+import { el, setText, shorten, valueText } from "/element.js";
 import { keep, kept } from "/kept.js";
-import { chooser, find, load, typedText } from "/signals.js";
+import { chooser, find, load } from "/signals.js";
 import { goTo, isLive, state } from "/time.js";
 import { bandPlugin } from "/bands.js";
 import { bandLegend } from "/legend.js";
@@ -268,7 +268,7 @@ function labelsOf(lane) {
     return [[lane.base + 0.35, shorten(lane.name, 18)]];
   }
   const name = [lane.base + lane.height / 2 - 0.15, shorten(lane.name, 18)];
-  return lane.high > lane.low ? [[heightOf(lane, lane.low), typedText(lane.type, lane.low)], name, [heightOf(lane, lane.high), typedText(lane.type, lane.high)]] : [name];
+  return lane.high > lane.low ? [[heightOf(lane, lane.low), valueText(lane.low, lane.type)], name, [heightOf(lane, lane.high), valueText(lane.high, lane.type)]] : [name];
 }
 
 function draw() {
@@ -288,7 +288,7 @@ function draw() {
     width: 2,
     paths: uPlot.paths.stepped({ align: 1 }),
     points: { show: false },
-    value: (_, __, ___, at) => (at === null ? "" : typedText(lanes[index].type, values[index][at])),
+    value: (_, __, ___, at) => (at === null ? "" : valueText(values[index][at], lanes[index].type)),
   }));
   const bandRows = answer.sources.length;
   const axis = { stroke: color("--ink"), grid: { stroke: color("--line"), width: 1 }, ticks: { stroke: color("--line") } };

@@ -2,9 +2,9 @@
 
 import { addressOf, changed } from "/address.js";
 import { act, ask } from "/ask.js";
-import { el, keyed, setAttribute, setText } from "/element.js";
+import { el, keyed, setAttribute, setText, valueText } from "/element.js";
 import { keep, kept } from "/kept.js";
-import { chooser, find, fullName, load, typedText } from "/signals.js";
+import { chooser, find, fullName, load } from "/signals.js";
 import { cycleParameter, isLive, state } from "/time.js";
 
 const MAXIMUM_SIGNALS = 100;
@@ -120,7 +120,7 @@ function fill(values, cycle) {
     const force = forceOf(signal);
     const value = values.get(signal.id);
     // A forced output is driven with the forced value.
-    const text = typedText(signal.type, force && signal.kind === "output" ? force.value : value);
+    const text = valueText(force && signal.kind === "output" ? force.value : value, signal.type);
     setText(row.querySelector(".watch-value"), text);
     setText(row.querySelector(".watch-forced"), force ? ` F forced by ${force.owner}` : "");
     setAttribute(row, "data-value", text);

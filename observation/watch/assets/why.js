@@ -59,7 +59,7 @@ async function explain(program, output, cycle, takesFocus) {
   }
   const close = el("button", { type: "button", click: hide }, "Close");
   drawer.replaceChildren(
-    el("div", { class: "drawer-head" }, el("h2", {}, `Why is ${answer.signal} ${valueText(answer.value)}?`), close),
+    el("div", { class: "drawer-head" }, el("h2", {}, `Why is ${answer.signal} ${valueText(answer.value, answer.type)}?`), close),
     el("p", { class: "soft" }, `${answer.program}, cycle ${answer.cycle}; remote I/O ${answer.remote_io}`),
     ...source(answer).map((line) => el("p", {}, line)),
     answer.because ? el("ul", { class: "cause" }, tree(answer.because)) : el("p", {}, "It is the configured fail-safe value: the program did not cause it."),
@@ -75,7 +75,7 @@ async function explain(program, output, cycle, takesFocus) {
 function source(answer) {
   const lines = [`It is ${SOURCES[answer.source]?.words ?? "not known yet"}${answer.missing ? `: ${answer.missing}` : ""}.`];
   if (answer.scanned !== null && answer.scanned !== answer.value) {
-    lines.push(`The scan of the program yields ${valueText(answer.scanned)}.`);
+    lines.push(`The scan of the program yields ${valueText(answer.scanned, answer.type)}.`);
   }
   const { reconstructed } = answer;
   if (reconstructed) {
@@ -92,7 +92,7 @@ function source(answer) {
 function tree(reason) {
   const line = [
     el("button", { class: "link", type: "button", click: () => goTo(reason.cycle) }, `cycle ${reason.cycle}`),
-    ` ${reason.signal} = ${valueText(reason.value)}`,
+    ` ${reason.signal} = ${valueText(reason.value, reason.type)}`,
     reason.rung ? `, rung ${reason.rung}${reason.title ? ` “${reason.title}”` : ""}` : "",
     reason.line ? [`, line ${reason.line} `, el("code", {}, reason.statement)] : null,
     `: ${reason.text}`];

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 use understudy_cluster::{Cluster, Overrides, read_with};
-use understudy_view::{Bounds, Filter, Level, Listing, Model, Reason, diff};
+use understudy_view::{Bounds, Filter, Level, Listing, Model, NamedValue, Reason, diff};
 use understudy_wire::ProgramId;
 
 use crate::support::{records, scenario};
@@ -215,10 +215,14 @@ fn the_text_shows_the_values_of_its_scan() {
             assert_eq!(lines.len(), FEED.lines().count());
             let values = &model.snapshot_at(cycle).expect("known").programs[program.index()].values;
             let line = |number: usize| &lines[number - 1];
-            assert_eq!(line(15).values[0], ("share".to_owned(), values["share"].clone()));
-            assert_eq!(line(15).values[1], ("speed".to_owned(), values["speed"].clone()));
+            let shown = |place: usize| {
+                let NamedValue { name, value, .. } = &line(15).values[place];
+                (name.as_str(), value)
+            };
+            assert_eq!(shown(0), ("share", &values["share"]));
+            assert_eq!(shown(1), ("speed", &values["speed"]));
             assert!(line(15).executed && !line(13).executed);
-            let part: Vec<&Value> = line(16).values.iter().map(|(_, value)| value).collect();
+            let part: Vec<&Value> = line(16).values.iter().map(|shown| &shown.value).collect();
             assert_eq!(part, [&values["rate"], &values["share"]]);
         }
     }

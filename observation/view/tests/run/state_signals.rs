@@ -90,8 +90,8 @@ fn the_variables_of_a_program_with_numbers_are_those_of_its_trace() {
         let values = model.state_values(program, cycle, &signals).expect("known");
         for (name, value) in names.iter().zip(values) {
             let mut shown = lines.iter().flat_map(|line| &line.values);
-            let traced = shown.find(|(own, _)| own == name);
-            assert_eq!(Some(&value), traced.map(|(_, value)| value), "cycle {cycle}");
+            let traced = shown.find(|shown| shown.name == *name);
+            assert_eq!(Some(&value), traced.map(|shown| &shown.value), "cycle {cycle}");
             seen.insert((*name, value.as_bool()));
         }
     }
