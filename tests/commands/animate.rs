@@ -1,7 +1,7 @@
 //! `understudy animate`, and the moving picture of the README: it is drawn from the journal of a real run.
 //!
-//! `kill/journal.jsonl` holds lines of the journal that `understudy demo --period 50ms` wrote on 2026-11-22: what robot-io applied in cycles 170 to
-//! 362, the first kill and the start after it, what press-io applied around these two, and how the station joined. They draw the same picture as the whole journal.
+//! `kill/journal.jsonl` holds lines of the journal that `understudy demo --period 50ms` wrote on 2026-11-26: of cycles 70 to 199 what both remote I/Os
+//! applied and what all stations published, and what happened until then but for samples and plants. They draw the same picture as the whole journal.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -31,7 +31,7 @@ fn the_picture_of_the_readme_is_drawn_from_a_recorded_run() {
     let drawn = understudy_in(&folder, &["animate", "run", "--output", "kill.svg", "--json"]);
     assert_eq!(drawn.status, 0, "{}", drawn.shown());
     let result = drawn.json()["result"].clone();
-    assert_eq!((&result["from"], &result["to"]), (&176.into(), &355.into()));
+    assert_eq!((&result["from"], &result["to"]), (&76.into(), &192.into()));
     let picture = fs::read_to_string(folder.join("kill.svg")).expect("a picture");
     let shown = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/pictures/kill.svg");
     let shown = fs::read_to_string(shown).expect("the picture of the README");
@@ -49,7 +49,7 @@ fn a_part_of_a_run_is_animated() {
         let arguments = [&["animate", "run", "--output", "part.svg"], more].concat();
         understudy_in(&folder, &arguments)
     };
-    let part = draw(&["--program", "robot", "--from", "180", "--to", "190"]);
+    let part = draw(&["--program", "robot", "--from", "80", "--to", "90"]);
     assert_eq!(part.status, 0, "{}", part.shown());
     let picture = fs::read_to_string(folder.join("part.svg")).expect("a picture");
     // All of it is direct: nothing else may be drawn.
@@ -69,8 +69,8 @@ fn what_is_not_in_the_journal_is_not_drawn() {
         assert!(!folder.join("none.svg").exists(), "{arguments:?}");
     };
     check(&["--program", "robbot"], "U0577", "robot, press");
-    check(&["--from", "5000"], "U0575", "170 to 362");
-    check(&["--from", "200", "--to", "190"], "U0579", "190, comes before");
+    check(&["--from", "5000"], "U0575", "70 to 199");
+    check(&["--from", "100", "--to", "90"], "U0579", "90, comes before");
     let journal = folder.join("run/journal.jsonl");
     let text = fs::read_to_string(&journal).expect("a journal");
     let undisturbed = text.lines().filter(|line| !line.contains("\"fault\""));
