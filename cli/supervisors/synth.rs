@@ -25,10 +25,8 @@ use crate::supervisors::reduction;
 Example:
   understudy synth examples/small-factory/model.toml --reduce -o supervisor.toml
   understudy supervisor-to-ladder supervisor.toml --plant supervisor.toml
-
   understudy synth examples/boiler/complete.toml --engine specified -o supervisors.toml
-  understudy supervisor-to-ladder supervisors.toml --io examples/boiler/complete-map.toml \\
-      --plant examples/boiler/complete.toml -o complete.ladder
+  understudy supervisor-to-ladder supervisors.toml --io examples/boiler/complete-map.toml --plant examples/boiler/complete.toml -o complete.ladder
 
 The supervisor is nonblocking. Specifications restrict only the events of their alphabets. Errors of a model are reported with the shortest
 sequence of events that shows them. The symbolic engine counts and decides without listing states. The modular engine synthesises one
