@@ -99,7 +99,7 @@ async function watch() {
 
 async function trends() {
   await open("trends?signals=0.state.laps,0.state.lap.time,0.output.4&span=100");
-  await until("trends", `document.querySelector("#trend-plot canvas") !== null && [...document.querySelectorAll(".u-legend .u-value")].some((value) => /\\d ms/.test(value.textContent))`);
+  await until("trends", `document.querySelector("#trend-plot canvas") !== null && [...document.querySelectorAll(".u-legend .u-value")].some((value) => /\\dm?s/.test(value.textContent))`);
   await evaluate("(window.saved = [], window.make = URL.createObjectURL, URL.createObjectURL = (blob) => (saved.push(blob), make.call(URL, blob)))");
   await click("#trend-in");
   await until("a zoom", `${text("#trend-words")}.includes("zoomed") && /from=\\d+&to=\\d+/.test(location.hash)`);
