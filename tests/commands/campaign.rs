@@ -62,12 +62,13 @@ fn merged_shards_are_the_whole_and_failures_fail_again() {
     }
 }
 
-/// Whether a process holds SIGINT back, as a campaign does once it can be interrupted.
+/// Whether a process holds SIGINT back, as a campaign does once it can be interrupted; while its log starts, all signals are held back.
 fn holds_back_sigint(pid: u32) -> bool {
     let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
     let mask = status.lines().find_map(|line| line.strip_prefix("SigBlk:"));
     let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
-    mask.is_some_and(|mask| mask >> (Signal::SIGINT as u32 - 1) & 1 == 1)
+    let holds_back = |mask: u64, signal: Signal| mask >> (signal as u32 - 1) & 1 == 1;
+    mask.is_some_and(|mask| holds_back(mask, Signal::SIGINT) && !holds_back(mask, Signal::SIGUSR1))
 }
 
 #[test]
