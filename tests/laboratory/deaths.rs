@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use nix::sys::signal::Signal;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::shared::{DEADLINE, answer, empty_folder, some_at_a_time};
 use super::{PRESS_CELL, no_orphan, running, running_with, signal};
@@ -93,12 +93,19 @@ fn every_kind_of_member_is_killed_from_outside_and_started_again_by_an_operator(
     let out = empty_folder("members");
     let (mut child, mut errors) = running(&out, &[]);
     let run = fs::canonicalize(out.join("latest")).expect("a run");
-    let members = ["press", "understudy", "press-io", "ram"];
-    for name in members {
+    let members = [
+        ("press", json!({"station": 1})),
+        ("understudy", json!({"station": 2})),
+        ("press-io", json!({"remote-io": 1})),
+        ("ram", json!({"plant": 1})),
+    ];
+    for (name, member) in members {
         let process = Records::of(&run).ready(name);
         let mut records = Records::of(&run);
         signal(process, Signal::SIGKILL);
-        let ended = records.wait_for("its end", |record| is(record, "laboratory", "ended"));
+        let ended = records.wait_for("its end", |record| {
+            is(record, "laboratory", "ended") && record["event"]["member"] == member
+        });
         assert_eq!(ended["event"]["how"], "signal: 9 (SIGKILL)", "{ended}");
         if name == "press" {
             let restored = |record: &Value| applied(record, "press-io", "reconstructed");
@@ -143,7 +150,7 @@ fn every_kind_of_member_is_killed_from_outside_and_started_again_by_an_operator(
     let summary: Value = serde_json::from_str(&summary).expect("JSON");
     let deaths = summary["deaths"].as_array().expect("a list");
     let names: Vec<&str> = deaths.iter().filter_map(|death| death["name"].as_str()).collect();
-    assert_eq!(names, members);
+    assert_eq!(names, ["press", "understudy", "press-io", "ram"]);
     assert_eq!(summary["violation_count"], 0);
     let (status, document) = operate(&run, "press", "restart");
     assert_eq!((status, code(&document)), (1, "U0557"), "{document:#}");

@@ -175,7 +175,7 @@ fn thousands_of_segments_are_read_in_seconds() {
     let folder = Folder::new("follow-thousands");
     let path = folder.join("journal.jsonl");
     for number in 1..=SEGMENTS {
-        let closed = folder.join(&format!("journal.{number:06}.jsonl"));
+        let closed = folder.join(format!("journal.{number:06}.jsonl"));
         fs::write(closed, [journal_header(number), line(number)].concat()).expect("written");
     }
     let text = [journal_header(SEGMENTS + 1), line(SEGMENTS + 1)].concat();
