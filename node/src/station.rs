@@ -56,6 +56,8 @@ pub struct Station {
     awaited: ProgramSet,
     /// Cycles in a row without a sample, for each replica; reported at a bound, and without effect on the cycle.
     unsampled: SmallVec<[u32; 2]>,
+    /// When the last cycle began that was looked at for samples.
+    looked_at: Time,
 }
 
 /// Who starts the cycles.
@@ -144,6 +146,7 @@ impl Station {
             lacked: ProgramSet::EMPTY,
             awaited: ProgramSet::EMPTY,
             unsampled: settings.runs().map(|_| 0).collect(),
+            looked_at: now,
             settings,
         };
         station.member.wake_at(station.next_wakeup());
@@ -336,6 +339,7 @@ impl Hash for Station {
             awaited,
             // Only reported.
             unsampled: _,
+            looked_at: _,
         } = self;
         (member, replicas).hash(hasher);
         (cycle, started, role, wanted).hash(hasher);

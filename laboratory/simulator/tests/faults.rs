@@ -204,6 +204,32 @@ fn one_member_with_another_configuration_keeps_no_cluster_from_its_start() {
     }
 }
 
+/// A station that stood still for seconds misses samples that its remote I/O has sent all the time: that is no remote I/O that is gone.
+#[test]
+fn a_station_that_stood_still_does_not_report_samples_as_missing() {
+    for station in [ROBOT, UNDERSTUDY] {
+        for (cycles, phase) in [150, 300, 450]
+            .into_iter()
+            .flat_map(|cycles| [0.0, 0.3, 0.6, 0.9].map(|phase| (cycles, phase)))
+        {
+            let mut simulation =
+                Simulation::new(press_cell::parts(Mode::Full, 1), Network::default(), 1);
+            for (at_cycle, action) in [(50, Action::Stop), (50 + cycles, Action::Continue)] {
+                simulation.schedule(Fault { at_cycle, phase, member: station, action });
+            }
+            let mut missing = Vec::new();
+            simulation
+                .run(800, 100, &mut |_, cycle, member, record| {
+                    if let Record::Station(Event::SamplesMissing { .. }) = record {
+                        missing.push((cycle, member));
+                    }
+                })
+                .expect("the cluster gets ready");
+            assert_eq!(missing, [], "{station:?} stood still for {cycles} cycles at {phase}");
+        }
+    }
+}
+
 /// Up to a slot and far beyond it: a slow station is late, then silent, and never wrong.
 #[test]
 fn a_slow_station_is_late_and_then_silent() {

@@ -43,6 +43,10 @@ impl Station {
     /// Reports the programs whose samples are missing, and those whose samples have returned.
     fn note_samples(&mut self, moment: Moment) {
         let agreement = &self.settings.agreement;
+        // One that stood still goes through what it has missed at once: those cycles took no time in which samples could come.
+        let began = self.member.clock.anchor();
+        let took_time = began.since(self.looked_at) >= agreement.schedule.period() / 2;
+        self.looked_at = began;
         // A remote I/O that starts listens first, longest where a station is missing.
         let bound = missing_after(agreement.schedule.period()).max(agreement.listen_cycles * 6);
         for (place, replica) in self.replicas.iter().enumerate() {
@@ -54,7 +58,7 @@ impl Station {
                     self.member.report(Event::SamplesReturned { moment, program });
                 }
                 *unsampled = 0;
-            } else if *unsampled < bound {
+            } else if took_time && *unsampled < bound {
                 *unsampled += 1;
                 if *unsampled == bound {
                     self.member.report(Event::SamplesMissing { moment, program });
