@@ -17,13 +17,13 @@ impl Hash for Simulation {
             wakeups: _,
             plants,
             referees,
-            // It only judges.
+            // They only judge.
             signals: _,
+            synchronised: _,
             tallies: _,
             ready,
             arrived,
             holders,
-            synchronised,
             misled,
             violations,
             faults,
@@ -31,8 +31,7 @@ impl Hash for Simulation {
             founded,
         } = self;
         (links, stations, remote_ios, plants, referees).hash(hasher);
-        (ready, arrived, holders, synchronised, misled, violations.len(), pace, founded)
-            .hash(hasher);
+        (ready, arrived, holders, misled, violations.len(), pace, founded).hash(hasher);
         for fault in faults {
             (fault.at_cycle, fault.phase.to_bits(), fault.member, fault.action).hash(hasher);
         }
