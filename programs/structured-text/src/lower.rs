@@ -144,7 +144,7 @@ struct Lowering<'a> {
     types: HashMap<String, TypeState<'a>>,
     /// Bounds of the variables that are subranges, by the places of their names.
     ranges: HashMap<Range<usize>, (i128, i128)>,
-    /// Names in capitals of INTERFACEs.
+    /// Names of what an INTERFACE declares, in capitals.
     interfaces: HashSet<String>,
     /// By the ids of the program's structures.
     structures: Vec<Rc<StructureInfo>>,
