@@ -16,6 +16,9 @@ pub(super) struct Misled {
     is_permitted: bool,
 }
 
+/// Cycles in which the last samples tell all members that a station is gone, at most.
+const CYCLES_TO_TELL: u32 = 6;
+
 /// Stations that had the state of a program when outputs of it were last applied.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) struct Synchronised {
@@ -65,7 +68,7 @@ impl Synchronised {
 
 impl Simulation {
     pub(super) fn judge(&mut self, program: ProgramId, event: &Event, observe: &mut Observe<'_>) {
-        if self.is_permitted(program, event) {
+        if self.may_be_misled(program, event) {
             self.ready.remove(program);
             self.tallies[program.index()].count(event);
             return;
@@ -76,9 +79,9 @@ impl Simulation {
             holder = found.map(|station| (*moment, station));
         }
         if let Event::Applied { source, .. } = event {
-            let holders = self.holders(program);
+            let with_state = self.with_state(program);
+            let holders = self.received_both_ways(program, with_state);
             if matches!(source, Source::Direct | Source::Reconstructed) {
-                let with_state = self.with_state(program);
                 let running = (0..).map(StationId).zip(&self.stations);
                 let running = running.filter(|(_, slot)| slot.running().is_some());
                 let running = running.map(|(station, _)| station).collect();
@@ -124,8 +127,8 @@ impl Simulation {
         self.tallies[program.index()].count(event);
     }
 
-    /// Whether a remote I/O with a wrong program may drive it, so that nothing that it applies is judged.
-    fn is_permitted(&mut self, program: ProgramId, event: &Event) -> bool {
+    /// Takes an event of a remote I/O, and tells whether it may drive a wrong program, so that nothing that it applies is judged.
+    fn may_be_misled(&mut self, program: ProgramId, event: &Event) -> bool {
         let Some(mut misled) = self.misled[program.index()] else {
             return false;
         };
@@ -186,7 +189,7 @@ impl Simulation {
     /// receive each other.
     fn holder_in_doubt(&self, program: ProgramId) -> Option<StationId> {
         let agreement = &self.parts.remote_ios[program.index()].agreement;
-        let known_after = agreement.flag_after + agreement.history as u32 + 6;
+        let known_after = agreement.flag_after + agreement.history as u32 + CYCLES_TO_TELL;
         let in_doubt = self.synchronised[program.index()].in_doubt(known_after);
         let holders = self.lasting_holders(program);
         let pairs = in_doubt.iter().flat_map(|from| in_doubt.iter().map(move |to| (from, to)));
@@ -201,20 +204,24 @@ impl Simulation {
     fn lasting_holders(&self, program: ProgramId) -> StationSet {
         let [_, last, earlier] = self.arrived[program.index()];
         let [held, held_before] = self.holders[program.index()];
-        self.holders(program).and(last).and(earlier).and(held).and(held_before)
+        let now = self.received_both_ways(program, self.with_state(program));
+        now.and(last).and(earlier).and(held).and(held_before)
     }
 
-    /// Those of [`Self::with_state`] that the remote I/O of a program can receive and that can receive it.
-    fn holders(&self, program: ProgramId) -> StationSet {
+    /// Those of `stations` that the remote I/O of a program can receive and that can receive it; none while it is down or has another
+    /// configuration, since they refuse each other then.
+    fn received_both_ways(&self, program: ProgramId, stations: StationSet) -> StationSet {
         let remote_io = Member::RemoteIo(program);
-        if self.remote_ios[program.index()].running().is_none() {
+        let running = self.remote_ios[program.index()].running();
+        let right = self.parts.remote_ios[program.index()].agreement.configuration;
+        if running.is_none_or(|it| it.configuration() != right) {
             return StationSet::EMPTY;
         }
         let reaches = |station: &StationId| {
             let station = Member::Station(*station);
             self.links.reaches(station, remote_io) && self.links.reaches(remote_io, station)
         };
-        self.with_state(program).iter().filter(reaches).collect()
+        stations.iter().filter(reaches).collect()
     }
 
     /// The stations that run with the right configuration and a state of a program that its next sample could extend.
