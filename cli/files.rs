@@ -122,10 +122,13 @@ impl ProgramText {
 /// The most files of a folder that are examined for those of a project.
 const MAXIMUM_FILES: usize = 20_000;
 
+/// Whether a path is the file of a TwinCAT project, by its end.
+pub(crate) fn is_project(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("plcproj"))
+}
+
 /// The files of a TwinCAT project, where the path is one: its file or its folder.
 fn project(path: &Path) -> Result<Option<Vec<PathBuf>>, Answer> {
-    let is_project =
-        |path: &Path| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("plcproj"));
     if !path.is_dir() {
         return if is_project(path) { named_by(path).map(Some) } else { Ok(None) };
     }

@@ -134,8 +134,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         found.add_joined(&parts[0], text, program, &looking);
     }
     for path in arguments.files.iter().filter(|path| !are_together(path)) {
-        if path.is_dir() || path.extension().is_some_and(|end| end.eq_ignore_ascii_case("plcproj"))
-        {
+        if path.is_dir() || files::is_project(path) {
             found.add_joined(path, ProgramText::of(path), program, &looking);
             continue;
         }
