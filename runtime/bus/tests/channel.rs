@@ -12,14 +12,14 @@ mod members;
 use std::fs;
 use std::net::{Ipv6Addr, SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};
-use std::thread::spawn;
+use std::thread::{JoinHandle, spawn};
 use std::time::{Duration, Instant, SystemTime};
 
 use members::{Chatter, endpoints, peers, station};
 use serde_json::json;
 use understudy_bus::{
-    Admitted, BusError, Call, ChannelSettings, Commands, DONE, Guard, LinesInEffect, LinkKind,
-    MemberSettings, NoField, Peer, Request, TlsKeys, run_member,
+    Admitted, BusError, Call, ChannelSettings, Commands, DONE, Endpoints, Guard, LinesInEffect,
+    LinkKind, MemberSettings, NoField, Peer, Request, Summary, TlsKeys, run_member,
 };
 use understudy_cycle::Mode;
 use understudy_keys::{Authority, Date, People};
@@ -91,6 +91,32 @@ fn router(folder: &Path, member: SocketAddr, own: SocketAddr) -> zenoh::Session 
     zenoh::open(config).wait().expect("a free port")
 }
 
+/// A member that runs with a channel for those who are admitted.
+fn member_with(
+    endpoints: Endpoints,
+    keys: TlsKeys,
+    admitted: fn() -> Admitted,
+) -> JoinHandle<Result<Summary, BusError>> {
+    spawn(move || {
+        let settings = MemberSettings {
+            endpoints,
+            link: LinkKind::Udp,
+            guard: Guard::Off,
+            channel: Some(ChannelSettings {
+                keys,
+                admitted: Box::new(admitted),
+                configuration: "what everybody has to agree on".into(),
+                in_effect: Box::new(NothingInEffect),
+            }),
+            field: Box::new(NoField),
+            commands: Commands::None,
+            ends_with_parent: false,
+            real_time: false,
+        };
+        run_member(Chatter::new(station(0), 1), settings, std::io::sink())
+    })
+}
+
 fn until<T>(what: &str, mut ask: impl FnMut() -> Result<T, BusError>) -> T {
     let started = Instant::now();
     loop {
@@ -108,30 +134,11 @@ fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
     peers[0].name = "robot".into();
     let endpoint = endpoints(station(0), &peers);
     let (member, hash) = (endpoint.own().address, endpoint.cluster());
-    let own = keys(&folder, "robot");
-    let running = spawn(move || {
-        let admitted = || Admitted {
-            engineers: vec!["site-router.1".into(), "shift-leader.1".into()],
-            operators: vec!["line-operator.1".into()],
-            viewers: Vec::new(),
-            members: vec!["robot.1".into()],
-        };
-        let settings = MemberSettings {
-            endpoints: endpoint,
-            link: LinkKind::Udp,
-            guard: Guard::Off,
-            channel: Some(ChannelSettings {
-                keys: own,
-                admitted: Box::new(admitted),
-                configuration: "what everybody has to agree on".into(),
-                in_effect: Box::new(NothingInEffect),
-            }),
-            field: Box::new(NoField),
-            commands: Commands::None,
-            ends_with_parent: false,
-            real_time: false,
-        };
-        run_member(Chatter::new(station(0), 1), settings, std::io::sink())
+    let running = member_with(endpoint, keys(&folder, "robot"), || Admitted {
+        engineers: vec!["site-router.1".into(), "shift-leader.1".into()],
+        operators: vec!["line-operator.1".into()],
+        viewers: Vec::new(),
+        members: vec!["robot.1".into()],
     });
     let call = |address, who: &str| Call::to(address, hash, "robot", &keys(&folder, who));
     let asked = |address, who: &str, request| call(address, who)?.ask(&request);
@@ -232,25 +239,9 @@ fn an_operator_reaches_a_member_with_an_ipv6_address() {
     let peers = [Peer { member: station(0), name: "robot".into(), address }];
     let endpoint = endpoints(station(0), &peers);
     let hash = endpoint.cluster();
-    let own = keys(&folder, "robot");
-    let running = spawn(move || {
-        let admitted = || Admitted { engineers: vec!["leader.1".into()], ..Admitted::default() };
-        let settings = MemberSettings {
-            endpoints: endpoint,
-            link: LinkKind::Udp,
-            guard: Guard::Off,
-            channel: Some(ChannelSettings {
-                keys: own,
-                admitted: Box::new(admitted),
-                configuration: "what everybody has to agree on".into(),
-                in_effect: Box::new(NothingInEffect),
-            }),
-            field: Box::new(NoField),
-            commands: Commands::None,
-            ends_with_parent: false,
-            real_time: false,
-        };
-        run_member(Chatter::new(station(0), 1), settings, std::io::sink())
+    let running = member_with(endpoint, keys(&folder, "robot"), || Admitted {
+        engineers: vec!["leader.1".into()],
+        ..Admitted::default()
     });
     let ask = |request| Call::to(address, hash, "robot", &keys(&folder, "leader"))?.ask(&request);
     let text = until("the member", || ask(Request::Configuration));
