@@ -209,7 +209,7 @@ impl Recorder {
         match &record.event {
             Happening::RemoteIo(RemoteIoEvent::Applied { moment, .. }) => self.origin(*moment),
             Happening::Station(StationEvent::Published { moment, .. }) => {
-                self.published.get_or_insert((*moment, Instant::now()));
+                self.published.get_or_insert_with(|| (*moment, Instant::now()));
             }
             _ => {}
         }
