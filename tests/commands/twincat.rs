@@ -21,7 +21,7 @@ fn the_files_of_a_project_are_one_program() {
     // Of a folder without a project, all files.
     assert_eq!(run(&["scan", ".", "--inputs", "inputs.txt"]).output, scanned);
     write("plc.plcproj", PROJECT);
-    // A file that the project does not name is none of it.
+    // A file that the project does not name is not read.
     write(
         "Old.TcPOU",
         "<TcPlcObject><POU Name=\"MAIN\"><Declaration>no</Declaration></POU></TcPlcObject>",

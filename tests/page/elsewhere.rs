@@ -87,7 +87,7 @@ fn protection_is_known_at_once_and_a_remote_io_that_is_gone_is_an_alarm() {
     let healthy = second.wait_for("the same at a second page", is_healthy);
     assert!(alarms(&healthy, NOT_DRIVEN).is_empty(), "{healthy:#}");
 
-    // Killed, and one that only stands still.
+    // One is killed, and one is suspended.
     for (name, signal) in [("robot-io", Signal::SIGKILL), ("press-io", Signal::SIGSTOP)] {
         let last = first.wait_for("cycles", |_| true);
         running.signal(name, signal);

@@ -102,7 +102,7 @@ impl Deployed {
         let own = self.keys.join("members").join(name);
         let journal = self.journal(name);
         for before in [&journal, &self.errors(name)] {
-            // Of the process before.
+            // What the previous process wrote.
             let _ = fs::remove_file(before);
         }
         let member = [command, text(cluster), "--name", name, "--keys", text(&own)];

@@ -110,7 +110,7 @@ fn a_state_that_a_living_station_holds_is_not_lost() {
 }
 
 /// A station that was gone comes back, and within a few cycles its remote I/O restarts, at each part of the cycle: the other station has the state,
-/// and nobody is asked.
+/// and the operator is not asked.
 #[test]
 fn a_station_that_has_just_returned_is_no_reason_to_ask() {
     const PHASES: [f64; 5] = [0.0, 0.2, 0.4, 0.6, 0.9];

@@ -40,7 +40,7 @@ impl<S> Checked<S> {
         Self { stream, received: Vec::new(), right: Vec::new(), exceptions: Vec::new() }
     }
 
-    /// Checks the first request that is received as a whole; false where there is none.
+    /// Checks the first request that is received as a whole; false where no whole request is received.
     fn check(&mut self) -> io::Result<bool> {
         let Some(head) = self.received.first_chunk::<HEAD>() else {
             return Ok(false);

@@ -1,4 +1,4 @@
-//! The records in effect of one member, repeated for whoever attaches to it while it runs.
+//! The records in effect of one member, repeated for viewers that attach to it while it runs.
 //!
 //! ```text
 //!   {"in_effect":{…record…}}
@@ -22,7 +22,7 @@ struct Line<R> {
 /// The beginning of a line of a repetition.
 const BEGINS: &str = "{\"in_effect\":";
 
-/// What happens in every cycle, and is in effect never: such a line is not parsed.
+/// What happens in every cycle, and is never in effect: such a line is not parsed.
 const EVERY_CYCLE: [&str; 3] = ["\"sampled\"", "\"applied\"", "\"holds\""];
 
 /// What ends the joining of a station, and is parsed for that alone.

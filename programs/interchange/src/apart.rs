@@ -20,7 +20,7 @@ use crate::written::{WriteError, Written, write};
 pub struct Apart {
     /// What it is; never a library.
     pub source: Source,
-    /// From one scan to the next, where the file says so.
+    /// Its scan period, where the file states one.
     pub period: Option<Duration>,
     /// A text of its own and its form, where the file has other programs too.
     pub written: Option<Result<(Format, Written), WriteError>>,

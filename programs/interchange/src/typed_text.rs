@@ -64,7 +64,7 @@ pub fn typed_text(
             };
             let style = |unit: &Unit| bodies.style(drawn.get(&unit.name.key()).copied());
             let document = match document(&file, &read, wanted, &style) {
-                // Networks that are not the statements are none: a text is.
+                // Networks that differ from the statements are replaced by the text.
                 Err(WriteError::Different(_)) => {
                     document(&file, &read, wanted, &|_| None).map(|(printed, _, scans)| {
                         let units = file.units.iter().filter(|unit| style(unit).is_some());

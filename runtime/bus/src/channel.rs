@@ -93,7 +93,7 @@ pub struct ChannelSettings {
     pub in_effect: Box<dyn LinesInEffect>,
 }
 
-/// The lines of a journal that are in effect: they are repeated for whoever attaches while the member runs.
+/// The lines of a journal that are in effect: they are repeated for viewers that attach while the member runs.
 pub trait LinesInEffect: Send {
     /// Takes the next line of the journal.
     fn note(&mut self, line: &[u8]);
@@ -246,7 +246,7 @@ impl<E: Send + 'static> Channel<E> {
                 continue;
             }
             looked = now;
-            // Whoever attaches now knows the present soon, and not when something changes.
+            // A viewer that attaches now knows the present soon, and not when something changes.
             let repetition = self.settings.in_effect.repetition();
             if let Some(opened) = opened.as_ref().filter(|_| !repetition.is_empty()) {
                 let _ = opened.journal.put(repetition).wait();

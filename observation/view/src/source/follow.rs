@@ -65,7 +65,7 @@ impl Listed {
         for (number, path) in closed {
             let segment = known.remove(number).or_else(|| {
                 let length = SegmentFile::open(path).and_then(|file| file.text_bytes());
-                // One that is gone is none of what is ahead.
+                // One that is gone is not ahead.
                 Some((path.clone(), length.ok()?))
             });
             self.segments.extend(segment.map(|segment| (*number, segment)));

@@ -103,7 +103,7 @@ fn fault(at: u64, station: &str, action: &str) -> String {
     format!("[[step]]\nat = {at}\nstation = \"{station}\"\naction = \"{action}\"\n")
 }
 
-/// Nobody drives the plant of a remote I/O that is dead or suspended: an alarm within two seconds, from the stations that live, until it is back.
+/// The plant of a remote I/O that is dead or suspended is not driven: an alarm within two seconds, from the stations that live, until it is back.
 #[test]
 fn a_remote_io_that_sends_no_samples_is_an_alarm() {
     for (ends, begins) in [("crash", "restart"), ("stop", "continue")] {

@@ -27,9 +27,9 @@ const MAXIMUM_ELEMENTS: u64 = 1_000;
 pub(super) struct Elements {
     /// By their addresses: the element, such as `lamps[3]`, and where its array is declared.
     known: HashMap<String, (String, Span)>,
-    /// From points into arrays.
+    /// Statements that copy points into the arrays of inputs.
     before: Vec<Statement>,
-    /// From arrays into points.
+    /// Statements that copy the arrays of outputs into points.
     behind: Vec<Statement>,
 }
 

@@ -183,7 +183,7 @@ rung \"each input is on for half a round\"
 }
 
 impl Round {
-    /// That of so many inputs, at least one.
+    /// The round of this number of inputs, at least one.
     pub(super) fn of(inputs: usize, period: Duration) -> Self {
         let half = inputs.min(MAXIMUM_PRESET_VALUE as usize / 2);
         let cycles = (ROUND_CYCLES / (2 * half)).clamp(2, 10);

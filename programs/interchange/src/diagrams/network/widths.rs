@@ -16,7 +16,7 @@ const NARROW: [(&str, u32); 6] =
 /// What is done with a value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Use {
-    /// So many of its low bits are taken.
+    /// That number of its low bits is taken.
     Cut(u32),
     /// It is cut to its own type.
     Own,
