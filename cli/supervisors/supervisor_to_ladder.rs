@@ -6,10 +6,11 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use understudy_ladder::print;
 use understudy_supervisor::ladder::{
-    Conversion, InputOutputMap, Located, Mode, Modules, convert, read_map, table,
+    Conversion, InputOutputMap, Located, Mode, Modules, OneEvent, convert, read_map, table,
 };
 use understudy_supervisor::proof::{
-    Finding, FindingSeverity, ProofSettings, Proving, Verdict, findings, prove_with_progress,
+    Counterexample, Deviation, Finding, FindingSeverity, ProofSettings, Proving, Verdict, findings,
+    prove_with_progress,
 };
 use understudy_supervisor::{Automaton, Label, Model, Signal};
 use understudy_text::{Diagnostic, Report};
@@ -25,6 +26,7 @@ use crate::supervisors::automata::{self, Sources};
 #[command(after_help = "\
 Example:
   understudy supervisor-to-ladder examples/motivating-example/supervisor.ADS --io examples/motivating-example/map.toml --mode manual -o motivating.ladder
+  understudy supervisor-to-ladder examples/avalanche/figure-7.toml --one-event queue --priority d,f
 
 The supervisor is a TCT automaton (.ADS) or a model (.toml) with supervisors. A reduced supervisor does not track the state of its plant;
 supply the plants by --plant. Findings about the supervisor are warnings, unless no ladder program can implement it. The ladder is written
@@ -40,6 +42,12 @@ pub(crate) struct Arguments {
     /// Selection among enabled commands
     #[arg(long, value_enum, default_value = "automatic")]
     mode: ModeWord,
+    /// Process at most one event in a scan
+    #[arg(long, value_enum, value_name = "HOW")]
+    one_event: Option<OneEventWord>,
+    /// Events that have their turn first, in this order; the others follow by label
+    #[arg(long, value_name = "EVENT", value_delimiter = ',')]
+    priority: Vec<String>,
     /// Plants that the ladder tracks in addition to the supervisor
     #[arg(long = "plant", value_name = "FILE", num_args = 1..)]
     plants: Vec<PathBuf>,
@@ -59,6 +67,14 @@ enum ModeWord {
     Manual,
     /// By the operator, always
     Requested,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum OneEventWord {
+    /// Events wait for their turn; a counter has those that come again while they wait
+    Queue,
+    /// The inputs bring at most one event in a scan, and no rung checks it
+    Assume,
 }
 
 impl From<ModeWord> for Mode {
@@ -82,7 +98,9 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     }
     let supervisors =
         some(&arguments.supervisor, supervisor.model.supervisors.clone(), "supervisor")?;
-    let (map, report) = read_signals(arguments, &supervisors, &plants, supervisor, signals)?;
+    let (mut map, report) = read_signals(arguments, &supervisors, &plants, supervisor, signals)?;
+    map.one_event = one_event(arguments)?;
+    let map = map;
     let name = |automata: Vec<Automaton>| -> Vec<Automaton> {
         automata.into_iter().map(|automaton| map.name_events(automaton)).collect()
     };
@@ -91,7 +109,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     let mode = Mode::from(arguments.mode);
     let conversion = convert(&modules, &map, mode)
         .map_err(|diagnostics| bad_map(report.clone(), diagnostics))?;
-    let found = findings(&modules)?;
+    let found = findings(&modules, Some(&map))?;
     let settings = ProofSettings { mode, ..ProofSettings::default() };
     let patience = Patience::new(None, console);
     let mut report = |at: Proving| {
@@ -108,7 +126,24 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         settings,
         &mut report,
     )?;
+    if arguments.output.is_none() && matches!(verdict, Verdict::Proved(_)) {
+        // The answer is the ladder alone.
+        notes(&found).lines().for_each(|line| console.note(line));
+    }
     Ok(answer(arguments, &modules, &conversion, &found, verdict))
+}
+
+fn one_event(arguments: &Arguments) -> Result<Option<OneEvent>, Answer> {
+    let order = arguments.priority.iter().map(|event| event.as_str().into()).collect();
+    match arguments.one_event {
+        Some(OneEventWord::Queue) => Ok(Some(OneEvent::Queued(order))),
+        _ if !arguments.priority.is_empty() => {
+            let message = "--priority is the order of events that wait; add `--one-event queue`";
+            Err(Answer::failed(Status::BadInput, "U0600", message))
+        }
+        Some(OneEventWord::Assume) => Ok(Some(OneEvent::Assumed)),
+        None => Ok(None),
+    }
 }
 
 /// An input file: a model, or a TCT automaton in each of its roles.
@@ -221,6 +256,11 @@ pub(crate) fn withheld(found: &[Finding], result: &Value) -> Option<Answer> {
     }))
 }
 
+/// Whether a run ends in a scan with several events that it does not process as an order of them would.
+fn has_two_events(counterexample: &Counterexample) -> bool {
+    counterexample.deviation == Deviation::NotAllowed && counterexample.last.events.len() > 1
+}
+
 fn answer(
     arguments: &Arguments,
     modules: &Modules,
@@ -243,7 +283,10 @@ fn answer(
         Verdict::Proved(proof) => proof,
         Verdict::Refuted(counterexample) => {
             result["counterexample"] = Value::String(counterexample.to_string());
-            let message = format!("the ladder violates the supervisor:\n{counterexample}");
+            let mut message = format!("the ladder violates the supervisor:\n{counterexample}");
+            if arguments.one_event.is_none() && has_two_events(&counterexample) {
+                message.push_str("no order of the rungs serves two events in one scan in every state; `--one-event queue` processes one in a scan");
+            }
             return Answer::done(notes, result).and_failure(Status::Failed, "U0875", message);
         }
     };

@@ -198,6 +198,41 @@ fn the_papers_small_automata_have_their_avalanche_events_and_ladders_without() {
     }
 }
 
+/// Figures 11 to 13 of the paper, whose inputs bring all events; what two events in one scan do is said.
+#[test]
+fn the_papers_figures_have_their_ladders() {
+    let ladder = |number: u32, more: &[&str]| {
+        let model = format!("examples/avalanche/figure-{number}.toml");
+        let map = "examples/avalanche/start.toml";
+        understudy(&[&["supervisor-to-ladder", &model, "--io", map, "--json"], more].concat())
+    };
+    for (number, more, rungs) in [(4, &[][..], 6), (6, &[], 5), (7, &["--one-event", "assume"], 20)]
+    {
+        let result = &ladder(number, more).json()["result"];
+        assert_eq!(result["rungs"], rungs, "figure {number}: {result}");
+    }
+    let refuted = ladder(7, &[]).json();
+    let message = refuted["failures"][0]["message"].as_str().expect("a message");
+    assert!(message.contains("--one-event queue"), "{message}");
+    let queue = ladder(7, &["--one-event", "queue", "--priority", "f,d"]).json();
+    let findings = queue["result"]["findings"].as_array().expect("a list");
+    let order = findings.iter().find(|finding| finding["code"] == "U0877").expect("the bound");
+    assert_eq!(order["events"], json!([12, 8, 2, 4, 6, 10]), "{order}");
+    let wrong = ladder(7, &["--one-event", "assume", "--priority", "f"]);
+    assert_eq!(wrong.status, 2, "{}", wrong.output);
+    let unknown = ladder(7, &["--one-event", "queue", "--priority", "g"]);
+    assert!(unknown.output.contains("U0851"), "{}", unknown.output);
+}
+
+/// What there is to know about a ladder is said where it goes to standard output, too.
+#[test]
+fn warnings_of_a_printed_ladder_are_said() {
+    let file = "examples/avalanche/figure-7.toml";
+    let answer = understudy(&["supervisor-to-ladder", file, "--one-event", "queue"]);
+    assert!(answer.errors.contains("warning[U0877]"), "{}", answer.errors);
+    assert!(!answer.output.contains("warning["), "{}", answer.output);
+}
+
 /// As in the README; each ladder is proved again on the way.
 #[test]
 fn the_boilers_ladders_are_made_from_their_models() {

@@ -9,7 +9,8 @@
 //!   automaton has a bit of its own where several share the event;
 //! - events come before commands, and there is at most one command, so that the plant sees each and can answer it;
 //! - of two events in one scan neither is lost where the model has an order for them: the groups of rungs stand in that
-//!   order, and where no order serves all states, a group stands again below the one that it waits for.
+//!   order, and where no order serves all states, a group stands again below the one that it waits for. There are automata
+//!   that no order of groups serves; for these a scan can have at most one event ([`OneEvent`]).
 //!
 //! Self-loops of events have no rung (assumption 3 of the thesis): they change neither the state nor what is enabled.
 
@@ -29,8 +30,8 @@ pub use addresses::{Located, locate};
 pub use avalanche::{Repetition, avalanche_events, repetitions};
 pub use convert::{Conversion, Correspondence, convert};
 pub use map::{
-    Agent, EventName, InputEvent, InputOutputMap, Mode, Position, Pulse, Request, Switch, Timer,
-    When,
+    Agent, EventName, InputEvent, InputOutputMap, Mode, OneEvent, Position, Pulse, Request, Switch,
+    Timer, When,
 };
 pub use omega::{Row, Trigger, omega, table};
 pub use partition::{Meaning, Modules, Partition};
@@ -38,3 +39,4 @@ pub use read::{ReadMap, read_map};
 
 pub(crate) use addresses::{check_signals, read_addresses};
 pub(crate) use names::{ILLEGAL_NAME, Names, is_legal};
+pub(crate) use positions::Positions;

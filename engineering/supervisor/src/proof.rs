@@ -11,6 +11,7 @@ mod explore;
 mod findings;
 mod hybrid;
 mod reference;
+mod relevant;
 mod timers;
 mod verdict;
 mod view;

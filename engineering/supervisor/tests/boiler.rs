@@ -54,7 +54,7 @@ fn check(text: &str, map_text: &str, ladder: &str, thesis: &str) -> String {
         Verdict::Refuted(counterexample) => panic!("{counterexample}"),
     };
     assert_eq!(print(&conversion.program), ladder, "the ladder in examples/boiler is another one");
-    let found = findings(&modules).expect("small");
+    let found = findings(&modules, None).expect("small");
     let messages = found.iter().map(|finding| format!("{} {}", finding.code(), finding.message));
     format!(
         "{counts}\n{} rungs, proved over {} states\n{}",

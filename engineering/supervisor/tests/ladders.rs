@@ -42,7 +42,7 @@ fn findings_are_those_of_the_reference() {
         let supervisors = [automaton(model, "_SUPER")];
         let plants = Model::read(model).plants;
         let modules = Modules { supervisors: &supervisors, plants: &plants };
-        let found = findings(&modules).expect("small enough");
+        let found = findings(&modules, None).expect("small enough");
         let has = |kind| found.iter().any(|finding| finding.kind == kind);
         assert!(!has(FindingKind::Controllability), "{model}");
         assert_eq!(!has(FindingKind::Blocking), expected["nonblocking"], "{model}");

@@ -1,7 +1,15 @@
-//! What is wrong with a map of signals, all of it in one run.
+//! What is wrong with a map of signals, all of it in one run, and what its signals cannot show.
 
-use understudy_supervisor::ladder::{InputOutputMap, Mode, Modules, Partition, convert, read_map};
-use understudy_supervisor::{Automaton, read_ads, read_model};
+use std::time::Duration;
+
+use proptest::prelude::*;
+use understudy_ladder::{Interpreter, Name};
+use understudy_supervisor::ladder::{
+    Agent, InputEvent, InputOutputMap, Mode, Modules, Partition, Position, Switch, When, convert,
+    read_map,
+};
+use understudy_supervisor::proof::{Finding, FindingKind, findings};
+use understudy_supervisor::{Automaton, Event, Label, State, Transition, read_ads, read_model};
 use understudy_text::{Diagnostic, Report};
 
 fn shown(text: &str, diagnostics: Vec<Diagnostic>) -> String {
@@ -200,4 +208,127 @@ fn signals_of_a_model_are_a_map() {
     down  plant: done when it becomes 1; lifted when it becomes 0
     lower  on since start
     ");
+}
+
+const HEATER: &str = "\
+[events]
+a = { controllable = false }
+h = { controllable = true }
+c = { controllable = true }
+
+[[supervisor]]
+name = \"heater\"
+marked = \"all\"
+transitions = [\"s0 a s1\", \"s1 h s2\", \"s2 a s0\", \"s1 c s0\"]
+";
+
+fn heater_map() -> InputOutputMap {
+    let text = "program = \"heater\"\n[[input]]\nevent = \"a\"\nsignal = \"x_a\"\n\
+                [[switch]]\noff = \"c\"\npositions = [{ event = \"h\", signal = \"x_h\" }]\n";
+    read_map(text).map.expect("a map")
+}
+
+fn latched_again(modules: &Modules, map: &InputOutputMap) -> Vec<Finding> {
+    let found = findings(modules, Some(map)).expect("small");
+    found.into_iter().filter(|found| found.kind == FindingKind::LatchedAgain).collect()
+}
+
+/// Assumption 4 of the thesis: `x_h` stays on from one h to the next, so the second one has no edge.
+#[test]
+fn a_command_whose_signal_is_on_is_found_with_its_run() {
+    let model = read_model(HEATER, |_| Err(String::new())).model.expect("a model");
+    let map = heater_map();
+    let alone = Modules::supervisor(&model.supervisors[0]);
+    let beside = Modules { supervisors: &model.supervisors, plants: &model.supervisors };
+    let said = [alone, beside].map(|modules| latched_again(&modules, &map).remove(0).message);
+    insta::assert_snapshot!(said.join("\n"));
+    // With a c in between there is nothing to find.
+    let text = HEATER.replace("s2 a s0", "s2 c s0").replace(", \"s1 c s0\"", "");
+    let model = read_model(&text, |_| Err(String::new())).model.expect("a model");
+    assert_eq!(latched_again(&Modules::supervisor(&model.supervisors[0]), &map), []);
+}
+
+/// The pulse of a command that follows itself at once has one edge for two commands, and is found; with an event in between it is not.
+#[test]
+fn a_pulse_that_follows_itself_is_found() {
+    for (transitions, is_found) in [
+        ("\"s0 a s1\", \"s1 h s2\", \"s2 h s0\"", true),
+        ("\"s0 a s1\", \"s1 h s2\", \"s2 a s3\", \"s3 h s0\"", false),
+    ] {
+        let (head, _) = HEATER.split_once("transitions").expect("transitions");
+        let text = format!(
+            "{}transitions = [{transitions}]\n",
+            head.replace("c = { controllable = true }\n", "")
+        );
+        let model = read_model(&text, |_| Err(String::new())).model.expect("a model");
+        let modules = Modules::supervisor(&model.supervisors[0]);
+        let map = InputOutputMap::direct("heater", &modules.alphabet());
+        let found = latched_again(&modules, &map);
+        assert_eq!(!found.is_empty(), is_found, "{found:?}");
+        let made = convert(&modules, &map, Mode::Automatic).expect("the map fits");
+        let mut run = Interpreter::new(&made.program, Duration::from_millis(10)).expect("a ladder");
+        let on = [true, false, false].map(|event| run.scan(&[event])[0]);
+        assert_eq!(on, [true, is_found, false]);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// A run of a finding leads to its command, and a command that is seen twice in a row on any run is found. Events 0 and 2;
+    /// commands 1, which is off, and 3 and 5, which are positions.
+    #[test]
+    fn commands_without_an_edge_are_those_that_are_found(
+        targets in proptest::collection::vec(proptest::option::weighted(0.5, 0_u32..4), 20),
+        choices in proptest::collection::vec(0_usize..20, 200),
+    ) {
+        let labels = [0, 1, 2, 3, 5].map(Label::new);
+        let steps = targets.iter().enumerate().filter_map(|(cell, target)| {
+            let source = State::new(cell as u32 / 5);
+            Some(Transition { source, label: labels[cell % 5], target: State::new((*target)?) })
+        });
+        let events = labels.map(Event::unnamed);
+        let automaton = Automaton::new("random", events, vec![true; 4], steps.collect());
+        let automaton = automaton.expect("deterministic");
+        let name = |label: usize| Name::from(labels[label].to_string());
+        let input = |label: usize, signal: &str| InputEvent {
+            event: name(label),
+            signal: signal.into(),
+            when: When::Rising,
+            by: Agent::Plant,
+        };
+        let position = |label: usize, signal: &str| Position { event: name(label), signal: signal.into() };
+        let map = InputOutputMap {
+            program: "random".into(),
+            inputs: vec![input(0, "u0"), input(2, "u2")],
+            switches: vec![Switch {
+                off: Some(name(1)),
+                positions: vec![position(3, "y3"), position(4, "y5")],
+                memory: false,
+            }],
+            ..InputOutputMap::default()
+        };
+        let found = latched_again(&Modules::supervisor(&automaton), &map);
+        let at = |label: Label| [1, 3, 5].iter().position(|&number| number == label.number());
+        for finding in &found {
+            let command = finding.events[0];
+            let mut state = State::INITIAL;
+            let mut position = 0;
+            for &label in &finding.run {
+                state = automaton.step(state, label).expect("a run");
+                position = at(label).unwrap_or(position);
+            }
+            prop_assert_eq!(Some(position), at(command));
+            prop_assert!(automaton.step(state, command).is_some_and(|target| target != state));
+        }
+        let (mut state, mut position) = (State::INITIAL, 0);
+        for choice in choices {
+            let label = labels[choice % 5];
+            let Some(target) = automaton.step(state, label) else { continue };
+            let is_again = at(label).is_some_and(|at| at > 0 && at == position) && target != state;
+            prop_assert!(!is_again || found.iter().any(|finding| finding.events == [label]));
+            position = at(label).unwrap_or(position);
+            state = target;
+        }
+    }
 }

@@ -132,7 +132,7 @@ proptest! {
             }
         }
         if let Verdict::Refuted(found) = verdict(&conversion, &modules, &map, mode, 2) {
-            let known = findings(&modules).expect("small");
+            let known = findings(&modules, Some(&map)).expect("small");
             prop_assert!(
                 known.iter().any(|finding| finding.kind == FindingKind::Simultaneity),
                 "{}\n{found}", understudy_ladder::print(&conversion.program)
@@ -150,7 +150,7 @@ proptest! {
     ) {
         let (supervisors, plants) = automata.split_at(automata.len() - plants);
         let modules = Modules { supervisors, plants };
-        let known = findings(&modules).expect("small");
+        let known = findings(&modules, None).expect("small");
         let whens = [When::Pulse, When::Rising, When::Falling];
         let map = map(whens, start, &modules);
         let conversion = convert(&modules, &map, mode).expect("the map fits");

@@ -1,5 +1,6 @@
 //! From automata to rungs.
 
+mod queue;
 mod several;
 mod single;
 
@@ -9,10 +10,10 @@ use understudy_ladder::{Block, BlockKind, Coil, Element, Name, Program, Signal};
 use understudy_text::Diagnostic;
 
 use super::addresses::locate;
-use super::map::{Agent, InputOutputMap, Mode, When};
+use super::map::{Agent, InputOutputMap, Mode, OneEvent, When};
 use super::names::Names;
 use super::omega::{Row, omega};
-use super::order::{Group, groups};
+use super::order::{Group, groups, single_groups};
 use super::partition::{Meaning, Modules, Partition};
 use super::rung::{closed, open, reset, rising, rung, set, write};
 use crate::{Automaton, Label, State};
@@ -27,6 +28,8 @@ pub struct Correspondence {
     pub states: Vec<Vec<Name>>,
     /// x^σ of each command that waits for a request in some state.
     pub requests: BTreeMap<Label, Name>,
+    /// The bit that is on while an event waits for its turn.
+    pub waiting: BTreeMap<Label, Name>,
 }
 
 /// A ladder and where it comes from.
@@ -82,6 +85,10 @@ struct Converter<'a> {
     started: Option<Name>,
     /// On when this scan has generated a command.
     commanded: Option<Name>,
+    /// The bit of each event that waits for its turn.
+    waiting: BTreeMap<Label, Name>,
+    /// On while an event waits for its turn.
+    queued: Option<Name>,
 }
 
 impl<'a> Converter<'a> {
@@ -97,7 +104,10 @@ impl<'a> Converter<'a> {
             mode,
             automata: modules.all().collect(),
             modules: *modules,
-            groups: groups(modules),
+            groups: match map.one_event {
+                Some(_) => single_groups(modules),
+                None => groups(modules),
+            },
             names: Names::default(),
             program: Program { name: map.program.clone(), ..Program::default() },
             states: Vec::new(),
@@ -108,6 +118,8 @@ impl<'a> Converter<'a> {
             are_named: Vec::new(),
             started: None,
             commanded: None,
+            waiting: BTreeMap::new(),
+            queued: None,
         };
         converter.declare_signals();
         converter.declare_states();
@@ -119,9 +131,16 @@ impl<'a> Converter<'a> {
         self.begin_scan();
         self.start();
         self.timers();
+        self.queue();
         match rows.as_slice() {
             [rows] => self.single(rows),
             _ => self.several(),
+        }
+        if self.map.one_event.is_some() {
+            for bit in std::mem::take(&mut self.left) {
+                let title = format!("reset {bit}, which no state has used");
+                self.push(&title, Vec::new(), vec![reset(&bit)]);
+            }
         }
         if !self.left.is_empty() {
             let coils = self.left.iter().map(reset).collect();
@@ -131,7 +150,11 @@ impl<'a> Converter<'a> {
             program: self.program,
             rows,
             consumed: self.consumed.into_iter().collect(),
-            correspondence: Correspondence { states: self.states, requests: self.requests },
+            correspondence: Correspondence {
+                states: self.states,
+                requests: self.requests,
+                waiting: self.waiting,
+            },
         }
     }
 
@@ -144,9 +167,25 @@ impl<'a> Converter<'a> {
                 format!("{} ({states} states, {transitions} transitions)", automaton.name())
             })
             .collect();
+        let scan = match &self.map.one_event {
+            None => {
+                "Each scan evaluates the events, then generates at most one command.".to_owned()
+            }
+            Some(OneEvent::Assumed) => {
+                "Right only where at most one event occurs in a scan.".to_owned()
+            }
+            Some(OneEvent::Queued(_)) => {
+                let order = self.partition.queue().iter().map(|&label| self.event_name(label));
+                format!(
+                    "Each scan processes one event, the first possible one of {}; then it generates at most one command, if no event waits. None is lost if none of them comes twice within {} scans.",
+                    order.collect::<Vec<_>>().join(", "),
+                    self.partition.queue().len()
+                )
+            }
+        };
         self.program.comments = vec![
             format!("Generated from {}.", names.join(", ")),
-            "One bit for each state; exactly one of them is on. Each scan evaluates the events, then generates at most one command.".into(),
+            format!("One bit for each state; exactly one of them is on. {scan}"),
         ];
     }
 

@@ -33,6 +33,17 @@ pub struct InputOutputMap {
     pub requests: Vec<Request>,
     /// Where signals are in the PLC.
     pub addresses: Vec<Located>,
+    /// How the program keeps to at most one event in a scan; none where it processes all events of a scan.
+    pub one_event: Option<OneEvent>,
+}
+
+/// How a program keeps to at most one event in a scan.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum OneEvent {
+    /// The inputs bring at most one event in a scan; no rung checks it.
+    Assumed,
+    /// Events wait for their turn. These come first, in this order; the others follow by ascending label.
+    Queued(Vec<Name>),
 }
 
 /// What people call an event.

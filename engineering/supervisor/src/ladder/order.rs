@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::partition::Modules;
-use crate::{Label, State};
+use crate::{Automaton, Label, State};
 
 /// The rungs of one event.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -17,17 +17,25 @@ pub(crate) struct Group {
     pub(crate) again: bool,
 }
 
+/// The uncontrollable events that move something.
+pub(crate) fn moving(modules: &Modules) -> BTreeSet<Label> {
+    let transitions = modules.all().flat_map(Automaton::transitions);
+    transitions
+        .filter(|transition| {
+            !transition.label.is_controllable() && transition.source != transition.target
+        })
+        .map(|transition| transition.label)
+        .collect()
+}
+
+/// The groups of all uncontrollable events that move something, where at most one of them is processed in a scan.
+pub(crate) fn single_groups(modules: &Modules) -> Vec<Group> {
+    moving(modules).into_iter().map(|label| Group { label, again: false }).collect()
+}
+
 /// The groups of all uncontrollable events that move something, from the first rung to the last.
 pub(crate) fn groups(modules: &Modules) -> Vec<Group> {
-    let automata: Vec<_> = modules.all().collect();
-    let mut moving = BTreeSet::new();
-    for automaton in &automata {
-        for transition in automaton.transitions() {
-            if !transition.label.is_controllable() && transition.source != transition.target {
-                moving.insert(transition.label);
-            }
-        }
-    }
+    let moving = moving(modules);
     let (enables, saves) = before(modules, &moving);
     let mut waiting: BTreeMap<Label, BTreeSet<Label>> =
         moving.iter().map(|&label| (label, BTreeSet::new())).collect();

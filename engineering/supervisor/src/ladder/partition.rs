@@ -6,8 +6,9 @@ use understudy_ladder::Name;
 use understudy_text::Diagnostic;
 use understudy_text::spelling;
 
-use super::map::InputOutputMap;
+use super::map::{InputOutputMap, OneEvent, When};
 use super::names::{ILLEGAL_NAME, is_legal};
+use super::order::moving;
 use crate::{Alphabet, Automaton, Event, Label};
 
 /// The most positions that a switch has, besides off.
@@ -87,6 +88,7 @@ pub enum Meaning {
 pub struct Partition {
     meanings: BTreeMap<Label, Meaning>,
     requests: BTreeMap<Label, Name>,
+    queue: Vec<Label>,
 }
 
 impl Partition {
@@ -95,7 +97,8 @@ impl Partition {
     /// # Errors
     /// All that is wrong: U0851 an unknown event, U0852 an event with two meanings, U0853 one without, U0854 a command that is
     /// uncontrollable or an input that is controllable, U0855 an illegal name, U0856 a signal with two meanings, U0857 a timer
-    /// on a signal that no switch has, U0858 an automaton without states, U0859 too many positions, or none.
+    /// on a signal that no switch has, U0858 an automaton without states, U0859 too many positions, or none, U0868 an event by
+    /// level where a scan has at most one event.
     pub fn new(map: &InputOutputMap, modules: &Modules) -> Result<Self, Vec<Diagnostic>> {
         let alphabet = modules.alphabet();
         let given = map
@@ -125,6 +128,7 @@ impl Partition {
         resolver.inputs(map);
         resolver.commands(map);
         let requests = resolver.requests(map);
+        let queue = resolver.queue(map, modules);
         resolver.missing();
         if resolver.diagnostics.is_empty() {
             Ok(Self {
@@ -134,6 +138,7 @@ impl Partition {
                     .map(|(label, (meaning, _))| (label, meaning))
                     .collect(),
                 requests,
+                queue,
             })
         } else {
             Err(resolver.diagnostics)
@@ -148,6 +153,11 @@ impl Partition {
     /// All events, ascending.
     pub fn labels(&self) -> impl Iterator<Item = Label> + '_ {
         self.meanings.keys().copied()
+    }
+
+    /// The events that wait for their turn, the first the one that is processed first; empty where none waits.
+    pub fn queue(&self) -> &[Label] {
+        &self.queue
     }
 
     /// x^σ of a command, where the map names one.
@@ -251,6 +261,40 @@ impl Resolver<'_> {
             }
         }
         requests
+    }
+
+    /// The order of the events that wait for their turn.
+    fn queue(&mut self, map: &InputOutputMap, modules: &Modules) -> Vec<Label> {
+        let Some(one_event) = &map.one_event else {
+            return Vec::new();
+        };
+        for input in map.inputs.iter().filter(|input| matches!(input.when, When::High | When::Low))
+        {
+            let message = format!(
+                "the event `{}` is the level of `{}`, so it occurs in every scan; with one event in a scan no other one would be processed",
+                input.event, input.signal
+            );
+            self.diagnostics.push(
+                Diagnostic::error("U0868", message, input.event.span())
+                    .with_help("make it a change: when = \"rising\", \"falling\" or \"pulse\""),
+            );
+        }
+        let OneEvent::Queued(first) = one_event else {
+            return Vec::new();
+        };
+        let moving = moving(modules);
+        let mut queue = Vec::new();
+        for event in first {
+            if let Some(label) = self.label(event) {
+                self.direction(event, label, false);
+                if moving.contains(&label) && !queue.contains(&label) {
+                    queue.push(label);
+                }
+            }
+        }
+        let rest: Vec<Label> = moving.into_iter().filter(|label| !queue.contains(label)).collect();
+        queue.extend(rest);
+        queue
     }
 
     fn missing(&mut self) {

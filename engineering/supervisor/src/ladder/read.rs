@@ -122,6 +122,7 @@ fn map(form: &mut Form<'_>, table: &DeTable) -> InputOutputMap {
             }
         }),
         addresses: read_addresses(form, table),
+        one_event: None,
     }
 }
 

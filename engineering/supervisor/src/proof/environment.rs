@@ -7,7 +7,7 @@ use understudy_ladder::Name;
 use super::reference::Happening;
 use super::timers::FreeTimer;
 use crate::Label;
-use crate::ladder::{Correspondence, InputOutputMap, Meaning, Partition, When};
+use crate::ladder::{Correspondence, InputOutputMap, Meaning, OneEvent, Partition, When};
 
 /// An input and how it may change.
 #[derive(Debug, Clone)]
@@ -29,6 +29,8 @@ pub(super) struct Environment {
     /// Event, input, and what of it.
     events: Vec<(Label, usize, When)>,
     simultaneous: usize,
+    /// Whether a scan has at most one event.
+    one_event: bool,
 }
 
 impl Environment {
@@ -73,6 +75,7 @@ impl Environment {
             requests: requests.filter_map(|(&label, name)| Some((label, at(name)?))).collect(),
             events,
             simultaneous,
+            one_event: map.one_event == Some(OneEvent::Assumed),
         }
     }
 
@@ -108,7 +111,11 @@ impl Environment {
                 choices.push(place);
             }
         }
-        images(&rest, &choices, self.simultaneous)
+        let mut images = images(&rest, &choices, self.simultaneous);
+        if self.one_event {
+            images.retain(|image| self.happening(last, image).events.len() <= 1);
+        }
+        images
     }
 
     /// What the change from `last` to `now` means.

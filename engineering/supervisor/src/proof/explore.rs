@@ -11,6 +11,7 @@ use understudy_logic::{Circuit, SPARSE, Scan, Sparse, SparseRun, ones_in, pack};
 
 use super::environment::Environment;
 use super::reference::{Allowed, Happening, Joint, Reference};
+use super::relevant::relevant;
 use super::timers::free_timers;
 use super::verdict::{Counterexample, Deviation, Proof, ProofError, ScanRecord, Verdict};
 use super::view::{Bit, Seen, View};
@@ -49,8 +50,8 @@ pub struct Proving {
 /// Holds `program` to the automata of `modules`, from its first scan through all that it can reach.
 ///
 /// In each scan up to [`ProofSettings::simultaneous`] inputs change; a rising, falling, high or low signal keeps its value as
-/// long as it likes, and any input may change at any time, whether the plant's model expects that or not. Breadth first, so
-/// that a counterexample is as short as any.
+/// long as it likes, and any input may change at any time, whether the plant's model expects that or not; where the map assumes
+/// one event in a scan, there is no scan with two. Breadth first, so that a counterexample is as short as any.
 ///
 /// # Errors
 /// An unsuitable map, an invalid ladder or one that lacks the bits, or more states than the limit.
@@ -77,7 +78,8 @@ pub fn prove_with_progress(
     report: &mut dyn FnMut(Proving),
 ) -> Result<Verdict, ProofError> {
     let partition = Partition::new(map, modules).map_err(ProofError::Partition)?;
-    let (freed, timers) = free_timers(program);
+    let compared = relevant(program, map, correspondence);
+    let (freed, timers) = free_timers(&compared);
     let circuit = freed.lower(Duration::from_millis(1))?;
     drop(freed);
     let reference = Reference::new(modules, map, &partition, settings.mode);
@@ -114,10 +116,12 @@ struct Node {
     kept: Box<[bool]>,
     state: Joint,
     positions: Box<[u8]>,
+    /// Events that wait for their turn, ascending.
+    waiting: Vec<Label>,
     parent: Option<(usize, Box<[bool]>)>,
 }
 
-type Question = (Joint, Box<[u8]>, Vec<Label>, Vec<Label>, bool);
+type Question = (Joint, Box<[u8]>, Vec<Label>, Vec<Label>, Vec<Label>, bool);
 
 struct Exploration<'a> {
     sparse: Sparse,
@@ -146,6 +150,7 @@ impl Exploration<'_> {
             kept: vec![false; self.circuit.inputs().len()].into(),
             state,
             positions: vec![0; self.reference.switch_count()].into(),
+            waiting: Vec::new(),
             parent: None,
         });
         let mut next = 0;
@@ -225,7 +230,7 @@ impl Exploration<'_> {
         let node = &self.nodes[index];
         let happening = self.environment.happening(&node.kept, image);
         if let Some(state) = &node.state {
-            for &event in &happening.events {
+            for &event in happening.events.iter().chain(&node.waiting) {
                 if let Some(supervisor) = self.reference.forbids(state, event) {
                     let automaton = self.reference.automata()[supervisor];
                     let deviation = Deviation::Uncontrollable {
@@ -240,6 +245,7 @@ impl Exploration<'_> {
         let question = (
             node.state.clone(),
             node.positions.clone(),
+            node.waiting.clone(),
             happening.events.clone(),
             happening.requests.clone(),
             happening.start,
@@ -248,7 +254,8 @@ impl Exploration<'_> {
             if self.cache.len() >= REMEMBERED {
                 self.cache.clear();
             }
-            let allowed = self.reference.scan(&node.state, &node.positions, &happening);
+            let allowed =
+                self.reference.scan(&node.state, &node.positions, &node.waiting, &happening);
             self.cache.insert(question.clone(), allowed);
         }
         let seen = self.see(&run.on, &run.signals);
@@ -264,6 +271,7 @@ impl Exploration<'_> {
             kept: self.environment.kept(image).into(),
             state: found.state.clone(),
             positions: found.positions.clone(),
+            waiting: found.waiting.clone(),
             parent: Some((index, image.into())),
         });
         None
@@ -274,6 +282,7 @@ impl Exploration<'_> {
             states: vec![Vec::new(); self.reference.automata().len()],
             positions: vec![Vec::new(); self.reference.switch_count()],
             pulses: Vec::new(),
+            waiting: Vec::new(),
         };
         for &(automaton, state) in &self.view.constant {
             seen.states[automaton].push(state);
@@ -286,14 +295,16 @@ impl Exploration<'_> {
                 Bit::State { automaton, state } => seen.states[automaton].push(state),
                 Bit::Switch { switch, position } => seen.positions[switch].push(position),
                 Bit::Pulse(pulse) => seen.pulses.push(pulse),
+                Bit::Waiting(label) => seen.waiting.push(label),
             }
         }
+        seen.waiting.sort_unstable();
         seen
     }
 
     fn deviation(&self, seen: &Seen, question: &Question) -> Deviation {
         let automata = self.reference.automata();
-        let is_started = question.0.is_some() || question.4;
+        let is_started = question.0.is_some() || question.5;
         let name = |index: usize| automata[index].name().to_owned();
         if let Some(index) = seen.states.iter().position(|states| states.len() > 1) {
             return Deviation::StateDoubled { automaton: name(index) };
@@ -340,6 +351,7 @@ impl Exploration<'_> {
                 },
                 positions: node.positions.iter().map(|&position| vec![position]).collect(),
                 pulses: Vec::new(),
+                waiting: node.waiting.clone(),
             };
             scans.push(self.record(&self.nodes[*parent].kept, image, &seen));
             at = *parent;

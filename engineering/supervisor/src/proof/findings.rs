@@ -6,10 +6,11 @@
 
 mod closed_loop;
 mod conditions;
+mod signals;
 
 use self::closed_loop::ClosedLoop;
 use super::verdict::ProofError;
-use crate::ladder::{Modules, avalanche_events};
+use crate::ladder::{InputOutputMap, Modules, OneEvent, Partition, avalanche_events};
 use crate::petri::{ExplorationError, Net, buffers};
 use crate::{Automaton, AutomatonError, Label, State};
 
@@ -26,6 +27,10 @@ pub enum FindingKind {
     Response,
     /// A state from which a PLC that generates every command at once does not come to rest in a marked state.
     BlockingUnderControl,
+    /// A command that can be generated while its signal is on, so that it has no edge.
+    LatchedAgain,
+    /// A ladder that processes one event in a scan.
+    OneEvent,
     /// An event on successive transitions.
     Avalanche,
     /// Two events whose order, which one scan cannot see, makes a difference.
@@ -67,54 +72,81 @@ impl Finding {
             FindingKind::Choice => "U0883",
             FindingKind::Response => "U0884",
             FindingKind::BlockingUnderControl => "U0885",
+            FindingKind::LatchedAgain => "U0876",
+            FindingKind::OneEvent => "U0877",
             FindingKind::Avalanche => "U0886",
             FindingKind::Simultaneity => "U0887",
         }
     }
 }
 
-/// All findings about `modules`, by kind.
+/// All findings about `modules`, by kind; with a map also those about its signals.
 ///
 /// # Errors
-/// More than 2,000,000 states together.
-pub fn findings(modules: &Modules) -> Result<Vec<Finding>, ProofError> {
+/// An unsuitable map, or more than 2,000,000 states together.
+pub fn findings(
+    modules: &Modules,
+    map: Option<&InputOutputMap>,
+) -> Result<Vec<Finding>, ProofError> {
     let closed = ClosedLoop::of(modules)?;
+    let partition = map.map(|map| Partition::new(map, modules)).transpose();
+    let partition = partition.map_err(ProofError::Partition)?;
+    let one_event = map.and_then(|map| map.one_event.as_ref());
     let mut found = closed.controllability.clone();
     found.extend(closed.blocking());
     found.extend(closed.choices());
     found.extend(closed.response());
     found.extend(closed.blocking_under_control());
-    found.extend(avalanche(modules));
-    found.extend(closed.simultaneity());
+    if let (Some(map), Some(partition)) = (map, &partition) {
+        found.extend(closed.latched_again(modules, map, partition));
+        found.extend(closed.pulsed_again(map, partition));
+    }
+    let queue = partition.as_ref().map(Partition::queue).unwrap_or_default();
+    found.extend(one_event.and_then(|one_event| closed.one_event(one_event, queue)));
+    found.extend(avalanche(modules, map.is_some()));
+    if one_event != Some(&OneEvent::Assumed) {
+        found.extend(closed.simultaneity(queue));
+    }
     Ok(found)
 }
 
-fn avalanche(modules: &Modules) -> Vec<Finding> {
-    let findings = modules.all().filter_map(|automaton| {
-        let events = avalanche_events(automaton);
-        if events.is_empty() {
-            return None;
-        }
-        let names: Vec<String> =
-            events.iter().map(|&label| format!("`{}`", automaton.alphabet().name(label))).collect();
-        let (stand, bits) = match names.len() {
-            1 => ("stands", "its bit is"),
-            _ => ("stand", "each bit is"),
-        };
-        Some(Finding {
-            kind: FindingKind::Avalanche,
-            severity: FindingSeverity::Warning,
-            message: format!(
-                "in `{}` {} {stand} on successive transitions; {bits} reset by the rung that uses it",
-                automaton.name(),
-                names.join(", ")
-            ),
-            states: Vec::new(),
-            events,
-            run: Vec::new(),
+/// Events on successive transitions. A command has a bit only in a net or beside other automata; a supervisor alone generates it
+/// once in a scan.
+fn avalanche(modules: &Modules, has_map: bool) -> Vec<Finding> {
+    let is_alone = has_map && modules.len() == 1;
+    let findings = modules.all().flat_map(|automaton| {
+        let (commands, seen): (Vec<Label>, Vec<Label>) = avalanche_events(automaton)
+            .into_iter()
+            .partition(|label| is_alone && label.is_controllable());
+        [(seen, false), (commands, true)].map(|(events, are_commands)| {
+            let names =
+                events.iter().map(|&label| format!("`{}`", automaton.alphabet().name(label)));
+            let names: Vec<String> = names.collect();
+            let (stand, bits) = match names.len() {
+                0 => return None,
+                1 => ("stands", "its bit is"),
+                _ => ("stand", "each bit is"),
+            };
+            let measure = if are_commands {
+                "a scan generates at most one command".to_owned()
+            } else {
+                format!("{bits} reset by the rung that uses it")
+            };
+            Some(Finding {
+                kind: FindingKind::Avalanche,
+                severity: FindingSeverity::Warning,
+                message: format!(
+                    "in `{}` {} {stand} on successive transitions; {measure}",
+                    automaton.name(),
+                    names.join(", ")
+                ),
+                states: Vec::new(),
+                events,
+                run: Vec::new(),
+            })
         })
     });
-    findings.collect()
+    findings.flatten().collect()
 }
 
 /// All findings about `supervisors` of a net, whose places are the plants; nothing about a net without supervisors.
@@ -132,7 +164,7 @@ pub fn hybrid_findings(
     let bounds = net.explore(limit)?.bounds();
     let plants = buffers(net, &bounds)?;
     let modules = Modules { supervisors, plants: &plants };
-    Ok(findings(&modules)?)
+    Ok(findings(&modules, None)?)
 }
 
 /// Why there are no findings about a net.

@@ -8,6 +8,9 @@
 //!
 //! where all automata step together on a shared event. Of more than two events at once it is asked only that what happens is
 //! possible and that something happens where something can: a PLC cannot do better without trying all orders.
+//!
+//! Where events wait for their turn, E joins those that wait. The first of them that the automata can do occurs; where they can do
+//! none, all are forgotten. A command needs that none waits any more.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -25,6 +28,8 @@ pub(super) struct Allowed {
     pub(super) positions: Box<[u8]>,
     /// The pulse that is on.
     pub(super) pulse: Option<usize>,
+    /// Events that wait for their turn after it, ascending.
+    pub(super) waiting: Vec<Label>,
     /// The order of events, and the command.
     pub(super) word: Vec<Label>,
 }
@@ -103,11 +108,13 @@ impl<'a> Reference<'a> {
         forbidding.map(|(index, _)| *index)
     }
 
-    /// Every end that a scan may have, from `state` with the switches in `positions`.
+    /// Every end that a scan may have, from `state` with the switches in `positions` while the events `waiting` wait for their
+    /// turn.
     pub(super) fn scan(
         &self,
         state: &Joint,
         positions: &[u8],
+        waiting: &[Label],
         happening: &Happening,
     ) -> Vec<Allowed> {
         let started = match state {
@@ -115,6 +122,15 @@ impl<'a> Reference<'a> {
             None if happening.start => self.initial(),
             None => return vec![self.quiet(state.clone(), positions, Vec::new())],
         };
+        if !self.partition.queue().is_empty() {
+            let (state, word, waiting) = self.turn(started, waiting, &happening.events);
+            if waiting.is_empty() {
+                return self.commands(&state, positions, &happening.requests, &word);
+            }
+            let mut end = self.quiet(Some(state), positions, word);
+            end.waiting = waiting;
+            return vec![end];
+        }
         let mut ends = Vec::new();
         let mut seen = BTreeSet::new();
         self.orders(started, &happening.events, Vec::new(), &mut seen, &mut ends);
@@ -128,6 +144,25 @@ impl<'a> Reference<'a> {
             .into_iter()
             .flat_map(|(state, word)| self.commands(&state, positions, &happening.requests, &word));
         commands.collect()
+    }
+
+    /// The state after the first possible one of the events that wait and `events`, that event, and those that wait on.
+    fn turn(
+        &self,
+        state: Box<[State]>,
+        waiting: &[Label],
+        events: &[Label],
+    ) -> (Box<[State]>, Vec<Label>, Vec<Label>) {
+        let queue = self.partition.queue();
+        let mut waiting: BTreeSet<Label> = waiting.iter().chain(events).copied().collect();
+        waiting.retain(|label| queue.contains(label));
+        for &label in queue.iter().filter(|label| waiting.contains(label)) {
+            if let Some(next) = self.step(&state, label) {
+                waiting.remove(&label);
+                return (next, vec![label], waiting.into_iter().collect());
+            }
+        }
+        (state, Vec::new(), Vec::new())
     }
 
     /// All orders of all sets of `events` that the automata admit, with where they lead; only orders after which nothing
@@ -202,7 +237,7 @@ impl<'a> Reference<'a> {
     }
 
     fn quiet(&self, state: Joint, positions: &[u8], word: Vec<Label>) -> Allowed {
-        Allowed { state, positions: positions.into(), pulse: None, word }
+        Allowed { state, positions: positions.into(), pulse: None, waiting: Vec::new(), word }
     }
 
     /// How many switches the map has.

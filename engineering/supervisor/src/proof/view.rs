@@ -7,16 +7,24 @@ use understudy_logic::Circuit;
 
 use super::reference::Allowed;
 use super::verdict::ProofError;
-use crate::State;
 use crate::ladder::{Correspondence, InputOutputMap};
+use crate::{Label, State};
 
 /// What a register or an output bit is.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Bit {
     Other,
-    State { automaton: usize, state: State },
-    Switch { switch: usize, position: u8 },
+    State {
+        automaton: usize,
+        state: State,
+    },
+    Switch {
+        switch: usize,
+        position: u8,
+    },
     Pulse(usize),
+    /// An event waits for its turn.
+    Waiting(Label),
 }
 
 /// Which bits of the circuit say what.
@@ -74,6 +82,10 @@ impl View {
             let bit = Bit::Pulse(pulse);
             view.place(&entry.signal, bit, &register_of, &output_of, &written)?;
         }
+        for (&label, name) in &correspondence.waiting {
+            let place = register_of.get(name.as_str()).ok_or_else(|| no_bit(name))?;
+            view.registers[*place] = Bit::Waiting(label);
+        }
         view.register_of = register_of;
         Ok(view)
     }
@@ -108,6 +120,8 @@ pub(super) struct Seen {
     /// The positions of each switch that are on.
     pub(super) positions: Vec<Vec<u8>>,
     pub(super) pulses: Vec<usize>,
+    /// Events that wait for their turn, ascending.
+    pub(super) waiting: Vec<Label>,
 }
 
 impl Seen {
@@ -122,6 +136,7 @@ impl Seen {
         };
         let mut positions = self.positions.iter().zip(&allowed.positions);
         states
+            && self.waiting == allowed.waiting
             && positions.all(|(on, &position)| match position {
                 0 => on.is_empty(),
                 _ => on.as_slice() == [position],

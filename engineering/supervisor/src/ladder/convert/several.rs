@@ -74,7 +74,7 @@ impl Converter<'_> {
     }
 
     /// Passes power while automaton `index` allows `label`; nothing where it always does.
-    fn allows(&self, index: usize, label: Label) -> Vec<Element> {
+    pub(super) fn allows(&self, index: usize, label: Label) -> Vec<Element> {
         let automaton = self.automata[index];
         let Some(event) = automaton.alphabet().place(label) else {
             return Vec::new();
@@ -168,7 +168,7 @@ impl Converter<'_> {
             let request = self.ask(label, &Name::from(format!("request_{event}")));
             network.push(open(&request));
         }
-        network.extend(self.commanded.iter().map(closed));
+        network.extend(self.commanded.iter().chain(&self.queued).map(closed));
         network.extend(self.started.iter().map(open));
         network.extend(changes(self.map, self.partition.meaning(label)));
         for index in 0..self.automata.len() {

@@ -20,13 +20,20 @@ impl Converter<'_> {
             let label = group.label;
             let stands_again = groups.iter().any(|other| other.label == label && other.again);
             let consumed = stands_again || repeats(automaton, label);
-            if !group.again && (consumed || !self.is_level(label)) {
+            if !self.is_queued(label) && !group.again && (consumed || !self.is_level(label)) {
                 let bit = self.detect(label, consumed);
                 self.bits.insert(label, bit);
             }
             if consumed {
                 self.consumed.insert(label);
             }
+        }
+        if self.map.one_event.is_some() {
+            // One event at most moves the automaton, so the rungs stand by state, as in figure 13 of Uzam and Gelen.
+            for row in rows {
+                self.event_row(row, false);
+            }
+            by_event.clear();
         }
         for group in &groups {
             for row in by_event.get(&group.label).into_iter().flatten() {
@@ -88,9 +95,7 @@ impl Converter<'_> {
             let request = self.ask(label, wanted);
             network.push(open(&request));
         }
-        if let Some(commanded) = &self.commanded {
-            network.push(closed(commanded));
-        }
+        network.extend(self.commanded.iter().chain(&self.queued).map(closed));
         let mut coils = Vec::new();
         if source == target {
             network.extend(changes(self.map, self.partition.meaning(label)));

@@ -113,23 +113,46 @@ impl ClosedLoop {
         ))
     }
 
-    pub(super) fn simultaneity(&self) -> Vec<Finding> {
-        let mut pairs: BTreeMap<(Label, Label, &str), Vec<State>> = BTreeMap::new();
+    /// Pairs of events of which the order makes a difference; `queue` is the order in which events have their turn, if they wait.
+    pub(super) fn simultaneity(&self, queue: &[Label]) -> Vec<Finding> {
+        let mut pairs: BTreeMap<(Label, Label, String), Vec<State>> = BTreeMap::new();
         for state in self.automaton.states() {
             let enabled: Vec<_> = self.edges(state, false).collect();
             for (index, &(first, after_first)) in enabled.iter().enumerate() {
                 for &(second, after_second) in &enabled[index + 1..] {
                     let one = self.automaton.step(after_first, second);
                     let other = self.automaton.step(after_second, first);
-                    let reason = match (one, other) {
-                        (Some(one), Some(other)) if one == other => continue,
-                        (Some(_), Some(_)) => {
+                    let place = |label| queue.iter().position(|&queued| queued == label);
+                    let turns = place(first).zip(place(second));
+                    let is_second_next = turns.is_some_and(|(one, other)| other < one);
+                    let (next, later) =
+                        if is_second_next { (second, first) } else { (first, second) };
+                    let (next, later) = (self.name(next), self.name(later));
+                    let has_both = if is_second_next { other.is_some() } else { one.is_some() };
+                    let reason = match (one, other, turns) {
+                        (Some(one), Some(other), _) if one == other => continue,
+                        (Some(_), Some(_), None) => {
                             "lead to different states by their order, which one scan cannot see"
+                                .to_owned()
                         }
-                        (None, None) => {
+                        (None, None, None) => {
                             "forbid each other; where both come in one scan, one of them is lost"
+                                .to_owned()
                         }
-                        _ => "can occur together in one order only; that one is taken",
+                        (_, _, None) => {
+                            "can occur together in one order only; that one is taken".to_owned()
+                        }
+                        (Some(_), Some(_), Some(_)) => format!(
+                            "lead to different states by their order, which one scan cannot see; {next} has its turn first"
+                        ),
+                        (_, _, Some(_)) if has_both => {
+                            format!(
+                                "can occur together in one order only; {next} has its turn first"
+                            )
+                        }
+                        (_, _, Some(_)) => format!(
+                            "cannot both occur after {next}, which has its turn first; {later} is then ignored"
+                        ),
                     };
                     pairs.entry((first, second, reason)).or_default().push(state);
                 }
