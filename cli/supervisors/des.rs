@@ -285,14 +285,17 @@ impl Operation {
             Self::Convert { .. } => Outcome::of(parts[0].clone()),
             Self::Avalanche { .. } => {
                 let events = avalanche_events(parts[0]);
-                let numbers: Vec<u32> = events.iter().map(|label| label.number()).collect();
-                let text = if events.is_empty() {
-                    format!("{}: no event causes the avalanche effect", parts[0].name())
+                let all: Vec<Label> = parts[0].alphabet().labels().collect();
+                let name = parts[0].name();
+                let cause = if events.is_empty() {
+                    format!("{name}: no event causes the avalanche effect")
                 } else {
-                    let names = word(parts[0], &events.to_vec());
-                    format!("{}: the avalanche effect is caused by {names}", parts[0].name())
+                    let names = word(parts[0], &events);
+                    format!("{name}: the avalanche effect is caused by {names}")
                 };
-                Outcome::Answer(Answer::done(text, json!({ "events": numbers })))
+                let text = format!("{name}: all events are {}\n{cause}", word(parts[0], &all));
+                let result = json!({ "events": numbers(&events), "all_events": numbers(&all) });
+                Outcome::Answer(Answer::done(text, result))
             }
         })
     }
@@ -434,10 +437,13 @@ fn reduce(
     }
     Ok(match reduced(plant, supervisor, bounds, budget, console) {
         Err(answer) => Outcome::Answer(answer),
-        Ok((reduced, warning)) => {
-            let result = json!({ "is_complete": warning.is_none() });
-            let answer = Answer::done(warning.unwrap_or_default(), result);
-            Outcome::Automaton(reduced, answer)
+        Ok(reduced) => {
+            let result = json!({
+                "is_complete": reduced.warning.is_none(),
+                "lower_bound": reduced.lower_bound,
+            });
+            let answer = Answer::done(reduced.notes(), result);
+            Outcome::Automaton(reduced.supervisor, answer)
         }
     })
 }

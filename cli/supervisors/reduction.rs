@@ -3,7 +3,9 @@
 use std::time::Duration;
 
 use understudy_bus::Interruption;
-use understudy_supervisor::operations::{Reducing, compare_effects, supreduce_while};
+use understudy_supervisor::operations::{
+    Reducing, compare_effects, fewest_states, supreduce_while,
+};
 use understudy_supervisor::{Automaton, Bounds};
 
 use crate::answer::{Answer, Status};
@@ -13,8 +15,27 @@ use crate::patience::Patience;
 /// Default time limit: the smallest supervisor so far is the result.
 pub(crate) const BUDGET: &str = "30s";
 
-/// Reduced supervisor, with a warning if the time limit, SIGINT or SIGTERM stopped the reduction. Its effect on the plant was compared
-/// with that of `supervisor`.
+/// A supervisor of which the effect on the plant was compared with that of the given one.
+pub(crate) struct Reduced {
+    pub(crate) supervisor: Automaton,
+    /// Where the time limit, SIGINT or SIGTERM stopped the reduction.
+    pub(crate) warning: Option<String>,
+    /// No supervisor with this effect has fewer states.
+    pub(crate) lower_bound: usize,
+}
+
+impl Reduced {
+    /// The warning, and how few states are possible.
+    pub(crate) fn notes(&self) -> String {
+        let warning = self.warning.as_deref().unwrap_or_default();
+        format!(
+            "{warning}lower bound: no supervisor with this effect has fewer than {} states\n",
+            self.lower_bound
+        )
+    }
+}
+
+/// Reduced supervisor.
 ///
 /// # Errors
 /// If the product of the two exceeds the bounds, or the effects differ, which is a defect of the reduction.
@@ -24,7 +45,7 @@ pub(crate) fn reduced(
     bounds: Bounds,
     budget: Duration,
     console: &mut Console,
-) -> Result<(Automaton, Option<String>), Answer> {
+) -> Result<Reduced, Answer> {
     // Without the flag an interruption ends the command.
     let interruption = Interruption::expected().ok();
     let patience = Patience::new(Some(budget), console);
@@ -54,5 +75,6 @@ pub(crate) fn reduced(
             supervisor.state_count()
         )
     });
-    Ok((made.supervisor, warning))
+    let lower_bound = fewest_states(plant, supervisor, bounds)?;
+    Ok(Reduced { supervisor: made.supervisor, warning, lower_bound })
 }

@@ -235,7 +235,7 @@ fn named(arguments: &Arguments, supervisor: Automaton) -> Automaton {
     }
 }
 
-/// Reduces the supervisor as requested, with a possible warning.
+/// Reduces the supervisor as requested, with what there is to say about that.
 fn reduced(
     arguments: &Arguments,
     plants: &[&Automaton],
@@ -250,9 +250,9 @@ fn reduced(
         return Ok((supervisor, String::new()));
     }
     let plant = sync(plants, bounds)?;
-    let (supervisor, warning) =
-        reduction::reduced(&plant, &supervisor, bounds, arguments.budget, console)?;
-    Ok((supervisor, warning.unwrap_or_default()))
+    let reduced = reduction::reduced(&plant, &supervisor, bounds, arguments.budget, console)?;
+    let notes = reduced.notes();
+    Ok((reduced.supervisor, notes))
 }
 
 /// Adds errors as failures and warnings in front of the text.

@@ -45,6 +45,7 @@ fn from_machines_to_a_reduced_supervisor_as_in_tct() {
     assert_eq!(other.status, 1);
     let made = des(&["supreduce", &plant, &supervisor, "-o", &reduced]);
     assert_eq!(counts(&made), (3, 14));
+    assert_eq!(made.json()["result"]["lower_bound"], 3);
     let data = des(&["condat", &plant, &given("_SUPER")]).json();
     assert_eq!(
         (&data["result"]["states_with_disablement"], &data["result"]["pairs"]),
@@ -61,6 +62,7 @@ fn from_machines_to_a_reduced_supervisor_as_in_tct() {
 fn the_events_of_the_avalanche_effect() {
     let answer = des(&["avalanche", "examples/avalanche/TEST.ADS"]).json();
     assert_eq!(answer["result"]["events"], json!([1, 2, 3]));
+    assert_eq!(answer["result"]["all_events"], json!([1, 2, 3, 4, 5, 6]));
 }
 
 #[test]

@@ -9,6 +9,7 @@
 //! | [`supcon`] | the supremal controllable, nonblocking sublanguage |
 //! | [`condat`] | which controllable events a supervisor disables where |
 //! | [`supreduce`] | a smaller supervisor with the same effect |
+//! | [`fewest_states`] | a number of states that no such supervisor has fewer than |
 //! | [`compare_effects`] | where two supervisors have different effects on a plant |
 //! | [`minstate`] | the fewest states with the same languages |
 //! | [`isomorph`] | whether two automata are one but for the numbers |
@@ -40,4 +41,4 @@ pub use products::{meet, mutex, sync};
 pub use project::project;
 pub(crate) use supcon::explicit_supcon;
 pub use supcon::{Explanation, Supcon, Violation, lift, supcon};
-pub use supreduce::{Reducing, Reduction, supreduce, supreduce_while};
+pub use supreduce::{Reducing, Reduction, fewest_states, supreduce, supreduce_while};

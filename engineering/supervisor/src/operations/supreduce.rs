@@ -4,12 +4,14 @@
 //! plant leaves it to them, and when the same holds for all that follows. Finding the fewest states is NP-hard; merging greedily
 //! is not, and what comes out depends on the order in which pairs are tried. A few orders are tried and the smallest result is kept.
 
+mod bound;
 mod cells;
 mod demands;
 mod sieve;
 
 use crate::automaton::{Automaton, State};
 use crate::explicit::{Bounds, TooLarge};
+pub use bound::fewest_states;
 use cells::{Cells, End, Limits};
 use demands::Demands;
 use sieve::Sieve;

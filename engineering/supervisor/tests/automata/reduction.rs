@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use proptest::prelude::*;
 use understudy_supervisor::operations::{
-    compare_effects, isomorph, meet, supreduce, supreduce_while, sync,
+    compare_effects, fewest_states, isomorph, meet, supreduce, supreduce_while, sync,
 };
 use understudy_supervisor::{Automaton, Bounds, Label, State, Transition, synthesise};
 
@@ -193,4 +193,59 @@ fn a_large_supervisor_is_reduced() {
     let stopped = stopped.expect("it fits");
     assert!(!stopped.is_complete && stopped.supervisor.state_count() < supervisor.state_count());
     assert_eq!(compare_effects(&plant, &supervisor, &stopped.supervisor, bounds), Ok(None));
+}
+
+/// All automata of `states` states over the events 0 and 1.
+fn all_of(states: u32) -> Vec<Automaton> {
+    let cells = 2 * states;
+    let tables = (states + 1).pow(cells);
+    let of = |table: u32, marks: u32| {
+        let steps = (0..cells).filter_map(|cell| {
+            let target = (table / (states + 1).pow(cell) % (states + 1)).checked_sub(1)?;
+            let (source, label) = (State::new(cell / 2), Label::new(cell % 2));
+            Some(Transition { source, label, target: State::new(target) })
+        });
+        let marked = (0..states).map(|state| marks >> state & 1 == 1).collect();
+        Automaton::new("small", [], marked, steps.collect()).expect("deterministic")
+    };
+    (0..tables).flat_map(|table| (0..1 << states).map(move |marks| of(table, marks))).collect()
+}
+
+/// No automaton with fewer states than the lower bound has the same effect; all of them are tried.
+#[test]
+fn no_supervisor_has_fewer_states_than_the_lower_bound() {
+    let bounds = Bounds::default();
+    let smaller = [all_of(1), all_of(2)];
+    let plants = all_of(3);
+    let mut reached = [0; 4];
+    for (number, plant) in plants.iter().enumerate().step_by(977) {
+        for specification in plants.iter().skip(number % 7).step_by(1_013) {
+            let supervisor = meet(&[plant, specification], bounds).expect("small");
+            let fewest = fewest_states(plant, &supervisor, bounds).expect("small");
+            let found = supreduce(plant, &supervisor, bounds).expect("small").state_count();
+            assert!(fewest <= found, "{fewest} of {found}");
+            reached[fewest.min(3)] += 1;
+            for small in smaller.iter().take(fewest.saturating_sub(1)).flatten() {
+                let other = compare_effects(plant, &supervisor, small, bounds).expect("small");
+                assert!(other.is_some(), "{} states of {fewest}", small.state_count());
+            }
+        }
+    }
+    assert!(reached[1..].iter().all(|&count| count > 0), "{reached:?}");
+}
+
+/// The published lower bound of the small factory, and that the reduction never passes a bound.
+#[test]
+fn lower_bounds_of_the_reference_models() {
+    let bounds = Bounds::default();
+    let mut said = Vec::new();
+    for name in ["small_factory", "transfer_line", "guideway", "dining5", "line4_3", "agv"] {
+        let model = crate::models::Model::read(name);
+        let plant = sync(&model.plants(), bounds).expect("small");
+        let (supervisor, of_tct) = (model.file("_SUPER"), model.file("_SIMSUP"));
+        let fewest = fewest_states(&plant, &supervisor, bounds).expect("small");
+        assert!(fewest <= of_tct.state_count(), "{name}");
+        said.push(format!("{name} {fewest} of {}", of_tct.state_count()));
+    }
+    insta::assert_snapshot!(said.join("\n"));
 }
