@@ -44,7 +44,7 @@ pub(crate) fn group() -> Group {
             command("synth", |it, console| synth::run(&it, console)),
             command("supervisor-to-ladder", |it, console| supervisor_to_ladder::run(&it, console)),
             command("des", |it, console| des::run(&it, console)),
-            command("petri", |it, _| petri::run(&it)),
+            command("petri", |it, console| petri::run(&it, console)),
             command("reconfigure", |it, _| reconfigure::run(&it)),
         ],
     }

@@ -7,7 +7,8 @@ use serde_json::{Value, json};
 use understudy_ladder::print;
 use understudy_supervisor::ladder::locate;
 use understudy_supervisor::petri::{
-    HybridError, NetFile, draw_net_dot, draw_net_svg, read_net, reduce, to_ladder, write_net,
+    HybridError, NetFile, draw_net_dot, draw_net_svg, hybrid_net, list_arcs, list_control,
+    read_net, reduce, to_ladder, write_net,
 };
 use understudy_supervisor::proof::{
     Finding, HybridProof, HybridVerdict, ProofSettings, hybrid_findings, prove_hybrid,
@@ -16,6 +17,7 @@ use understudy_supervisor::{Automaton, Model, write_model};
 use understudy_text::Report;
 
 use crate::answer::{Answer, Status};
+use crate::console::Console;
 use crate::files;
 use crate::kind::Kind;
 use crate::supervisors::automata::{self, Sources, description, summary};
@@ -77,13 +79,19 @@ enum Operation {
         #[arg(long = "supervisor", value_name = "FILE", num_args = 1..)]
         supervisors: Vec<PathBuf>,
     },
-    /// Drawing of the net
+    /// Drawing of the net, alone or controlled by supervisors
     #[command(
-        after_help = "Example:\n  understudy petri draw examples/assembly-cell/net.toml -o net.svg"
+        after_help = "Example:\n  understudy petri draw examples/assembly-cell/net.toml -o net.svg\n  understudy petri draw examples/assembly-cell/net.toml --supervisor keeper.toml --as arcs"
     )]
     Draw {
         #[arg(value_name = "NET.toml")]
         net: PathBuf,
+        /// Supervisors, as nets with inhibitor arcs: TCT automata (.ADS) or models with supervisors (.toml)
+        #[arg(long = "supervisor", value_name = "FILE", num_args = 1..)]
+        supervisors: Vec<PathBuf>,
+        /// The nets of the supervisors without the plant
+        #[arg(long, requires = "supervisors")]
+        auto_net: bool,
         /// Output format
         #[arg(long = "as", value_enum, default_value = "svg")]
         form: Form,
@@ -96,6 +104,8 @@ enum Form {
     Svg,
     /// Graphviz
     Dot,
+    /// List of all arcs, and the control data as inhibitor arcs
+    Arcs,
 }
 
 impl Operation {
@@ -110,7 +120,7 @@ impl Operation {
     }
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let path = arguments.operation.net();
     let text = files::text_of(Kind::Net, path)?;
     let read = read_net(&text);
@@ -124,9 +134,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         Operation::Automaton { .. } => automaton(&file, arguments.markings, output),
         Operation::Reduce { .. } => reduced(file, output),
         Operation::Ladder { supervisors, .. } => {
-            return ladder(&file, supervisors, arguments.markings, output, report);
+            return ladder(&file, supervisors, arguments.markings, output, report, console);
         }
-        Operation::Draw { form, .. } => drawn(&file, *form, output),
+        Operation::Draw { form, supervisors, auto_net, .. } => {
+            drawn(&file, supervisors, *auto_net, *form, output)
+        }
     };
     Ok(Answer::from(answer).with_reports(vec![report]))
 }
@@ -214,10 +226,22 @@ fn reduced(mut file: NetFile, output: Option<&Path>) -> Result<Answer, Answer> {
     }
 }
 
-fn drawn(file: &NetFile, form: Form, output: Option<&Path>) -> Result<Answer, Answer> {
+fn drawn(
+    file: &NetFile,
+    paths: &[PathBuf],
+    auto_net: bool,
+    form: Form,
+    output: Option<&Path>,
+) -> Result<Answer, Answer> {
+    let named = supervisors(paths)?.into_iter();
+    let named: Vec<Automaton> = named.map(|one| one.with_event_names(&file.events)).collect();
+    let plant = (!auto_net).then_some(&file.net);
+    let net = hybrid_net(plant, &named, &file.events);
+    let net = net.map_err(|error| failed(error.code(), error))?;
     let text = match form {
-        Form::Dot => draw_net_dot(&file.net),
-        Form::Svg => draw_net_svg(&file.net)?,
+        Form::Dot => draw_net_dot(&net),
+        Form::Svg => draw_net_svg(&net)?,
+        Form::Arcs => format!("{}{}", list_arcs(&net), list_control(&net, &named)),
     };
     files::deliver(output, &text, json!({ "text": text }))
 }
@@ -228,6 +252,7 @@ fn ladder(
     limit: usize,
     output: Option<&Path>,
     mut report: Report,
+    console: &mut Console,
 ) -> Result<Answer, Answer> {
     let named = supervisors(paths)?.into_iter();
     let named: Vec<Automaton> = named.map(|one| one.with_event_names(&file.events)).collect();
@@ -254,6 +279,10 @@ fn ladder(
             failed("U0875", message)
         }
         Ok(HybridVerdict::Proved(proof)) => {
+            if let (None, Ok(found)) = (output, &found) {
+                // The answer is the ladder alone.
+                notes(found).lines().for_each(|line| console.note(line));
+            }
             proved(&print(&made.program), &proof, &found, output).into()
         }
     };

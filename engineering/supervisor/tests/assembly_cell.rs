@@ -5,14 +5,17 @@
 
 use std::time::Duration;
 
-use understudy_ladder::{Element, Interpreter, check, print};
+use understudy_ladder::{ContactKind, Element, Interpreter, check, print};
 use understudy_supervisor::ladder::avalanche_events;
 use understudy_supervisor::operations::{condat, supreduce, sync};
-use understudy_supervisor::petri::{HybridLadder, Net, read_net, to_ladder};
+use understudy_supervisor::petri::{
+    HybridLadder, Net, draw_net_dot, draw_net_svg, hybrid_net, list_arcs, list_control, read_net,
+    to_ladder,
+};
 use understudy_supervisor::proof::{
     HybridDeviation, HybridVerdict, ProofSettings, hybrid_findings, prove_hybrid,
 };
-use understudy_supervisor::{Automaton, Bounds, Label, State, read_model, synthesise};
+use understudy_supervisor::{Automaton, Bounds, Event, Label, State, read_model, synthesise};
 
 const DONE: u32 = 30;
 
@@ -205,4 +208,41 @@ U0885 a PLC that generates every command at once never comes to rest in a marked
 U0886 in `keeper` `placed` stands on successive transitions; its bit is reset by the rung that uses it
 "#);
     assert_eq!(hybrid_findings(&cell.net, &[], 1_000), Ok(Vec::new()));
+}
+
+/// Figures 16 and 17 and Table 2: the auto-net, the net that it controls, and its control data as inhibitor arcs. The ladder has a
+/// closed contact for each of these arcs and for no other state.
+#[test]
+fn the_controlled_net_has_the_arcs_of_the_ladder() {
+    let cell = cell();
+    let supervisors = std::slice::from_ref(&cell.reduced);
+    let events = read_net(NET).file.expect("a net").events;
+    let auto_net = hybrid_net(None, supervisors, &events).expect("an auto-net");
+    assert_eq!((auto_net.places().len(), auto_net.transitions().len()), (6, 22));
+    let both = hybrid_net(Some(&cell.net), supervisors, &events).expect("a net");
+    assert_eq!((both.places().len(), both.transitions().len()), (12, 28));
+    for (transition, of_plant) in both.transitions().iter().zip(cell.net.transitions()) {
+        let inhibiting = transition.inhibitors.iter().map(|arc| arc.place - 6);
+        let inhibiting: Vec<usize> = inhibiting.collect();
+        let rungs = &cell.ladder.program.rungs;
+        let rung = rungs.iter().find(|rung| rung.title.as_ref() == Some(&of_plant.name));
+        let closed = rung.expect("a rung").network.iter().filter_map(|element| match element {
+            Element::Contact(contact) if contact.kind == ContactKind::NormallyClosed => {
+                cell.ladder.states[0].iter().position(|bit| *bit == contact.operand)
+            }
+            _ => None,
+        });
+        assert_eq!(inhibiting, closed.collect::<Vec<_>>(), "{}", transition.name);
+    }
+    assert!(draw_net_dot(&both).contains("arrowhead=odot"));
+    let svg = draw_net_svg(&both).expect("small");
+    assert_eq!(svg.matches("url(#circle)").count(), 9);
+    insta::assert_snapshot!(format!("{}{}", list_arcs(&both), list_control(&both, supervisors)));
+    let stranger =
+        Automaton::new("stranger", [Event::unnamed(Label::new(99))], vec![true], Vec::new());
+    let stranger = [stranger.expect("an automaton")];
+    assert_eq!(
+        hybrid_net(Some(&cell.net), &stranger, &events).expect_err("unknown").code(),
+        "U0898"
+    );
 }

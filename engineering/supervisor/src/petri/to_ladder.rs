@@ -88,6 +88,18 @@ pub fn to_ladder(
     limit: usize,
 ) -> Result<HybridLadder, HybridError> {
     let bounds = net.explore(limit)?.bounds();
+    check_events(net, supervisors)?;
+    let ladder = Maker::new(net, supervisors, &bounds).make();
+    let mut found = understudy_ladder::check(&ladder.program);
+    if has_errors(&found) {
+        found.retain(|found| found.severity == understudy_text::Severity::Error);
+        return Err(HybridError::Invalid(found));
+    }
+    Ok(ladder)
+}
+
+/// Whether each supervisor has a state, and the net each of its events.
+pub(super) fn check_events(net: &Net, supervisors: &[Automaton]) -> Result<(), HybridError> {
     for supervisor in supervisors {
         let name = supervisor.name().to_owned();
         if supervisor.is_empty() {
@@ -101,13 +113,7 @@ pub fn to_ladder(
             });
         }
     }
-    let ladder = Maker::new(net, supervisors, &bounds).make();
-    let mut found = understudy_ladder::check(&ladder.program);
-    if has_errors(&found) {
-        found.retain(|found| found.severity == understudy_text::Severity::Error);
-        return Err(HybridError::Invalid(found));
-    }
-    Ok(ladder)
+    Ok(())
 }
 
 struct Maker<'a> {
