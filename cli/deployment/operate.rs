@@ -8,7 +8,7 @@ use std::time::{Duration, SystemTime};
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
-use understudy_bus::{BusError, Call, DONE, Request};
+use understudy_bus::{BusError, Call, DONE, Request, Told};
 use understudy_cluster::{Cluster, Overrides};
 use understudy_executable::Interface;
 use understudy_journal::{
@@ -165,6 +165,7 @@ fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
         | What::AcknowledgeAlarm
         | What::ShelveAlarm
         | What::UnshelveAlarm => {
+            named(arguments)?;
             let message = format!(
                 "`{word}` requires a remote member: give the folder of the operator's keys by --keys; a laboratory accepts kill, restart, release, cold-start, accept-state, force, unforce and write"
             );
@@ -190,6 +191,16 @@ fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
         result["cycle"] = json!(cycle);
     }
     Ok(Answer::done(text, result).and_next(&[&"top", &run.path()]))
+}
+
+/// Whether the cluster of the run, or of the cluster file, has the member.
+fn named(arguments: &Arguments) -> Result<Member, Answer> {
+    let target = &arguments.target;
+    if target.is_dir() {
+        return crate::member::find(Run::open(target)?.cluster(), &arguments.name);
+    }
+    let (cluster, _) = files::cluster(target, Overrides::default())?;
+    crate::member::find(&cluster, &arguments.name)
 }
 
 /// The forced signal: its place, its type, and the text of its value.
@@ -342,7 +353,15 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
     let call = call()?;
     let Some(request) = request else {
         let mut left = arguments.lines;
-        let take = |line: &str| {
+        let take = |told: Told<'_>| {
+            let line = match told {
+                Told::Line(line) => line,
+                // Standard output has records alone.
+                Told::Lost(lines) => {
+                    return writeln!(std::io::stderr(), "{lines} lines were lost on their way")
+                        .is_ok();
+                }
+            };
             if repeated(line).is_ok() {
                 return true;
             }

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use tokio::sync::mpsc::Sender;
-use understudy_bus::{Call, Peer};
+use understudy_bus::{Call, Peer, Told as Followed};
 use understudy_wire::Member;
 
 use crate::found::{Line, Vain};
@@ -18,6 +18,8 @@ const AGAIN: Duration = Duration::from_secs(2);
 pub(crate) enum Told {
     /// A line of the member's journal.
     Line(Member, String),
+    /// So many lines of it were lost.
+    Lost(Member, u64),
     /// It is heard from now on.
     Attached(Member),
     /// It is not heard, and why.
@@ -87,13 +89,16 @@ impl Follower {
         self.calls.set(member, Some(Arc::clone(&call)));
         let mut heard = false;
         // The caller reports that it cannot be followed.
-        let _ = call.follow(self.line.patience, |line| {
+        let _ = call.follow(self.line.patience, |followed| {
             if !std::mem::replace(&mut heard, true)
                 && self.told.blocking_send(Told::Attached(member)).is_err()
             {
                 return false;
             }
-            let told = Told::Line(member, line.to_owned());
+            let told = match followed {
+                Followed::Line(line) => Told::Line(member, line.to_owned()),
+                Followed::Lost(lines) => Told::Lost(member, lines),
+            };
             self.told.blocking_send(told).is_ok() && !self.ends.load(Ordering::Relaxed)
         });
         self.calls.set(member, None);

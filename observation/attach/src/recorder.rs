@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::mpsc::{Receiver, channel};
 use tokio::sync::oneshot;
-use understudy_bus::{DONE, Request};
+use understudy_bus::{DONE, HostEvent, Request};
 use understudy_cluster::AlarmDeclaration;
 use understudy_journal::{
     Command, Commanded, Commander, Commands, Done, Happening, Journal, OperatorAction, Record,
@@ -184,6 +184,7 @@ impl Recorder {
     fn note(&mut self, told: Told) {
         let (member, line) = match told {
             Told::Line(member, line) => (member, line),
+            Told::Lost(member, records) => return self.lost(member, records),
             Told::Attached(member) => {
                 self.in_effect.attached(member);
                 return self.own(RunEvent::Attached { member });
@@ -213,6 +214,13 @@ impl Recorder {
             }
             _ => {}
         }
+    }
+
+    /// The journal of the run lacks lines that the member has written.
+    fn lost(&mut self, member: Member, records: u64) {
+        let name = self.names.get(&member).cloned().unwrap_or_default();
+        let event = Happening::Host(HostEvent::JournalLost { records });
+        self.write_of_member(&Record { at_ns: monotonic_ns(), name, member: Some(member), event });
     }
 
     fn write_of_member(&mut self, record: &Record) {

@@ -45,10 +45,11 @@ use crate::orders::{Control, Order};
 use crate::rights::run_in_background;
 use crate::writes::{self, Callers};
 
-pub(crate) use followed::{Telemetry, followed};
+pub(crate) use followed::{Batch, Gaps, Telemetry, followed};
 pub use tls::{Admitted, TlsKeys};
 pub(crate) use tls::{WRITE_KEYS, endpoint, hash_key, insert, prefix, tls_config};
 
+use followed::Line;
 use tls::access_control;
 
 /// How often it is looked who is admitted.
@@ -56,9 +57,6 @@ const LOOK_EVERY: Duration = Duration::from_millis(500);
 
 /// Who follows a journal is told of it so often.
 const GATHER: Duration = Duration::from_millis(50);
-
-/// Bytes that are told at once, but for the last line.
-const GATHERED_BYTES: usize = 64 * 1024;
 
 /// After a channel could not be opened.
 const TRY_AGAIN_AFTER: Duration = Duration::from_secs(5);
@@ -105,7 +103,7 @@ pub trait LinesInEffect: Send {
 /// A channel that runs; ends when it is dropped.
 pub(crate) struct RunningChannel {
     stop: Arc<AtomicBool>,
-    wake: SyncSender<Vec<u8>>,
+    wake: SyncSender<Line>,
     closed: Receiver<Never>,
 }
 
@@ -117,7 +115,7 @@ impl RunningChannel {
     pub(crate) fn stop(&self) {
         self.stop.store(true, Ordering::SeqCst);
         // A full queue wakes it as well.
-        let _ = self.wake.try_send(Vec::new());
+        let _ = self.wake.try_send(Line::default());
     }
 }
 
@@ -225,11 +223,14 @@ impl<E: Send + 'static> Channel<E> {
                 opened = self.open(&admitted);
                 next_try = now + TRY_AGAIN_AFTER;
             }
-            match self.telemetry.lines.recv_timeout(LOOK_EVERY) {
+            let waiting = self.telemetry.take_next().map(Ok);
+            match waiting.unwrap_or_else(|| self.telemetry.lines.recv_timeout(LOOK_EVERY)) {
+                // Only to wake.
+                Ok(line) if line.text.is_empty() => {}
                 Ok(line) => {
                     let lines = self.gather(line);
                     if let Some(opened) = &opened {
-                        // What is not sent is lost to those who follow, and is in the journal.
+                        // What is not sent is in the journal, and those who follow know by the numbers of the lines that they lack it.
                         if let Err(error) = opened.journal.put(lines).wait() {
                             tracing::debug!(%error, "lines of the journal were not published");
                         }
@@ -272,10 +273,6 @@ impl<E: Send + 'static> Channel<E> {
                 };
                 self.sink.record(now, Noted::Host(event));
             }
-            let lost = self.telemetry.lost.swap(0, Ordering::Relaxed);
-            if lost > 0 {
-                tracing::debug!(lost, "lines that nobody could follow");
-            }
         }
         // The journal ends when nobody reports any more.
         drop(self.sink);
@@ -287,17 +284,10 @@ impl<E: Send + 'static> Channel<E> {
         clippy::disallowed_methods,
         reason = "who looks on is told a moment later, and the cycle never waits for this thread"
     )]
-    fn gather(&mut self, first: Vec<u8>) -> Vec<u8> {
+    fn gather(&mut self, first: Line) -> Vec<u8> {
         std::thread::sleep(GATHER);
-        self.settings.in_effect.note(&first);
-        let mut lines = first;
-        while lines.len() < GATHERED_BYTES
-            && let Ok(line) = self.telemetry.lines.try_recv()
-        {
-            self.settings.in_effect.note(&line);
-            lines.extend_from_slice(&line);
-        }
-        lines
+        let in_effect = &mut self.settings.in_effect;
+        self.telemetry.gather(first, |line| in_effect.note(line))
     }
 
     fn open(&mut self, admitted: &Admitted) -> Option<Opened> {

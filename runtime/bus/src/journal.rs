@@ -224,19 +224,20 @@ impl<E> Clone for JournalSender<E> {
 
 impl<E> EventSink<E> for JournalSender<E> {
     fn record(&mut self, now: Time, event: Noted<E>) {
-        let lost = self.lost.swap(0, Ordering::Relaxed);
-        let mut missed = 0;
+        // No record comes between a loss and the word about it: readers judge what is complete. Of two senders that find a loss at once
+        // both report it.
+        let lost = self.lost.load(Ordering::Relaxed);
         if lost > 0 {
             let note = Noted::Host(HostEvent::JournalLost { records: lost });
             if self.sender.try_send((now, note)).is_err() {
-                missed += lost;
+                self.lost.fetch_add(1, Ordering::Relaxed);
+                return;
             }
+            let less = |now: u64| Some(now.saturating_sub(lost));
+            let _ = self.lost.fetch_update(Ordering::Relaxed, Ordering::Relaxed, less);
         }
         if self.sender.try_send((now, event)).is_err() {
-            missed += 1;
-        }
-        if missed > 0 {
-            self.lost.fetch_add(missed, Ordering::Relaxed);
+            self.lost.fetch_add(1, Ordering::Relaxed);
         }
     }
 }
@@ -401,6 +402,18 @@ mod tests {
                 _ => 0,
             })
             .sum();
+        // Wherever numbers are missing, the journal says so before it goes on.
+        let (mut next, mut said) = (0, 0);
+        for event in &events {
+            match event {
+                Noted::Member(number) => {
+                    assert_eq!(u64::from(number - next), said, "before {number}");
+                    (next, said) = (number + 1, 0);
+                }
+                Noted::Host(HostEvent::JournalLost { records }) => said += records,
+                Noted::Host(_) => {}
+            }
+        }
         // A thread that began late may have said the first of them before it was held.
         let in_all = lost + unsaid;
         assert!(in_all >= u64::from(RECORDS) - 8 - 1 - BURST, "{in_all} of {number}");

@@ -60,7 +60,7 @@ pub use link::{Link, LinkCounters, LinkKind, NoSuchLink, Reopening};
 pub use log::{Line, Log, LogFilter, LogFormat, LogSettings, log_environment};
 pub use member::{MemberSettings, run_member};
 pub use multicast::loopback_groups;
-pub use operator::{Call, Request};
+pub use operator::{Call, Request, Told};
 pub use orders::{Control, Cuts, Order, Orders, orders};
 pub use ports::free_addresses;
 pub use refused_as::RefusedAs;

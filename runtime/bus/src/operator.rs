@@ -8,7 +8,9 @@ use serde_json::json;
 use understudy_wire::{ClusterHash, Force, Role, SignalPlace, StateChoice, Write};
 use zenoh::Wait;
 
-use crate::channel::{TlsKeys, WRITE_KEYS, endpoint, hash_key, insert, prefix, tls_config};
+use crate::channel::{
+    Batch, Gaps, TlsKeys, WRITE_KEYS, endpoint, hash_key, insert, prefix, tls_config,
+};
 use crate::error::{BusError, reason};
 
 /// Longer than it takes a member on a network that works.
@@ -75,6 +77,15 @@ impl Request {
         };
         text.unwrap_or_default()
     }
+}
+
+/// What comes of a journal that is followed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Told<'a> {
+    /// A line.
+    Line(&'a str),
+    /// So many lines were lost on their way: they are in the journal of the member itself.
+    Lost(u64),
 }
 
 /// A call to one member.
@@ -169,14 +180,15 @@ impl Call {
         info.routers_zid().wait().next().is_some() || info.peers_zid().wait().next().is_some()
     }
 
-    /// Gives each line of the member's journal to `take` until that says false, or `patience` passes without a line.
+    /// Gives each line of the member's journal to `take`, and what was lost on the way, until that says false, or `patience` passes without
+    /// a line.
     ///
     /// # Errors
     /// [`BusError::Unanswered`] where the journal cannot be followed.
     pub fn follow(
         &self,
         patience: Duration,
-        mut take: impl FnMut(&str) -> bool,
+        mut take: impl FnMut(Told<'_>) -> bool,
     ) -> Result<(), BusError> {
         let unanswered = || BusError::Unanswered {
             name: self.name.clone(),
@@ -189,12 +201,17 @@ impl Call {
             .with(zenoh::handlers::FifoChannel::new(WAITING_LINES))
             .wait()
             .map_err(|_| unanswered())?;
+        let mut gaps = Gaps::default();
         loop {
             match subscriber.recv_timeout(patience) {
                 Ok(Some(sample)) => {
                     let bytes = sample.payload().to_bytes();
                     let text = String::from_utf8_lossy(&bytes);
-                    if !text.lines().all(&mut take) {
+                    let mut told = text.lines().map(|line| match Batch::of_line(line) {
+                        Some(batch) => Told::Lost(gaps.before(batch)),
+                        None => Told::Line(line),
+                    });
+                    if !told.all(|told| told == Told::Lost(0) || take(told)) {
                         return Ok(());
                     }
                 }

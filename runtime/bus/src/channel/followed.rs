@@ -1,9 +1,15 @@
 //! A writer whose lines others can follow.
+//!
+//! Lines are numbered, so that who follows knows where some are lost. Those that are told at once begin with a line of their own:
+//!
+//! ```text
+//!   {"lines":{"first":1234,"count":17}}
+//! ```
 
 use std::io::{self, Write};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
+
+use serde::{Deserialize, Serialize};
 
 /// Lines of the journal that wait for those who follow it, at most; they lose what comes on top.
 const WAITING_LINES: usize = 1024;
@@ -11,28 +17,36 @@ const WAITING_LINES: usize = 1024;
 /// A line without an end is cut here.
 const LINE_BYTES: usize = 64 * 1024;
 
+/// Bytes that are told at once, but for the last line.
+const GATHERED_BYTES: usize = 64 * 1024;
+
+/// A line of the journal with its number.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub(crate) struct Line {
+    number: u64,
+    pub(crate) text: Vec<u8>,
+}
+
 /// The journal's end of the channel: what is written goes to `inner`, and line by line to those who follow.
 pub(crate) struct Followed<W> {
     inner: W,
     begun: Vec<u8>,
-    lines: SyncSender<Vec<u8>>,
-    lost: Arc<AtomicU64>,
+    count: u64,
+    lines: SyncSender<Line>,
 }
 
 /// A channel that is not started yet.
 pub(crate) struct Telemetry {
-    pub(super) lines: Receiver<Vec<u8>>,
-    pub(super) wake: SyncSender<Vec<u8>>,
-    pub(super) lost: Arc<AtomicU64>,
+    pub(super) lines: Receiver<Line>,
+    pub(super) wake: SyncSender<Line>,
+    /// A line that did not follow the one before it.
+    next: Option<Line>,
 }
 
 pub(crate) fn followed<W: Write>(inner: W) -> (Followed<W>, Telemetry) {
     let (sender, lines) = sync_channel(WAITING_LINES);
-    let lost = Arc::new(AtomicU64::new(0));
-    let followed =
-        Followed { inner, begun: Vec::new(), lines: sender.clone(), lost: Arc::clone(&lost) };
-    let telemetry = Telemetry { lines, wake: sender, lost };
-    (followed, telemetry)
+    let followed = Followed { inner, begun: Vec::new(), count: 0, lines: sender.clone() };
+    (followed, Telemetry { lines, wake: sender, next: None })
 }
 
 impl<W: Write> Write for Followed<W> {
@@ -41,11 +55,11 @@ impl<W: Write> Write for Followed<W> {
         for piece in bytes[..written].split_inclusive(|&byte| byte == b'\n') {
             self.begun.extend_from_slice(piece);
             if piece.ends_with(b"\n") || self.begun.len() > LINE_BYTES {
-                let mut line = std::mem::take(&mut self.begun);
-                line.truncate(LINE_BYTES);
-                if self.lines.try_send(line).is_err() {
-                    self.lost.fetch_add(1, Ordering::Relaxed);
-                }
+                let mut text = std::mem::take(&mut self.begun);
+                text.truncate(LINE_BYTES);
+                self.count += 1;
+                // One that finds no room is missing in the numbers.
+                let _ = self.lines.try_send(Line { number: self.count, text });
             }
         }
         Ok(written)
@@ -56,23 +70,136 @@ impl<W: Write> Write for Followed<W> {
     }
 }
 
+impl Telemetry {
+    /// The lines from `first` on that wait and follow each other, as they are told at once; `note` is shown each of them.
+    pub(super) fn gather(&mut self, first: Line, mut note: impl FnMut(&[u8])) -> Vec<u8> {
+        let mut batch = Batch { first: first.number, count: 0 };
+        let mut text = Vec::new();
+        let mut line = Some(first);
+        while let Some(next) = line.take() {
+            note(&next.text);
+            text.extend_from_slice(&next.text);
+            batch.count += 1;
+            if text.len() >= GATHERED_BYTES {
+                break;
+            }
+            match self.lines.try_recv() {
+                Ok(found) if found.number == batch.first + batch.count => line = Some(found),
+                Ok(found) => self.next = Some(found),
+                Err(TryRecvError::Empty | TryRecvError::Disconnected) => {}
+            }
+        }
+        let mut told = batch.line();
+        told.extend_from_slice(&text);
+        told
+    }
+
+    /// The line that did not belong to the ones that were told.
+    pub(super) fn take_next(&mut self) -> Option<Line> {
+        self.next.take()
+    }
+}
+
+/// Which lines are told at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Batch {
+    first: u64,
+    count: u64,
+}
+
+#[derive(Serialize, Deserialize)]
+struct BatchLine {
+    lines: Batch,
+}
+
+/// The beginning of a line that says which lines follow.
+const BEGINS: &str = "{\"lines\":";
+
+impl Batch {
+    fn line(self) -> Vec<u8> {
+        // Writing to memory does not fail.
+        let mut text = serde_json::to_vec(&BatchLine { lines: self }).unwrap_or_default();
+        text.push(b'\n');
+        text
+    }
+
+    /// Which lines a line says that follow; nothing for a line of the journal.
+    pub(crate) fn of_line(line: &str) -> Option<Self> {
+        let found: Option<BatchLine> =
+            line.starts_with(BEGINS).then(|| serde_json::from_str(line).ok()).flatten();
+        found.map(|found| found.lines)
+    }
+}
+
+/// Counts the lines that one who follows has lost.
+#[derive(Debug, Default)]
+pub(crate) struct Gaps {
+    next: Option<u64>,
+}
+
+impl Gaps {
+    /// Takes what comes next; how many lines before it are lost. A journal that begins anew has lost none.
+    pub(crate) fn before(&mut self, batch: Batch) -> u64 {
+        let next = self.next.replace(batch.first.saturating_add(batch.count));
+        next.map_or(0, |next| batch.first.saturating_sub(next))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What is told next, without waiting.
+    fn told(telemetry: &mut Telemetry) -> Option<String> {
+        let first = telemetry.take_next().or_else(|| telemetry.lines.try_recv().ok())?;
+        Some(String::from_utf8(telemetry.gather(first, |_| {})).expect("text"))
+    }
 
     #[test]
     fn what_is_written_is_followed_line_by_line_and_never_waited_for() {
         let (mut followed, telemetry) = followed(Vec::new());
         followed.write_all(b"one\ntw").expect("it is memory");
         followed.write_all(b"o\n").expect("it is memory");
-        let lines: Vec<Vec<u8>> = telemetry.lines.try_iter().collect();
-        assert_eq!(lines, [b"one\n".to_vec(), b"two\n".to_vec()]);
+        let lines = telemetry.lines.try_iter().map(|line| (line.number, line.text));
+        assert_eq!(lines.collect::<Vec<_>>(), [(1, b"one\n".to_vec()), (2, b"two\n".to_vec())]);
         for _ in 0..WAITING_LINES + 7 {
             followed.write_all(b"more\n").expect("it is memory");
         }
-        assert_eq!(telemetry.lost.load(Ordering::Relaxed), 7);
+        assert_eq!(telemetry.lines.try_iter().count(), WAITING_LINES);
         followed.write_all(&[b'x'; LINE_BYTES * 2]).expect("it is memory");
         assert_eq!(followed.inner.len(), 8 + 5 * (WAITING_LINES + 7) + LINE_BYTES * 2);
         assert!(followed.begun.len() <= LINE_BYTES);
+    }
+
+    /// Whatever finds no room in the queue, or is dropped on its way, is counted before the next line.
+    #[test]
+    fn who_follows_knows_what_is_lost() {
+        let (mut followed, mut telemetry) = followed(Vec::new());
+        let mut gaps = Gaps::default();
+        let (mut next, mut lost_in_all, mut taken) = (0, 0, 0);
+        for round in 0..60_u32 {
+            let many = if round % 7 == 3 { WAITING_LINES + 50 } else { 40 };
+            for _ in 0..many {
+                followed.write_all(format!("{next}\n").as_bytes()).expect("it is memory");
+                next += 1;
+            }
+            while let Some(text) = told(&mut telemetry) {
+                // On its way.
+                if round % 5 == 2 {
+                    continue;
+                }
+                let (head, lines) = text.split_once('\n').expect("lines");
+                let lost = gaps.before(Batch::of_line(head).expect("a head"));
+                let first = if taken == 0 { 0 } else { lost };
+                for (place, line) in lines.lines().enumerate() {
+                    assert_eq!(Batch::of_line(line), None);
+                    let missing = if place == 0 { first } else { 0 };
+                    assert_eq!(line, (taken + missing).to_string(), "round {round}");
+                    taken += missing + 1;
+                }
+                lost_in_all += first;
+            }
+        }
+        assert!(lost_in_all > 500, "{lost_in_all}");
     }
 }
