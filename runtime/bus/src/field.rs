@@ -1,6 +1,9 @@
 //! What stands between a remote I/O and its sensors and actuators.
 
+pub(crate) mod silence;
+
 use std::sync::Arc;
+use std::time::Duration;
 
 use understudy_cycle::Agreement;
 use understudy_wire::{Actuation, Body, Frame, Header, Image, Member, Moment, ProgramId};
@@ -12,6 +15,11 @@ pub trait FieldDriver: Send {
 
     /// u(i), where `frame` comes from this field.
     fn sense<'frame>(&mut self, frame: &'frame Frame) -> Option<&'frame Image>;
+
+    /// How long a field that is reached over the link may be silent.
+    fn patience(&self) -> Option<Duration> {
+        None
+    }
 
     /// What is new since the last look, where the field is reached by another way than the link.
     fn look(&mut self) -> Option<Look> {
@@ -46,6 +54,9 @@ impl FieldDriver for NoField {
         None
     }
 }
+
+/// A plant sends in every period; one that has sent nothing for so long is suspended, has ended, or is not received.
+const PLANT_PATIENCE: Duration = Duration::from_secs(1);
 
 /// Of a remote I/O whose plant is a process of its own and is reached over the link.
 #[derive(Debug, Clone)]
@@ -84,5 +95,9 @@ impl FieldDriver for SimulatedField {
             Body::Field(field) if ours => Some(&field.sensors),
             _ => None,
         }
+    }
+
+    fn patience(&self) -> Option<Duration> {
+        Some(PLANT_PATIENCE.max(self.agreement.schedule.period() * 3))
     }
 }

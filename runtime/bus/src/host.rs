@@ -17,6 +17,7 @@ use understudy_wire::{Body, Frame, Moment, Time, encode};
 
 use crate::clock::Clock;
 use crate::error::BusError;
+use crate::field::silence::Silence;
 use crate::field::{FieldDriver, Look};
 use crate::guard::Guard;
 use crate::journal::{EventSink, HostEvent, Noted};
@@ -101,6 +102,7 @@ struct Round {
     cycle: Option<EnteredSpan>,
     wakeups_in_a_row: u32,
     field_lost: bool,
+    field_silence: Silence,
     refused: Refusals,
     duplicates: Duplicates,
     unreceived: Option<Unreceived>,
@@ -161,6 +163,7 @@ impl<M: Machine> Host<'_, M> {
             self.look(&mut round);
             let heard = self.listen(&mut round);
             let now = self.clock.now();
+            self.note_silence(now, &mut round);
             let due = self.machine.wakeup();
             if now >= due && round.wakeups_in_a_row < WAKEUPS_IN_A_ROW {
                 round.wakeups_in_a_row += 1;
@@ -248,6 +251,15 @@ impl<M: Machine> Host<'_, M> {
         self.drain(now, round);
     }
 
+    /// Reports a field that is reached over the link and shows nothing any more. Its last sensors are sampled meanwhile.
+    fn note_silence(&mut self, now: Time, round: &mut Round) {
+        if let Some(patience) = self.field.patience()
+            && let Some(reason) = round.field_silence.lasts(now, patience)
+        {
+            self.sink.record(now, Noted::Host(HostEvent::FieldLost { reason }));
+        }
+    }
+
     /// Takes what has arrived, and says how many datagrams that were.
     fn listen(&mut self, round: &mut Round) -> usize {
         for taken in 0..INPUTS_IN_A_ROW {
@@ -277,7 +289,12 @@ impl<M: Machine> Host<'_, M> {
                     let _frame = frame_span(&frame).entered();
                     trace!("received");
                     let input = match self.field.sense(&frame) {
-                        Some(sensors) => Input::RemoteIo(RemoteIoInput::Field(sensors)),
+                        Some(sensors) => {
+                            if round.field_silence.ends() {
+                                self.sink.record(now, Noted::Host(HostEvent::FieldRegained));
+                            }
+                            Input::RemoteIo(RemoteIoInput::Field(sensors))
+                        }
                         None => Input::Frame(&frame),
                     };
                     self.machine.handle_input(now, input);
