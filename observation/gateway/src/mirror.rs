@@ -154,6 +154,7 @@ fn values(program: &ProgramSnapshot, interface: &Interface) -> Value {
         "awaits_release": program.awaits_release,
         "forced": program.forced,
         "protection": program.protection,
+        "silent_cycles": program.silent_cycles,
         "lost": program.lost,
         "deadlines": {
             "direct": program.direct,

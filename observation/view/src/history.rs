@@ -3,6 +3,8 @@
 //! The [`Referee`] of the simulator runs the program from the samples, each of which names the state that it extends. A step keeps
 //! x(t), u(t) and the lineages before and after, so that a scan can be looked at as its station evaluated it.
 
+mod order;
+
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -11,6 +13,8 @@ use understudy_remote_io::{Event, Missing};
 use understudy_simulator::{Referee, Violation};
 use understudy_typed::{Fault, Program as TypedProgram};
 use understudy_wire::{Image, Lineage, Moment, ProgramId, Source, StationId, StationSet, Write};
+
+use order::Order;
 
 /// A sample and its effect on the program.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -79,6 +83,9 @@ pub struct History {
     /// The state after a sample that is still to come.
     awaited: Option<(Moment, Lineage, Image)>,
     end: End,
+    order: Order,
+    /// Whether fail-safe outputs depend on earlier deadlines.
+    has_ramps: bool,
 }
 
 /// Whether the oldest state that is known was not enough for an answer.
@@ -120,6 +127,8 @@ impl History {
             unplaced: VecDeque::new(),
             awaited: None,
             end: End::default(),
+            order: Order::default(),
+            has_ramps: !settings.ramps.is_empty(),
         })
     }
 
@@ -198,11 +207,13 @@ impl History {
     /// Its remote I/O starts again.
     pub(crate) fn starts_again(&mut self) {
         self.referee.starts_again();
+        self.order.starts_again();
     }
 
     /// Records of its remote I/O are missing; its state is known again when a station reports the state that it holds.
     pub(crate) fn misses_records(&mut self) {
         self.referee.misses_records();
+        self.order.cut();
         self.cut = true;
         self.unplaced.clear();
         self.awaited = None;
@@ -294,7 +305,9 @@ impl History {
             let sampled = sampled.filter(|step| step.sampled.is_some() && !step.void);
             sampled.take(*samples).for_each(|step| step.void = true);
         }
+        self.order.note(event);
         let (sampled, violation) = self.sample(event);
+        let violation = self.judged(event, violation);
         match event {
             Event::Sampled { moment, .. } => {
                 self.place_later(*moment, event);
@@ -326,6 +339,34 @@ impl History {
             _ => {}
         }
         violation.filter(|violation| !self.is_of_a_cut_journal(violation))
+    }
+
+    /// A violation, unless a record that is missing may be the reason.
+    fn judged(&mut self, event: &Event, violation: Option<Violation>) -> Option<Violation> {
+        match &violation {
+            None => {
+                let truth = self.referee.truth();
+                if let Event::Applied { moment, missing: None, .. } = event
+                    && truth.is_some_and(|(of, _)| of == *moment)
+                {
+                    self.order.begins();
+                }
+            }
+            // What the state after this sample is, is not known.
+            Some(Violation::UnknownHistory { .. } | Violation::Wrong { truth: None, .. })
+                if self.order.is_cut() =>
+            {
+                self.misses_records();
+                return None;
+            }
+            Some(Violation::WronglyHeld { .. }) if self.order.is_cut() => return None,
+            Some(Violation::NotTheFailSafe { .. }) if self.order.is_cut() && self.has_ramps => {
+                return None;
+            }
+            // Of a state and a sample that are known; a state before the floor is none that follows it, whatever is missing.
+            Some(_) => {}
+        }
+        violation
     }
 
     /// What went before the first record of a journal is no violation of what comes after.

@@ -201,6 +201,7 @@ impl Model {
             Trouble::Gone { count } => count.unwrap_or(1),
             _ => 1,
         };
+        self.histories.iter_mut().for_each(History::misses_records);
         let changes = self.process_alarms.fold.forget_all();
         let cycle = self.cycles.of(None);
         self.process_alarms_changed("journal", cycle, &changes);

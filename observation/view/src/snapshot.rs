@@ -292,8 +292,10 @@ pub struct ProgramSnapshot {
     /// Whether signals of other programs are valid in this sample, by the first bit of their inputs; those that its remote I/O has reported.
     #[serde(skip)]
     pub validity: BTreeMap<u16, bool>,
-    /// Whether the failure of one station would be masked; nothing while its remote I/O has not reported it.
+    /// Whether the failure of one station would be masked; nothing while its remote I/O has not reported it, or does not report.
     pub protection: Option<Protection>,
+    /// Cycles since the last deadline that its remote I/O reported, where that does not report any more.
+    pub silent_cycles: Option<u64>,
     /// What is available where no living station can prove its state.
     pub lost: Option<LostState>,
     /// Parts that the plant has finished.
@@ -302,10 +304,28 @@ pub struct ProgramSnapshot {
     pub plant_faults: Option<u64>,
 }
 
+impl Snapshot {
+    /// Whether a program is protected, and why not; where that is not known, since when.
+    pub fn protection_text(&self, program: &ProgramSnapshot) -> String {
+        match (&program.protection, program.silent_cycles) {
+            (Some(protection), _) => protection.text(),
+            (None, Some(cycles)) => {
+                let seconds = cycles as f64 * self.period_us as f64 / 1e6;
+                let name = &program.remote_io;
+                format!(
+                    "not known: {name} has reported nothing for {cycles} cycles ({seconds:.1} s)"
+                )
+            }
+            (None, None) => "not reported yet".to_owned(),
+        }
+    }
+}
+
 /// The remaining redundancy: which further failures would be masked.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct MarginSnapshot {
-    /// Further failures of stations that are masked whichever they are: 0, 1, or 2 and perhaps more.
+    /// Further failures of stations that are masked whichever they are: 0, 1, or 2 and perhaps more. 0 while a remote I/O does not report:
+    /// what would be masked is not known of its program.
     pub survives: u8,
     /// Programs with provable outputs.
     pub served: Vec<String>,

@@ -101,8 +101,10 @@ pub(crate) struct StationStanding {
     pub(crate) refused: bool,
     /// Programs whose remote I/O has closed its slot.
     pub(crate) flagged_by: ProgramSet,
-    /// The last action on it with its cycle, for causes.
+    /// The last action on it with its cycle.
     pub(crate) done: Option<(String, i64)>,
+    /// The last action that may have silenced it and is not over.
+    pub(crate) silenced: Option<(String, i64)>,
 }
 
 impl StationStanding {

@@ -38,6 +38,9 @@ pub struct Why {
     pub remote_io: String,
     /// From the origin of the run.
     pub cycle: i64,
+    /// Cycles since then, where it is the last one that the remote I/O reported and that does not report any more.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub age_cycles: Option<u64>,
     /// Its value as driven, of a variable after the scan: a BOOL as true or false, a number as a number, null where it is not finite, a time in
     /// nanoseconds.
     pub value: Value,
@@ -161,7 +164,13 @@ impl Model {
             }
         };
         let place = place.ok_or_else(|| self.no_cycle(program, cycle.unwrap_or(0)))?;
-        self.why_at(program, history, &name, place)
+        let mut why = self.why_at(program, history, &name, place)?;
+        if cycle.is_none() {
+            let newest = self.newest();
+            let standing = self.standing(newest.unwrap_or(i64::MAX));
+            why.age_cycles = self.silent_cycles(&standing, program, newest);
+        }
+        Ok(why)
     }
 
     fn why_at(
@@ -219,6 +228,7 @@ impl Model {
             program: controller.name.clone(),
             remote_io: self.members.name(Member::RemoteIo(program)).to_owned(),
             cycle: step.cycle,
+            age_cycles: None,
             source: source.map(source_word),
             missing: missing.map(missing_text),
             scanned: scanned.filter(|scanned| *scanned != value),

@@ -46,12 +46,12 @@ export function show(state) {
 
 // A lamp for each program: whether the failure of one station would be masked, and the choices of the operator where its state is lost.
 function protection(programs) {
-  const look = ({ protection, lost }) => {
+  const look = ({ protection, protection_words: words, lost }) => {
     if (lost) {
       return ["lost", "✗", lost.words];
     }
     if (!protection) {
-      return ["unknown", "?", "not reported yet"];
+      return ["unknown", "?", words];
     }
     return protection.protected ? ["protected", "●", protection.words] : ["unprotected", "⚠", protection.words];
   };

@@ -80,8 +80,10 @@ struct ShownProgram {
     signals: Vec<ShownSignal>,
     awaits_release: bool,
     forced: Vec<ShownForce>,
-    /// Nothing while the remote I/O has not reported it.
+    /// Nothing while the remote I/O has not reported it, or does not report.
     protection: Option<ShownProtection>,
+    /// The same in words, also while it is not known.
+    protection_words: String,
     lost: Option<ShownLost>,
     counts: Counts,
 }
@@ -284,6 +286,7 @@ fn shown_program(
             .protection
             .clone()
             .map(|protection| ShownProtection { words: protection.text(), protection }),
+        protection_words: snapshot.protection_text(program),
         lost: program.lost.clone().map(|lost| ShownLost { words: lost.text(), lost }),
         counts: Counts {
             direct: program.direct,
@@ -379,15 +382,16 @@ fn redundancy(snapshot: &Snapshot) -> Redundancy {
 
 fn in_words(margin: &MarginSnapshot, singles: &[&OutcomeSnapshot]) -> (&'static str, String) {
     let masked = singles.iter().filter(|outcome| outcome.masked).count();
-    let (level, words) = match (margin.survives, masked) {
+    let of = singles.len();
+    let all_pairs = margin.pairs.iter().all(|pair| pair.masked);
+    let (level, words) = match (masked, all_pairs) {
         _ if margin.served.is_empty() => ("none", "no program has provable outputs"),
-        (0, 0) => ("none", "no further failure of a station would be masked"),
-        (0, _) => {
-            let of = singles.len();
+        (0, _) => ("none", "no further failure of a station would be masked"),
+        (_, _) if masked < of => {
             let words = format!("{masked} of {of} failures of a single station would be masked");
             return ("some", words);
         }
-        (1, _) => ("all", "any one further failure of a station would be masked"),
+        (_, false) => ("all", "any one further failure of a station would be masked"),
         _ => ("all", "any two further failures of stations would be masked"),
     };
     (level, words.to_owned())

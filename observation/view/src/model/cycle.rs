@@ -152,6 +152,23 @@ impl Model {
         step.driven.is_some().then_some(step)
     }
 
+    /// Cycles since the last deadline that a remote I/O has reported, where it does not report any more.
+    pub(crate) fn silent_cycles(
+        &self,
+        standing: &Standing,
+        program: ProgramId,
+        cycle: Option<i64>,
+    ) -> Option<u64> {
+        let cycle = cycle.filter(|_| !standing.reports(Member::RemoteIo(program)))?;
+        let mut steps = self.history(program)?.steps().iter().rev();
+        let last = steps.find(|step| step.driven.is_some() && step.cycle <= cycle);
+        // Where the journal was not read from its first record, the deadlines before are counted.
+        let counted = self.programs.get(program.index())?.tally.deadlines();
+        let counted = counted.map(|deadlines| deadlines.until - 1).filter(|last| *last <= cycle);
+        let last = last.map(|step| step.cycle).or(counted)?;
+        u64::try_from(cycle - last).ok()
+    }
+
     /// The state of a station in a cycle.
     pub(crate) fn station_state_in(
         &self,

@@ -28,6 +28,7 @@ impl Model {
             let process = self.changes.now().process(member);
             if process.is_none_or(|process| process.is_running()) {
                 self.changes.push(cycle, Change::Silent(member));
+                self.values_unknown(member, cycle);
             }
         }
         for program in samples.iter() {
@@ -46,6 +47,15 @@ impl Model {
             }
         }
         self.find_complete();
+    }
+
+    /// The values at a remote I/O that does not report are not known, and neither are the alarms on them.
+    fn values_unknown(&mut self, member: Member, cycle: i64) {
+        if let Member::RemoteIo(program) = member {
+            let changes = self.process_alarms.fold.forget(program);
+            let name = self.members.name(member).to_owned();
+            self.process_alarms_changed(&name, cycle, &changes);
+        }
     }
 
     pub(super) fn find_complete(&mut self) {

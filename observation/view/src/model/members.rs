@@ -86,7 +86,7 @@ impl Model {
         self.exclusion_alarm(record, station, cycle, event);
         let cause = match event {
             StationEvent::Flagged { station, .. } => self.cause_of_silence(*station),
-            StationEvent::Joins { .. } => self.cause_of_silence(station),
+            StationEvent::Joins { .. } => self.done_to(station),
             _ => None,
         };
         self.happened(record, cycle, cause);
@@ -259,8 +259,19 @@ impl Model {
         }
     }
 
-    /// The last action on a station, in words.
+    /// Why a station may be silent, in words, with the cycle; nothing where it was not done to it.
+    pub(super) fn silenced(&self, station: StationId) -> Option<(String, i64)> {
+        let own = self.changes.now().station(station)?;
+        let (what, cycle) = own.silenced.as_ref()?;
+        Some((format!("{what} in cycle {cycle}"), *cycle))
+    }
+
     pub(super) fn cause_of_silence(&self, station: StationId) -> Option<String> {
+        self.silenced(station).map(|(why, _)| why)
+    }
+
+    /// The last action on a station, in words.
+    fn done_to(&self, station: StationId) -> Option<String> {
         let own = self.changes.now().station(station)?;
         let (what, cycle) = own.done.as_ref()?;
         Some(format!("{what} in cycle {cycle}"))

@@ -275,19 +275,7 @@ impl Model {
             Source::Held => Level::Warning,
             Source::FailSafe => Level::Alarm,
         };
-        let own = StationId(program.0);
-        let cause = match source {
-            Source::Direct => None,
-            _ if !heard.contains(own) => {
-                let name = self.members.name(Member::Station(own));
-                let why = self.cause_of_silence(own);
-                Some(match why {
-                    Some(why) => format!("{name} is not received: {why}"),
-                    None => format!("{name} is not received"),
-                })
-            }
-            _ => None,
-        };
+        let cause = self.cause_of_source(program, source, *missing, *heard);
         let subject = (record.name.clone(), FAIL_SAFE);
         if source == Source::FailSafe {
             let why = cause.clone().unwrap_or_else(|| text.clone());
@@ -305,6 +293,38 @@ impl Model {
             text,
             cause,
         });
+    }
+
+    /// The stations that are not received and would prove the outputs, with the newest thing that was done to one of them.
+    fn cause_of_source(
+        &self,
+        program: ProgramId,
+        source: Source,
+        missing: Option<Missing>,
+        heard: StationSet,
+    ) -> Option<String> {
+        let own = StationId(program.0);
+        if source == Source::Direct || heard.contains(own) {
+            return None;
+        }
+        let schedule = &self.cluster.agreement().schedule;
+        let could_prove = |station: &StationId| {
+            // Of a word that was received, another member may be missing.
+            let any = matches!(missing, Some(Missing::TwoErasures | Missing::SecondFailure));
+            let others = source != Source::Reconstructed;
+            *station == own || others && (any || schedule.is_understudy(*station))
+        };
+        let away: Vec<StationId> = self
+            .station_ids()
+            .filter(|station| !heard.contains(*station) && could_prove(station))
+            .collect();
+        let names = away.iter().map(|station| self.members.name(Member::Station(*station)));
+        let names: Vec<&str> = names.collect();
+        let verb = if names.len() == 1 { "is" } else { "are" };
+        let newest = away.iter().filter_map(|station| self.silenced(*station));
+        let newest = newest.max_by_key(|(_, cycle)| *cycle);
+        let why = newest.map_or_else(String::new, |(why, _)| format!(": {why}"));
+        Some(format!("{} {verb} not received{why}", names.join(" and ")))
     }
 
     /// Something that must never happen.

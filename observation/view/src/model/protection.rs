@@ -13,10 +13,11 @@ const UNPROTECTED: &str = "unprotected";
 const STATE_LOST: &str = "state-lost";
 
 impl Model {
-    /// The process of a remote I/O begins or ends: the alarms about its reports and its commands are over.
+    /// The process of a remote I/O begins or ends: the alarms about its reports and its commands are over. A new one says so if its field or
+    /// its link fails.
     pub(super) fn remote_io_is_new(&mut self, program: ProgramId) {
         let name = self.members.name(Member::RemoteIo(program)).to_owned();
-        let over = [STATE_LOST, "forced"];
+        let over = [STATE_LOST, "forced", "field-lost", "field-contested", "link-failed"];
         self.alarms.all_over(&name, &over, self.cycles.of(None));
         if let Some(history) = self.histories.get_mut(program.index()) {
             history.starts_again();

@@ -23,7 +23,7 @@ impl Model {
             RunEvent::Started { member } => {
                 let name = self.members.name(*member).to_owned();
                 self.process_is(*member, Process::Running, cycle);
-                self.done(*member, format!("{name} is started"), cycle);
+                self.done(*member, format!("{name} is started"), Some(false), cycle);
                 self.alarms.over(&(name, "ended"), cycle);
             }
             RunEvent::Fault { action, member, .. } => self.fault(*action, *member, cycle),
@@ -31,7 +31,7 @@ impl Model {
                 let name = self.members.name(*member).to_owned();
                 let text = format!("{name} ended unexpectedly: {how}");
                 self.process_is(*member, Process::Ended, cycle);
-                self.done(*member, text.clone(), cycle);
+                self.done(*member, text.clone(), Some(true), cycle);
                 match member {
                     Member::RemoteIo(program) => drop(self.not_driven(*program, cycle, &text)),
                     _ => self.alarms.raise((name, "ended"), cycle, text),
@@ -98,7 +98,9 @@ impl Model {
             let reason = format!("{} {what}", self.members.name(member));
             self.not_driven(program, cycle, &reason);
         }
-        self.done(member, fault_text(action, member, &self.members), cycle);
+        let runs = self.changes.now().process(member).is_none_or(Process::is_running);
+        let silences = silences(action).filter(|silences| *silences || runs);
+        self.done(member, fault_text(action, member, &self.members), silences, cycle);
     }
 
     fn process_is(&mut self, member: Member, process: Process, cycle: i64) {
@@ -116,10 +118,20 @@ impl Model {
         }
     }
 
-    fn done(&mut self, member: Member, text: String, cycle: i64) {
+    fn done(&mut self, member: Member, text: String, silences: Option<bool>, cycle: i64) {
         if let Member::Station(station) = member {
-            let change = Change::Station(station, StationChange::Done(text));
+            let change = Change::Station(station, StationChange::Done { text, silences });
             self.changes.push(cycle, change);
         }
+    }
+}
+
+/// Whether a member may be silent after an action; nothing for an action that does not concern this.
+fn silences(action: Action) -> Option<bool> {
+    match action {
+        Action::Crash | Action::Stop | Action::Cut { .. } | Action::Corrupt { .. } => Some(true),
+        Action::Slow { by } | Action::Delay { by, .. } => Some(!by.is_zero()),
+        Action::Continue | Action::Heal { .. } => Some(false),
+        _ => Process::after(action).map(|_| false),
     }
 }

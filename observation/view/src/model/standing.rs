@@ -75,6 +75,12 @@ impl Standing {
         self.detached.contains(&member)
     }
 
+    /// Whether a member executes, as far as is known, and is received here.
+    pub(crate) fn reports(&self, member: Member) -> bool {
+        let executes = self.process(member).is_none_or(Process::is_running);
+        executes && !self.is_silent(member) && !self.is_detached(member)
+    }
+
     /// Whether a member has ceased to report.
     pub(crate) fn is_silent(&self, member: Member) -> bool {
         self.silent.contains(&member)
@@ -168,7 +174,7 @@ impl Standing {
 
     pub(super) fn shift(&mut self, by: i64) {
         for station in &mut self.stations {
-            if let Some((_, cycle)) = &mut station.done {
+            for (_, cycle) in [&mut station.done, &mut station.silenced].into_iter().flatten() {
                 *cycle = cycle.saturating_add(by);
             }
         }
@@ -221,7 +227,7 @@ impl Change {
             | Self::Silent(_)
             | Self::Reports(_)
             | Self::ScenarioOver(_)
-            | Self::Station(_, StationChange::Done(_)) => false,
+            | Self::Station(_, StationChange::Done { .. }) => false,
             Self::Alive(_) | Self::BecameCycleMaster(_) | Self::Station(..) | Self::Program(..) => {
                 true
             }
@@ -239,7 +245,11 @@ pub(super) enum StationChange {
     Refused,
     Flagged(ProgramId),
     Cleared(ProgramId),
-    Done(String),
+    /// Something was done to it; whether it may be silent since, where that changes.
+    Done {
+        text: String,
+        silences: Option<bool>,
+    },
 }
 
 impl StationChange {
@@ -259,7 +269,14 @@ impl StationChange {
             Self::Refused => own.refused = true,
             Self::Flagged(by) => own.flagged_by.insert(*by),
             Self::Cleared(by) => own.flagged_by.remove(*by),
-            Self::Done(text) => own.done = Some((text.clone(), cycle)),
+            Self::Done { text, silences } => {
+                own.done = Some((text.clone(), cycle));
+                match silences {
+                    Some(true) => own.silenced.clone_from(&own.done),
+                    Some(false) => own.silenced = None,
+                    None => {}
+                }
+            }
         }
     }
 }

@@ -177,6 +177,10 @@ impl Picture<'_> {
             }
     }
 
+    fn reports(&self, program: ProgramId) -> bool {
+        self.standing.reports(Member::RemoteIo(program))
+    }
+
     fn link(&self, member: Member) -> LinkSnapshot {
         let cut_from = self.standing.cut_from(member);
         let cut_from: Vec<String> = cut_from.map(|other| self.name(other)).collect();
@@ -260,7 +264,8 @@ impl Picture<'_> {
             validity: self
                 .cycle
                 .map_or_else(BTreeMap::new, |cycle| self.model.validity(program, cycle)),
-            protection: own.protection,
+            protection: own.protection.filter(|_| self.reports(program)),
+            silent_cycles: model.silent_cycles(self.standing, program, self.cycle),
             lost: own.lost,
             finished: own.plant.map(|(finished, _)| finished),
             plant_faults: own.plant.map(|(_, plant_faults)| plant_faults),
@@ -337,8 +342,9 @@ impl Picture<'_> {
     }
 
     fn margin(&self, margin: &Margin) -> MarginSnapshot {
+        let is_known = self.model.program_ids().all(|program| self.reports(program));
         MarginSnapshot {
-            survives: margin.survives,
+            survives: if is_known { margin.survives } else { 0 },
             served: self.program_names(margin.served),
             singles: margin.singles.iter().map(|of| self.outcome(of)).collect(),
             pairs: margin.pairs.iter().map(|of| self.outcome(of)).collect(),

@@ -126,10 +126,11 @@ pub(super) fn protection(snapshot: &Snapshot) -> Vec<Line<'static>> {
     let alarm = Style::new().fg(BAD).add_modifier(Modifier::BOLD);
     let programs = snapshot.programs.iter();
     let texts = programs.filter_map(|program| {
-        let text = match (&program.lost, &program.protection) {
-            (Some(lost), _) => lost.text(),
-            (None, Some(protection)) if !protection.protected => protection.text(),
-            _ => return None,
+        let is_protected = program.protection.as_ref().is_none_or(|of| of.protected);
+        let text = match &program.lost {
+            Some(lost) => lost.text(),
+            None if is_protected && program.silent_cycles.is_none() => return None,
+            None => snapshot.protection_text(program),
         };
         Some(format!("{}: {text}", program.program))
     });
@@ -180,17 +181,16 @@ fn sentence(margin: &MarginSnapshot) -> String {
         let more = if more > 0 { format!(" and {more} more") } else { String::new() };
         format!("{}{more}", fatal.join(", "))
     };
-    match margin.survives {
-        0 => {
-            let singles = margin.singles.iter().filter(|single| {
-                // A remote I/O is never redundant.
-                !single.masked && !is_remote_io(single, margin)
-            });
-            let fatal = singles.map(|single| single.failed.join("+")).collect();
-            format!("NOT masked: {}", most(fatal))
-        }
-        1 => format!("any one station; not {}", most(stations(&margin.pairs, 2))),
-        _ => "any two stations".to_owned(),
+    let singles = margin.singles.iter().filter(|single| {
+        // A remote I/O is never redundant.
+        !single.masked && !is_remote_io(single, margin)
+    });
+    let singles: Vec<String> = singles.map(|single| single.failed.join("+")).collect();
+    let pairs = stations(&margin.pairs, 2);
+    match (singles.is_empty(), pairs.is_empty()) {
+        (false, _) => format!("NOT masked: {}", most(singles)),
+        (true, false) => format!("any one station; not {}", most(pairs)),
+        (true, true) => "any two stations".to_owned(),
     }
 }
 

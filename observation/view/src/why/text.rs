@@ -15,6 +15,13 @@ impl Why {
         let value = shown(&self.value, self.of);
         let _ =
             writeln!(text, "{}.{} is {value} in cycle {}", self.program, self.signal, self.cycle);
+        if let Some(age) = self.age_cycles {
+            let _ = writeln!(
+                text,
+                "  NOT THE PRESENT: {} has reported nothing for {age} cycles",
+                self.remote_io
+            );
+        }
         if let Some(source) = self.source {
             let why = self.missing.map_or(String::new(), |missing| format!(": {missing}"));
             let _ = writeln!(text, "  {} drives it, {source}{why}", self.remote_io);

@@ -16,10 +16,10 @@ const PERIOD_NS: u64 = 10_000_000;
 /// The longest delay of a line: its member gathers lines, and the network and the viewer take their time.
 const LATEST_NS: u64 = 300_000_000;
 
-const QUIET: &str = "title = \"quiet\"\ncycles = 150\n";
+pub(crate) const QUIET: &str = "title = \"quiet\"\ncycles = 150\n";
 
 /// Losses of stations, of frames and of protection.
-const DISTURBED: &str = r#"
+pub(crate) const DISTURBED: &str = r#"
 title = "disturbed"
 cycles = 300
 
@@ -55,7 +55,7 @@ to = "press"
 
 /// The records in the order in which a viewer of a remote cluster gets them: those of each member in batches, with a delay that changes. Actions
 /// of the laboratory are not known there.
-fn delivered(records: &[Record], chance: &mut Pcg64Mcg) -> Vec<Record> {
+pub(crate) fn delivered(records: &[Record], chance: &mut Pcg64Mcg) -> Vec<Record> {
     let mut arrives: std::collections::BTreeMap<Member, u64> = std::collections::BTreeMap::new();
     let gather_ns = chance.random_range(1..=60_000_000);
     let mut delivered: Vec<(u64, usize)> = Vec::new();
@@ -143,7 +143,11 @@ fn a_healthy_cluster_is_shown_as_healthy_in_every_cycle() {
 }
 
 /// Records of a remote I/O end, and of the stations those with its samples: nobody says why.
-fn without_remote_io(records: &[Record], from: i64, to: i64) -> (Model, Vec<(i64, Snapshot)>) {
+pub(crate) fn without_remote_io(
+    records: &[Record],
+    from: i64,
+    to: i64,
+) -> (Model, Vec<(i64, Snapshot)>) {
     let cell = cell();
     let mut model = Model::new(Arc::new(cell), Bounds::default());
     let mut shown = Vec::new();
@@ -195,6 +199,7 @@ fn a_remote_io_that_gives_no_sign_is_an_alarm_within_two_seconds_until_it_is_bac
     assert_eq!(late.remote_ios[1].state, RemoteIoState::Serving);
     assert_eq!(late.programs[0].source, None);
     assert_eq!(late.margin.served, ["press"]);
+    assert_eq!(late.margin.survives, 0, "of the robot it is not known");
     let now = model.snapshot();
     assert_eq!(alarms(&now), [""; 0]);
     assert_eq!(now.remote_ios[0].state, RemoteIoState::Serving);

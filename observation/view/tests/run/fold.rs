@@ -86,7 +86,7 @@ fn a_loss_is_an_alarm_with_its_cause() {
     let alarm = model.alarms().find(|alarm| alarm.alarm == "fail-safe");
     let alarm = alarm.expect("an alarm");
     assert_eq!((alarm.name.as_str(), alarm.over), ("press-io", None));
-    assert_eq!(alarm.text, "press is not received: press is killed in cycle 30");
+    assert_eq!(alarm.text, "press and understudy are not received: press is killed in cycle 30");
     let snapshot = model.snapshot();
     assert_eq!(snapshot.margin.survives, 0);
     assert_eq!(snapshot.margin.served, ["robot"]);

@@ -11,6 +11,7 @@ mod directory;
 mod drawings;
 mod fold;
 mod hostile;
+mod losses;
 mod margin;
 mod numbers;
 mod past;

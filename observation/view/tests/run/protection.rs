@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use understudy_journal::{Happening, Record, RunEvent};
-use understudy_view::{Bounds, LostState, Model, Protection};
+use understudy_view::{Bounds, LostState, Model, Protection, RemoteIoState};
 use understudy_wire::{Member, ProgramId, StationId};
 
-use crate::support::{cell, records, scenario};
+use crate::complete::without_remote_io;
+use crate::support::{cell, model, records, scenario};
 
 const LOST_STATE: &str = include_str!("../../../../examples/press-cell/lost-state.toml");
 
@@ -147,4 +148,72 @@ fn a_member_with_another_configuration_is_an_alarm_while_it_lasts() {
         let is_it = |alarm: &&String| alarm.starts_with(expected) && alarm.contains(", lasts");
         assert!(found.iter().any(|alarm| is_it(&alarm)), "{expected}: {found:#?}");
     }
+}
+
+/// What a remote I/O said last is no news: protection is not known, and an explanation says how old it is.
+#[test]
+fn a_remote_io_that_does_not_report_is_not_taken_at_its_last_word() {
+    let cell = cell();
+    let text = "title = \"quiet\"\ncycles = 600\n";
+    let records = records(&cell, &scenario(&cell, text), 1);
+    let (model, shown) = without_remote_io(&records, 100, i64::MAX);
+    let mut is_known = 0;
+    for (_, snapshot) in &shown {
+        let robot = &snapshot.programs[0];
+        let reports = snapshot.remote_ios[0].state != RemoteIoState::NotReporting;
+        if !reports {
+            assert_eq!(robot.protection, None);
+            assert_eq!(snapshot.margin.survives, 0);
+            assert!(
+                snapshot.protection_text(robot).starts_with("not known: robot-io has reported")
+            );
+        }
+        is_known += usize::from(robot.protection.is_some());
+    }
+    assert!(is_known > 100, "it was known before");
+    let snapshot = model.snapshot();
+    let age = snapshot.programs[0].silent_cycles.expect("it is silent");
+    assert!((480..520).contains(&age), "{age}");
+    assert_eq!(snapshot.programs[1].silent_cycles, None);
+    assert!(snapshot.programs[1].protection.as_ref().is_some_and(|of| of.protected));
+    let of = |signal, cycle| model.why(signal, cycle).expect("it is known");
+    let why = of("robot.grip", None);
+    assert_eq!(why.age_cycles, Some(age));
+    assert!(why.to_text().contains("NOT THE PRESENT: robot-io has reported nothing for"));
+    assert_eq!(of("robot.grip", Some(50)).age_cycles, None, "it was asked for");
+    assert_eq!(of("press.move_down", None).age_cycles, None);
+}
+
+/// The cause of lost outputs is what was done last to a station that would prove them; that a station was started is no cause.
+#[test]
+fn the_cause_of_lost_outputs_is_the_newest_true_one() {
+    let cell = cell();
+    let step = |at: u32, action: &str, station: &str| {
+        format!("[[step]]\nat = {at}\naction = \"{action}\"\nstation = \"{station}\"\n")
+    };
+    let text = [
+        "title = \"causes\"\ncycles = 260\n".to_owned(),
+        step(20, "crash", "robot"),
+        step(40, "restart", "robot"),
+        step(100, "stop", "robot"),
+        step(140, "crash", "understudy"),
+    ];
+    let model = model(&cell, &scenario(&cell, &text.concat()), 1);
+    let alarm = model.alarms().find(|alarm| alarm.alarm == "fail-safe").expect("an alarm");
+    assert_eq!(alarm.name, "robot-io");
+    assert_eq!(
+        alarm.text,
+        "robot and understudy are not received: understudy is killed in cycle 140"
+    );
+    // Suspended by somebody else: nobody knows of it here.
+    let mut model = Model::new(Arc::new(cell.clone()), Bounds::default());
+    for record in records(&cell, &scenario(&cell, &text.concat()), 1) {
+        let is_late = model.cycle().is_some_and(|cycle| cycle > 90);
+        if is_late && matches!(record.event, Happening::Run(RunEvent::Fault { .. })) {
+            continue;
+        }
+        model.note(&record);
+    }
+    let alarm = model.alarms().find(|alarm| alarm.alarm == "fail-safe").expect("an alarm");
+    assert_eq!(alarm.text, "robot and understudy are not received");
 }
