@@ -60,7 +60,7 @@ impl Records {
     }
 
     /// The process of a member, as its newest `ready` record says it.
-    fn ready(&mut self, name: &str) -> u32 {
+    pub(super) fn ready(&mut self, name: &str) -> u32 {
         let what = format!("{name} is ready");
         let record = self.wait_for(&what, |record| is(record, name, "ready"));
         let process = record["event"]["process"].as_u64().expect("a number");
@@ -134,6 +134,8 @@ fn every_kind_of_member_is_killed_from_outside_and_started_again_by_an_operator(
     }
     let (status, document) = operate(&run, "robot", "status");
     assert_eq!((status, code(&document)), (2, "U0621"), "{document:#}");
+    let (status, document) = operate(&run, "nonsense", "status");
+    assert_eq!((status, code(&document)), (2, "U0605"), "the name is the fault: {document:#}");
     signal(child.id(), Signal::SIGINT);
     let mut said = String::new();
     errors.read_to_string(&mut said).expect("text");

@@ -19,6 +19,7 @@ mod set_inputs;
 #[allow(dead_code, reason = "each test uses its part")]
 #[path = "../shared/mod.rs"]
 mod shared;
+mod standing_still;
 mod tennessee_eastman;
 mod writes;
 

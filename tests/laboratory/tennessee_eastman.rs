@@ -126,8 +126,10 @@ fn the_valves_of_equipment_on_modbus_move_alike_with_and_without_failures() {
         let found = run("tennessee_eastman_killed", &kills(20_261_125));
         (undisturbed.join().expect("it ran"), found)
     });
+    // The process waits for the slowest controller, so the steps of a run are as many as the machine has time for; each one depends on all
+    // before it, and each controller was killed between them.
     let steps = expected.len().min(found.len());
-    assert!(steps > CYCLES / 5, "{} and {}", expected.len(), found.len());
+    assert!(steps > 2 * CONTROLLERS.len(), "{} and {}", expected.len(), found.len());
     let valve = |line: &String| line.split_whitespace().nth(1).map(str::to_owned);
     assert_ne!(valve(&expected[1]), valve(&expected[steps - 1]), "it moves");
     for (step, (expected, found)) in expected.iter().zip(&found).enumerate() {

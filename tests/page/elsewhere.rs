@@ -97,6 +97,17 @@ fn protection_is_known_at_once_and_a_remote_io_that_is_gone_is_an_alarm() {
             let raised = alarms(&state, NOT_DRIVEN)[name];
             let after = raised - cycle(&last);
             assert!((0..=TWO_SECONDS).contains(&after), "{name}: after {after} cycles, {state:#}");
+            // Its last word is not the present.
+            page.wait_for("protection that is not known", |state| {
+                let programs = state["programs"].as_array().expect("programs").iter();
+                let own =
+                    programs.zip(["robot-io", "press-io"]).find(|(_, remote)| *remote == name);
+                let (program, _) = own.expect("a program");
+                let words = program["protection_words"].as_str().expect("words");
+                let is_unknown = program["protection"].is_null();
+                assert_eq!(is_unknown, words.starts_with("not known: "), "{program:#}");
+                is_unknown && state["redundancy"]["survives"] == 0
+            });
         }
     }
     // A page that comes now finds no remote I/O: it shows what the stations say, the alarms, and of whom it knows nothing.
@@ -170,4 +181,30 @@ fn a_controller_and_a_remote_io_with_another_program_drive_nothing_and_are_alarm
         line.contains("\"source\":\"direct\"") || line.contains("\"source\":\"reconstructed\"")
     });
     assert_eq!(driven.collect::<Vec<_>>(), [""; 0], "a wrong program drives");
+}
+
+/// What the alarm of a remote I/O says whose plant is suspended or has ended.
+const NO_FIELD: &str = "its plant has sent nothing";
+
+#[test]
+fn a_suspended_plant_is_an_alarm_until_it_goes_on() {
+    let _turn = one_at_a_time();
+    let folder = empty_folder("elsewhere-plant");
+    let mut running = Deployed::start(&folder);
+    let first = first_page(&running, &folder.join("first"));
+    let healthy = first.wait_for("a healthy cluster", is_healthy);
+    assert!(alarms(&healthy, NO_FIELD).is_empty(), "{healthy:#}");
+    let last = first.wait_for("cycles", |_| true);
+    running.signal("arm", Signal::SIGSTOP);
+    let is_raised = |state: &Value| alarms(state, NO_FIELD).contains_key("robot-io");
+    let state = first.wait_for("an alarm", is_raised);
+    let after = alarms(&state, NO_FIELD)["robot-io"] - cycle(&last);
+    assert!((0..=TWO_SECONDS).contains(&after), "after {after} cycles, {state:#}");
+    assert_eq!(alarms(&state, NO_FIELD).len(), 1, "{state:#}");
+    let late = attached(&running, &folder.join("late"));
+    late.wait_for("the same at a page that came later", is_raised);
+    running.signal("arm", Signal::SIGCONT);
+    for page in [&first, &late] {
+        page.wait_for("its end", |state| alarms(state, NO_FIELD).is_empty());
+    }
 }
