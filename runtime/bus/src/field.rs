@@ -63,12 +63,19 @@ const PLANT_PATIENCE: Duration = Duration::from_secs(1);
 pub struct SimulatedField {
     program: ProgramId,
     agreement: Arc<Agreement>,
+    has_plant: bool,
 }
 
 impl SimulatedField {
     /// The field of the remote I/O of `program`.
     pub fn new(program: ProgramId, agreement: Arc<Agreement>) -> Self {
-        Self { program, agreement }
+        Self { program, agreement, has_plant: false }
+    }
+
+    /// The cluster has a plant there, whose silence is reported.
+    #[must_use]
+    pub fn with_plant(self) -> Self {
+        Self { has_plant: true, ..self }
     }
 }
 
@@ -98,6 +105,6 @@ impl FieldDriver for SimulatedField {
     }
 
     fn patience(&self) -> Option<Duration> {
-        Some(PLANT_PATIENCE.max(self.agreement.schedule.period() * 3))
+        self.has_plant.then(|| PLANT_PATIENCE.max(self.agreement.schedule.period() * 3))
     }
 }

@@ -106,7 +106,9 @@ fn field_of(
     let agreement = cluster.agreement();
     let remote_io = cluster.remote_ios().get(program.index());
     let Some(device) = remote_io.and_then(|remote_io| remote_io.field.clone()) else {
-        return Ok(Box::new(SimulatedField::new(program, agreement.clone())));
+        let field = SimulatedField::new(program, agreement.clone());
+        let has_plant = cluster.member_name(Member::Plant(program)).is_some();
+        return Ok(Box::new(if has_plant { field.with_plant() } else { field }));
     };
     let period = agreement.schedule.period();
     let equipment = Equipment::start(device, fail_safe, period, options.real_time);
