@@ -77,6 +77,8 @@ pub(crate) struct About {
     pub(crate) numbers: Map<String, Value>,
     /// Next steps after success; text only.
     pub(crate) next: Vec<String>,
+    /// Findings that the text says: they are not counted again.
+    pub(crate) told: Vec<Diagnostic>,
 }
 
 impl Answer {
@@ -108,9 +110,15 @@ impl Answer {
         self
     }
 
-    /// Files that the command used: the text counts their warnings, JSON lists them.
+    /// Files that the command used: the text counts the warnings that `check` lists and shows all others, JSON lists them.
     pub(crate) fn with_used(self, reports: Vec<Report>) -> Self {
         Self { counts_warnings: true, ..self.with_reports(reports) }
+    }
+
+    /// Findings in the files that the text says already.
+    pub(crate) fn and_told(mut self, told: Vec<Diagnostic>) -> Self {
+        self.about.told = told;
+        self
     }
 
     pub(crate) fn with_numbers(mut self, numbers: Map<String, Value>) -> Self {

@@ -1,6 +1,7 @@
 //! All printing: answers on standard output, diagnostics and progress on standard error.
 
 use std::io::{self, IsTerminal, Write};
+use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -10,11 +11,13 @@ use codespan_reporting::term::termcolor::{
 };
 use codespan_reporting::term::{self, Config};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use understudy_interchange::is_part;
 use understudy_processes::Progress;
 use understudy_text::{Diagnostic, Lines, Report, Severity, visible, visible_json};
 
 use crate::answer::{Answer, Envelope, Status, shown};
 use crate::excerpt::Shown;
+use crate::files::listed_by_check;
 
 /// Columns of the terminal on standard output; `None` where that is a file or a pipe.
 pub(crate) fn terminal_columns() -> Option<usize> {
@@ -142,7 +145,7 @@ fn print_json(command: &str, answer: &Answer) -> io::Result<()> {
 fn print_text(answer: &Answer) -> io::Result<()> {
     let has_errors = answer.reports.iter().any(Report::has_errors);
     if answer.counts_warnings && !has_errors {
-        print_count(&answer.reports)?;
+        print_count(answer)?;
     } else {
         for (report, found) in shown(&answer.reports) {
             print_report(report, &found)?;
@@ -187,25 +190,61 @@ fn without_code(message: &str) -> &str {
     }
 }
 
-/// Prints the number of warnings and the command that shows them. A file that names the others shows theirs.
-fn print_count(reports: &[Report]) -> io::Result<()> {
-    let count: usize = reports.iter().map(|report| report.diagnostics.len()).sum();
+/// Prints the number of the warnings that `check` lists of the same files, and that command. The others depend on what this command
+/// was asked, or on what it wrote: they are printed.
+fn print_count(answer: &Answer) -> io::Result<()> {
+    let (counted, own) = counted(answer);
+    for (report, found) in shown(&own) {
+        print_report(report, &found)?;
+    }
+    let count: usize = counted.iter().map(|(_, count)| count).sum();
     let (warnings, them) = match count {
         0 => return Ok(()),
         1 => ("1 warning".to_owned(), "it"),
         _ => (format!("{count} warnings"), "them"),
     };
-    let names = |report: &Report| report.name.ends_with(".toml");
-    let files: Vec<&str> = match reports.first() {
-        Some(first) if names(first) => vec![&first.name],
-        _ => {
-            let warned = reports.iter().filter(|report| !report.diagnostics.is_empty());
-            warned.map(|report| report.name.as_str()).collect()
-        }
-    };
+    let files: Vec<&str> = counted.iter().map(|(file, _)| file.as_str()).collect();
     let files = files.join(" ");
     let files = visible(&files);
     writeln!(io::stderr(), "{warnings}; `understudy check {files}` lists {them}")
+}
+
+/// The files of which `check` lists warnings of an answer, with their number, and the reports of all other ones.
+fn counted(answer: &Answer) -> (Vec<(String, usize)>, Vec<Report>) {
+    let mut left: Vec<Report> = answer.reports.clone();
+    for report in &mut left {
+        report.diagnostics.retain(|found| !answer.about.told.contains(found));
+    }
+    left.retain(|report| !report.diagnostics.is_empty());
+    // A file that names the others lists theirs.
+    let is_naming = |name: &&String| name.ends_with(".toml");
+    let all = || answer.reports.iter().map(|report| &report.name);
+    // `check` reads several files of a TwinCAT project as one.
+    let parts = all().filter(|name| is_part(name)).count();
+    let is_alone = |name: &&String| parts == 1 || !is_part(name);
+    let named = all().filter(is_naming).chain(all().filter(is_alone));
+    let mut counted: Vec<(String, usize)> = Vec::new();
+    for name in named {
+        if left.is_empty() || counted.iter().any(|(known, _)| known == name) {
+            continue;
+        }
+        let listed = listed_by_check(Path::new(name));
+        let mut count = 0;
+        for report in &mut left {
+            let same = |known: &&Report| known.name == report.name;
+            let Some(known) = listed.iter().find(same) else {
+                continue;
+            };
+            let before = report.diagnostics.len();
+            report.diagnostics.retain(|found| !known.diagnostics.contains(found));
+            count += before - report.diagnostics.len();
+        }
+        left.retain(|report| !report.diagnostics.is_empty());
+        if count > 0 {
+            counted.push((name.clone(), count));
+        }
+    }
+    (counted, left)
 }
 
 /// Prints all findings of a file at once.

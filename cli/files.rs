@@ -3,12 +3,12 @@
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 use serde_json::{Value, json};
 use understudy_cluster::{Cluster, Loaded, Overrides, TemplateFile};
 use understudy_interchange::{
-    Joined, Source, Wanted, files_of_project, is_part, parse_program, read_source,
+    Joined, Source, USUAL_PERIOD, Wanted, files_of_project, is_part, read_ladder, read_source,
 };
 use understudy_journal::{Members, RunDirectory, RunDirectoryError, named_file};
 use understudy_ladder::Program;
@@ -16,6 +16,7 @@ use understudy_parity::ParityController;
 use understudy_scenarios::{Scenario, read as read_scenario};
 use understudy_text::spelling::nearest;
 use understudy_text::{Diagnostic, Report, decode, has_errors};
+use understudy_typed::Program as Typed;
 
 use crate::answer::{Answer, Status};
 use crate::kind::{self, Kind};
@@ -180,26 +181,56 @@ fn named_by(project: &Path) -> Result<Vec<PathBuf>, Answer> {
     }
 }
 
-/// A program without errors, whatever it is written in, and its file with the warnings.
+/// What `check` lists of a program, or of a cluster and its programs, apart from what it searches for within its time limit.
+pub(crate) fn listed_by_check(path: &Path) -> Vec<Report> {
+    if path.extension().is_some_and(|ending| ending == "toml") {
+        let read = text(path).map(|text| read_cluster(path, &text, Overrides::default()).reports);
+        return read.unwrap_or_default();
+    }
+    let read = ProgramText::of(path).map(|text| {
+        let found = read_source(&text.name, &text.text, Wanted::default());
+        text.reports(found.diagnostics)
+    });
+    read.unwrap_or_default()
+}
+
+/// A program without errors, whatever it is written in, its file with the warnings, and its period.
 ///
 /// # Errors
 /// If the file cannot be read, is no program or has errors.
-pub(crate) fn program(path: &Path, wanted: Wanted<'_>) -> Result<(Source, Report), Answer> {
+pub(crate) fn program(
+    path: &Path,
+    wanted: Wanted<'_>,
+) -> Result<(Source, Report, Duration), Answer> {
     let text = text_of(Kind::Program, path)?;
     let name = path.display().to_string();
-    // A Boolean program has stronger proofs than the same program with numbers.
+    let period = |found: Option<Duration>| wanted.period.or(found).unwrap_or(USUAL_PERIOD);
+    // A Boolean program has stronger proofs than the same program with numbers. It runs in every scan.
     if wanted.program.is_none() {
-        let parsed = parse_program(&name, &text);
-        if !has_errors(&parsed.diagnostics) {
-            let report = Report { name, text, diagnostics: parsed.diagnostics };
-            return Ok((Source::Ladder(parsed.program), report));
+        let read = read_ladder(&name, &text, None);
+        let is_every_scan = read.period.is_none_or(|interval| interval == period(read.period));
+        if let Some(ladder) = read.program.filter(|_| is_every_scan)
+            && !has_errors(&read.diagnostics)
+        {
+            let report = Report { name, text, diagnostics: read.diagnostics };
+            return Ok((Source::Ladder(ladder), report, period(read.period)));
         }
     }
     let read = read_source(&name, &text, wanted);
     let report = Report { name, text, diagnostics: read.diagnostics };
     match read.source {
-        Some(source) if !report.has_errors() => Ok((source, report)),
+        Some(source) if !report.has_errors() => Ok((source, report, period(read.period))),
         _ => Err(Answer::bad_files(vec![report])),
+    }
+}
+
+/// Why a typed program is no ladder, behind its subject.
+pub(crate) fn why_no_ladder(program: &Typed) -> &'static str {
+    match program.tasks.iter().any(|task| task.every > 1) {
+        true => {
+            "does not run in every scan, since the interval of its task is longer than the period"
+        }
+        false => "has numbers",
     }
 }
 
@@ -208,11 +239,20 @@ pub(crate) fn program(path: &Path, wanted: Wanted<'_>) -> Result<(Source, Report
 /// # Errors
 /// If the file cannot be read, is not a ladder or has errors.
 pub fn ladder(path: &Path) -> Result<(Program, Report), Answer> {
+    ladder_at(path, None).map(|(program, report, _)| (program, report))
+}
+
+/// As [`ladder`], for a period; with the interval that the file states.
+pub(crate) fn ladder_at(
+    path: &Path,
+    period: Option<Duration>,
+) -> Result<(Program, Report, Option<Duration>), Answer> {
     let text = text_of(Kind::Program, path)?;
     let name = path.display().to_string();
-    let parsed = parse_program(&name, &text);
-    let report = Report { name, text, diagnostics: parsed.diagnostics };
-    if report.has_errors() {
+    let read = read_ladder(&name, &text, period);
+    let report = Report { name, text, diagnostics: read.diagnostics };
+    let program = read.program.filter(|_| !report.has_errors());
+    let Some(program) = program else {
         let typed = read_source(&report.name, &report.text, Wanted::default()).source;
         let answer = Answer::bad_files(vec![report]);
         return Err(match typed {
@@ -222,8 +262,8 @@ pub fn ladder(path: &Path) -> Result<(Program, Report), Answer> {
             }
             _ => answer,
         });
-    }
-    Ok((parsed.program, report))
+    };
+    Ok((program, report, read.period))
 }
 
 /// Writes a file.
@@ -365,11 +405,15 @@ pub(crate) fn parity_of<'a>(
 ) -> Result<&'a ParityController, Answer> {
     cluster.parity().ok_or_else(|| {
         let mut controllers = cluster.controllers().iter();
-        let typed = controllers.find(|controller| controller.circuit().is_none());
-        let message = format!(
-            "`{command}` works on Boolean programs, and the program of `{}` has numbers",
-            typed.map_or("the cluster", |typed| &typed.name)
-        );
+        let typed = controllers.find_map(|controller| {
+            controller
+                .code
+                .typed()
+                .map(|program| (controller.name.as_str(), why_no_ladder(program)))
+        });
+        let (name, why) = typed.unwrap_or(("the cluster", "has numbers"));
+        let message =
+            format!("`{command}` works on Boolean programs, and the program of `{name}` {why}");
         Answer::failed(Status::BadInput, "U0438", message)
     })
 }

@@ -47,9 +47,9 @@ pub(crate) struct Arguments {
     /// Number of understudies, without a cluster file
     #[arg(long, value_name = "NUMBER", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=8))]
     understudies: u8,
-    /// Scan period, without a cluster file
-    #[arg(long, value_name = "TIME", default_value = "10ms", value_parser = parse_positive)]
-    period: Duration,
+    /// Scan period, without a cluster file. Default: that of the files, else 10ms
+    #[arg(long, value_name = "TIME", value_parser = parse_positive)]
+    period: Option<Duration>,
     /// Requirement, such as inputs>=24, languages~ladder, vendor=Siemens, remote-io:ethernet; repeatable
     #[arg(long, value_name = "WHAT")]
     require: Vec<String>,

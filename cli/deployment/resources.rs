@@ -28,9 +28,9 @@ pub(crate) struct Arguments {
     /// Print the Instruction List of each program
     #[arg(long)]
     instructions: bool,
-    /// Scan period, without a cluster file
-    #[arg(long, value_name = "TIME", default_value = "10ms", value_parser = parse_positive)]
-    period: Duration,
+    /// Scan period, without a cluster file. Default: that of the files, else 10ms
+    #[arg(long, value_name = "TIME", value_parser = parse_positive)]
+    period: Option<Duration>,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {

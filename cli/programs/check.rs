@@ -10,7 +10,7 @@ use std::time::Duration;
 use clap::Args;
 use serde::Serialize;
 use understudy_cluster::{Cluster, Overrides};
-use understudy_interchange::{Source, Wanted, is_part, read_source, unknown_form};
+use understudy_interchange::{Source, USUAL_PERIOD, Wanted, is_part, read_source, unknown_form};
 use understudy_journal::Members;
 use understudy_scenarios::read;
 use understudy_supervisor::ladder::read_map;
@@ -50,9 +50,6 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "TIME", default_value = "1s", value_parser = duration::parse)]
     budget: Duration,
 }
-
-/// Scan period of a ladder without a cluster, as for `verify`.
-const PERIOD: Duration = Duration::from_millis(10);
 
 #[derive(Serialize)]
 struct Result {
@@ -213,10 +210,11 @@ impl Found<'_> {
     ) -> Vec<Diagnostic> {
         let file = read_source(name, text, Wanted { program, period: None });
         let mut diagnostics = file.diagnostics;
+        let period = file.period.unwrap_or(USUAL_PERIOD);
         let shown = shown.to_owned();
         match &file.source {
             Some(Source::Ladder(program))
-                if looking.at_rungs(program, PERIOD, &mut diagnostics) =>
+                if looking.at_rungs(program, period, &mut diagnostics) =>
             {
                 self.cut_short.push(shown);
             }

@@ -97,8 +97,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let wanted = Wanted { program: arguments.unit.as_deref(), period: arguments.period };
     let form = form_of_output(arguments);
     let failed = |error: WriteError| (code(&error), error.to_string());
-    let has_numbers = reading.program.is_some()
-        && matches!(read_source(&report.name, &report.text, wanted).source, Some(Source::Typed(_)));
+    let as_it_is = Wanted { period: None, ..wanted };
+    let as_it_is = || read_source(&report.name, &report.text, as_it_is).source;
+    let has_numbers = reading.program.is_some() && matches!(as_it_is(), Some(Source::Typed(_)));
     let written = match (&reading.program, form) {
         // What is no ladder may be a program with numbers; a form that has numbers keeps those that a ladder has as bits.
         (program, Ok(form @ (Form::St | Form::Plcopen | Form::PlcopenFbd)))
@@ -121,7 +122,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
             let period = arguments.period.or(reading.period);
             let written = |form: Form| write(form.format(), program, period).map_err(failed);
             if has_numbers {
-                report.diagnostics.push(in_bits(program));
+                report.diagnostics.extend(in_bits(program));
             }
             Some(form.and_then(written))
         }
@@ -163,17 +164,17 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
 }
 
 /// The finding on numbers that a ladder has bit by bit.
-fn in_bits(program: &Program) -> Diagnostic {
+fn in_bits(program: &Program) -> Option<Diagnostic> {
     let signals = program.inputs.iter().chain(&program.outputs);
     let numbers = signals.filter_map(|signal| signal.name.strip_suffix(".0"));
     let numbers: Vec<String> = numbers.map(|name| format!("`{name}`")).collect();
     let message = format!(
         "the written form has no numbers: {} as the bits of the values that the program reaches, such as {}.0",
         numbers.join(", "),
-        numbers.first().map_or("", |first| first.trim_matches('`'))
+        numbers.first()?.trim_matches('`')
     );
     let help = "stations and `check` take numbers of the original; .st and .xml keep them";
-    Diagnostic::warning("U1018", message, 0..0).with_help(help)
+    Some(Diagnostic::warning("U1018", message, 0..0).with_help(help))
 }
 
 /// Code of the error that prevented the conversion.

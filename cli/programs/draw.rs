@@ -51,7 +51,7 @@ enum Form {
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let path = arguments.file.as_path();
     let wanted = Wanted { program: arguments.program.as_deref(), period: None };
-    let (source, report) = files::program(path, wanted)?;
+    let (source, report, _) = files::program(path, wanted)?;
     let (text, report, is_ladder) = match (source, arguments.form) {
         (Source::Ladder(program), Form::Text) => (draw_text(&program), report, true),
         (Source::Ladder(program), Form::Svg) => (draw_svg(&program), report, true),

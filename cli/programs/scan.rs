@@ -8,7 +8,7 @@ use clap::Args;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 use understudy_executable::{Executable, Interface, Scratch, declared, digest};
-use understudy_interchange::{Source, Wanted, no_program, read_source};
+use understudy_interchange::{Source, USUAL_PERIOD, Wanted, no_program, read_source};
 use understudy_ladder::Program as Ladder;
 use understudy_text::{Diagnostic, Report, duration, has_errors};
 use understudy_typed::{Elementary, Fault, Point, Points, Program};
@@ -53,9 +53,6 @@ pub(crate) struct SubjectArguments {
     #[arg(long, value_name = "NAME")]
     program: Option<String>,
 }
-
-/// Period of a program whose file has none.
-const PERIOD: Duration = Duration::from_millis(10);
 
 /// The longest file of inputs, in scans.
 const MAXIMUM_SCANS: usize = 1_000_000;
@@ -133,14 +130,9 @@ pub(crate) fn subject(
     arguments: &SubjectArguments,
 ) -> std::result::Result<(Subject, Vec<Report>), Answer> {
     let source = ProgramText::of(&arguments.program_file)?;
-    let wanted = |period| Wanted { period: Some(period), program: arguments.program.as_deref() };
-    let read_with = |period| read_source(&source.name, &source.text, wanted(period));
-    let mut read = read_with(arguments.period.unwrap_or(PERIOD));
-    // A period in the file is known only after it was read.
-    let period = arguments.period.or(read.period).unwrap_or(PERIOD);
-    if arguments.period.is_none() && period != PERIOD {
-        read = read_with(period);
-    }
+    let wanted = Wanted { period: arguments.period, program: arguments.program.as_deref() };
+    let mut read = read_source(&source.name, &source.text, wanted);
+    let period = arguments.period.or(read.period).unwrap_or(USUAL_PERIOD);
     if let Some(Source::Library(_)) = read.source {
         read.diagnostics.push(no_program());
     }

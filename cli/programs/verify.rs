@@ -63,9 +63,9 @@ pub(crate) struct Arguments {
     /// Fairness condition, true infinitely often in every run considered; repeatable
     #[arg(long, value_name = "TEXT")]
     fair: Vec<String>,
-    /// Scan period; determines the length of timers in scans
-    #[arg(long, value_name = "TIME", default_value = "10ms", value_parser = parse_positive)]
-    period: Duration,
+    /// Scan period; determines the length of timers in scans. Default: that of the file, else 10ms
+    #[arg(long, value_name = "TIME", value_parser = parse_positive)]
+    period: Option<Duration>,
     /// Maximum number of live nodes of decision diagrams
     #[arg(long, value_name = "NUMBER", default_value_t = 4_000_000)]
     nodes: usize,
@@ -100,18 +100,18 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     if is_cluster {
         return cluster(arguments, &patience);
     }
-    let wanted = Wanted { period: Some(arguments.period), program: arguments.program.as_deref() };
-    let (program, mut report) = match files::program(&arguments.file, wanted)? {
-        (Source::Typed(program), report) => {
+    let wanted = Wanted { period: arguments.period, program: arguments.program.as_deref() };
+    let (program, mut report, period) = match files::program(&arguments.file, wanted)? {
+        (Source::Typed(program), report, _) => {
             return numbers::of_program(arguments, &program, report, &patience);
         }
-        (Source::Ladder(program), report) => (program, report),
-        (Source::Library(_), _) => {
+        (Source::Ladder(program), report, period) => (program, report, period),
+        (Source::Library(_), _, _) => {
             let message = "the file has no PROGRAM: properties are of programs";
             return Err(Answer::failed(Status::BadInput, "U0436", message));
         }
     };
-    let subject = Subject::new(&program, arguments.period).map_err(not_lowered)?;
+    let subject = Subject::new(&program, period).map_err(not_lowered)?;
     let asked = match asked(arguments, &|property| subject.resolve(property)) {
         Ok(asked) => asked,
         Err(mut answer) => {
@@ -119,24 +119,24 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
             return Err(answer);
         }
     };
-    let answer =
-        match arguments.smv {
-            Some(form) => {
-                let text = text_for_nusmv(form, &program, &subject, &asked);
-                files::deliver(arguments.output.as_deref(), &text, json!({ "text": text }))?
-            }
-            None => {
-                let go_on = |work| patience.goes_on(work);
-                let bounds = bounds(arguments, &go_on);
-                patience.turn_to("the order and the effect of the rungs".to_owned());
-                let remarks =
-                    subject.remarks(&program, arguments.period, bounds).map_err(not_lowered)?;
-                let found = remarks.found.iter();
-                report.diagnostics.extend(found.map(|remark| remark.diagnostic.clone()));
-                proved(arguments, &program, &subject, &remarks, &asked, &patience, bounds)?
-                    .and_next(&[&"init", &"cell", &"--from", &arguments.file])
-            }
-        };
+    let answer = match arguments.smv {
+        Some(form) => {
+            let text = text_for_nusmv(form, &program, &subject, &asked);
+            files::deliver(arguments.output.as_deref(), &text, json!({ "text": text }))?
+        }
+        None => {
+            let go_on = |work| patience.goes_on(work);
+            let bounds = bounds(arguments, &go_on);
+            patience.turn_to("the order and the effect of the rungs".to_owned());
+            let remarks = subject.remarks(&program, period, bounds).map_err(not_lowered)?;
+            let told = remarks.found.iter().map(|remark| remark.diagnostic.clone());
+            let told: Vec<Diagnostic> = told.collect();
+            report.diagnostics.extend(told.iter().cloned());
+            proved(arguments, (&program, period), &subject, &remarks, &asked, &patience, bounds)?
+                .and_next(&[&"init", &"cell", &"--from", &arguments.file])
+                .and_told(told)
+        }
+    };
     Ok(answer.with_used(vec![report]))
 }
 
@@ -217,7 +217,7 @@ fn text_for_nusmv(form: Smv, program: &Program, subject: &Subject, asked: &Asked
 
 fn proved(
     arguments: &Arguments,
-    ladder: &Program,
+    (ladder, period): (&Program, Duration),
     subject: &Subject,
     remarks: &Remarks,
     asked: &Asked,
@@ -239,7 +239,7 @@ fn proved(
         program.properties.push(Finding::new(subject.circuit(), property, formula, proof));
     }
     let page = arguments.draw.as_deref();
-    let page = page.map(|path| draw(path, arguments.period, ladder, subject, &program));
+    let page = page.map(|path| draw(path, period, ladder, subject, &program));
     Ok(answer::of_programs(vec![program], None, page.transpose()?))
 }
 

@@ -122,7 +122,7 @@ fn each_program_of_a_file_gets_a_controller() {
     // A name on the command line is a prefix then.
     let other = ["init", "other", "--from", "north=plant.st"];
     assert_eq!(understudy_in(&folder, &other).status, 0);
-    assert!(folder.join("other/north-drain.ladder").exists());
+    assert!(folder.join("other/north-drain.st").exists());
 }
 
 #[test]

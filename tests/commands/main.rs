@@ -34,6 +34,7 @@ mod twincat;
 mod verdicts;
 mod verify;
 mod view;
+mod warnings;
 mod whole_numbers;
 
 use std::path::{Path, PathBuf};

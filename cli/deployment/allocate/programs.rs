@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use understudy_cluster::{Cluster, Overrides};
+use understudy_interchange::USUAL_PERIOD;
 use understudy_ladder::Program;
 use understudy_logic::Circuit;
 use understudy_parity::{ParityController, generate};
-use understudy_text::Report;
+use understudy_text::{Report, duration};
 
 use crate::answer::{Answer, Status};
 use crate::files;
@@ -47,13 +48,20 @@ impl Group {
 
 impl Programs {
     /// Reads all files and reports all errors.
-    pub(crate) fn read(paths: &[PathBuf], period: Duration) -> Result<Self, Answer> {
+    pub(crate) fn read(paths: &[PathBuf], period: Option<Duration>) -> Result<Self, Answer> {
+        let is_cluster = |path: &Path| path.extension().is_some_and(|ending| ending == "toml");
+        let period = period.or_else(|| {
+            let ladders = paths.iter().filter(|path| !is_cluster(path));
+            let stated = ladders.filter_map(|path| files::ladder_at(path, None).ok()?.2);
+            stated.reduce(duration::common)
+        });
+        let period = period.unwrap_or(USUAL_PERIOD);
         let mut reports = Vec::new();
         let mut wrong = Answer::done("", serde_json::Value::Null);
         let mut ladders = Vec::new();
         let mut clusters = Vec::new();
         for path in paths {
-            let read = if path.extension().is_some_and(|extension| extension == "toml") {
+            let read = if is_cluster(path) {
                 files::cluster(path, Overrides::default()).map(|(cluster, found)| {
                     reports.extend(found);
                     clusters.push(cluster);
@@ -103,7 +111,7 @@ impl Programs {
 }
 
 fn ladder(path: &Path, period: Duration) -> Result<(Member, Report), Answer> {
-    let (program, report) = files::ladder(path)?;
+    let (program, report, _) = files::ladder_at(path, Some(period))?;
     let circuit =
         program.lower(period).map_err(|error| Answer::failed(Status::BadInput, "U0436", error))?;
     let member = Member { name: program.name.to_string(), ladder: program, circuit };

@@ -11,7 +11,7 @@ use understudy_cluster::{
     Draft, DraftProgram, MAXIMUM_PROGRAM_NAME, is_name, read as read_cluster,
 };
 use understudy_interchange::{Apart, Format, Source, USUAL_PERIOD, read_apart};
-use understudy_text::{Report, Severity, decode};
+use understudy_text::{Report, Severity, decode, duration};
 use understudy_wire::MAXIMUM_PROGRAMS;
 
 use super::written;
@@ -221,10 +221,11 @@ impl Found {
     }
 
     fn draft(&mut self, folder: &Path) -> Draft {
-        let shortest = self.periods.iter().min().copied();
+        // All programs run in one cycle, as those of one file do.
+        let common = self.periods.iter().copied().reduce(duration::common);
         Draft::new(
             cluster_name(folder),
-            shortest.unwrap_or(USUAL_PERIOD),
+            common.unwrap_or(USUAL_PERIOD),
             std::mem::take(&mut self.programs),
         )
     }

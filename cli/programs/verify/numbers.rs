@@ -11,6 +11,7 @@ use understudy_verification::symbolic::Resolved;
 use super::answer::{self, Finding, ProgramAnswer};
 use super::{Arguments, Asked, asked, bounds};
 use crate::answer::{Answer, Status};
+use crate::files::why_no_ladder;
 use crate::patience::Patience;
 
 /// The standard property of a program with numbers.
@@ -24,7 +25,10 @@ pub(super) fn of_program(
     patience: &Patience<'_>,
 ) -> Result<Answer, Answer> {
     if arguments.smv.is_some() || arguments.draw.is_some() {
-        let message = "--draw and --smv work on Boolean programs, and the program has numbers";
+        let message = format!(
+            "--draw and --smv work on Boolean programs, and the program {}",
+            why_no_ladder(program)
+        );
         return Err(Answer::failed(Status::BadInput, "U0438", message));
     }
     patience.turn_to("the statements of the program".to_owned());

@@ -19,7 +19,7 @@ use std::ops::{Range, RangeInclusive};
 use std::time::Duration;
 
 use toml::de::DeTable;
-use understudy_interchange::parse_program;
+use understudy_interchange::read_ladder;
 use understudy_ladder::Program;
 use understudy_text::spelling::suggestion;
 use understudy_text::tables::{Codes, Fields, Placed, Value};
@@ -164,9 +164,11 @@ impl Reader<'_> {
         top.finish(found);
         let mut fields = project?;
         fields.require(&["ladder"], found);
-        let ladder =
-            fields.text("ladder", &mut self.diagnostics).and_then(|name| self.ladder(&name));
-        let plant = fields.text("plant", &mut self.diagnostics).and_then(|name| self.ladder(&name));
+        let period = fields.time("period", TIMES, found).unwrap_or(PERIOD);
+        let ladder = fields.text("ladder", &mut self.diagnostics);
+        let ladder = ladder.and_then(|name| self.ladder(&name, period));
+        let plant = fields.text("plant", &mut self.diagnostics);
+        let plant = plant.and_then(|name| self.ladder(&name, period));
         let records = fields.texts("records", &mut self.diagnostics);
         let mut read_records = Vec::new();
         for record in &records {
@@ -183,7 +185,6 @@ impl Reader<'_> {
             );
         }
         let found = &mut self.diagnostics;
-        let period = fields.time("period", TIMES, found).unwrap_or(PERIOD);
         let analysis = fields.word("detection", &["late", "prompt"], found);
         let objective = fields.word("objective", &["fewest", "nearest"], found);
         let simultaneous = fields.count("simultaneous", 1..=64, found);
@@ -241,7 +242,7 @@ impl Reader<'_> {
         );
     }
 
-    fn ladder(&mut self, name: &Placed<&str>) -> Option<Program> {
+    fn ladder(&mut self, name: &Placed<&str>, period: Duration) -> Option<Program> {
         let text = match (self.open)(name.value) {
             Ok(text) => text,
             Err(reason) => {
@@ -249,14 +250,11 @@ impl Reader<'_> {
                 return None;
             }
         };
-        let parsed = parse_program(name.value, &text);
-        let wrong = has_errors(&parsed.diagnostics);
-        self.ladders.push(Report {
-            name: name.value.to_owned(),
-            text,
-            diagnostics: parsed.diagnostics,
-        });
-        (!wrong).then_some(parsed.program)
+        let read = read_ladder(name.value, &text, Some(period));
+        let program = read.program.filter(|_| !has_errors(&read.diagnostics));
+        let (name, diagnostics) = (name.value.to_owned(), read.diagnostics);
+        self.ladders.push(Report { name, text, diagnostics });
+        program
     }
 
     fn places(&mut self, names: Vec<Placed<&str>>, known: &[&str], what: &str) -> Vec<usize> {

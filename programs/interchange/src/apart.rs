@@ -5,14 +5,16 @@
 use std::collections::{HashMap, HashSet};
 use std::time::Duration;
 
+use understudy_structured_text::lower::{event, has_event};
 use understudy_structured_text::print;
-use understudy_structured_text::syntax::{Declaration, File, Unit, UnitKind};
+use understudy_structured_text::syntax::{Declaration, File, Name, Unit, UnitKind};
 use understudy_text::{Diagnostic, has_errors};
 
 use crate::format::Format;
 use crate::plcopen;
 use crate::source::{Source, SourceFile, Wanted, no_program, read_source};
-use crate::typed_text::{Bodies, parsed, typed_text};
+use crate::twincat;
+use crate::typed_text::{Bodies, parsed, typed_text_with};
 use crate::written::{WriteError, Written, write};
 
 /// A program for a controller of its own.
@@ -51,28 +53,62 @@ pub fn read_apart(name: &str, text: &str) -> (Vec<Apart>, Vec<Diagnostic>) {
                 diagnostics.push(finding);
             }
         }
-        let written = match &source {
-            Some(Source::Ladder(ladder)) => {
-                write(Format::Ladder, ladder, period).map(|written| (Format::Ladder, written))
-            }
-            Some(Source::Typed(_)) => {
-                let to = Format::StructuredText;
-                let wanted = Wanted { period, ..wanted };
-                match typed_text(name, text, wanted, to, Bodies::AsRead) {
-                    Ok((Some(written), _)) => Ok((to, written)),
-                    Ok((None, _)) => Err(WriteError::NotHeld("it has errors".to_owned())),
-                    Err(error) => Err(error),
-                }
-            }
+        let has_event = parsed.as_ref().is_some_and(|file| has_event(file, Some(unit)));
+        let is_document =
+            Format::of(name, text) == Some(Format::PlcOpen) && twincat::read(text).is_none();
+        let to = match &source {
+            // A ladder states neither interval nor event.
+            Some(Source::Ladder(_)) if period.is_none() && !has_event => Format::Ladder,
+            Some(Source::Ladder(_)) if is_document => Format::PlcOpen,
+            Some(Source::Ladder(_) | Source::Typed(_)) => Format::StructuredText,
             Some(Source::Library(_)) | None => continue,
         };
+        let written = match &source {
+            Some(Source::Ladder(ladder)) if to == Format::Ladder => write(to, ladder, None),
+            _ => match typed_text_with(name, text, wanted, (to, Bodies::AsRead), None) {
+                Ok((Some(written), _)) => Ok(written),
+                Ok((None, _)) => Err(WriteError::NotHeld("it has errors".to_owned())),
+                Err(error) => Err(error),
+            },
+        };
+        // What is drafted is what will be read of the text.
+        let read = written.as_ref().ok().and_then(|written| {
+            let name = format!("{unit}.{}", to.ending());
+            read_source(&name, &written.text, Wanted::default()).source
+        });
         // Where the programs cannot be written apart, one controller runs them all.
-        if written.is_err() && whole.source.is_some() {
+        if read.is_none() && whole.source.is_some() {
             return together(whole);
         }
-        apart.extend(source.map(|source| Apart { source, period, written: Some(written) }));
+        let written = Some(written.map(|written| (to, written)));
+        apart.extend(read.or(source).map(|source| Apart { source, period, written }));
     }
     (apart, diagnostics)
+}
+
+/// Leaves of a file the program of that name and what it uses.
+pub(crate) fn alone(file: &mut File, program: &str) {
+    let chosen = |name: &Name| name.is(program);
+    let mut parts: HashMap<String, HashSet<String>> = HashMap::new();
+    for unit in &file.units {
+        parts.entry(unit.name.key()).or_default().extend(words(&print::unit(unit)));
+    }
+    for of in &file.types {
+        let only = File { types: vec![of.clone()], ..File::default() };
+        parts.entry(of.name.key()).or_default().extend(words(&print::file(&only)));
+    }
+    for global in &file.globals {
+        let only = print::declarations(std::slice::from_ref(global));
+        parts.entry(global.name.key()).or_default().extend(words(&only));
+    }
+    let runs = file.instances.iter().filter(|run| chosen(&run.of));
+    let events = runs.filter_map(|run| event(file, run));
+    let mut own: HashSet<String> =
+        events.flat_map(|event| words(&print::expression(event))).collect();
+    own.insert(program.to_ascii_uppercase());
+    let used: HashSet<String> = reached(&own, &parts).into_iter().map(str::to_owned).collect();
+    file.units.retain(|unit| used.contains(&unit.name.key()));
+    file.globals.retain(|global| global.constant || used.contains(&global.name.key()));
 }
 
 /// One controller for all that the file runs.
@@ -113,7 +149,7 @@ fn belong_together(file: &File, programs: &[String]) -> bool {
     let mut instances = file.instances.iter();
     let is_more = instances
         .any(|instance| !instance.connections.is_empty() || !seen.insert(instance.of.key()));
-    let words_of = |unit: &Unit| (unit.name.key(), words(unit));
+    let words_of = |unit: &Unit| (unit.name.key(), words(&print::unit(unit)));
     let (main, called): (Vec<&Unit>, Vec<&Unit>) =
         file.units.iter().partition(|unit| unit.kind == UnitKind::Program);
     let main: HashMap<String, HashSet<String>> = main.into_iter().map(words_of).collect();
@@ -125,13 +161,16 @@ fn belong_together(file: &File, programs: &[String]) -> bool {
     let globals = file.globals.iter().filter(|global| !global.constant);
     let globals = globals.filter(|global| !is_at_input(global));
     let globals: HashSet<String> = globals.map(|global| global.name.key()).collect();
-    let mut users: HashMap<&str, usize> = HashMap::new();
+    let mut users: HashMap<String, usize> = HashMap::new();
     for program in programs {
-        let own = main.get(&program.to_ascii_uppercase());
-        for word in own.map_or_else(HashSet::new, |own| reached(own, &called)) {
+        let mut own = main.get(&program.to_ascii_uppercase()).cloned().unwrap_or_default();
+        let runs = file.instances.iter().filter(|run| run.of.is(program));
+        let events = runs.filter_map(|run| event(file, run));
+        own.extend(events.flat_map(|event| words(&print::expression(event))));
+        for word in reached(&own, &called) {
             let is_memory = word.starts_with('%') && !is_input(word);
             if globals.contains(word) || is_memory {
-                *users.entry(word).or_default() += 1;
+                *users.entry(word.to_owned()).or_default() += 1;
             }
         }
     }
@@ -155,9 +194,9 @@ fn reached<'a>(
     reached
 }
 
-/// Names and addresses in a unit, in capitals.
-fn words(unit: &Unit) -> HashSet<String> {
-    let text = print::unit(unit).to_ascii_uppercase();
+/// Names and addresses in a text, in capitals.
+fn words(text: &str) -> HashSet<String> {
+    let text = text.to_ascii_uppercase();
     let is_part = |letter: char| letter.is_alphanumeric() || letter == '_';
     let mut words = HashSet::new();
     let names = text.split(|letter: char| !is_part(letter)).filter(|word| !word.is_empty());

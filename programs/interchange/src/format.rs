@@ -2,10 +2,11 @@
 
 use std::time::Duration;
 
-use understudy_ladder::{Parsed, Program, parse};
+use understudy_ladder::{Program, parse};
 use understudy_text::{Diagnostic, has_errors};
 
 use crate::plcopen::Fidelity;
+use crate::source::another_period;
 use crate::text::whole;
 use crate::{digraph, ldmicro, plcopen, text as written, twincat};
 
@@ -175,14 +176,16 @@ fn stem(name: &str) -> &str {
     file.split('.').next().unwrap_or(file)
 }
 
-/// Reads a program wherever a ladder is asked for, whatever its form.
-pub fn parse_program(name: &str, text: &str) -> Parsed {
-    let reading = match Format::of(name, text) {
-        Some(Format::Ladder) => return parse(text),
+/// Reads a program wherever a ladder is asked for, whatever its form; `period` is from one scan to the next, where that is known.
+pub fn read_ladder(name: &str, text: &str, period: Option<Duration>) -> Reading {
+    let mut reading = match Format::of(name, text) {
         Some(format) => read(format, name, text, None),
         None => Reading { diagnostics: vec![unknown_form(text)], ..Reading::default() },
     };
-    Parsed { program: reading.program.unwrap_or_default(), diagnostics: reading.diagnostics }
+    let ladder = reading.program.as_ref();
+    let found = ladder.and_then(|ladder| another_period(ladder, reading.period, period));
+    reading.diagnostics.extend(found);
+    reading
 }
 
 /// The finding on a file of which neither name nor contents tell the form.
@@ -225,7 +228,7 @@ mod tests {
 
     #[test]
     fn a_file_of_no_known_form_is_one_error() {
-        let found = parse_program("a.clp", "_FILES_CLASSICLADDER\n_FILE-a\n#1\n").diagnostics;
+        let found = read_ladder("a.clp", "_FILES_CLASSICLADDER\n_FILE-a\n#1\n", None).diagnostics;
         assert_eq!(found.len(), 1, "{found:?}");
         assert_eq!(found[0].code, "U0619");
     }

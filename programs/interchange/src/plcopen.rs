@@ -196,9 +196,7 @@ fn errors_of_others(text: &str, diagnostics: &mut Vec<Diagnostic>) {
         let meets = |known: &Diagnostic| {
             known.span.start <= found.span.end && found.span.start <= known.span.end
         };
-        // The interval that is no time is said where it is written.
-        let is_interval = |known: &Diagnostic| known.code == "U1011" && found.code == "U1084";
-        is_error(found) && !known.any(|known| meets(known) || is_interval(known))
+        is_error(found) && !known.any(meets)
     });
     diagnostics.extend(found);
 }
@@ -244,8 +242,10 @@ fn translate(text: &str, project: &Project, pou: &Pou, reading: &mut Reading) {
     for used in units::used(project, pou) {
         unnamed_parts(used, &mut reading.diagnostics);
     }
+    let has_event = runs.is_some_and(|instance| instance.has_event);
     if let Some(Body::Graph(graph)) = &pou.body
         && graph.language != Language::Sequence
+        && !has_event
     {
         let mut found = Vec::new();
         let period = reading.period.unwrap_or(USUAL_PERIOD);
@@ -273,8 +273,8 @@ fn translate(text: &str, project: &Project, pou: &Pou, reading: &mut Reading) {
     let used = used.iter().map(|unit| unit.name.to_uppercase()).collect();
     let (mut file, found) = typed::read_typed_of(text, Some(&used));
     // The period is that of the task that was found.
-    file.instances.clear();
-    file.tasks.clear();
+    file.instances.retain(|instance| has_event && instance.of.is(&pou.name));
+    file.tasks.retain(|_| has_event);
     for unit in &mut file.units {
         // A block that is asked for is read as if it were a program.
         if unit.name.is(&pou.name) && unit.kind == UnitKind::FunctionBlock {

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_ladder::Program as Ladder;
+use understudy_structured_text::lower::another_interval;
 use understudy_structured_text::parse;
 use understudy_text::{Diagnostic, Severity};
 use understudy_typed::{Elementary, Program as Typed};
@@ -41,7 +42,7 @@ pub struct Wanted<'a> {
 pub struct SourceFile {
     /// What it holds; nothing where there are errors.
     pub source: Option<Source>,
-    /// From one scan to the next, where the file says so.
+    /// The period of the intervals that the file states.
     pub period: Option<Duration>,
     /// Everything that is wrong or odd, with its place.
     pub diagnostics: Vec<Diagnostic>,
@@ -58,7 +59,8 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
     if format == Format::StructuredText {
         return source(whole(text, parse(text), wanted.program, wanted.period));
     }
-    let Reading { program, period, diagnostics, .. } = read(format, name, text, wanted.program);
+    let Reading { program, period, mut diagnostics, .. } = read(format, name, text, wanted.program);
+    diagnostics.extend(program.as_ref().and_then(|it| another_period(it, period, wanted.period)));
     let ladder = SourceFile { source: program.map(Source::Ladder), period, diagnostics };
     if format != Format::PlcOpen {
         return ladder;
@@ -71,14 +73,16 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
         return SourceFile { diagnostics: parsed.1, ..ladder };
     }
     let read = whole(text, parsed, wanted.program, wanted.period);
-    let is_more = |typed: &Typed| typed.tasks.len() > 1 || has_numbers_as_points(typed);
+    let is_more = |typed: &Typed| {
+        let is_every_scan = matches!(typed.tasks.as_slice(), [task] if task.every == 1);
+        !is_every_scan || has_numbers_as_points(typed)
+    };
     let has_bits =
         matches!(&ladder.source, Some(Source::Ladder(ladder)) if has_bits_of_numbers(ladder));
     if is_ladder && !has_bits && !read.typed.as_ref().is_some_and(is_more) {
         return ladder;
     }
     let mut found = source(read);
-    found.period = ladder.period.or(found.period);
     // Of two readings of a document that both have errors, the one with fewer is nearer to what was meant; a ladder has
     // no circles, no library and no document of the first edition.
     let errors = |found: &[Diagnostic]| {
@@ -92,6 +96,19 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
         found.diagnostics = ladder.diagnostics;
     }
     found
+}
+
+/// The warning on a ladder whose file states another interval than the period at which it runs: it runs in every scan.
+pub(crate) fn another_period(
+    ladder: &Ladder,
+    interval: Option<Duration>,
+    period: Option<Duration>,
+) -> Option<Diagnostic> {
+    let nanoseconds = |time: Duration| i64::try_from(time.as_nanos()).unwrap_or(i64::MAX);
+    let (interval, period) = (nanoseconds(interval?), nanoseconds(period?));
+    let program = (ladder.name.as_str(), ladder.name.span());
+    (interval != period)
+        .then(|| another_interval(program, (period, period.into()), (interval, interval)))
 }
 
 fn source(whole: Whole) -> SourceFile {

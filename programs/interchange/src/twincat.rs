@@ -84,9 +84,21 @@ impl Reader {
             let written = child(object, element).map(word)?;
             written.parse::<i64>().ok()
         };
+        let cycle = child(object, "CycleTime").map(word).filter(|written| !written.is_empty());
+        let interval = cycle.and_then(|written| {
+            let interval = written.parse::<i64>().ok().and_then(|cycle| cycle.checked_mul(1_000));
+            if interval.is_none() {
+                let message = format!(
+                    "the cycle time `{written}` of the task `{name}` is no number of microseconds"
+                );
+                let error = Diagnostic::error("U1011", message, written.span());
+                self.diagnostics.push(error.with_help("10000 is 10 ms"));
+            }
+            interval
+        });
         self.file.tasks.push(Task {
             name: name.clone(),
-            interval: number("CycleTime").and_then(|cycle| cycle.checked_mul(1_000)),
+            interval,
             priority: number("Priority"),
             single: None,
         });

@@ -6,11 +6,13 @@ use std::collections::HashMap;
 use std::time::Duration;
 
 use understudy_executable::{Executable, Interface, digest};
+use understudy_structured_text::lower::{event, intervals};
 use understudy_structured_text::syntax::{Body, File, Name, ProgramInstance, Task, Unit, UnitKind};
 use understudy_structured_text::{control_blocks, parse, print};
 use understudy_text::{Diagnostic, Severity, has_errors};
 use understudy_typed::Program;
 
+use crate::apart::alone;
 use crate::diagrams::Style;
 use crate::format::Format;
 use crate::plcopen;
@@ -35,21 +37,43 @@ pub fn typed_text(
     to: Format,
     bodies: Bodies,
 ) -> Result<(Option<Written>, Vec<Diagnostic>), WriteError> {
+    typed_text_with(name, text, wanted, (to, bodies), Some(USUAL_PERIOD))
+}
+
+/// As [`typed_text`]; `usual` is the interval of a task that it adds where the file states none.
+pub(crate) fn typed_text_with(
+    name: &str,
+    text: &str,
+    wanted: Wanted<'_>,
+    (to, bodies): (Format, Bodies),
+    usual: Option<Duration>,
+) -> Result<(Option<Written>, Vec<Diagnostic>), WriteError> {
     let format = Format::of(name, text);
     let Some((mut file, found)) = parsed(name, text) else {
         return Ok((None, Vec::new()));
     };
+    if let Some(program) = wanted.program {
+        alone(&mut file, program);
+    }
+    let mut losses = Vec::new();
+    let period = match given_interval(&mut file, wanted) {
+        true => wanted.period,
+        false => {
+            losses.extend(wanted.period.map(own_intervals));
+            None
+        }
+    };
+    let wanted = Wanted { period, ..wanted };
     let read = whole(text, (file.clone(), found), wanted.program, wanted.period);
     let diagnostics = read.diagnostics.clone();
     if has_errors(&diagnostics) || (read.typed.is_none() && read.checked.is_empty()) {
         return Ok((None, diagnostics));
     }
     if read.typed.is_some() {
-        configure(&mut file, wanted, read.period);
+        configure(&mut file, wanted, wanted.period.or(read.period).or(usual));
     }
     let file = with_library(file);
     let as_text = print::file(&file);
-    let mut losses = Vec::new();
     let (printed, scans) = match to {
         Format::StructuredText => {
             let printed = with_written_names(&file, as_text.clone());
@@ -83,7 +107,11 @@ pub fn typed_text(
     };
     let compared = Compared { scans, ..Compared::default() };
     if format == Some(Format::StructuredText) {
-        losses.extend(lost_comments(text, &as_text));
+        let kept = match wanted.program {
+            Some(_) => file.units.iter().filter_map(|unit| text.get(unit.span.clone())).collect(),
+            None => text.to_owned(),
+        };
+        losses.extend(lost_comments(&kept, &as_text));
     }
     let written = Written { losses, text: printed, compared };
     Ok((Some(written), diagnostics))
@@ -150,8 +178,33 @@ fn in_text(reasons: &[String]) -> Option<Diagnostic> {
     Some(Diagnostic::warning("U1018", message, 0..0))
 }
 
-/// Runs the program by a task, where the file does not say what runs, or another program is wanted.
-fn configure(file: &mut File, wanted: Wanted<'_>, period: Option<Duration>) {
+/// Gives the one interval of a file the wanted period; false where the file has several, or runs its programs without one.
+fn given_interval(file: &mut File, wanted: Wanted<'_>) -> bool {
+    let Some(period) = wanted.period else {
+        return true;
+    };
+    let intervals = intervals(file, wanted.program);
+    let Some(first) = intervals.first() else {
+        return file.instances.is_empty() || wanted.program.is_some();
+    };
+    let is_one = intervals.iter().all(|interval| interval == first);
+    for task in file.tasks.iter_mut().filter(|task| is_one && task.interval == Some(*first)) {
+        task.interval = i64::try_from(period.as_nanos()).ok();
+    }
+    is_one
+}
+
+/// The finding on a period that a text with intervals of its own does not have.
+fn own_intervals(period: Duration) -> Diagnostic {
+    let period = understudy_text::duration::text(period);
+    let message =
+        format!("the written text keeps the intervals of its tasks, not the period of {period}");
+    let help = "a cluster file or --period gives the period at which they are counted";
+    Diagnostic::warning("U1018", message, 0..0).with_help(help)
+}
+
+/// Runs the program by a task, where the file does not say what runs, or another program is wanted. What starts that program stays its task.
+fn configure(file: &mut File, wanted: Wanted<'_>, interval: Option<Duration>) {
     let is_wanted = |unit: &&Unit| {
         unit.kind == UnitKind::Program && wanted.program.is_none_or(|name| unit.name.is(name))
     };
@@ -160,14 +213,13 @@ fn configure(file: &mut File, wanted: Wanted<'_>, period: Option<Duration>) {
     if !file.instances.is_empty() && wanted.program.is_none() {
         return;
     }
-    let interval = wanted.period.or(period).unwrap_or(USUAL_PERIOD);
     let name = |text: &str| Name::new(text, 0..0);
-    file.tasks = vec![Task {
-        name: name("Task0"),
-        interval: i64::try_from(interval.as_nanos()).ok(),
-        priority: Some(0),
-        single: None,
-    }];
+    let mut runs = file.instances.iter();
+    let runs = runs.find(|run| wanted.program.is_some_and(|program| run.of.is(program)));
+    let single = runs.and_then(|run| event(file, run).cloned());
+    let interval = interval.filter(|_| single.is_none());
+    let interval = interval.and_then(|interval| i64::try_from(interval.as_nanos()).ok());
+    file.tasks = vec![Task { name: name("Task0"), interval, priority: Some(0), single }];
     // The points of several programs have the names of the programs in front.
     let are_several = chosen.len() > 1;
     let instances = chosen.into_iter().map(|of| ProgramInstance {
@@ -258,7 +310,9 @@ fn compare(read: &Whole, again: &Whole) -> Result<usize, WriteError> {
         (Some(before), Some(after)) => {
             let digested = |program: &Program| {
                 let (executable, interface) = (Executable::from(program), Interface::from(program));
-                (digest(&executable, &interface, SCANS as u64), points(&interface))
+                let every: Vec<u32> = program.tasks.iter().map(|task| task.every).collect();
+                let outputs = digest(&executable, &interface, SCANS as u64);
+                (outputs, points(&interface), program.period, every)
             };
             if digested(before) != digested(after) {
                 return different("its outputs differ in scans with random inputs".to_owned());

@@ -36,7 +36,7 @@ mod times;
 mod types;
 
 pub use standard::input_names;
-pub use tasks::period;
+pub use tasks::{another_interval, event, has_event, intervals, period};
 
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;

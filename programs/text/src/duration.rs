@@ -81,6 +81,16 @@ pub fn parse_up_to(text: &str, most: Duration) -> Result<Duration, InvalidDurati
     Ok(duration)
 }
 
+/// The longest duration of which both are multiples; the other one where one is zero.
+pub fn common(one: Duration, other: Duration) -> Duration {
+    let nanoseconds = |duration: Duration| u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
+    let (mut one, mut other) = (nanoseconds(one), nanoseconds(other));
+    while other != 0 {
+        (one, other) = (other, one % other);
+    }
+    Duration::from_nanos(one)
+}
+
 /// The sum of the parts; the largest number where it is larger still.
 fn nanoseconds(text: &str) -> Option<u128> {
     let mut rest = text.trim_matches(' ');

@@ -29,6 +29,9 @@ const LONGEST_SUFFIX: &str = "-plant";
 /// The most characters of a comment behind a signal.
 const MAXIMUM_COMMENT: usize = 70;
 
+/// Parts of an interval that are tried as the period of a cluster.
+const MAXIMUM_PARTS: usize = 100_000;
+
 /// The longest name of a program that leaves room for the names of its remote I/O and its plant.
 pub const MAXIMUM_PROGRAM_NAME: usize = MAXIMUM_NAME_LENGTH - LONGEST_SUFFIX.len();
 
@@ -77,15 +80,10 @@ impl DraftProgram {
 }
 
 impl Draft {
-    /// A cluster of one controller for each program, in the order of their turns, with the possible period that is nearest to `interval`.
+    /// A cluster of one controller for each program, in the order of their turns, with the longest possible period of which `interval`
+    /// is a multiple.
     pub fn new(name: String, interval: Duration, programs: Vec<DraftProgram>) -> Self {
-        let microseconds = interval.clamp(SHORTEST_PERIOD, LONGEST_PERIOD).as_micros();
-        Self {
-            name,
-            // Ladders have whole microseconds.
-            period: Duration::from_micros(u64::try_from(microseconds).unwrap_or(u64::MAX)),
-            programs,
-        }
+        Self { name, period: possible(interval), programs }
     }
 
     /// Members that belong to no program.
@@ -116,7 +114,7 @@ impl Draft {
 
 [cluster]
 name = \"{}\"
-# The shortest interval that the programs state, or 10ms. The timers of all programs count in it.
+# The longest that divides the intervals of all programs, or 10ms. The timers of all programs count in it.
 period = \"{period}\"
 
 # One controller for each program, in the order of their turns. A controller or understudy on a machine of its own also
@@ -194,6 +192,17 @@ functional = [{plants}]
 {during}"
         )
     }
+}
+
+/// The longest period of a cluster, in whole microseconds, of which the interval is a multiple; where there is none, the nearest one.
+fn possible(interval: Duration) -> Duration {
+    let microseconds = |time: Duration| u64::try_from(time.as_micros()).unwrap_or(u64::MAX);
+    let (whole, longest) = (microseconds(interval), microseconds(LONGEST_PERIOD));
+    let least = microseconds(SHORTEST_PERIOD);
+    let parts = whole.div_ceil(longest).max(1)..=whole / least;
+    let divides = |parts: &u64| whole.is_multiple_of(*parts);
+    let found = parts.take(MAXIMUM_PARTS).find(divides).map(|parts| whole / parts);
+    Duration::from_micros(found.unwrap_or(whole.clamp(least, longest)))
 }
 
 fn push_remote_io(text: &mut String, program: &DraftProgram) {

@@ -41,6 +41,8 @@ pub(crate) struct Ignored {
 pub(crate) struct Instance {
     pub(crate) type_name: Name,
     pub(crate) interval: Option<Duration>,
+    /// An event starts it in place of an interval.
+    pub(crate) has_event: bool,
 }
 
 /// What a program organisation unit is.

@@ -1,8 +1,10 @@
 //! Literals of IEC 61131-3: truth values, whole numbers, times.
 
+use std::ops::Range;
 use std::time::Duration;
 
-use understudy_text::duration;
+use understudy_ladder::PERIODS;
+use understudy_text::{Diagnostic, duration};
 
 /// `TRUE`, `FALSE`, `1`, `0`, `BOOL#1`, in any case.
 pub(crate) fn boolean(text: &str) -> Option<bool> {
@@ -61,6 +63,26 @@ pub(crate) fn clock(text: &str) -> Option<Duration> {
     let whole = f64::from(hours) * 3600.0 + f64::from(minutes) * 60.0;
     let found = Duration::try_from_secs_f64(whole + seconds).ok()?;
     (!found.is_zero()).then_some(found)
+}
+
+/// The interval of a task: a literal of time, as a clock, or seconds with a point; in the bounds of a period.
+pub(crate) fn interval(text: &str) -> Option<Duration> {
+    let seconds = || {
+        let number = text.contains('.').then(|| text.parse().ok())?;
+        Duration::try_from_secs_f64(number?).ok()
+    };
+    let found = time(text).or_else(|| clock(text)).or_else(seconds);
+    found.filter(|interval| PERIODS.contains(interval))
+}
+
+/// The finding on an interval that is none.
+pub(crate) fn no_interval(text: &str, span: Range<usize>) -> Diagnostic {
+    let message = format!(
+        "the interval `{text}` of the task is not a time from {} to {}",
+        duration::text(*PERIODS.start()),
+        duration::text(*PERIODS.end())
+    );
+    Diagnostic::error("U1011", message, span).with_help("write it as a literal such as T#20ms")
 }
 
 /// The value of a literal of time behind its `T#`: as every other duration, in any case, with `_` between its parts.

@@ -101,11 +101,6 @@ impl Typed {
         self.diagnostics.push(Diagnostic::error(code, message, span));
     }
 
-    fn error_with(&mut self, code: &'static str, message: String, span: Range<usize>, help: &str) {
-        let error = Diagnostic::error(code, message, span);
-        self.diagnostics.push(error.with_help(help));
-    }
-
     /// An attribute that the reader cannot do without.
     fn needed(&mut self, node: Node<'_, '_>, name: &str) -> Option<Written> {
         let found = attribute(node, name).filter(|value| !value.is_empty());

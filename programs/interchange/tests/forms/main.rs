@@ -7,6 +7,7 @@ use understudy_ladder::print;
 
 use crate::reading::reading;
 
+mod intervals;
 mod outputs;
 #[path = "../shared/reading.rs"]
 mod reading;

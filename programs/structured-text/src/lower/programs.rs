@@ -11,7 +11,7 @@ use super::blocks::{Block, Key};
 use super::called::called;
 use super::images::initial;
 use super::names::{Owner, Symbol, Variable};
-use super::tasks::interval;
+use super::tasks::{interval, shortest, task};
 use super::types::TypeState;
 use super::{DEFAULT_PERIOD, Lowering, Options};
 
@@ -130,7 +130,8 @@ impl<'a> Lowering<'a> {
         }
         self.running = instances.iter().map(|instance| instance.unit).collect();
         let base = self.base(&instances, options.period);
-        self.program.period = options.period.or(base).unwrap_or(DEFAULT_PERIOD);
+        let period = options.period.or(base.map(|base| base.common));
+        self.program.period = period.unwrap_or(DEFAULT_PERIOD);
         let name = instances[0].name;
         self.program.name = match instances.len() {
             1 => self.units[instances[0].unit].unit.name.as_str().to_owned(),
@@ -139,11 +140,11 @@ impl<'a> Lowering<'a> {
         let are_several = instances.len() > 1;
         for instance in &instances {
             let every = match (instance.interval, base) {
-                (Some(interval), Some(base)) => u32::try_from(interval / base).unwrap_or(u32::MAX),
+                (Some(interval), Some(base)) => base.every(interval),
                 _ => 1,
             };
             let is_only = instances.iter().filter(|other| other.unit == instance.unit).count() == 1;
-            self.run(instance, every.max(1), are_several, is_only);
+            self.run(instance, every, are_several, is_only);
         }
         self.bodies();
         self.copy_elements();
@@ -163,10 +164,11 @@ impl<'a> Lowering<'a> {
         options: &Options<'_>,
     ) -> Vec<Instance<'a>> {
         let names = || programs.iter().map(|program| program.name.as_str());
+        let alone = if file.instances.is_empty() { shortest(file) } else { None };
         let whole = |unit: &'a Unit, index: usize| Instance {
             name: &unit.name,
             unit: index,
-            interval: None,
+            interval: alone,
             priority: 0,
             connections: &[],
             event: None,
@@ -181,11 +183,10 @@ impl<'a> Lowering<'a> {
             };
             let mut instance = whole(unit, self.unit_names[&unit.name.key()]);
             let declared = file.instances.iter().find(|found| found.of.is(chosen));
-            if let Some(task) = declared.and_then(|found| found.task.as_ref()) {
-                let task = file.tasks.iter().find(|found| found.name == *task);
-                instance.interval = task.and_then(interval);
-            }
-            return vec![instance];
+            return match declared.and_then(|found| found.task.as_ref()) {
+                Some(task) if !self.give_task(file, task, &mut instance) => Vec::new(),
+                _ => vec![instance],
+            };
         }
         if file.instances.is_empty() {
             // What others call does not run by itself.
@@ -204,15 +205,8 @@ impl<'a> Lowering<'a> {
                 let help = format!("choose one with --program, of {}", list.join(", "));
                 self.warn("U1013", message, second.name.span(), help);
             }
-            let only = match file.tasks.as_slice() {
-                [task] => interval(task),
-                _ => None,
-            };
-            let runs = roots.into_iter().map(|unit| Instance {
-                interval: only,
-                ..whole(unit, self.unit_names[&unit.name.key()])
-            });
-            return runs.collect();
+            let runs = roots.into_iter();
+            return runs.map(|unit| whole(unit, self.unit_names[&unit.name.key()])).collect();
         }
         let mut instances = Vec::new();
         for declared in &file.instances {
@@ -226,29 +220,35 @@ impl<'a> Lowering<'a> {
             instance.name = &declared.name;
             instance.connections = &declared.connections;
             instance.priority = i64::MAX;
-            if let Some(name) = &declared.task {
-                let Some(task) = file.tasks.iter().find(|task| task.name == *name) else {
-                    let message = format!("the task `{name}` is not declared");
-                    let known = file.tasks.iter().map(|task| task.name.as_str());
-                    let help = spelling::suggestion(name.as_str(), known);
-                    self.error_with("U1041", message, name.span(), help);
-                    continue;
-                };
-                if task.single.is_some() && task.interval.is_some_and(|interval| interval > 0) {
-                    let message =
-                        format!("the task `{name}` has an INTERVAL and an event (SINGLE)");
-                    let help = "give it one of them";
-                    self.error_with("U1084", message, task.name.span(), help);
-                    continue;
-                }
-                instance.event = task.single.as_ref();
-                instance.interval = interval(task);
-                instance.priority = task.priority.unwrap_or(i64::MAX);
+            if let Some(name) = &declared.task
+                && !self.give_task(file, name, &mut instance)
+            {
+                continue;
             }
             instances.push(instance);
         }
         instances.sort_by_key(|instance| instance.priority);
         instances
+    }
+
+    /// Gives a program the interval, the event and the priority of its task; false where the task has an error.
+    fn give_task(&mut self, file: &'a File, name: &Name, instance: &mut Instance<'a>) -> bool {
+        let Some(task) = task(file, name) else {
+            let message = format!("the task `{name}` is not declared");
+            let known = file.tasks.iter().map(|task| task.name.as_str());
+            let help = spelling::suggestion(name.as_str(), known);
+            self.error_with("U1041", message, name.span(), help);
+            return false;
+        };
+        if task.single.is_some() && task.interval.is_some_and(|interval| interval > 0) {
+            let message = format!("the task `{name}` has an INTERVAL and an event (SINGLE)");
+            self.error_with("U1084", message, task.name.span(), "give it one of them");
+            return false;
+        }
+        instance.event = task.single.as_ref();
+        instance.interval = interval(task);
+        instance.priority = task.priority.unwrap_or(i64::MAX);
+        true
     }
 
     fn run(&mut self, instance: &Instance<'a>, every: u32, are_several: bool, is_only: bool) {

@@ -1,17 +1,16 @@
 //! From elements to a [`Project`]: projects, units, variables, types.
 
 use std::collections::HashMap;
-use std::time::Duration;
 
 use roxmltree::Node;
-use understudy_ladder::{Name, PERIODS};
+use understudy_ladder::Name;
 use understudy_text::Diagnostic;
 
 use super::objects::graph;
 use super::{
     Body, Ignored, Instance, Language, Part, Pou, PouKind, Project, Section, Variable, VariableType,
 };
-use crate::plcopen::literal::{clock, time};
+use crate::plcopen::literal::{interval, no_interval};
 use crate::plcopen::xml::{
     applications, attribute, child, children, elements, parts_of_tools, program_type, start_tag,
     text, word,
@@ -347,40 +346,21 @@ impl Reader {
                     };
                     let task =
                         node.parent_element().filter(|task| task.tag_name().name() == "task");
-                    let interval = task
-                        .and_then(|task| attribute(task, "interval"))
-                        .filter(|interval| !interval.is_empty())
-                        .and_then(|interval| self.interval(&interval));
-                    self.project.instances.push(Instance { type_name, interval });
-                }
-                "task" if attribute(node, "single").is_some_and(|single| !single.is_empty()) => {
-                    self.ignore(
-                        "a task that an event starts; it is scanned with the period here",
-                        node,
-                    );
+                    let given = |name| attribute(task?, name).filter(|value| !value.is_empty());
+                    let interval = given("interval").and_then(|written| {
+                        let found = interval(&written);
+                        if found.is_none() {
+                            self.diagnostics.push(no_interval(&written, written.span()));
+                        }
+                        found
+                    });
+                    let has_event = given("single").is_some();
+                    self.project.instances.push(Instance { type_name, interval, has_event });
                 }
                 "addData" => self.ignore("additional data of a tool", node),
                 _ => {}
             }
         }
-    }
-}
-
-impl Reader {
-    /// The time from one scan to the next.
-    fn interval(&mut self, text: &Name) -> Option<Duration> {
-        let interval = time(text).or_else(|| clock(text));
-        let interval = interval.filter(|interval| PERIODS.contains(interval));
-        if interval.is_none() {
-            let message = format!(
-                "the interval `{text}` of the task is not a time from {:?} to {:?}",
-                PERIODS.start(),
-                PERIODS.end()
-            );
-            let error = Diagnostic::error("U1011", message, text.span());
-            self.diagnostics.push(error.with_help("write it as a literal such as T#20ms"));
-        }
-        interval
     }
 }
 

@@ -2,11 +2,11 @@
 
 use roxmltree::Node;
 use understudy_structured_text::parser::{Places, parse_expression_at};
-use understudy_structured_text::syntax::{Class, ExpressionKind, Literal, ProgramInstance, Task};
+use understudy_structured_text::syntax::{Class, ProgramInstance, Task};
 
 use super::Typed;
 use super::make::name;
-use crate::plcopen::literal::clock;
+use crate::plcopen::literal::{interval, no_interval};
 use crate::plcopen::xml::{attribute, children, elements, program_type, start_tag};
 
 impl Typed {
@@ -42,18 +42,12 @@ impl Typed {
             return;
         };
         let given = |name: &str| attribute(node, name).filter(|value| !value.is_empty());
-        let interval = given("interval").and_then(|interval| {
-            let found = nanoseconds(&interval);
+        let interval = given("interval").and_then(|written| {
+            let found = interval(&written);
             if found.is_none() {
-                let message = format!("the interval `{interval}` of the task is not a time");
-                self.error_with(
-                    "U1011",
-                    message,
-                    interval.span(),
-                    "write it as a literal such as T#20ms",
-                );
+                self.diagnostics.push(no_interval(&written, written.span()));
             }
-            found
+            i64::try_from(found?.as_nanos()).ok()
         });
         let single = given("single").map(|single| {
             let start = single.span().start;
@@ -92,25 +86,4 @@ impl Typed {
             });
         }
     }
-}
-
-/// `T#20ms`, or as a clock; also plain seconds.
-fn nanoseconds(text: &str) -> Option<i64> {
-    if let Some(found) = clock(text) {
-        return i64::try_from(found.as_nanos()).ok();
-    }
-    let (value, found) = parse_expression_at(text, &|span| span);
-    match value.kind {
-        ExpressionKind::Literal(Literal::Time { nanoseconds, .. }) if found.is_empty() => {
-            Some(nanoseconds)
-        }
-        ExpressionKind::Literal(Literal::Real { .. } | Literal::Integer { .. }) => seconds_of(text),
-        _ => None,
-    }
-}
-
-fn seconds_of(text: &str) -> Option<i64> {
-    let seconds: f64 = text.parse().ok()?;
-    let nanoseconds = (seconds * 1e9).round();
-    (nanoseconds > 0.0 && nanoseconds < 1e18).then_some(nanoseconds as i64)
 }
