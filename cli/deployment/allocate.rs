@@ -59,7 +59,7 @@ pub(crate) struct Arguments {
     /// Reserve of every capacity
     #[arg(long, value_name = "PERCENT", default_value = "0%", value_parser = reserve)]
     reserve: u8,
-    /// Add expansion modules where on-board terminals are insufficient
+    /// Add expansion modules of the catalogue where on-board terminals or memory are insufficient
     #[arg(long)]
     expansion: bool,
     /// Assumed value of a figure unknown for a family, such as program_bytes_per_instruction=8; repeatable

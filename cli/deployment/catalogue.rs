@@ -135,10 +135,10 @@ struct Entry {
     /// Model
     #[arg(long, value_name = "NAME")]
     model: String,
-    /// Family of models with the same program storage
+    /// Family of models with the same program storage; of a module: the family that it extends
     #[arg(long, value_name = "NAME")]
     family: String,
-    /// Kind: `plc` or `embedded`
+    /// Kind: `plc`, `embedded` or `module`
     #[arg(long, value_name = "KIND", default_value = "plc", value_parser = kind)]
     kind: Kind,
     /// Source of the figures: a URL, a document, a quotation
@@ -156,7 +156,7 @@ struct Entry {
 }
 
 fn kind(text: &str) -> Result<Kind, String> {
-    Kind::of(text).ok_or_else(|| "expected plc or embedded".to_owned())
+    Kind::of(text).ok_or_else(|| format!("expected {}", Kind::WORDS))
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
@@ -181,7 +181,15 @@ fn refused(errors: &[AdditionError]) -> Answer {
 /// Catalogue at `path`, or the built-in one, with its name.
 pub(crate) fn read(path: Option<&Path>) -> Result<(Catalogue, String), Answer> {
     let (catalogue, name) = match path {
-        Some(path) => (read_file(path)?.0, path.display().to_string()),
+        Some(path) => {
+            let catalogue = read_file(path)?.0;
+            let faults = catalogue.module_faults();
+            if !faults.is_empty() {
+                let faults: Vec<AdditionError> = faults.into_iter().map(Into::into).collect();
+                return Err(refused(&faults));
+            }
+            (catalogue, path.display().to_string())
+        }
         None => {
             let catalogue = Catalogue::built_in().map_err(Answer::bad_files)?;
             let name = "the built-in catalogue".to_owned();
@@ -297,7 +305,9 @@ fn remove(path: &Path, name: &str) -> Result<Answer, Answer> {
         };
         return Err(Answer::failed(Status::BadInput, error.code(), error));
     };
-    let removed = catalogue.remove(vendor, model);
+    let removed = catalogue
+        .remove(vendor, model)
+        .map_err(|error| Answer::failed(Status::BadInput, "U1144", message(&error)))?;
     files::replace(path, &file::write(&catalogue))?;
     let text = format!("{}: {vendor} {model} removed", path.display());
     let result = json!({ "catalogue": path.display().to_string(), "removed": removed });
@@ -421,17 +431,21 @@ fn put(file: &WrittenFile, part: &Catalogue, update: bool, empty: bool) -> Resul
     let added = catalogue.add(part, mode);
     let added = added.map_err(|errors| refused(&errors))?;
     files::replace(path, &file::write(&catalogue))?;
-    let Added { models, updated, family_figures, changed } = &added;
+    let Added { models, modules, updated, family_figures, changed } = &added;
     let mut text = format!(
         "{}: {models} added, {updated} updated, {family_figures} figures of families\n",
         path.display()
     );
+    if *modules > 0 {
+        let _ = writeln!(text, "  modules added: {modules}");
+    }
     for figure in changed {
         let _ = writeln!(text, "  changed: {figure}");
     }
     let result = json!({
         "catalogue": path.display().to_string(),
         "added": models,
+        "modules": modules,
         "updated": updated,
         "family_figures": family_figures,
         "changed": changed,

@@ -2,12 +2,14 @@
 
 use understudy_text::Report;
 
-use crate::controller::Catalogue;
+use crate::controller::{Catalogue, Controller, Kind};
 use crate::file;
+use crate::modules::ModuleFault;
 
-const FILES: [(&str, &str); 2] = [
+const FILES: [(&str, &str); 3] = [
     ("controllers.csv", include_str!("../data/controllers.csv")),
     ("families.csv", include_str!("../data/families.csv")),
+    ("modules.csv", include_str!("../data/modules.csv")),
 ];
 
 impl Catalogue {
@@ -29,8 +31,8 @@ impl Catalogue {
     }
 
     fn merge(&mut self, part: &Self) {
-        for controller in part.controllers() {
-            self.put(controller.clone());
+        for row in part.rows() {
+            self.put(row.clone());
         }
         for (name, family) in &part.families {
             self.put_family(name, family.clone());
@@ -40,15 +42,20 @@ impl Catalogue {
     /// Adds `part`.
     ///
     /// # Errors
-    /// Everything of `part` that is there already, under [`Mode::New`], or that disagrees with what is there. Then nothing is added.
+    /// Everything of `part` that is there already, under [`Mode::New`], or that disagrees with what is there, and modules that extend nothing
+    /// after the addition. Then nothing is added.
     pub fn add(&mut self, part: &Self, mode: Mode) -> Result<Added, Vec<AdditionError>> {
-        let errors = self.refused(part, mode);
+        let mut errors = self.refused(part, mode);
+        let mut sum = self.clone();
+        sum.merge(part);
+        errors.extend(sum.module_faults().into_iter().map(AdditionError::Module));
         if !errors.is_empty() {
             return Err(errors);
         }
         let mut added = Added::default();
-        for controller in part.controllers() {
+        for controller in part.rows() {
             match self.get(&controller.vendor, &controller.model) {
+                None if controller.kind == Kind::Module => added.modules += 1,
                 None => added.models += 1,
                 Some(known) => {
                     added.updated += 1;
@@ -60,13 +67,34 @@ impl Catalogue {
         }
         let figures = part.families.values().map(|family| family.numbers.len());
         added.family_figures = figures.sum();
-        self.merge(part);
+        *self = sum;
         Ok(added)
+    }
+
+    /// Takes out the row of this vendor and model.
+    ///
+    /// # Errors
+    /// Modules of the catalogue extend no other controller. Then nothing is taken out.
+    pub fn remove(&mut self, vendor: &str, model: &str) -> Result<Option<Controller>, InUse> {
+        let mut rest = self.clone();
+        let Some(row) = rest.take(vendor, model) else { return Ok(None) };
+        let of_family = |other: &&Controller| other.family == row.family;
+        let is_last = row.kind != Kind::Module && !rest.controllers().any(|one| of_family(&one));
+        let modules: Vec<String> = rest
+            .modules()
+            .filter(|one| is_last && of_family(one))
+            .map(|one| one.to_string())
+            .collect();
+        if !modules.is_empty() {
+            return Err(InUse { row: row.to_string(), family: row.family, modules });
+        }
+        *self = rest;
+        Ok(Some(row))
     }
 
     fn refused(&self, part: &Self, mode: Mode) -> Vec<AdditionError> {
         let mut errors = Vec::new();
-        for controller in part.controllers() {
+        for controller in part.rows() {
             let Some(known) = self.get(&controller.vendor, &controller.model) else {
                 continue;
             };
@@ -102,6 +130,22 @@ impl Catalogue {
     }
 }
 
+/// A controller that modules of the catalogue need.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "U1144: {row} is the last controller of the family `{family}`, which {} extend{}; remove the modules first",
+    modules.join(", "),
+    if modules.len() == 1 { "s" } else { "" }
+)]
+pub struct InUse {
+    /// Vendor and model.
+    pub row: String,
+    /// Its family.
+    pub family: String,
+    /// The modules that would extend nothing.
+    pub modules: Vec<String>,
+}
+
 /// Permission to change known models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mode {
@@ -114,8 +158,10 @@ pub enum Mode {
 /// Result of an addition.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Added {
-    /// Models that were not there.
+    /// Controllers that were not there.
     pub models: usize,
+    /// Modules that were not there.
+    pub modules: usize,
     /// Models that were there.
     pub updated: usize,
     /// Figures of families.
@@ -144,6 +190,9 @@ pub enum AdditionError {
         /// The family or kind that is to be added for it.
         new: String,
     },
+    /// A module that extends nothing.
+    #[error(transparent)]
+    Module(#[from] ModuleFault),
 }
 
 impl AdditionError {
@@ -152,6 +201,7 @@ impl AdditionError {
         match self {
             Self::Present(_) => "U1125",
             Self::Disagrees { .. } => "U1129",
+            Self::Module(fault) => fault.code(),
         }
     }
 }

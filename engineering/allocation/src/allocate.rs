@@ -5,6 +5,7 @@
 //! box unless the user says so: a box that fails would take two of them, and then one understudy of the paper's kind cannot restore either.
 //! A remote I/O is located at the plant and is never shared.
 
+mod offers;
 mod preference;
 mod stock;
 
@@ -13,7 +14,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::controller::{Catalogue, Controller};
-use crate::fit::{Dimension, Fit, Verdict, fit};
+use crate::fit::{Dimension, Fit, Verdict};
+use crate::modules::Modules;
 use crate::need::{Need, Terms};
 use crate::packing::{BoxType, PackingError, pack};
 use crate::requirement::Role;
@@ -84,6 +86,8 @@ pub struct Candidate {
     pub vendor: String,
     /// The model.
     pub model: String,
+    /// Modules that it needs.
+    pub modules: Vec<Modules>,
     /// Every criterion.
     #[serde(flatten)]
     pub fit: Fit,
@@ -134,8 +138,10 @@ pub struct Taken {
 /// A box to take.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BoxOnPlan {
-    /// The model.
+    /// The model; with modules its figures are the sums.
     pub controller: Controller,
+    /// Modules that it needs.
+    pub modules: Vec<Modules>,
     /// Names of what is on it.
     pub items: Vec<String>,
     /// Shared resources with their loads.
@@ -184,6 +190,11 @@ pub enum AllocationError {
     /// Prices of several currencies cannot be compared.
     #[error("U1133: prices are in {}: one currency is needed to prefer by cost", .0.join(", "))]
     Currencies(Vec<String>),
+    /// A module in a list of controllers.
+    #[error(
+        "U1145: {0} is a module: --stock has controllers, and --expansion adds the modules that they need"
+    )]
+    Module(String),
     /// No packing.
     #[error(transparent)]
     Packing(#[from] PackingError),
@@ -196,6 +207,7 @@ impl AllocationError {
             Self::NoModel { .. } => "U1131",
             Self::Ambiguous { .. } => "U1132",
             Self::Currencies(_) => "U1133",
+            Self::Module(_) => "U1145",
             Self::Packing(_) => "U1140",
         }
     }
@@ -212,25 +224,15 @@ pub fn allocate(
 ) -> Result<Allocation, Vec<AllocationError>> {
     let types = stock::types(catalogue, &options.stock)?;
     let mut remarks = Vec::new();
-    let order =
-        preference::order(&types, options.preference, &mut remarks).map_err(|error| vec![error])?;
     let may_be_placed = |item: &Item| {
         options.unverified || item.verification.has_passed() || item.need.program.is_none()
     };
-    let fits: Vec<Vec<Fit>> = items
-        .iter()
-        .map(|item| {
-            if !may_be_placed(item) {
-                return Vec::new();
-            }
-            let of_type = |(controller, _): &(&Controller, _)| {
-                let family = catalogue.families.get(&controller.family);
-                fit(controller, family, &item.need, &options.terms)
-            };
-            types.iter().map(of_type).collect()
-        })
-        .collect();
-    let box_types: Vec<BoxType> = (0..types.len())
+    let placeable: Vec<Option<&Need>> =
+        items.iter().map(|item| may_be_placed(item).then_some(&item.need)).collect();
+    let (offers, fits) = offers::of(catalogue, &types, &placeable, options);
+    let order = preference::order(&offers, types.len(), options.preference, &mut remarks)
+        .map_err(|error| vec![error])?;
+    let box_types: Vec<BoxType> = (0..offers.len())
         .map(|place| {
             let on_it = fits.iter().map(|of_item| of_item.get(place));
             let loads = on_it.map(|fit| {
@@ -240,7 +242,8 @@ pub fn allocate(
             let loads: Vec<_> = loads.collect();
             BoxType {
                 cost: order.cost(place, fits.iter().filter_map(|of_item| of_item.get(place))),
-                stock: types[place].1,
+                model: offers[place].model,
+                stock: offers[place].stock,
                 loads,
             }
         })
@@ -256,7 +259,8 @@ pub fn allocate(
         let loads = packed.items.iter();
         let loads = loads.filter_map(|&item| box_type.loads[item].as_ref());
         BoxOnPlan {
-            controller: types[packed.box_type].0.clone(),
+            controller: offers[packed.box_type].controller.clone(),
+            modules: offers[packed.box_type].modules.clone(),
             items: packed.items.iter().map(|&item| items[item].name.clone()).collect(),
             taken: taken(loads),
         }
@@ -264,7 +268,7 @@ pub fn allocate(
     let boxes = boxes.collect();
     let placed = items.iter().zip(&fits).enumerate();
     let placed = placed.map(|(place, (item, of_item))| {
-        let candidates = order.rank(&types, of_item);
+        let candidates = order.rank(&offers, of_item);
         let left_over = packing.left_over.contains(&place);
         Placed {
             name: item.name.clone(),
@@ -277,7 +281,13 @@ pub fn allocate(
             candidates,
         }
     });
-    Ok(Allocation { items: placed.collect(), boxes, best: packing.best, remarks })
+    let placed = placed.collect();
+    // Modules are chosen for one item at a time, and items that share a controller may need fewer.
+    let may_share =
+        |left: usize, right: usize| !apart(&items[left], &items[right], options.share_members);
+    let shared = (0..items.len()).any(|one| (0..one).any(|other| may_share(one, other)));
+    let extended = offers.len() > types.len();
+    Ok(Allocation { items: placed, boxes, best: packing.best && !(shared && extended), remarks })
 }
 
 /// Whether one failure must not take both.

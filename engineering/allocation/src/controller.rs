@@ -16,10 +16,12 @@ words! {
         Plc = "plc",
         /// An embedded controller or a board.
         Embedded = "embedded",
+        /// An expansion module of the controllers of its family.
+        Module = "module",
     }
 }
 
-/// One model.
+/// One model of a controller, or of a module that extends controllers: then its numbers are what it adds.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Controller {
     /// The vendor.
@@ -28,7 +30,7 @@ pub struct Controller {
     pub model: String,
     /// Models that store programs in the same way.
     pub family: String,
-    /// PLC or embedded.
+    /// PLC, embedded controller or module.
     pub kind: Kind,
     /// Known numbers.
     pub numbers: BTreeMap<Quantity, Figure<u64>>,
@@ -36,6 +38,11 @@ pub struct Controller {
     pub texts: BTreeMap<Statement, Figure<String>>,
     /// Note on its figures, such as conflicting sources.
     pub notes: String,
+}
+
+impl Kind {
+    /// The words of all kinds, for messages.
+    pub const WORDS: &'static str = "`plc`, `embedded` or `module`";
 }
 
 impl Controller {
@@ -65,8 +72,14 @@ impl Controller {
 
     /// Names of what is not known.
     pub fn unknown(&self) -> Vec<&'static str> {
+        let is_module = self.kind == Kind::Module;
+        let of_module = |quantity: &Quantity| {
+            Quantity::EXTENDABLE.contains(quantity) || *quantity == Quantity::Price
+        };
         let numbers = Quantity::ALL.into_iter();
-        let numbers = numbers.filter(|quantity| !self.numbers.contains_key(quantity));
+        let numbers = numbers
+            .filter(|quantity| !self.numbers.contains_key(quantity))
+            .filter(|quantity| !is_module || of_module(quantity));
         let texts = Statement::ALL.into_iter();
         let texts = texts.filter(|statement| !self.texts.contains_key(statement));
         let texts = texts.map(Statement::name);
@@ -119,9 +132,9 @@ impl Family {
     }
 }
 
-/// The catalogue of controllers.
+/// The catalogue of controllers and of the modules that extend them.
 ///
-/// Invariant: no two controllers have the same vendor and model.
+/// Invariant: no two rows have the same vendor and model.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Catalogue {
     controllers: BTreeMap<(String, String), Controller>,
@@ -130,14 +143,24 @@ pub struct Catalogue {
 }
 
 impl Catalogue {
+    /// All rows by vendor and model: controllers and modules.
+    pub fn rows(&self) -> impl Iterator<Item = &Controller> {
+        self.controllers.values()
+    }
+
     /// All controllers by vendor and model.
     pub fn controllers(&self) -> impl Iterator<Item = &Controller> {
-        self.controllers.values()
+        self.rows().filter(|row| row.kind != Kind::Module)
+    }
+
+    /// All modules that extend controllers, by vendor and model.
+    pub fn modules(&self) -> impl Iterator<Item = &Controller> {
+        self.rows().filter(|row| row.kind == Kind::Module)
     }
 
     /// Number of controllers.
     pub fn len(&self) -> usize {
-        self.controllers.len()
+        self.controllers().count()
     }
 
     /// Whether it has none.
@@ -145,23 +168,21 @@ impl Catalogue {
         self.controllers.is_empty()
     }
 
-    /// The controller of this vendor and model.
+    /// The row of this vendor and model.
     pub fn get(&self, vendor: &str, model: &str) -> Option<&Controller> {
         self.controllers.get(&(vendor.to_owned(), model.to_owned()))
     }
 
-    /// Controllers with this name: the model, or vendor and model separated by a blank.
+    /// Rows with this name: the model, or vendor and model separated by a blank.
     pub fn named(&self, name: &str) -> Vec<&Controller> {
-        self.controllers()
-            .filter(|found| found.model == name || found.to_string() == name)
-            .collect()
+        self.rows().filter(|found| found.model == name || found.to_string() == name).collect()
     }
 
     /// Models whose names are like `name`, the most alike first.
     pub fn like(&self, name: &str) -> Vec<String> {
         let wanted = name.to_lowercase();
         let part = |model: &str| model.to_lowercase().contains(&wanted);
-        let models = || self.controllers().map(|controller| controller.model.as_str());
+        let models = || self.rows().map(|controller| controller.model.as_str());
         let mut found: Vec<&str> = models().filter(|model| part(model)).collect();
         found.sort_unstable();
         let others = spelling::alike(name, models().filter(|model| !part(model)));
@@ -169,7 +190,7 @@ impl Catalogue {
         found.map(str::to_owned).collect()
     }
 
-    /// Adds a controller, or new figures for one that is there; answers with the names of figures that it had and that changed.
+    /// Adds a row, or new figures for one that is there; answers with the names of figures that it had and that changed.
     pub fn put(&mut self, controller: Controller) -> Vec<&'static str> {
         let key = (controller.vendor.clone(), controller.model.clone());
         match self.controllers.get_mut(&key) {
@@ -181,8 +202,8 @@ impl Catalogue {
         }
     }
 
-    /// Takes a controller out; figures of its family stay.
-    pub fn remove(&mut self, vendor: &str, model: &str) -> Option<Controller> {
+    /// Takes a row out; figures of its family stay.
+    pub(crate) fn take(&mut self, vendor: &str, model: &str) -> Option<Controller> {
         self.controllers.remove(&(vendor.to_owned(), model.to_owned()))
     }
 

@@ -36,10 +36,22 @@ words! {
         DataBusBits = "data_bus_bits",
         /// Mean time between failures that the maker states.
         MtbfHours = "mtbf_hours",
+        /// Expansion modules that it takes.
+        ExpansionModules = "expansion_modules",
     }
 }
 
 impl Quantity {
+    /// What an expansion module can add to.
+    pub const EXTENDABLE: [Self; 6] = [
+        Self::DigitalInputs,
+        Self::DigitalOutputs,
+        Self::AnalogIn,
+        Self::AnalogOut,
+        Self::ProgramMemoryBytes,
+        Self::DataMemoryBytes,
+    ];
+
     /// The largest number that is believed.
     pub fn most(self) -> u64 {
         match self {
@@ -53,6 +65,7 @@ impl Quantity {
             Self::ClockKhz => 100_000_000,
             Self::AddressBusBits | Self::DataBusBits => 1024,
             Self::MtbfHours => 1_000_000_000,
+            Self::ExpansionModules => 256,
         }
     }
 

@@ -178,7 +178,7 @@ impl Row<'_> {
         if kind.is_none() {
             let message = format!("`{}` is not a kind of controller", self.text("kind"));
             let diagnostic = Diagnostic::error("U1106", message, self.span("kind"));
-            wrong.push(diagnostic.with_help("expected `plc` or `embedded`"));
+            wrong.push(diagnostic.with_help(format!("expected {}", Kind::WORDS)));
         }
         Some(Controller::new(&vendor?, &model?, &family?, kind?))
     }

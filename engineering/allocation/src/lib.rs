@@ -17,6 +17,7 @@ pub mod file;
 mod fit;
 mod instructions;
 mod memory;
+mod modules;
 mod need;
 pub mod packing;
 mod plant;
@@ -25,7 +26,7 @@ mod requirement;
 mod resources;
 mod search;
 
-pub use additions::{Added, AdditionError, Mode};
+pub use additions::{Added, AdditionError, InUse, Mode};
 pub use allocate::{
     Allocation, AllocationError, BoxOnPlan, Candidate, Item, Options, Placed, Preference, Stock,
     Verification, allocate,
@@ -34,6 +35,7 @@ pub use controller::{Catalogue, Controller, Family, Kind};
 pub use figures::{FamilyQuantity, Figure, Quantity, Statement};
 pub use fit::{Dimension, Finding, Fit, Load, Verdict, fit};
 pub use instructions::{Instruction, Operator, instructions};
+pub use modules::{Assessment, ModuleFault, Modules, assess};
 pub use need::{MOST_RESERVE_PERCENT, Need, Terms};
 pub use plant::{Group, Member, alone};
 pub use report::{Provenance, ReportError, csv, html, text};

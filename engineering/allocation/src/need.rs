@@ -53,7 +53,7 @@ impl Need {
 pub struct Terms {
     /// Part of each capacity that stays free, in percent; at most [`MOST_RESERVE_PERCENT`].
     pub reserve_percent: u8,
-    /// Whether inputs and outputs of expansion modules count.
+    /// Whether expansion modules are added where a controller alone is not sufficient.
     pub expansion: bool,
     /// Additional requirements.
     pub requirements: Vec<Requirement>,
@@ -67,6 +67,12 @@ impl Terms {
         let percent = 100 - u64::from(self.reserve_percent.min(MOST_RESERVE_PERCENT));
         // Capacities are below 2^41, so the product fits.
         capacity * percent / 100
+    }
+
+    /// The smallest capacity of which `need` is usable.
+    pub(crate) fn capacity_for(&self, need: u64) -> u64 {
+        let percent = 100 - u64::from(self.reserve_percent.min(MOST_RESERVE_PERCENT));
+        need.saturating_mul(100).div_ceil(percent)
     }
 
     /// A figure of a family, or what is assumed in its place.

@@ -7,6 +7,7 @@
 //! (3)  x_itk + x_jtk + .. <= y_tk      of items that must not share with each other there is one at most
 //! (4)  Σ_i d_itm x_itk <= D_tm y_tk    every dimension m of a box holds what is on it
 //! (5)  y_t,k+1 <= y_tk                 copies are alike
+//! (6)  Σ y_tk <= stock                 over the types t of one model
 //! ```
 //!
 //! Items that share with nobody, on types of which there are as many as wanted, are not part of it: each takes what is cheapest for it. What
@@ -28,7 +29,9 @@ const MAXIMUM_UNKNOWNS: usize = 1500;
 pub struct BoxType {
     /// Cost of one in any unit; not negative.
     pub cost: f64,
-    /// Available number; unlimited if none.
+    /// Number of its model; types of one model draw on one stock.
+    pub model: usize,
+    /// Available number of the model; unlimited if none.
     pub stock: Option<usize>,
     /// Amounts that each item takes of such a box; none where the item cannot be placed.
     pub loads: Vec<Option<BTreeMap<Dimension, Load>>>,
@@ -236,10 +239,10 @@ fn check(
 ) -> Result<(), PackingError> {
     let broken = |what: &str| Err(PackingError(format!("the solver's answer {what}")));
     let mut places = vec![0_usize; items];
-    let mut taken = vec![0_usize; types.len()];
+    let mut taken: BTreeMap<usize, usize> = BTreeMap::new();
     for packed in boxes {
         let box_type = &types[packed.box_type];
-        taken[packed.box_type] += 1;
+        *taken.entry(box_type.model).or_default() += 1;
         let mut sums: BTreeMap<Dimension, (u128, u64)> = BTreeMap::new();
         for (index, &item) in packed.items.iter().enumerate() {
             places[item] += 1;
@@ -261,9 +264,11 @@ fn check(
     if places.iter().any(|&count| count > 1) {
         return broken("places an item twice");
     }
-    let short =
-        |(box_type, &count): (&BoxType, &usize)| box_type.stock.is_some_and(|stock| count > stock);
-    if types.iter().zip(&taken).any(short) {
+    let short = |one: &BoxType| {
+        let count = taken.get(&one.model).copied().unwrap_or(0);
+        one.stock.is_some_and(|stock| count > stock)
+    };
+    if types.iter().any(short) {
         return broken("takes more boxes than there are");
     }
     Ok(())

@@ -11,6 +11,7 @@ use serde::Serialize;
 use crate::allocate::{Allocation, BoxOnPlan, Candidate, Placed};
 use crate::csv::line;
 use crate::fit::{Dimension, Verdict};
+use crate::modules::{with_modules, words};
 use crate::need::Terms;
 use crate::resources::Resources;
 
@@ -146,6 +147,7 @@ pub fn csv(allocation: &Allocation) -> String {
         "rank",
         "vendor",
         "model",
+        "modules",
         "chosen",
         "verdict",
         "criterion",
@@ -168,6 +170,7 @@ pub fn csv(allocation: &Allocation) -> String {
                 (rank + 1).to_string(),
                 candidate.vendor.clone(),
                 candidate.model.clone(),
+                words(&candidate.modules),
                 if is_chosen { "yes" } else { "no" }.to_owned(),
                 candidate.fit.verdict.words().to_owned(),
             ];
@@ -204,9 +207,7 @@ pub fn text(allocation: &Allocation, all: bool) -> String {
         }
     }
     if !allocation.best {
-        text.push_str(
-            "a better placement may exist: some models were omitted because of their number\n",
-        );
+        text.push_str("a better placement may exist: not every combination was compared\n");
     }
     for remark in &allocation.remarks {
         let _ = writeln!(text, "note: {remark}");
@@ -255,7 +256,8 @@ fn push_item(text: &mut String, item: &Placed, shown: usize) {
 }
 
 fn push_candidate(text: &mut String, candidate: &Candidate) {
-    let _ = write!(text, "    {} {}", candidate.vendor, candidate.model);
+    let model = with_modules(&candidate.model, &candidate.modules);
+    let _ = write!(text, "    {} {model}", candidate.vendor);
     let verdict = candidate.fit.verdict;
     if verdict == Verdict::Fits {
         if let Some(margin) = candidate.fit.smallest_margin() {
@@ -276,7 +278,8 @@ fn push_candidate(text: &mut String, candidate: &Candidate) {
 }
 
 fn push_box(text: &mut String, number: usize, taken: &BoxOnPlan) {
-    let _ = write!(text, "box {number}: {} for {}", taken.controller, taken.items.join(", "));
+    let model = with_modules(&taken.controller.to_string(), &taken.modules);
+    let _ = write!(text, "box {number}: {model} for {}", taken.items.join(", "));
     for part in &taken.taken {
         let percent = percent(part.takes as f64 / part.usable.max(1) as f64);
         let name = dimension_words(part.dimension);

@@ -95,6 +95,11 @@ impl Requirement {
         Ok(Self { role, asked: asked(rest.trim()).map_err(wrong)?, text: text.to_owned() })
     }
 
+    /// The name of its criterion in a comparison.
+    pub(crate) fn criterion(&self) -> String {
+        format!("required: {}", self.text)
+    }
+
     /// Whether it applies to controllers of this role.
     pub fn is_of(&self, role: Role) -> bool {
         self.role.is_none_or(|asked| asked == role)
@@ -138,7 +143,7 @@ fn asked(text: &str) -> Result<Asked, String> {
         "model" => only("=", Asked::Model(value.to_owned())),
         "kind" => match Kind::of(value) {
             Some(kind) => only("=", Asked::Kind(kind)),
-            None => Err(format!("`{value}` is not a kind; expected plc or embedded")),
+            None => Err(format!("`{value}` is not a kind; expected {}", Kind::WORDS)),
         },
         "scan_time" => match duration::parse_positive(value) {
             Ok(time) => only("<=", Asked::ScanTime(time)),

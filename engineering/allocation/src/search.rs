@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::controller::{Catalogue, Controller};
+use crate::controller::{Catalogue, Controller, Kind};
 use crate::fit::{Verdict, fit};
 use crate::need::{Need, Terms};
 use crate::requirement::{Asked, Requirement, RequirementError};
@@ -25,7 +25,7 @@ pub struct Lacking {
     pub messages: Vec<String>,
 }
 
-/// The controllers of `catalogue` that meet all `requirements`.
+/// The controllers of `catalogue` that meet all `requirements`; under `kind=module` its modules.
 ///
 /// # Errors
 /// Requirements that are about a role or a program: a search has none.
@@ -50,7 +50,10 @@ pub fn search<'a>(
     let need = Need::nothing();
     let terms = Terms { requirements: requirements.to_vec(), ..Terms::default() };
     let mut found = Found { controllers: Vec::new(), unknown: Vec::new() };
-    for controller in catalogue.controllers() {
+    let module = Asked::Kind(Kind::Module);
+    let of_modules = requirements.iter().any(|requirement| requirement.asked == module);
+    let rows = catalogue.rows().filter(|row| (row.kind == Kind::Module) == of_modules);
+    for controller in rows {
         let family = catalogue.families.get(&controller.family);
         let fit = fit(controller, family, &need, &terms);
         match fit.verdict {

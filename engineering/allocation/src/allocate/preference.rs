@@ -4,8 +4,8 @@ use std::cmp::Ordering;
 
 use serde::Serialize;
 
+use super::offers::{Offer, best_of_each};
 use super::{AllocationError, Candidate};
-use crate::controller::Controller;
 use crate::figures::{Quantity, Statement};
 use crate::fit::{Fit, Verdict};
 
@@ -37,19 +37,21 @@ pub(super) struct Order {
 }
 
 pub(super) fn order(
-    types: &[(&Controller, Option<usize>)],
+    offers: &[Offer],
+    controllers: usize,
     preference: Preference,
     remarks: &mut Vec<String>,
 ) -> Result<Order, AllocationError> {
     let prices: Vec<Option<u64>> =
-        types.iter().map(|(controller, _)| controller.number(Quantity::Price)).collect();
-    let known = prices.iter().flatten().count();
+        offers.iter().map(|offer| offer.controller.number(Quantity::Price)).collect();
+    let known = prices[..controllers].iter().flatten().count();
     let priced = preference == Preference::Cost && known > 0;
     if priced {
-        let mut currencies: Vec<String> = types
+        let mut currencies: Vec<String> = offers
             .iter()
-            .filter(|(controller, _)| controller.number(Quantity::Price).is_some())
-            .filter_map(|(controller, _)| controller.text(Statement::Currency))
+            .map(|offer| &offer.controller)
+            .filter(|controller| controller.number(Quantity::Price).is_some())
+            .filter_map(|controller| controller.text(Statement::Currency))
             .map(str::to_owned)
             .collect();
         currencies.sort();
@@ -58,7 +60,7 @@ pub(super) fn order(
             return Err(AllocationError::Currencies(currencies));
         }
     }
-    if preference == Preference::Cost && known < types.len() {
+    if preference == Preference::Cost && known < controllers {
         remarks.push(if known == 0 {
             "no price is known: sufficient models are ranked by memory size, and the smallest number of controllers is \
              taken (`understudy catalogue import FILE --update` brings prices)"
@@ -66,14 +68,14 @@ pub(super) fn order(
         } else {
             format!(
                 "{} of {} prices are unknown: models without a price are ranked after those with one, by memory size",
-                types.len() - known,
-                types.len()
+                controllers - known,
+                controllers
             )
         });
     }
-    let mut order: Vec<usize> = (0..types.len()).collect();
+    let mut order: Vec<usize> = (0..offers.len()).collect();
     order.sort_by_key(|&place| {
-        let controller = types[place].0;
+        let controller = &offers[place].controller;
         let number = |quantity| controller.number(quantity).unwrap_or(u64::MAX);
         let memory = number(Quantity::ProgramMemoryBytes);
         let points = number(Quantity::DigitalInputs);
@@ -82,9 +84,9 @@ pub(super) fn order(
             Preference::Memory | Preference::Reserve => memory,
             Preference::Speed => number(Quantity::BoolInstructionNs),
         };
-        (first, memory, points, place)
+        (first, offers[place].parts(), memory, points, place)
     });
-    let mut places = vec![(0, None); types.len()];
+    let mut places = vec![(0, None); offers.len()];
     for (rank, &place) in order.iter().enumerate() {
         places[place] = (rank, prices[place]);
     }
@@ -113,12 +115,8 @@ impl Order {
     }
 
     /// The controllers for one box, the best first.
-    pub(super) fn rank(
-        &self,
-        types: &[(&Controller, Option<usize>)],
-        fits: &[Fit],
-    ) -> Vec<Candidate> {
-        let mut order: Vec<usize> = (0..fits.len()).collect();
+    pub(super) fn rank(&self, offers: &[Offer], fits: &[Fit]) -> Vec<Candidate> {
+        let mut order = best_of_each(offers, fits);
         let missing = |fit: &Fit| fit.with(Verdict::Unknown).count();
         order.sort_by(|&left, &right| {
             let (one, other) = (&fits[left], &fits[right]);
@@ -133,10 +131,11 @@ impl Order {
             verdicts.then(preferred).then(self.places[left].0.cmp(&self.places[right].0))
         });
         let candidate = |place: usize| Candidate {
-            vendor: types[place].0.vendor.clone(),
-            model: types[place].0.model.clone(),
+            vendor: offers[place].controller.vendor.clone(),
+            model: offers[place].controller.model.clone(),
+            modules: offers[place].modules.clone(),
             fit: fits[place].clone(),
-            notes: types[place].0.notes.clone(),
+            notes: offers[place].controller.notes.clone(),
         };
         order.into_iter().map(candidate).collect()
     }

@@ -1,7 +1,7 @@
 //! Controllers in stock.
 
 use super::AllocationError;
-use crate::controller::{Catalogue, Controller};
+use crate::controller::{Catalogue, Controller, Kind};
 
 /// A number of controllers of one model.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -27,6 +27,9 @@ pub(super) fn types<'a>(
         match catalogue.named(name).as_slice() {
             [] => errors
                 .push(AllocationError::NoModel { name: name.clone(), like: catalogue.like(name) }),
+            [module] if module.kind == Kind::Module => {
+                errors.push(AllocationError::Module(module.to_string()));
+            }
             [controller] => match types.iter_mut().find(|(known, _)| known == controller) {
                 Some((_, known)) => *known = known.map(|known| known.saturating_add(*count)),
                 None => types.push((controller, Some(*count))),

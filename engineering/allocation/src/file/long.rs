@@ -43,7 +43,7 @@ pub(super) fn catalogue(rows: &[Row<'_>], wrong: &mut Vec<Diagnostic>) -> Catalo
             model(row, &mut catalogue, wrong);
         }
     }
-    for controller in catalogue.controllers() {
+    for controller in catalogue.rows() {
         let of_it = |row: &&Row<'_>| {
             row.text("vendor") == controller.vendor
                 && row.text("model") == controller.model
@@ -141,7 +141,7 @@ pub(super) fn write(catalogue: &Catalogue) -> String {
             push(&mut text, fields, &mut notes);
         }
     }
-    for controller in catalogue.controllers() {
+    for controller in catalogue.rows() {
         let mut notes = controller.notes.as_str();
         let numbers = controller.numbers.iter().map(|(quantity, figure)| {
             let value = quantity.text(figure.value);

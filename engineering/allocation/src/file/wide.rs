@@ -10,7 +10,7 @@ use crate::controller::Catalogue;
 use crate::figures::{Figure, Quantity, Statement};
 
 /// Columns; those of figures may be left out.
-pub(super) const HEADER: [&str; 27] = [
+pub(super) const HEADER: [&str; 28] = [
     "vendor",
     "model",
     "family",
@@ -26,6 +26,7 @@ pub(super) const HEADER: [&str; 27] = [
     "bool_instruction_ns",
     "comm_ports",
     "max_expansion_io",
+    "expansion_modules",
     "languages",
     "price",
     "currency",

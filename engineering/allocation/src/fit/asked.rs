@@ -8,7 +8,7 @@ use crate::requirement::{Asked, Bound, Requirement};
 
 pub(super) fn judge(judge: &mut Judge<'_>, requirement: &Requirement, need: &Need) {
     let controller = judge.controller;
-    let criterion = format!("required: {}", requirement.text);
+    let criterion = requirement.criterion();
     let instruction_time = judge.instruction_time();
     let mut is = |holds: bool, message: String, sources: Vec<String>| {
         let verdict = if holds { Verdict::Fits } else { Verdict::DoesNotFit };

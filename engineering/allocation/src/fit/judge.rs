@@ -86,7 +86,7 @@ impl<'a> Judge<'a> {
         figure.map(|figure| figure.source.clone()).into_iter().collect()
     }
 
-    /// Terminals on board, or with expansion modules where these count.
+    /// The terminals that it has.
     pub(super) fn points(&mut self, quantity: Quantity, need: u64, dimension: Dimension) {
         if need == 0 {
             return;
@@ -101,18 +101,11 @@ impl<'a> Judge<'a> {
                 let load = Load { takes: need, usable };
                 self.loads.insert(dimension, load);
             }
-            (has, Some(expansion)) if self.terms.expansion => {
-                let has = has.map_or_else(|| "not known".to_owned(), |has| has.to_string());
-                let message = format!(
-                    "needs {need} {words}; on board: {has}, and \"{expansion}\" as expansion: check whether that is sufficient"
-                );
-                let figure = self.controller.texts.get(&Statement::MaxExpansionIo);
-                let source = figure.map(|figure| figure.source.clone());
-                self.said(name, Verdict::Unknown, message, source.into_iter().collect());
-            }
             (Some(has), expansion) => {
                 self.compare(name, "", need, has, self.source(quantity));
-                if let (Some(expansion), Some(finding)) = (expansion, self.findings.last_mut()) {
+                if let (Some(expansion), Some(finding), false) =
+                    (expansion, self.findings.last_mut(), self.terms.expansion)
+                {
                     let more = format!(" on board (modules do not count here: \"{expansion}\")");
                     finding.message.push_str(&more);
                 }

@@ -25,7 +25,9 @@ pub(super) fn pack(
             packed.items.push(item);
             continue;
         }
-        let taken = |one: usize| boxes.iter().filter(|packed| packed.box_type == one).count();
+        let model = |packed: &PackedBox| types[packed.box_type].model;
+        let taken =
+            |one: usize| boxes.iter().filter(|packed| model(packed) == types[one].model).count();
         let free = by_cost.iter().copied().find(|&one| {
             types[one].loads[item].is_some()
                 && types[one].stock.is_none_or(|stock| taken(one) < stock)

@@ -81,6 +81,15 @@ pub(super) fn solve(
             constraints.push(constraint!(next.taken <= copy.taken)); // (5)
         }
     }
+    for of_model in models(&copies, types).into_values() {
+        let mut sum = Expression::from(0.0);
+        for copy in &of_model {
+            sum += copy.taken;
+        }
+        if let Some(stock) = of_model.first().and_then(|copy| types[copy.box_type].stock) {
+            constraints.push(constraint!(sum <= stock as f64)); // (6)
+        }
+    }
     let model = variables.minimise(objective).using(microlp);
     let mut model = model
         .with_time_limit(MAXIMUM_SECONDS)
@@ -102,6 +111,15 @@ pub(super) fn solve(
     let boxes = packed.filter(|packed| !packed.items.is_empty()).collect();
     let is_proved = matches!(solution.status(), SolutionStatus::Optimal);
     Some((boxes, is_proved))
+}
+
+/// The copies by model.
+fn models<'a>(copies: &'a [Copy], types: &[BoxType]) -> BTreeMap<usize, Vec<&'a Copy>> {
+    let mut models: BTreeMap<usize, Vec<&Copy>> = BTreeMap::new();
+    for copy in copies {
+        models.entry(types[copy.box_type].model).or_default().push(copy);
+    }
+    models
 }
 
 /// (2) and (3): of items that are all apart from each other one at most is on a copy, and only on one that is taken. Every pair that must be

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use understudy_allocation::{
-    Controller, Family, FamilyQuantity, Figure, Fit, Kind, Need, Quantity, Requirement, Resources,
-    Role, Statement, Terms, Verdict, fit,
+    Catalogue, Controller, Family, FamilyQuantity, Figure, Fit, Kind, Need, Quantity, Requirement,
+    Resources, Role, Statement, Terms, Verdict, assess, fit,
 };
 
 use crate::support::{controller, family, resources};
@@ -155,8 +155,8 @@ fn modules_do_not_count_unless_asked_and_then_leave_it_open() {
     assert_eq!(found.verdict, Verdict::DoesNotFit);
     assert!(messages(&found)[0].contains("7 modules"), "{:?}", messages(&found));
     terms.expansion = true;
-    let found = fit(&controller, Some(&known_family()), &need, &terms);
-    assert_eq!(found.verdict, Verdict::Unknown);
+    let found = assess(&Catalogue::default(), &controller, &need, &terms, false);
+    assert_eq!((found.alone.verdict, found.extended), (Verdict::Unknown, None));
 }
 
 #[test]

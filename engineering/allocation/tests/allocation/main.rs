@@ -4,6 +4,7 @@ mod additions;
 mod files;
 mod fitting;
 mod instruction_list;
+mod modules;
 mod packing;
 mod plan;
 mod resources;

@@ -20,8 +20,10 @@ struct Case {
 impl Case {
     fn box_types(&self) -> Vec<BoxType> {
         let dimensions = [Dimension::ProgramMemory, Dimension::Timers];
-        let of_type = self.types.iter().map(|(capacity, cost, stock, barred)| BoxType {
+        let numbered = self.types.iter().enumerate();
+        let of_type = numbered.map(|(model, (capacity, cost, stock, barred))| BoxType {
             cost: *cost as f64,
+            model,
             stock: *stock,
             loads: self
                 .takes

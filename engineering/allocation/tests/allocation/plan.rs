@@ -224,10 +224,10 @@ fn the_plan_as_lines_as_a_table_and_as_a_page() {
     let plan = planned(&cell(), &share());
     insta::assert_snapshot!("text", text(&plan, false));
     let table = csv(&plan);
-    assert_eq!(table.lines().next().map(|line| line.split(',').count()), Some(14));
+    assert_eq!(table.lines().next().map(|line| line.split(',').count()), Some(15));
     assert!(
         table.contains(
-            "robot,controller,1,Works,S,yes,fits,program_memory_bytes,fits,16,60,0.7333,"
+            "robot,controller,1,Works,S,,yes,fits,program_memory_bytes,fits,16,60,0.7333,"
         ),
         "{table}"
     );
