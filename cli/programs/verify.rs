@@ -19,12 +19,12 @@ use understudy_text::{Diagnostic, Report, has_errors};
 use understudy_verification::program::{Bounds, Remarks, Subject};
 use understudy_verification::property::{Properties, Property, not_of_one_scan, read, read_one};
 use understudy_verification::symbolic::Resolved;
-use understudy_verification::{GoOn, draw_runs, prove_parity, smv};
+use understudy_verification::{GoOn, draw_runs, prove_parity_while, smv};
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::files;
-use crate::patience::Patience;
+use crate::patience::{Patience, Resources};
 use answer::{Finding, ProgramAnswer};
 
 /// Prove properties of programs or show counterexamples
@@ -40,6 +40,7 @@ Example:
   understudy verify examples/press-cell/cluster.toml
   understudy verify examples/two-shuttles/cluster.toml --property \"never left.inside and right.inside\"
   understudy verify examples/boiler/complete.ladder --period 100ms --budget 60s
+  understudy verify examples/painting-system/painting-system.ladder --resources
 
 Without a property the command proves the standard property of every ladder program: each output can always be switched on and off again. It
 also remarks on rungs without effect, coils with conflicting values in one scan, and sequence steps that are passed in one scan. Of a program
@@ -75,6 +76,9 @@ pub(crate) struct Arguments {
     /// Maximum depth of the induction, in scans, for undecided properties
     #[arg(long, value_name = "SCANS", default_value_t = 20)]
     induction: u32,
+    /// Print the time, the nodes of decision diagrams, the listed states and the memory that the proofs took
+    #[arg(long, conflicts_with = "smv")]
+    resources: bool,
     /// HTML page with all counterexamples and witnesses, drawn into the ladder scan by scan
     #[arg(long, value_name = "FILE.html", conflicts_with = "smv")]
     draw: Option<PathBuf>,
@@ -240,7 +244,8 @@ fn proved(
     }
     let page = arguments.draw.as_deref();
     let page = page.map(|path| draw(path, period, ladder, subject, &program));
-    Ok(answer::of_programs(vec![program], None, page.transpose()?))
+    let used = used(arguments, patience);
+    Ok(answer::of_programs(vec![program], None, page.transpose()?, used))
 }
 
 /// Writes the page of runs and returns its name.
@@ -270,7 +275,7 @@ fn cluster(arguments: &Arguments, patience: &Patience<'_>) -> Result<Answer, Ans
     let is_asked = !arguments.property.is_empty() || arguments.properties.is_some();
     if is_asked {
         let together = numbers::of_cluster(arguments, &cluster, bounds, patience)?;
-        return Ok(answer::of_programs(vec![together], None, None)
+        return Ok(answer::of_programs(vec![together], None, None, used(arguments, patience))
             .with_used(reports)
             .and_next(&[&"simulate", &arguments.file]));
     }
@@ -289,18 +294,27 @@ fn cluster(arguments: &Arguments, patience: &Patience<'_>) -> Result<Answer, Ans
         }
     }
     let parity = cluster.parity();
-    let parity = parity.map(|understudy| parity_proof(&cluster, understudy));
-    Ok(answer::of_programs(programs, parity, None)
+    let parity = parity.map(|understudy| parity_proof(&cluster, understudy, bounds));
+    Ok(answer::of_programs(programs, parity, None, used(arguments, patience))
         .with_used(reports)
         .and_next(&[&"simulate", &arguments.file]))
 }
 
+/// What the proofs took, if it is asked for.
+fn used(arguments: &Arguments, patience: &Patience<'_>) -> Option<Resources> {
+    arguments.resources.then(|| patience.resources())
+}
+
 /// Result of the proof of the understudy.
-fn parity_proof(cluster: &Cluster, understudy: &ParityController) -> Result<String, String> {
+fn parity_proof(
+    cluster: &Cluster,
+    understudy: &ParityController,
+    bounds: Bounds<'_>,
+) -> Result<String, String> {
     let controllers = cluster.controllers().iter();
     let members: Vec<Circuit> =
         controllers.filter_map(|controller| controller.circuit().cloned()).collect();
-    match prove_parity(&members, understudy.circuit()) {
+    match prove_parity_while(&members, understudy.circuit(), bounds.nodes, bounds.go_on) {
         Ok(proof) => Ok(format!(
             "the understudy equals the sum of its members: {} registers and {} outputs compared",
             proof.registers, proof.outputs

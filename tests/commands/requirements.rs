@@ -18,22 +18,47 @@ fn number(text: &str) -> Option<&str> {
     (!digits.is_empty() && digits.chars().all(|digit| digit.is_ascii_digit())).then_some(word)
 }
 
-/// Runs every `understudy verify` of the page: all properties hold, and each requirement has one.
-#[test]
-fn the_boilers_requirements_are_proved_of_its_ladders() {
-    let page = page("boiler");
-    let rows = page.lines().filter_map(|line| number(line.strip_prefix("| ")?));
-    let listed: BTreeSet<&str> = rows.collect();
+/// Each number of a first column, `R1` for `R` and so on.
+fn listed<'a>(page: &'a str, letter: &str) -> BTreeSet<&'a str> {
+    let rows = page.lines().filter_map(|line| line.strip_prefix("| ")?.split(' ').next());
+    let is_number =
+        |word: &&str| word.strip_prefix(letter).is_some_and(|of| of.parse::<u32>().is_ok());
+    rows.filter(is_number).collect()
+}
+
+/// Runs every `understudy verify` and `understudy simulate` of a page. What a block `sh` proves holds, and each requirement R has a
+/// property; what a block `console` asks fails, and there is one for each N, a requirement that is not kept.
+fn check(folder: &str) {
+    let page = page(folder);
     let mut proved = BTreeSet::new();
-    let mut count = 0;
-    for command in page.lines().filter_map(|line| line.strip_prefix("understudy verify ")) {
-        let arguments: Vec<&str> = command.split(' ').collect();
-        let answer = understudy(&[&["verify"], &arguments[..], &["--json"]].concat());
-        assert_eq!(answer.status, 0, "{command}\n{}", answer.shown());
+    let (mut count, mut refuted, mut runs, mut fails) = (0, 0, 0, false);
+    for line in page.lines() {
+        fails = if line.starts_with("```") { line == "```console" } else { fails };
+        let Some(command) = line.strip_prefix("understudy ") else { continue };
+        let arguments: Vec<String> = words(command);
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        match arguments[0] {
+            "verify" => {}
+            // The emergencies of the boiler have a test of their own.
+            "simulate" if folder != "boiler" => {
+                let answer = understudy(&arguments);
+                assert_eq!(answer.status, 0, "{command}\n{}", answer.shown());
+                runs += 1;
+                continue;
+            }
+            _ => continue,
+        }
+        let answer = understudy(&[&arguments[..], &["--json"]].concat());
+        assert_eq!(answer.status, i32::from(fails), "{command}\n{}", answer.shown());
         let document = answer.json();
         let found = document["result"]["programs"][0]["properties"].as_array().expect("properties");
         for property in found {
-            assert_eq!(property["verdict"], "holds", "{property:#}");
+            let expected = if fails { "fails" } else { "holds" };
+            assert_eq!(property["verdict"], expected, "{property:#}");
+        }
+        if fails {
+            refuted += found.len();
+            continue;
         }
         count += found.len();
         let (_, file) = command.split_once("--properties ").expect("a file of properties");
@@ -42,8 +67,40 @@ fn the_boilers_requirements_are_proved_of_its_ladders() {
         proved.extend(lines.lines().filter_map(number).map(str::to_owned));
     }
     let proved: BTreeSet<&str> = proved.iter().map(String::as_str).collect();
-    assert_eq!(listed, proved);
-    assert!(page.contains(&format!("{count} properties are proved")), "{count}");
+    assert_eq!(listed(&page, "R"), proved, "{folder}");
+    assert_eq!(listed(&page, "N").len(), refuted, "{folder}");
+    assert!(page.contains(&format!("{count} properties are proved")), "{folder}: {count}");
+    let has_cluster = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("examples")
+        .join(folder)
+        .join("cluster.toml")
+        .exists();
+    assert!(
+        !has_cluster || folder == "boiler" || runs > 0,
+        "{folder}: no run shows the requirements"
+    );
+}
+
+/// The words of a command line; what is between quotes is one of them.
+fn words(command: &str) -> Vec<String> {
+    let parts = command.split('"').enumerate();
+    let words = parts.flat_map(|(place, part)| match place % 2 {
+        0 => part.split_whitespace().map(str::to_owned).collect(),
+        _ => vec![part.to_owned()],
+    });
+    words.collect()
+}
+
+#[test]
+fn the_boilers_requirements_are_proved_of_its_ladders() {
+    check("boiler");
+}
+
+#[test]
+fn the_requirements_of_the_papers_other_examples_are_proved_and_shown() {
+    for folder in ["vents", "painting-system", "filling-line", "assembly-cell", "press-cell"] {
+        check(folder);
+    }
 }
 
 /// The cycles in which an alarm of the remote I/O's program becomes 1 in the newest run of `out`.

@@ -15,6 +15,7 @@ use understudy_verification::symbolic::{Resolved, Signal, Trace};
 use understudy_verification::{Shown, scan_table};
 
 use crate::answer::{Answer, Status};
+use crate::patience::Resources;
 
 /// Result of `verify`.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -27,6 +28,8 @@ pub(crate) struct Verification {
     proved: bool,
     /// Page of runs.
     page: Option<String>,
+    /// What the proofs took, with `--resources`.
+    resources: Option<Resources>,
 }
 
 /// Results for one program.
@@ -326,6 +329,7 @@ pub(super) fn of_programs(
     programs: Vec<ProgramAnswer>,
     understudy: Option<Result<String, String>>,
     page: Option<String>,
+    resources: Option<Resources>,
 ) -> Answer {
     let right =
         programs.iter().all(ProgramAnswer::proved) && understudy.as_ref().is_none_or(Result::is_ok);
@@ -341,12 +345,16 @@ pub(super) fn of_programs(
     if let Some(page) = &page {
         let _ = writeln!(text, "\nruns are drawn in {page}");
     }
+    if let Some(resources) = &resources {
+        let _ = writeln!(text, "\nresources: {resources}");
+    }
     let status = if right { Status::Done } else { Status::Failed };
     let result = Verification {
         programs,
         understudy: understudy.map(|proof| proof.unwrap_or_else(|message| message)),
         proved: right,
         page,
+        resources,
     };
     Answer::done(text.trim_end().to_owned(), result).with_status(status)
 }

@@ -9,7 +9,7 @@ use understudy_verification::property::{Property, read_one};
 use understudy_verification::symbolic::Resolved;
 
 use super::answer::{self, Finding, ProgramAnswer};
-use super::{Arguments, Asked, asked, bounds};
+use super::{Arguments, Asked, asked, bounds, used};
 use crate::answer::{Answer, Status};
 use crate::files::why_no_ladder;
 use crate::patience::Patience;
@@ -45,12 +45,9 @@ pub(super) fn of_program(
     }
     let go_on = |work| patience.goes_on(work);
     let proved = prove(&model, &program.name, asked, bounds(arguments, &go_on), patience);
-    Ok(answer::of_programs(vec![proved], None, None).with_used(vec![report]).and_next(&[
-        &"init",
-        &"cell",
-        &"--from",
-        &arguments.file,
-    ]))
+    Ok(answer::of_programs(vec![proved], None, None, used(arguments, patience))
+        .with_used(vec![report])
+        .and_next(&[&"init", &"cell", &"--from", &arguments.file]))
 }
 
 /// Proves the standard property of a program of a cluster.

@@ -7,8 +7,13 @@ use understudy_logic::bdd::BddError;
 /// Current work, for the progress.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Work {
-    /// Computing sets of states as decision diagrams; number of steps so far.
-    Diagrams(u64),
+    /// Computing sets of states as decision diagrams.
+    Diagrams {
+        /// Number of steps so far.
+        steps: u64,
+        /// Nodes of the diagrams.
+        nodes: usize,
+    },
     /// So many states were listed.
     States(usize),
     /// Searching runs of this number of scans as clauses.
@@ -18,7 +23,7 @@ pub enum Work {
 impl fmt::Display for Work {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Diagrams(steps) => {
+            Self::Diagrams { steps, .. } => {
                 write!(formatter, "{steps} steps through sets of states")
             }
             Self::States(states) => write!(formatter, "{states} states listed"),
@@ -27,7 +32,7 @@ impl fmt::Display for Work {
     }
 }
 
-/// Whether to go on, asked many times a second; never again after the first no.
+/// Whether to go on, asked many times a second. After a no the work ends where it next can.
 pub type GoOn<'a> = &'a dyn Fn(Work) -> bool;
 
 /// Never stops.

@@ -186,6 +186,8 @@ impl Explicit {
             }
             first = states.end;
         }
+        // The list is complete: the answer is not needed.
+        let _ = go_on(Work::States(listed.origins.len()));
         (listed, None)
     }
 

@@ -337,7 +337,8 @@ impl Comparison<'_> {
         terms: &[(usize, Expression)],
     ) -> Result<Option<Vec<(Variable, bool)>>, Stopped> {
         self.compared += 1;
-        if self.compared > AT_LEAST && !(self.go_on)(Work::Diagrams(self.compared as u64)) {
+        let work = Work::Diagrams { steps: self.compared as u64, nodes: self.diagrams.nodes() };
+        if !(self.go_on)(work) && self.compared > AT_LEAST {
             return Err(Stopped::Time);
         }
         let found: Diagram = self.copies.diagram(copy)?;

@@ -324,6 +324,11 @@ impl Diagrams {
         made.map(Diagram).map_err(|_| BddError::TooManyNodes { limit: self.limit })
     }
 
+    /// Nodes of all diagrams, with those of no use that were not removed yet.
+    pub fn nodes(&self) -> usize {
+        self.manager.with_manager_shared(|manager| manager.num_inner_nodes())
+    }
+
     /// Removes dead nodes; whether they were an eighth of all, so that another try is worth while.
     fn makes_room(&self) -> bool {
         if self.variables.len() > SHALLOW {
@@ -331,8 +336,7 @@ impl Diagrams {
             return false;
         }
         self.collect_garbage();
-        let nodes = self.manager.with_manager_shared(|manager| manager.num_inner_nodes());
-        nodes < self.limit / 8 * 7
+        self.nodes() < self.limit / 8 * 7
     }
 
     /// Alone with the diagrams: where the library's own collection is still at work, it is waited for.

@@ -113,7 +113,7 @@ impl<'c> Model<'c> {
         let mut builder = diagrams.builder(graph, |variable| variable);
         let mut pairs = Vec::with_capacity(registers.len());
         for &register in &registers {
-            if !go_on(Work::Diagrams(0)) {
+            if !go_on(Work::Diagrams { steps: 0, nodes: diagrams.nodes() }) {
                 return Err(Stopped::Time);
             }
             let next = builder.diagram(circuit.registers()[register as usize].next)?;
@@ -177,7 +177,8 @@ impl<'c> Model<'c> {
     /// Counts a step, and ends when the caller no longer waits.
     pub(super) fn goes_on(&self) -> Result<(), Stopped> {
         self.steps.set(self.steps.get() + 1);
-        if (self.wanted)(Work::Diagrams(self.steps.get())) { Ok(()) } else { Err(Stopped::Time) }
+        let work = Work::Diagrams { steps: self.steps.get(), nodes: self.diagrams.nodes() };
+        if (self.wanted)(work) { Ok(()) } else { Err(Stopped::Time) }
     }
 
     /// Made on first use.

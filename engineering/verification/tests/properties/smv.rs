@@ -181,3 +181,44 @@ proptest! {
         run_beside(&circuit, &module, seed);
     }
 }
+
+/// Appendix 2 of the paper on the deployment of controllers, from its first module to its specification; `—` of the print is `|`.
+const APPENDIX_2: &str = include_str!("appendix-2.smv");
+
+/// A text in the names of the paper, without spaces, and with the constants of NuSMV.
+fn as_printed(text: &str) -> String {
+    let names = [
+        ("on_switch", "ONSWITCH"),
+        ("off_switch", "OFFSWITCH"),
+        ("start", "START"),
+        ("pe1", "PE1"),
+        ("ccw_sense", "CCWSENSE"),
+        ("cw_sense", "CWSENSE"),
+        ("g_timer", "GTIMER"),
+        ("green_lamp", "GLAMP"),
+        ("FALSE", "0"),
+    ];
+    let code = text.lines().map(|line| line.split("--").next().unwrap_or_default());
+    let words = code.flat_map(tokens).map(|word| {
+        let name = names.iter().find(|(ours, _)| *ours == word);
+        name.map_or(word, |(_, paper)| (*paper).to_owned())
+    });
+    // Brackets around a whole expression are the printer's choice.
+    let text = words.collect::<Vec<_>>().join(" ");
+    text.replace(": = ( GLAMP )", ": = GLAMP")
+        .replace("( ONSWITCH | START ) & ( ! OFFSWITCH )", "( ( ONSWITCH | START ) & ! OFFSWITCH )")
+}
+
+#[test]
+fn the_painting_system_is_written_as_in_appendix_2() {
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../examples/painting-system/painting-system.ladder"
+    );
+    let program = understudy_ladder::parse(&std::fs::read_to_string(path).expect("an example"));
+    let written = as_printed(&smv::of_rungs(&program.program));
+    for (ours, paper) in written.split("MODULE ").zip(as_printed(APPENDIX_2).split("MODULE ")) {
+        assert_eq!(ours, paper);
+    }
+    assert_eq!(written, as_printed(APPENDIX_2));
+}
