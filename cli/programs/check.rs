@@ -25,7 +25,7 @@ use crate::files::{self, ProgramText, read_cluster};
 use crate::kind::Kind;
 use crate::supervisors::automata;
 use crate::supervisors::reconfigure::read_project;
-use remarks::Looking;
+use remarks::{Looking, RungSize};
 
 /// Check files and report all errors and warnings
 #[derive(Debug, Args)]
@@ -33,6 +33,7 @@ use remarks::Looking;
 Example:
   understudy check examples/press-cell/cluster.toml scenarios/kill-each.toml
   understudy check --json examples/press-cell/robot.ladder
+  understudy check examples/boiler/main.ladder --rung-size 11x7
   understudy check examples/assembly-cell/model.toml examples/assembly-cell/net.toml examples/boiler/main-map.toml
   understudy check MAIN.TcPOU E_Mode.TcDUT
 
@@ -46,6 +47,9 @@ pub(crate) struct Arguments {
     /// The program to check in a text with several programs and no configuration
     #[arg(long, value_name = "NAME")]
     program: Option<String>,
+    /// The largest rung that the target takes, as elements across and lines down, such as 11x7; larger ones are warnings
+    #[arg(long, value_name = "ACROSSxDOWN")]
+    rung_size: Option<RungSize>,
     /// Time limit for the optional checks of large programs
     #[arg(long, value_name = "TIME", default_value = "1s", value_parser = duration::parse)]
     budget: Duration,
@@ -116,7 +120,7 @@ struct Found<'a> {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Answer {
-    let looking = Looking::new(arguments.budget);
+    let looking = Looking::new(arguments.budget, arguments.rung_size);
     let mut found = Found::default();
     let mut scenarios = Vec::new();
     let mut clusters = Vec::new();

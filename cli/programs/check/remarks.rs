@@ -1,6 +1,7 @@
 //! Optional checks within a time limit: suspicious rungs, and whether the understudy is the sum of its
 //! members.
 
+use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 use understudy_cluster::Cluster;
@@ -19,11 +20,41 @@ const NODES: usize = 100_000;
 /// Time limit of a check.
 pub(super) struct Looking {
     end: Instant,
+    rung_size: Option<RungSize>,
+}
+
+/// The largest rung that a target takes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RungSize {
+    /// Elements one behind the other.
+    across: usize,
+    /// Lines below each other.
+    down: usize,
+}
+
+impl FromStr for RungSize {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = |text: &str| text.trim().parse().ok().filter(|number| *number > 0);
+        let sizes = text.split_once(['x', '×']);
+        let sizes = sizes.and_then(|(across, down)| Some((number(across)?, number(down)?)));
+        let (across, down) =
+            sizes.ok_or("expected the elements across and the lines down, such as 11x7")?;
+        Ok(Self { across, down })
+    }
 }
 
 impl Looking {
-    pub(super) fn new(budget: Duration) -> Self {
-        Self { end: Instant::now() + budget }
+    pub(super) fn new(budget: Duration, rung_size: Option<RungSize>) -> Self {
+        Self { end: Instant::now() + budget, rung_size }
+    }
+
+    /// Reports rungs that are larger than the target takes.
+    fn at_sizes(&self, program: &Program, diagnostics: &mut Vec<Diagnostic>) {
+        if let Some(RungSize { across, down }) = self.rung_size {
+            diagnostics.extend(program.size_warnings(across, down));
+        }
     }
 
     /// Reports suspicious rungs of the program; true if the time limit ended the search.
@@ -33,6 +64,7 @@ impl Looking {
         period: Duration,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> bool {
+        self.at_sizes(program, diagnostics);
         let go_on = |_: Work| Instant::now() < self.end;
         let has_rungs = program.rungs.iter().any(|rung| !rung.coils.is_empty());
         if Instant::now() >= self.end {

@@ -5,6 +5,7 @@
 //! (a latch lasts over scans), and where its declaration gives an initial value (`memory step = 0`: a state).
 
 mod report;
+mod size;
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;

@@ -3,6 +3,7 @@
 //! Recursive descent; every loop consumes a lexeme or ends, and brackets nest at most [`MAXIMUM_NESTING`] deep, so any text
 //! is read in linear time and bounded stack. The grammar is in `docs/reference/ladder-format.md`; each function names its rule.
 
+mod alias;
 mod rung;
 
 pub use rung::MAXIMUM_PRESET_VALUE;
@@ -62,7 +63,8 @@ pub fn parse(text: &str) -> Parsed {
     }
     let (lexemes, diagnostics) = lex(text);
     let mut parser = Parser { lexemes, position: 0, comments: Vec::new(), diagnostics };
-    let program = parser.program();
+    let mut program = parser.program();
+    alias::resolve(&mut program);
     let mut diagnostics = parser.diagnostics;
     diagnostics.extend(check(&program));
     diagnostics.sort_by_key(|diagnostic| (diagnostic.span.start, diagnostic.span.end));

@@ -22,7 +22,15 @@ impl Checker<'_> {
             });
             let signals = self.places.keys().map(String::as_str);
             let names = signals.chain(self.blocks.keys().copied());
-            diagnostic = if let Some(block) = block {
+            let timing =
+                block.filter(|block| block.kind.preset_time().is_some() && name.ends_with(".TT"));
+            diagnostic = if let Some(timer) = timing {
+                diagnostic.with_help(format!(
+                    "a timer here has no timing bit: write its power into a memory bit above it, and read that bit with `/{0}.Q` for TON or \
+                     the closed bit with `{0}.Q` for TOF",
+                    timer.name
+                ))
+            } else if let Some(block) = block {
                 let outputs: Vec<String> = block
                     .kind
                     .outputs()

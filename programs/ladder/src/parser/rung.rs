@@ -93,7 +93,7 @@ impl Parser {
         }
     }
 
-    /// contact = [ "/" | "+" | "-" ], operand; comparison = counter, ".CV", relation, number;
+    /// contact = [ "/" | "+" | "-" ], operand; comparison = counter, ( ".CV" | ".ACC" ), relation, number;
     fn contact(&mut self) -> Option<Element> {
         let kind = match self.lexeme() {
             Lexeme::Sign("/") => ContactKind::NormallyClosed,
@@ -136,7 +136,8 @@ impl Parser {
             );
             return None;
         }
-        let Some(counter) = operand.strip_suffix(".CV") else {
+        let Some(counter) = operand.strip_suffix(".CV").or_else(|| operand.strip_suffix(".ACC"))
+        else {
             self.diagnostics.push(
                 Diagnostic::error(
                     "U0111",
