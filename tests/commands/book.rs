@@ -241,6 +241,7 @@ fn published(text: &str) -> Vec<String> {
     let written = written.iter().flat_map(|body| body.lines());
     let all = written.chain(indented).chain(between).map(str::trim_start);
     let ours = all.map(|line| line.replace("cargo run --release -- ", "understudy "));
+    let ours = ours.flat_map(|line| line.split(" && ").map(str::to_owned).collect::<Vec<_>>());
     ours.filter(|command| command.starts_with("understudy ") && !command.contains('\n')).collect()
 }
 
