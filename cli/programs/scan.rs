@@ -206,7 +206,7 @@ fn values(
         let named: Vec<String> = points
             .iter()
             .take(MAXIMUM_REPORTED)
-            .map(|point| format!("{} : {}", point.name, point.of))
+            .map(|point| format!("{} : {}", point.name, point.declared()))
             .collect();
         let help = format!("in this order: {}", named.join(", "));
         let span = start..start + line.len();
@@ -223,6 +223,14 @@ fn values(
             wrong.push(diagnostic.with_help(expected(point.of)));
             continue;
         };
+        let declared = point.declared();
+        if !declared.contains(stored) {
+            let at = start + (word.as_ptr() as usize - line.as_ptr() as usize);
+            let message = format!("`{word}` for `{}` is outside {declared}", point.name);
+            let diagnostic = Diagnostic::error("U0439", message, at..at + word.len());
+            wrong.push(diagnostic.with_help("write a value of the range"));
+            continue;
+        }
         read.push(stored);
     }
     if wrong.is_empty() { Ok(read) } else { Err(wrong) }

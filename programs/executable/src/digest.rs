@@ -54,7 +54,8 @@ impl Random {
         mixed ^ (mixed >> 31)
     }
 
-    /// A value as it is stored: reals from -1000 to 1000 in thousandths, times up to 10 s, everything else in the range of its type.
+    /// A value as it is stored: reals from -1000 to 1000 in thousandths, times up to 10 s, everything else in the subrange
+    /// or the range of its type.
     fn value(&mut self, point: &Point) -> u64 {
         let number = self.number();
         let real = (number % 2_000_001) as f64 / 1000.0 - 1000.0;
@@ -62,7 +63,13 @@ impl Random {
             Elementary::Real => u64::from((real as f32).to_bits()),
             Elementary::Lreal => real.to_bits(),
             of if of.is_time() => number % 10_000_000_000,
-            of => number & of.mask(),
+            of => match point.range {
+                Some((low, high)) => {
+                    let count = high.abs_diff(low).saturating_add(1);
+                    low.wrapping_add_unsigned(u128::from(number) % count) as u64 & of.mask()
+                }
+                None => number & of.mask(),
+            },
         }
     }
 }

@@ -17,14 +17,11 @@ mod program;
 mod timers;
 mod unroll;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 use understudy_ladder::{Name, Program as Ladder};
 use understudy_structured_text::lower::Names;
-use understudy_structured_text::syntax::{
-    Body, Expression, ExpressionKind, File, Literal, Statement, StatementKind, TypeKind, Unit,
-    UnitKind,
-};
+use understudy_structured_text::syntax::{Body, File, Statement, StatementKind, Unit, UnitKind};
 use understudy_text::{Diagnostic, Lines, has_errors};
 use understudy_typed::Program;
 
@@ -40,7 +37,6 @@ pub(crate) fn ladder(
     let lines = Lines::new(text);
     let mut units = file.units.iter();
     let unit = units.find(|unit| unit.kind == UnitKind::Program && unit.name.is(&program.name));
-    let ranges = unit.map(ranges).unwrap_or_default();
     let comments = comments(file, &lines);
     let declarations = unit.iter().flat_map(|unit| &unit.declarations);
     let places = declarations
@@ -49,7 +45,7 @@ pub(crate) fn ladder(
             (found.name.key(), u32::try_from(line).unwrap_or(u32::MAX))
         })
         .collect();
-    let around = Surroundings { names, ranges: &ranges, places: &places, comments: &comments };
+    let around = Surroundings { names, places: &places, comments: &comments };
     let place = |line: usize| match line.checked_sub(1) {
         Some(index) => {
             let range = lines.range(index);
@@ -103,27 +99,6 @@ fn footer(unit: &Unit) -> Vec<String> {
             _ => Vec::new(),
         },
         Body::Chart(_) | Body::Instructions(_) => Vec::new(),
-    }
-}
-
-/// The ranges that variables of a unit are declared with, by their names in capitals.
-fn ranges(unit: &Unit) -> HashMap<String, (i64, i64)> {
-    let mut ranges = HashMap::new();
-    for declaration in &unit.declarations {
-        if let TypeKind::Subrange(_, low, high) = &declaration.of.kind
-            && let (Some(low), Some(high)) = (literal(low), literal(high))
-        {
-            ranges.insert(declaration.name.key(), (low, high));
-        }
-    }
-    ranges
-}
-
-fn literal(expression: &Expression) -> Option<i64> {
-    match &expression.kind {
-        ExpressionKind::Literal(Literal::Integer { value, .. }) => i64::try_from(*value).ok(),
-        ExpressionKind::Minus(inner) => literal(inner)?.checked_neg(),
-        _ => None,
     }
 }
 

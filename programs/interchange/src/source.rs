@@ -121,8 +121,11 @@ fn source(whole: Whole) -> SourceFile {
             diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
             Some(Source::Ladder(ladder))
         }
-        (None, Some(typed)) => Some(Source::Typed(Arc::new(typed))),
-        (None, None) => library,
+        (None, typed) => {
+            diagnostics.extend(whole.subranges);
+            diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
+            typed.map(|typed| Source::Typed(Arc::new(typed))).or(library)
+        }
     };
     SourceFile { source, period: whole.period, diagnostics }
 }

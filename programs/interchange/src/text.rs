@@ -28,6 +28,8 @@ pub(crate) struct Whole {
     pub(crate) period: Option<Duration>,
     /// What was found of the program.
     pub(crate) diagnostics: Vec<Diagnostic>,
+    /// Warnings of numbers that can leave their subranges; those of a ladder are among its own.
+    pub(crate) subranges: Vec<Diagnostic>,
     /// What was found of it as a ladder; an error where it is none.
     pub(crate) reasons: Vec<Diagnostic>,
 }
@@ -41,7 +43,8 @@ pub(crate) fn whole(
 ) -> Whole {
     let nanoseconds = |period: Duration| i64::try_from(period.as_nanos()).unwrap_or(i64::MAX);
     let options = Options { text, program, period: period.map(nanoseconds) };
-    let Lowered { program: typed, checked, names, diagnostics: found } = lower(&file, &options);
+    let Lowered { program: typed, checked, names, diagnostics: found, subranges } =
+        lower(&file, &options);
     diagnostics.extend(found);
     let period = understudy_structured_text::lower::period(&file, program);
     diagnostics.extend(periods(&file, period));
@@ -59,6 +62,7 @@ pub(crate) fn whole(
         checked: if is_right { checked } else { Vec::new() },
         period: period.map(|interval| Duration::from_nanos(interval.unsigned_abs())),
         diagnostics,
+        subranges,
         reasons,
     }
 }
@@ -104,6 +108,9 @@ impl Whole {
     /// The ladder, or why it is none.
     pub(crate) fn reading(self) -> Reading {
         let mut diagnostics = self.diagnostics;
+        if self.ladder.is_none() {
+            diagnostics.extend(self.subranges);
+        }
         if self.typed.is_none() && !has_errors(&diagnostics) {
             diagnostics.push(no_program());
         }

@@ -18,6 +18,7 @@ mod convert;
 mod elements;
 mod expand;
 mod expressions;
+mod facts;
 mod fold;
 mod images;
 mod initial;
@@ -50,6 +51,7 @@ use crate::syntax::{File, Name, Unit};
 
 use self::blocks::{Block, Key, Routine};
 use self::constants::ConstantState;
+use self::facts::Facts;
 use self::names::{Owner, Scope, Symbol};
 use self::types::{StructureInfo, TypeState};
 
@@ -93,6 +95,8 @@ pub struct Lowered {
     pub names: Names,
     /// What was found, in the order of the text.
     pub diagnostics: Vec<Diagnostic>,
+    /// Warnings of numbers that can leave their subranges. What becomes a ladder is examined more closely there.
+    pub subranges: Vec<Diagnostic>,
 }
 
 /// Memory that is none of a program's variables, and whose routines are the library's.
@@ -102,6 +106,8 @@ pub struct Names {
     pub hidden: Vec<Variable>,
     /// Variables of functions, methods and VAR_TEMP; slots counted from the start of all frames.
     pub frames: Vec<Variable>,
+    /// Subranges of the programs' variables and of global ones, by their names in capitals.
+    pub ranges: HashMap<String, (i128, i128)>,
     /// For each routine, whether it is of a block of the library.
     pub library: Vec<bool>,
 }
@@ -142,8 +148,6 @@ struct Lowering<'a> {
     units: Vec<UnitEntry<'a>>,
     unit_names: HashMap<String, usize>,
     types: HashMap<String, TypeState<'a>>,
-    /// Bounds of the variables that are subranges, by the places of their names.
-    ranges: HashMap<Range<usize>, (i128, i128)>,
     /// Names of what an INTERFACE declares, in capitals.
     interfaces: HashSet<String>,
     /// By the ids of the program's structures.
@@ -169,6 +173,10 @@ struct Lowering<'a> {
     /// Which routines each routine calls, and where it first does.
     calls: Vec<Vec<(u32, Range<usize>)>>,
     scope: Scope,
+    /// What is known of variables at this place.
+    facts: Facts,
+    /// Warnings of numbers that can leave their subranges.
+    subranges: Vec<Diagnostic>,
     /// How often something was reported, or found that was reported before.
     blamed: usize,
     /// Calls of blocks of the standard that are not given the time between two calls.
@@ -213,7 +221,6 @@ impl<'a> Lowering<'a> {
             units,
             unit_names,
             types: HashMap::new(),
-            ranges: HashMap::new(),
             interfaces: file.interfaces.iter().map(Name::key).collect(),
             structures: Vec::new(),
             enumerators: HashMap::new(),
@@ -229,6 +236,8 @@ impl<'a> Lowering<'a> {
             queue: Vec::new(),
             calls: Vec::new(),
             scope: Scope::default(),
+            facts: Facts::default(),
+            subranges: Vec::new(),
             blamed: 0,
             without_cycle: Vec::new(),
             sets_cycle: false,
@@ -243,6 +252,9 @@ impl<'a> Lowering<'a> {
         self.calls_without_cycle();
         self.diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
         self.diagnostics.dedup();
+        self.subranges.sort_by_key(|found| (found.span.start, found.span.end));
+        self.subranges.dedup();
+        self.subranges.truncate(MAXIMUM_FINDINGS - self.diagnostics.len().min(MAXIMUM_FINDINGS));
         if self.diagnostics.len() > MAXIMUM_FINDINGS {
             self.diagnostics.truncate(MAXIMUM_FINDINGS);
             self.diagnostics.push(Diagnostic::too_many(0));
@@ -255,6 +267,7 @@ impl<'a> Lowering<'a> {
             checked,
             names: self.names,
             diagnostics: self.diagnostics,
+            subranges: self.subranges,
         }
     }
 

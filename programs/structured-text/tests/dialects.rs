@@ -130,7 +130,7 @@ fn narrower_types_keep_the_low_bits_with_a_warning() {
     );
     refused(
         "PROGRAM main VAR x : INT; y : REAL; END_VAR x := y; x := 70000; END_PROGRAM",
-        &["expected INT, found REAL", "70000 is not a INT"],
+        &["expected INT, found REAL", "70000 is not an INT"],
     );
 }
 

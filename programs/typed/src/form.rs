@@ -22,7 +22,7 @@ pub struct RoutineId(pub u32);
 /// wants; no routine calls itself, directly or through others.
 #[derive(Debug, Clone, Default)]
 pub struct Program {
-    /// Its name.
+    /// Its name; of several programs that run together, their names with commas between.
     pub name: String,
     /// Nanoseconds from one scan to the next.
     pub period: i64,
@@ -263,12 +263,14 @@ pub struct Place {
     pub indices: Vec<Index>,
     /// What lies there.
     pub of: Type,
+    /// Least and greatest value of the subrange that it is declared with, or that its elements are. It bounds no calculation.
+    pub range: Option<(i128, i128)>,
 }
 
 impl Place {
     /// A variable.
     pub fn new(root: Root, of: Type) -> Self {
-        Self { root, offset: 0, bit: 0, is_packed: false, indices: Vec::new(), of }
+        Self { root, offset: 0, bit: 0, is_packed: false, indices: Vec::new(), of, range: None }
     }
 
     /// Bits from its root to the end of what it may mean, whatever the values of its indices; saturates.

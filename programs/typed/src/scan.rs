@@ -1,14 +1,14 @@
 //! The frame of a scan, which both engines share: inputs, tasks, outputs, and what a fault leaves behind.
 //!
 //! ```text
-//! running   inputs → tasks → outputs are finite → count → outputs        x(t+1), y(t)
+//! running   inputs → tasks → outputs are finite and within their subranges → count → outputs        x(t+1), y(t)
 //! fault     the state before the scan, with slots 0 to 2 set; the outputs that this state holds
 //! faulted   the reset is FALSE: nothing changes; TRUE: the initial state, then as running
 //! ```
 
 use crate::fault::{Cause, Fault};
 use crate::form::{Program, Task};
-use crate::image::{Point, Points};
+use crate::image::{Declared, Point, Points};
 use crate::operation::real::Float;
 use crate::row::Row;
 use crate::types::Elementary;
@@ -29,6 +29,8 @@ pub(crate) struct Frame {
     faults: Vec<Wire>,
     /// Outputs that may be no finite number: their places in the image, slots and types.
     reals: Vec<(u64, u32, Elementary)>,
+    /// Outputs with a subrange: their slots and declarations.
+    limited: Vec<(u32, Declared)>,
     initial: Vec<u64>,
     tasks: Vec<Task>,
     period: i64,
@@ -69,11 +71,13 @@ impl Frame {
         let faults = program.outputs.iter().filter(|point| point.slot == 0);
         let outputs = program.outputs.iter().zip(0..);
         let reals = outputs.filter(|(point, _)| point.of.is_real());
+        let limited = program.outputs.iter().filter(|point| point.range.is_some());
         Self {
             given: stored.map(Wire::new).collect(),
             taken: words(&program.outputs),
             faults: faults.map(Wire::new).collect(),
             reals: reals.map(|(point, output)| (output, point.slot, point.of)).collect(),
+            limited: limited.map(|point| (point.slot, point.declared())).collect(),
             inputs: program.inputs.clone(),
             outputs: program.outputs.clone(),
             initial: program.initial_state(),
@@ -131,7 +135,7 @@ impl Frame {
         memory[SCANS].wrapping_mul(self.period as u64)
     }
 
-    /// Ends a scan whose tasks ran: counts it.
+    /// Ends a scan whose tasks ran: an output beyond its subrange becomes its end, and the scan is counted.
     ///
     /// # Errors
     /// If an output is not finite.
@@ -149,6 +153,10 @@ impl Frame {
                     line: 0,
                 });
             }
+        }
+        for (slot, declared) in &self.limited {
+            let value = &mut memory[*slot as usize];
+            *value = declared.limited(*value);
         }
         memory[SCANS] = memory[SCANS].wrapping_add(1);
         Ok(())

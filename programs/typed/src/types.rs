@@ -99,6 +99,11 @@ impl Elementary {
         }
     }
 
+    /// The article of its keyword: `an INT`, `a BOOL`.
+    pub fn article(self) -> &'static str {
+        if self == Self::Int { "an" } else { "a" }
+    }
+
     /// Width of a value in bits: 1, 8, 16, 32 or 64.
     pub fn bits(self) -> u32 {
         match self {

@@ -12,7 +12,8 @@ mod selections;
 use std::collections::HashMap;
 
 use understudy_typed::{
-    Comparison, Cost, Elementary, Expression, Program, RoutineId, Statement, StatementKind,
+    Comparison, Cost, Declared, Elementary, Expression, Program, RoutineId, Statement,
+    StatementKind,
 };
 
 use super::term::{Term, Terms};
@@ -196,6 +197,21 @@ impl<'a> Execution<'a> {
         let inside = self.terms.and(below, above);
         let outside = self.terms.not(inside);
         self.fault(outside);
+    }
+
+    /// Gives an output beyond its subrange the end of it, as the end of a scan does.
+    pub(super) fn limit(&mut self, slot: u32, declared: Declared) {
+        let Declared { of, range: Some(range) } = declared else {
+            return;
+        };
+        let address = 64 * u64::from(slot);
+        let value = self.typed(address, of);
+        let ends = [range.0, range.1].map(|end| self.terms.constant(of, end as u64 & of.mask()));
+        let below = self.terms.compare(Comparison::Less, value, ends[0]);
+        let above = self.terms.compare(Comparison::Greater, value, ends[1]);
+        let limited = self.terms.choose(above, ends[1], value);
+        let limited = self.terms.choose(below, ends[0], limited);
+        self.set(address, limited);
     }
 
     fn unsupported<T>(&self, context: Context, what: impl Into<String>) -> Result<T> {

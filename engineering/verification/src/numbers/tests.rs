@@ -114,7 +114,15 @@ fn compare(program: &Program, seed: u64, scans: usize) -> bool {
     faulted
 }
 
-const PROGRAMS: [&str; 6] = [
+const PROGRAMS: [&str; 7] = [
+    // Outputs with subranges, one of them read again.
+    "PROGRAM p
+       VAR_INPUT a : INT; u : UINT; END_VAR
+       VAR_OUTPUT y : INT (-3..7); z : UINT (2..5); on : BOOL; END_VAR
+       on := y = 7 OR z = 5;
+       IF a > 0 THEN y := a; ELSE y := y - 2; END_IF;
+       z := z + u;
+     END_PROGRAM",
     // Selections, loops of all kinds, leaving them.
     "FUNCTION count : INT
        VAR_INPUT from : INT; END_VAR

@@ -156,7 +156,7 @@ pub fn new_write(
 /// What is written instead for a signal of that type.
 pub fn force_value(text: &str, of: Elementary) -> Result<PointValue, String> {
     let stored = typed_value(text.trim(), of)
-        .map_err(|help| format!("invalid value `{text:.60}` of a {of}: {help}"))?;
+        .map_err(|help| format!("invalid value `{text:.60}` of {} {of}: {help}", of.article()))?;
     Ok(PointValue::new(of.bits(), stored))
 }
 

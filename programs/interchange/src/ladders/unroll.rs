@@ -42,8 +42,6 @@ type Found<T> = Result<T, Refusal>;
 /// What is known of a program beside its form.
 pub(super) struct Surroundings<'a> {
     pub(super) names: &'a Names,
-    /// Declared ranges of the program's variables, by their names in capitals.
-    pub(super) ranges: &'a HashMap<String, (i64, i64)>,
     /// The lines of their declarations, by their names in capitals.
     pub(super) places: &'a HashMap<String, u32>,
     /// Comments above statements, by line.
@@ -199,7 +197,12 @@ impl<'a> Unrolling<'a> {
             if kind_of(point.of).is_none() {
                 let line = self.around.places.get(&point.name.to_ascii_uppercase());
                 self.line = line.copied().unwrap_or(0);
-                return Err(self.refuse(format!("`{}` is a {}", point.name, point.of)));
+                return Err(self.refuse(format!(
+                    "`{}` is {} {}",
+                    point.name,
+                    point.of.article(),
+                    point.of
+                )));
             }
         }
         for variable in &program.variables {
@@ -299,7 +302,9 @@ impl<'a> Unrolling<'a> {
         let Kind::Number { wide, .. } = kind else {
             return kind;
         };
-        let declared = self.around.ranges.get(&name.to_ascii_uppercase()).copied();
+        let declared = self.around.names.ranges.get(&name.to_ascii_uppercase());
+        let whole = |end: i128| i64::try_from(end).ok();
+        let declared = declared.and_then(|(low, high)| whole(*low).zip(whole(*high)));
         let values = match of {
             Type::Enumeration(id, _) => {
                 let values = &self.program.enumerations[id.0 as usize].values;

@@ -196,7 +196,7 @@ impl Lowering<'_> {
                     let slots = (array.stride() / 64) as u32;
                     (*low..=*high).zip(0..).all(|(at, place)| {
                         let name = format!("{name}[{at}]");
-                        let of = (&array.element, None);
+                        let of = (&array.element, range);
                         self.points_of(of, &name, slot + place * slots, points)
                     })
                 }
@@ -284,6 +284,7 @@ pub(super) fn at_slot(name: &Name, slot: u32, resolved: &Resolved, is_input: boo
         class: Class::Local,
         is_constant: false,
         is_point: is_input,
+        range: resolved.range,
         span: name.span(),
     }))
 }

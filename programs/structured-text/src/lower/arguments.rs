@@ -8,6 +8,7 @@ use crate::syntax::{self, Argument, Class, Name, Path, Span};
 
 use super::Lowering;
 use super::blocks::{Key, Parameter, Routine};
+use super::places::load;
 
 /// The arguments of a call by its parameters.
 pub(super) struct Bound<'s> {
@@ -166,6 +167,7 @@ impl Lowering<'_> {
     }
 
     pub(super) fn called(&mut self, routine: &Routine, span: &Span) {
+        self.facts.forget();
         let caller = self.scope.routine as usize;
         if self.scope.symbols.is_some()
             && let Some(calls) = self.calls.get_mut(caller)
@@ -204,6 +206,9 @@ impl Lowering<'_> {
             self.error_with("U1043", message, value.span.clone(), help);
             return None;
         }
+        let own = parameter.place(target.place.root);
+        self.within(&load(own.clone()), &target.place, &value.span)?;
+        self.within(&load(target.place.clone()), &own, &value.span)?;
         Some(target.place)
     }
 
@@ -243,6 +248,7 @@ impl Lowering<'_> {
                     name: declaration.name.as_str().to_owned(),
                     class: declaration.class,
                     of: resolved.of,
+                    range: resolved.range,
                     slot: 0,
                     is_open: is_open(declaration),
                 });

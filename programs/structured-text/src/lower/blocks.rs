@@ -38,10 +38,18 @@ pub(super) struct Parameter {
     pub(super) name: String,
     pub(super) class: Class,
     pub(super) of: Type,
+    pub(super) range: Option<(i128, i128)>,
     /// Counted from the start of the block's memory, or of all frames.
     pub(super) slot: u32,
     /// Its type depends on what it is given.
     pub(super) is_open: bool,
+}
+
+impl Parameter {
+    /// It, where its memory begins at a root.
+    pub(super) fn place(&self, root: Root) -> Place {
+        Place { range: self.range, ..Place::new(root, self.of.clone()) }
+    }
 }
 
 /// A variable of a block.
@@ -81,6 +89,8 @@ pub(super) struct Block {
 struct Layout {
     fields: Vec<Field>,
     image: Builder,
+    /// Bounds of the fields that are subranges, by their slots.
+    ranges: HashMap<u32, (i128, i128)>,
     slots: u64,
     block: Block,
 }
@@ -92,6 +102,7 @@ impl Layout {
         if !is_reference && self.slots <= u64::from(MAXIMUM_SLOTS) {
             self.image.put(u64::from(slot) * 64, &resolved.of, &resolved.image);
         }
+        self.ranges.extend(resolved.range.map(|range| (slot, range)));
         self.fields.push(Field {
             name: name.to_owned(),
             of: resolved.of.clone(),
@@ -148,6 +159,7 @@ impl<'a> Lowering<'a> {
         let mut layout = Layout {
             fields: Vec::new(),
             image: Builder::default(),
+            ranges: HashMap::new(),
             slots: 0,
             block: Block {
                 of: Type::Text(1),
@@ -171,6 +183,7 @@ impl<'a> Lowering<'a> {
                 return None;
             };
             layout.fields = self.program.structures[id.0 as usize].fields.clone();
+            layout.ranges = self.structures[id.0 as usize].ranges.clone();
             layout.image = Builder::of(&base.image);
             layout.slots = u64::from(slots);
             layout.block = (*base).clone();
@@ -188,7 +201,7 @@ impl<'a> Lowering<'a> {
         let fields = fields.map(|(at, field)| (field.name.to_ascii_uppercase(), at));
         let image = layout.image.done();
         let info =
-            StructureInfo { fields: fields.collect(), ranges: HashMap::new(), unit: Some(unit) };
+            StructureInfo { fields: fields.collect(), ranges: layout.ranges, unit: Some(unit) };
         let structure = Structure { name: found.name.as_str().to_owned(), fields: layout.fields };
         let id = self.add_structure(structure, info);
         Some(Block { of: Type::Structure(id, layout.slots as u32), image, ..layout.block })
@@ -287,6 +300,7 @@ impl<'a> Lowering<'a> {
                 name: name.to_owned(),
                 class: declaration.class,
                 of: resolved.of.clone(),
+                range: resolved.range,
                 slot,
                 is_open,
             });
@@ -298,6 +312,7 @@ impl<'a> Lowering<'a> {
             class: declaration.class,
             is_constant: declaration.constant,
             is_point: is_program && declaration.class == Class::Input,
+            range: resolved.range,
             span: declaration.name.span(),
         }))
     }
@@ -306,9 +321,10 @@ impl<'a> Lowering<'a> {
     pub(super) fn reference_type(&mut self, of: &TypeName) -> Option<(Resolved, bool)> {
         match &of.kind {
             TypeKind::OpenArray(dimensions, element) => {
-                let element = self.resolve(element)?.of;
+                let Resolved { of: element, range, .. } = self.resolve(element)?;
                 let array = Array { ranges: vec![(0, 0); (*dimensions).clamp(1, 16)], element };
-                Some((Type::Array(Arc::new(array)).into(), true))
+                let resolved = Resolved::from(Type::Array(Arc::new(array)));
+                Some((Resolved { range, ..resolved }, true))
             }
             TypeKind::Text { .. } => Some((self.resolve(of)?, true)),
             _ => Some((self.resolve(of)?, false)),
@@ -328,6 +344,7 @@ impl<'a> Lowering<'a> {
                 class: Class::Global,
                 is_constant: declaration.constant,
                 is_point: false,
+                range: found.range,
                 span: name.span(),
             })),
             _ => Symbol::Faulty,

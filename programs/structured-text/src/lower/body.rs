@@ -30,6 +30,7 @@ impl Lowering<'_> {
             routine: routine.id.0,
             loops: 0,
         };
+        self.facts.forget();
         let mut body = Vec::new();
         if matches!(unit.kind, UnitKind::Program | UnitKind::FunctionBlock)
             && let Some(block) = self.block(key.owner.unit, &unit.span)

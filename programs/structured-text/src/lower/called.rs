@@ -61,6 +61,7 @@ impl<'a> Lowering<'a> {
             class: Class::Local,
             is_constant: false,
             is_point: self.running.contains(&unit),
+            range: None,
             span: name.span(),
         }))
     }

@@ -109,8 +109,8 @@ impl Lowering<'_> {
         }
         let of = target.of();
         if let Some(value) = self.coerce(Operand::Typed(value), &of, &path.span) {
-            let kind = self.store(target, value);
-            body.push(Statement { line, kind });
+            let kind = self.store(target, value, &path.span);
+            body.extend(kind.map(|kind| Statement { line, kind }));
         }
     }
 
@@ -167,11 +167,11 @@ impl Lowering<'_> {
         self.called(&routine, span);
         for (at, value) in &bound.given {
             let parameter = &routine.parameters[*at];
-            let to = instance.part(parameter.slot, &parameter.of);
+            let to = instance.part(parameter);
             let kind = if parameter.class == Class::InOut {
                 self.referenced(value, parameter).map(|from| StatementKind::Bind(to, from))
             } else {
-                self.expression(value, &parameter.of).map(|value| StatementKind::Assign(to, value))
+                self.stored_at(value, &to).map(|value| StatementKind::Assign(to, value))
             };
             body.extend(kind.map(|kind| Statement { line, kind }));
         }
@@ -181,7 +181,7 @@ impl Lowering<'_> {
         });
         for (at, path, negated) in &bound.taken {
             let parameter = &routine.parameters[*at];
-            let value = load(instance.part(parameter.slot, &parameter.of));
+            let value = load(instance.part(parameter));
             let kind = self.take_output(value, path, *negated);
             body.extend(kind.map(|kind| Statement { line, kind }));
         }
@@ -221,7 +221,7 @@ impl Lowering<'_> {
         };
         let of = target.of();
         let value = self.coerce(Operand::Typed(value), &of, &path.span)?;
-        Some(self.store(target, value))
+        self.store(target, value, &path.span)
     }
 
     /// A call of a function or method, with its EN and ENO.
@@ -262,12 +262,12 @@ impl Lowering<'_> {
         };
         for (at, value) in &bound.given {
             let parameter = &routine.parameters[*at];
-            let to = place(Root::Frame(parameter.slot), parameter.of.clone());
+            let to = parameter.place(Root::Frame(parameter.slot));
             if parameter.class == Class::InOut {
                 let from = self.referenced(value, parameter)?;
                 call.arguments.push(Given::Reference(to, from));
             } else {
-                let value = self.expression(value, &parameter.of)?;
+                let value = self.stored_at(value, &to)?;
                 call.arguments.push(Given::Value(to, value));
             }
         }
@@ -287,7 +287,8 @@ impl Lowering<'_> {
                 self.error_with("U1043", message, path.span.clone(), help);
                 return None;
             }
-            let from = place(Root::Frame(parameter.slot), parameter.of.clone());
+            let from = parameter.place(Root::Frame(parameter.slot));
+            self.within(&load(from.clone()), &target.place, &path.span)?;
             call.outputs.push((from, target.place));
         }
         Some((call, bound.enable, bound.enabled))
@@ -439,6 +440,8 @@ impl Lowering<'_> {
             span: value.span.clone(),
         };
         let assigned = self.assign(path, &value);
+        // It is perhaps left out.
+        self.facts.forget();
         let statements = assigned.map(|kind| Statement { line, kind });
         self.enabled((enable, enabled), statements.into_iter().collect(), line, body);
     }

@@ -401,6 +401,7 @@ impl Lowering<'_> {
         self.seen(&right, of, span);
         let operands = vec![convert(left.value, of), convert(right.value, of)];
         let value = apply(operation, operands, Type::Elementary(of));
+        self.product(&value, span);
         Some(match is_narrow(result) {
             true => Valued { value, own: Type::Elementary(result) },
             false => Valued::typed(reinterpret(value, result)),

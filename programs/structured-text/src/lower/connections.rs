@@ -39,8 +39,8 @@ impl<'a> Lowering<'a> {
         if let Some(bound) = bound {
             for (at, value) in &bound.given {
                 let parameter = &routine.parameters[*at];
-                let to = place(Root::Own(parameter.slot), parameter.of.clone());
-                let value = self.expression(value, &parameter.of);
+                let to = parameter.place(Root::Own(parameter.slot));
+                let value = self.stored_at(value, &to);
                 let kind = value.map(|value| StatementKind::Assign(to, value));
                 body.extend(kind.map(|kind| Statement { line, kind }));
             }
@@ -48,7 +48,7 @@ impl<'a> Lowering<'a> {
             body.push(Statement { line, kind });
             for (at, path, negated) in &bound.taken {
                 let parameter = &routine.parameters[*at];
-                let value = load(place(Root::Own(parameter.slot), parameter.of.clone()));
+                let value = load(parameter.place(Root::Own(parameter.slot)));
                 let kind = self.take_output(value, path, *negated);
                 body.extend(kind.map(|kind| Statement { line, kind }));
             }
@@ -92,6 +92,7 @@ impl<'a> Lowering<'a> {
                 class: Class::Local,
                 is_constant: false,
                 is_point: false,
+                range: None,
                 span: span.clone(),
             };
             self.names.hidden.push(hidden(&shown, slot));

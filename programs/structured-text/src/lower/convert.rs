@@ -173,7 +173,10 @@ impl Lowering<'_> {
         if value < least || value > most {
             let message = match elementary {
                 Elementary::Bool => format!("expected BOOL, found the number {value}"),
-                _ => format!("{value} is not a {elementary}, which is {least} to {most}"),
+                _ => {
+                    let article = elementary.article();
+                    format!("{value} is not {article} {elementary}, which is {least} to {most}")
+                }
             };
             let help = match elementary {
                 Elementary::Bool => "write TRUE or FALSE, or compare the number".to_owned(),
@@ -218,7 +221,9 @@ impl Lowering<'_> {
             Type::Elementary(to) if is_whole(*to) => Some(self.stored_as(value, own, *to, span)),
             Type::Elementary(to) if to.is_real() => {
                 let exact = (-(1 << 24), 1 << 24);
-                if *to == Elementary::Real && !ranges(&value).likely.is_within(exact) {
+                if *to == Elementary::Real
+                    && !ranges(&value, Some(&self.facts)).likely.is_within(exact)
+                {
                     self.rounded_to((own.name(), own), *to, span);
                 }
                 self.inverted(&value, own, to.bits(), span);

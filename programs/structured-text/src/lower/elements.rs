@@ -74,12 +74,13 @@ impl Lowering<'_> {
                 self.elements.known.insert(key, (shown.clone(), name.span()));
             }
             let own = self.state(1, &name.span())?;
-            self.point_at(shown, address, Declared { of, range: None }, own, is_input);
+            self.point_at(shown, address, Declared { of, range: resolved.range }, own, is_input);
             let bit = at * array.stride();
             let within = Place {
                 offset: (bit / 64) as u32,
                 bit: (bit % 64) as u32,
                 is_packed: true,
+                range: resolved.range,
                 ..place(Root::Global(slot), Type::Elementary(of))
             };
             let point = place(Root::Global(own), Type::Elementary(of));

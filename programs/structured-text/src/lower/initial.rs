@@ -18,26 +18,14 @@ impl Lowering<'_> {
         resolved: &Resolved,
     ) -> Option<Image> {
         let mut image = Builder::of(&resolved.image);
-        self.initialize(initial, &resolved.of, 0, &mut image)?;
-        let image = image.done();
-        if let (Some((low, high)), Initializer::Value(value)) = (resolved.range, initial) {
-            let stored = image.first().map_or(0, |(_, value)| *value);
-            let initial = resolved.of.elementary().map_or(0, |of| of.signed(stored));
-            if initial < low || initial > high {
-                let message =
-                    format!("the initial value {initial} is outside the range {low}..{high}");
-                let help = "write a value of the range, or a wider range";
-                self.error_with("U1036", message, value.span.clone(), help);
-                return None;
-            }
-        }
-        Some(image)
+        self.initialize(initial, (&resolved.of, resolved.range), 0, &mut image)?;
+        Some(image.done())
     }
 
     fn initialize(
         &mut self,
         initial: &Initializer,
-        of: &Type,
+        (of, range): (&Type, Option<(i128, i128)>),
         bit: u64,
         image: &mut Builder,
     ) -> Option<()> {
@@ -52,10 +40,10 @@ impl Lowering<'_> {
                 self.error_with("U1043", message, value.span.clone(), help);
                 None
             }
-            (Initializer::Value(value), _) => self.initial_value(value, of, bit, image),
+            (Initializer::Value(value), _) => self.initial_value(value, (of, range), bit, image),
             (Initializer::Array(entries, span), Type::Array(array)) => {
                 let mut at = 0;
-                self.entries(entries, array, bit, &mut at, image, span)
+                self.entries(entries, (array, range), bit, &mut at, image, span)
             }
             (Initializer::Structure(parts, span), Type::Structure(id, _)) => {
                 let info = self.structures[id.0 as usize].clone();
@@ -71,7 +59,8 @@ impl Lowering<'_> {
                         self.error("U1043", message, span.clone());
                         return None;
                     }
-                    self.initialize(part, &field.of, bit + u64::from(field.slot) * 64, image)?;
+                    let of = (&field.of, info.ranges.get(&field.slot).copied());
+                    self.initialize(part, of, bit + u64::from(field.slot) * 64, image)?;
                 }
                 Some(())
             }
@@ -87,13 +76,24 @@ impl Lowering<'_> {
     fn initial_value(
         &mut self,
         value: &Expression,
-        of: &Type,
+        (of, range): (&Type, Option<(i128, i128)>),
         bit: u64,
         image: &mut Builder,
     ) -> Option<()> {
         match self.constant_of(value, of)? {
-            Constant::Number(of, value) => {
-                image.set(bit, of.elementary()?.bits(), value);
+            Constant::Number(of, stored) => {
+                let of = of.elementary()?;
+                let initial = of.signed(stored);
+                if let Some((low, high)) = range
+                    && !(low..=high).contains(&initial)
+                {
+                    let message =
+                        format!("the initial value {initial} is outside the range {low}..{high}");
+                    let help = "write a value of the range, or a wider range";
+                    self.error_with("U1036", message, value.span.clone(), help);
+                    return None;
+                }
+                image.set(bit, of.bits(), stored);
             }
             Constant::Text(capacity, bytes) => {
                 image.put(bit, &Type::Text(capacity), &super::images::zero());
@@ -107,7 +107,7 @@ impl Lowering<'_> {
     fn entries(
         &mut self,
         entries: &[(Option<Expression>, Vec<Initializer>)],
-        array: &Array,
+        (array, range): (&Array, Option<(i128, i128)>),
         bit: u64,
         at: &mut u64,
         image: &mut Builder,
@@ -139,7 +139,7 @@ impl Lowering<'_> {
                     break;
                 }
                 for value in values {
-                    self.element(value, array, bit, at, image, span)?;
+                    self.element(value, (array, range), bit, at, image, span)?;
                 }
             }
         }
@@ -149,7 +149,7 @@ impl Lowering<'_> {
     fn element(
         &mut self,
         value: &Initializer,
-        array: &Array,
+        (array, range): (&Array, Option<(i128, i128)>),
         bit: u64,
         at: &mut u64,
         image: &mut Builder,
@@ -159,7 +159,7 @@ impl Lowering<'_> {
         if let (Initializer::Array(entries, span), false) =
             (value, matches!(array.element, Type::Array(_)))
         {
-            return self.entries(entries, array, bit, at, image, span);
+            return self.entries(entries, (array, range), bit, at, image, span);
         }
         if *at >= array.length() {
             let message =
@@ -167,7 +167,8 @@ impl Lowering<'_> {
             self.error("U1036", message, span.clone());
             return None;
         }
-        self.initialize(value, &array.element, bit + *at * array.stride(), image)?;
+        let of = (&array.element, range);
+        self.initialize(value, of, bit + *at * array.stride(), image)?;
         *at += 1;
         Some(())
     }

@@ -5,7 +5,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use understudy_text::spelling;
-use understudy_typed::{EnumerationId, Expression, ExpressionKind, Root, Type};
+use understudy_typed::{EnumerationId, Expression, ExpressionKind, Place, Root, Type};
 
 use crate::syntax::{Class, Declaration, Name, Span, Unit};
 
@@ -52,7 +52,15 @@ pub(super) struct Variable {
     pub(super) is_constant: bool,
     /// It is an input point.
     pub(super) is_point: bool,
+    /// The subrange that it is declared with, or that its elements are.
+    pub(super) range: Option<(i128, i128)>,
     pub(super) span: Span,
+}
+
+impl Variable {
+    pub(super) fn place(&self) -> Place {
+        Place { range: self.range, ..Place::new(self.root, self.of.clone()) }
+    }
 }
 
 /// A value that is known when the program is read.

@@ -10,6 +10,7 @@ use understudy_typed::{
 use crate::syntax::{self, Class, Name, Path, Span, Step};
 
 use super::Lowering;
+use super::blocks::Parameter;
 use super::convert::{as_bits, is_whole};
 use super::fold::{apply, convert, reinterpret};
 use super::names::{Symbol, Variable};
@@ -27,11 +28,10 @@ pub(super) struct Target {
 
 impl Target {
     /// A part of a block's memory.
-    pub(super) fn part(&self, slot: u32, of: &Type) -> Place {
+    pub(super) fn part(&self, parameter: &Parameter) -> Place {
         let mut place = self.place.clone();
-        place.offset += slot;
-        place.of = of.clone();
-        place
+        place.offset += parameter.slot;
+        Place { of: parameter.of.clone(), range: parameter.range, ..place }
     }
 
     pub(super) fn of(&self) -> Type {
@@ -139,12 +139,8 @@ impl Lowering<'_> {
                 variable
             }
         };
-        let target = Target {
-            place: place(variable.root, variable.of.clone()),
-            bits: None,
-            variable: Some(variable),
-            part: None,
-        };
+        let target =
+            Target { place: variable.place(), bits: None, variable: Some(variable), part: None };
         self.follow(target, steps, path)
     }
 
@@ -237,6 +233,7 @@ impl Lowering<'_> {
         }
         target.place.offset += field.slot;
         target.place.of = field.of;
+        target.place.range = info.ranges.get(&field.slot).copied();
         Some(())
     }
 

@@ -12,7 +12,7 @@ use super::called::called;
 use super::images::initial;
 use super::names::{Owner, Symbol, Variable};
 use super::tasks::{interval, shortest, task};
-use super::types::TypeState;
+use super::types::{Resolved, TypeState};
 use super::{DEFAULT_PERIOD, Lowering, Options};
 
 /// A PROGRAM that is run.
@@ -89,7 +89,7 @@ impl<'a> Lowering<'a> {
         }
         let slot = self.state(resolved.of.slots(), &declaration.name.span())?;
         self.program.initial.extend(initial(&resolved.image, slot));
-        let symbol = variable(declaration, Root::Global(slot), &resolved.of, false);
+        let symbol = variable(declaration, Root::Global(slot), &resolved);
         self.publish(declaration.name.as_str(), declaration, &symbol);
         Some(symbol)
     }
@@ -99,6 +99,8 @@ impl<'a> Lowering<'a> {
         if let Symbol::Variable(variable) = symbol
             && let Root::Global(slot) = variable.root
         {
+            let range = variable.range.map(|range| (name.to_ascii_uppercase(), range));
+            self.names.ranges.extend(range);
             self.program.variables.push(Shown {
                 name: name.to_owned(),
                 of: variable.of.clone(),
@@ -132,10 +134,10 @@ impl<'a> Lowering<'a> {
         let base = self.base(&instances, options.period);
         let period = options.period.or(base.map(|base| base.common));
         self.program.period = period.unwrap_or(DEFAULT_PERIOD);
-        let name = instances[0].name;
-        self.program.name = match instances.len() {
+        let names: Vec<&str> = instances.iter().map(|instance| instance.name.as_str()).collect();
+        self.program.name = match names.len() {
             1 => self.units[instances[0].unit].unit.name.as_str().to_owned(),
-            _ => name.as_str().to_owned(),
+            _ => names.join(", "),
         };
         let are_several = instances.len() > 1;
         for instance in &instances {
@@ -309,6 +311,8 @@ impl<'a> Lowering<'a> {
                 _ => continue,
             };
             let shown = format!("{prefix}{}", variable.name);
+            let range = variable.range.map(|range| (shown.to_ascii_uppercase(), range));
+            self.names.ranges.extend(range);
             let is_connected = connections.iter().any(|connection| match connection {
                 Argument::Given(name, _) | Argument::Taken { from: name, .. } => {
                     name.is(&variable.name)
@@ -339,7 +343,7 @@ impl<'a> Lowering<'a> {
 
     fn point(&mut self, name: &str, variable: &Variable, slot: u32, is_input: bool) {
         let mut points = Vec::new();
-        let root = (&variable.of, self.ranges.get(&variable.span).copied());
+        let root = (&variable.of, variable.range);
         if !self.points_of(root, name, slot, &mut points) {
             let found = self.describe(&variable.of);
             let message = match is_input {
@@ -430,14 +434,15 @@ pub(super) fn hidden(variable: &Variable, slot: u32) -> Shown {
     }
 }
 
-fn variable(declaration: &Declaration, root: Root, of: &Type, is_point: bool) -> Symbol {
+fn variable(declaration: &Declaration, root: Root, resolved: &Resolved) -> Symbol {
     Symbol::Variable(Rc::new(Variable {
         name: declaration.name.as_str().to_owned(),
         root,
-        of: of.clone(),
+        of: resolved.of.clone(),
         class: declaration.class,
         is_constant: declaration.constant,
-        is_point,
+        is_point: false,
+        range: resolved.range,
         span: declaration.name.span(),
     }))
 }

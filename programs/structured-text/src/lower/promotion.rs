@@ -141,13 +141,16 @@ fn has_not(value: &Expression) -> bool {
 }
 
 fn all_fit(operands: &[Expression], of: Elementary) -> bool {
-    operands.iter().all(|operand| ranges(operand).possible.is_within(limits(of)))
+    operands.iter().all(|operand| ranges(operand, None).possible.is_within(limits(of)))
 }
 
 impl Lowering<'_> {
     /// Warns where bits above those of its type are seen that NOT has set.
     pub(super) fn inverted(&mut self, value: &Expression, own: Elementary, bits: u32, span: &Span) {
-        if bits <= own.bits() || own.is_signed() || ranges(value).possible.ends().0 >= 0 {
+        if bits <= own.bits()
+            || own.is_signed()
+            || ranges(value, Some(&self.facts)).possible.ends().0 >= 0
+        {
             return;
         }
         if has_not(value) {
@@ -168,7 +171,7 @@ impl Lowering<'_> {
         to: Elementary,
         span: &Span,
     ) -> Expression {
-        let Range { possible, likely } = ranges(&value);
+        let Range { possible, likely } = ranges(&value, Some(&self.facts));
         let is_kept = possible.is_within(limits(to))
             || likely.is_within(limits(to)) && !matches!(value.kind, ExpressionKind::Constant(_));
         let keeps_bits = own.is_bit_string() && own.bits() == to.bits();
@@ -176,7 +179,7 @@ impl Lowering<'_> {
             self.inverted(&value, own, to.bits(), span);
         } else if own != to && likely.is_within(limits(own)) {
             self.converted((own.name(), own), to, span);
-        } else {
+        } else if !self.is_told(span) {
             let (least, most) = limits(to);
             let (low, high) = possible.ends();
             let found =

@@ -3,6 +3,7 @@
 use understudy_typed::{Elementary, Expression, ExpressionKind, Operation};
 
 use super::convert::{is_whole, limits};
+use super::facts::Facts;
 
 /// From the least to the greatest number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,6 +20,14 @@ pub(super) struct Range {
 }
 
 impl Interval {
+    pub(super) fn new(low: i128, high: i128) -> Self {
+        Self(low, high)
+    }
+
+    pub(super) fn just(number: i128) -> Self {
+        Self(number, number)
+    }
+
     pub(super) fn is_within(self, (least, most): (i128, i128)) -> bool {
         least <= self.0 && self.1 <= most
     }
@@ -46,7 +55,7 @@ impl Interval {
         Self(self.1.saturating_neg(), self.0.saturating_neg())
     }
 
-    fn times(self, other: Self) -> Self {
+    pub(super) fn times(self, other: Self) -> Self {
         self.corners(other, i128::saturating_mul)
     }
 
@@ -69,12 +78,12 @@ impl Interval {
         Self(low, high)
     }
 
-    fn hull(self, other: Self) -> Self {
+    pub(super) fn hull(self, other: Self) -> Self {
         Self(self.0.min(other.0), self.1.max(other.1))
     }
 
     /// What both have; the first where they have nothing.
-    fn meet(self, other: Self) -> Self {
+    pub(super) fn meet(self, other: Self) -> Self {
         let both = Self(self.0.max(other.0), self.1.min(other.1));
         if both.0 <= both.1 { both } else { self }
     }
@@ -87,16 +96,17 @@ impl Interval {
     }
 }
 
-/// The range, and the hull of the types of the parts.
-pub(super) fn ranges(value: &Expression) -> Range {
-    found(value).0
+/// What an expression can be. With what is known of variables, it is for warnings: nothing keeps a variable within its subrange.
+pub(super) fn ranges(value: &Expression, known: Option<&Facts>) -> Range {
+    found(value, known).0
 }
 
 fn exactly(range: Interval) -> (Range, Interval) {
     (Range { possible: range, likely: range }, range)
 }
 
-fn found(value: &Expression) -> (Range, Interval) {
+/// The range, and the hull of the types of the parts.
+fn found(value: &Expression, known: Option<&Facts>) -> (Range, Interval) {
     use Operation as O;
     let Some(of) = value.of.elementary().filter(|of| is_whole(*of)) else {
         return exactly(Interval(i128::MIN, i128::MAX));
@@ -109,14 +119,30 @@ fn found(value: &Expression) -> (Range, Interval) {
             return exactly(Interval(number, number));
         }
         ExpressionKind::Apply(operation, operands) => (*operation, operands.as_slice()),
+        ExpressionKind::Load(place) => {
+            let Some(known) = known else {
+                return exactly(whole);
+            };
+            let declared = place.range.map_or(whole, |(low, high)| Interval(low, high));
+            let found = known.of(place).unwrap_or(declared);
+            return (Range { possible: found, likely: found }, declared);
+        }
+        ExpressionKind::Call(call) if known.is_some() => {
+            let range = call.result.as_ref().and_then(|result| result.range);
+            return exactly(range.map_or(whole, |(low, high)| Interval(low, high)));
+        }
+        ExpressionKind::Choose(parts) => {
+            let [_, then, otherwise] = &**parts;
+            return either(found(then, known), found(otherwise, known));
+        }
         _ => return exactly(whole),
     };
     if let O::Not(_) | O::And(_) | O::Or(_) | O::Xor(_) = operation {
-        return bitwise(operation, operands);
+        return bitwise(operation, operands, known);
     }
     let found = match (operation, operands) {
         (O::Convert(from, _) | O::Reinterpret(from, _), [inner]) if is_whole(from) => {
-            let (inner, types) = found(inner);
+            let (inner, types) = found(inner, known);
             let kept = |range: Interval| match range.is_within((least, most)) {
                 true => range,
                 false => whole,
@@ -126,11 +152,12 @@ fn found(value: &Expression) -> (Range, Interval) {
         }
         (O::Convert(Elementary::Bool, _), _) => return exactly(Interval(0, 1)),
         (O::Negate(_), [inner]) => {
-            let (inner, types) = found(inner);
+            let (inner, types) = found(inner, known);
             let possible = inner.possible.negated();
             let likely = inner.likely.negated().meet(types.hull(Interval(0, 0)));
             (Range { possible, likely }, types)
         }
+        (O::Select(_), [_, no, yes]) => either(found(no, known), found(yes, known)),
         (
             O::Add(_)
             | O::Subtract(_)
@@ -141,7 +168,7 @@ fn found(value: &Expression) -> (Range, Interval) {
             | O::Maximum(_),
             [left, right],
         ) => {
-            let ((left, one), (right, other)) = (found(left), found(right));
+            let ((left, one), (right, other)) = (found(left, known), found(right, known));
             let types = one.hull(other);
             let joined = |left: Interval, right: Interval| match operation {
                 O::Add(_) => left.plus(right),
@@ -169,10 +196,23 @@ fn found(value: &Expression) -> (Range, Interval) {
     (Range { possible: kept(range.possible), likely: kept(range.likely) }, types)
 }
 
+/// One of two values.
+fn either(
+    (one, its): (Range, Interval),
+    (other, of_other): (Range, Interval),
+) -> (Range, Interval) {
+    let possible = one.possible.hull(other.possible);
+    (Range { possible, likely: one.likely.hull(other.likely) }, its.hull(of_other))
+}
+
 /// Bit by bit: the result has as many bits as the operands.
-fn bitwise(operation: Operation, operands: &[Expression]) -> (Range, Interval) {
+fn bitwise(
+    operation: Operation,
+    operands: &[Expression],
+    known: Option<&Facts>,
+) -> (Range, Interval) {
     let operands: Vec<(Range, Interval)> =
-        operands.iter().map(|operand| found(signed(operand))).collect();
+        operands.iter().map(|operand| found(signed(operand), known)).collect();
     let bits = operands.iter().map(|(range, _)| range.possible.bits()).max().unwrap_or(0);
     let size = 1_i128 << bits.min(64);
     let inverts = matches!(operation, Operation::Not(_));

@@ -11,7 +11,6 @@ use crate::syntax::{Class, Declaration, Name, Span, UnitKind};
 use super::blocks::{Key, Parameter, Routine};
 use super::images::initial;
 use super::names::{Symbol, Variable};
-use super::places::place;
 use super::programs::hidden;
 use super::types::Resolved;
 use super::{Lowering, MAXIMUM_FRAMES, MAXIMUM_ROUTINES};
@@ -83,10 +82,9 @@ impl<'a> Lowering<'a> {
             && let Some(resolved) = self.resolve(of)
         {
             let slot = self.take(&mut frame, &resolved, span)?;
-            let root = Root::Frame(slot);
-            result = Some(place(root, resolved.of.clone()));
-            let variable = new_variable(&unit.name, root, resolved.of, Class::Output);
-            frame.symbols.insert(unit.name.key(), variable);
+            let variable = result_variable(&unit.name, Root::Frame(slot), resolved);
+            result = Some(variable.place());
+            frame.symbols.insert(unit.name.key(), Symbol::Variable(Rc::new(variable)));
         }
         if frame.next > MAXIMUM_FRAMES {
             let message = format!(
@@ -183,7 +181,7 @@ impl<'a> Lowering<'a> {
             (self.declared_type(declaration)?, false)
         };
         if is_open && let Some(of) = frame.open.next() {
-            resolved = of.into();
+            resolved = Resolved { range: resolved.range, ..of.into() };
         }
         if declaration.address.is_some() {
             return Some(self.located(declaration, &resolved));
@@ -208,6 +206,7 @@ impl<'a> Lowering<'a> {
                 name: name.as_str().to_owned(),
                 class: declaration.class,
                 of: resolved.of.clone(),
+                range: resolved.range,
                 slot,
                 is_open,
             });
@@ -219,6 +218,7 @@ impl<'a> Lowering<'a> {
             class: declaration.class,
             is_constant: declaration.constant,
             is_point: false,
+            range: resolved.range,
             span: name.span(),
         })))
     }
@@ -282,20 +282,22 @@ fn open_members(frame: &mut Frame) {
                 class: variable.class,
                 is_constant: variable.is_constant,
                 is_point: variable.is_point,
+                range: variable.range,
                 span: variable.span.clone(),
             });
         }
     }
 }
 
-fn new_variable(name: &Name, root: Root, of: Type, class: Class) -> Symbol {
-    Symbol::Variable(Rc::new(Variable {
+fn result_variable(name: &Name, root: Root, resolved: Resolved) -> Variable {
+    Variable {
         name: name.as_str().to_owned(),
         root,
-        of,
-        class,
+        of: resolved.of,
+        class: Class::Output,
         is_constant: false,
         is_point: false,
+        range: resolved.range,
         span: name.span(),
-    }))
+    }
 }

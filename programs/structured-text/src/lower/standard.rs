@@ -22,7 +22,6 @@ use super::expand::{POINTED, STORED};
 use super::fold::{apply, boolean, choose, convert, reinterpret};
 use super::names::number;
 use super::numbers::{Number, Operand};
-use super::promotion::cut;
 
 /// The names that are known here, for suggestions; conversions come on top.
 pub(super) const NAMES: [&str; 92] = [
@@ -270,7 +269,10 @@ impl Lowering<'_> {
             let own = left.own_type().or_else(|| hint.cloned());
             let value = self.stored(right, own.as_ref());
             left = match self.binary(operator, (left, &whole), (value, &right.span), hint) {
-                Operand::Wide(value, own) => Operand::Typed(cut(value, own)),
+                Operand::Wide(value, own) => {
+                    let all = whole.start..right.span.end;
+                    Operand::Typed(self.stored_as(value, own, own, &all))
+                }
                 found => found,
             };
             whole.end = right.span.end;

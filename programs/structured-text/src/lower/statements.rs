@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use understudy_text::Diagnostic;
 use understudy_typed::{
-    Branch, Case, Elementary, Expression, For, Operation, Statement, StatementKind, Type,
+    Branch, Case, Elementary, Expression, For, Operation, Place, Statement, StatementKind, Type,
 };
 
 use crate::lexer::code_refused;
@@ -16,6 +16,7 @@ use super::fold::{apply, convert, reinterpret};
 use super::names::number;
 use super::numbers::{Number, Operand};
 use super::places::{Target, insert, load};
+use super::ranges::ranges;
 use super::standard_blocks::CYCLE;
 
 /// Labels of a CASE: the last value and the place by the first value.
@@ -68,24 +69,37 @@ impl Lowering<'_> {
             }
             S::If(branches, otherwise) => {
                 let mut lowered = Vec::with_capacity(branches.len());
+                let mut ends = Vec::with_capacity(branches.len());
                 for (condition, statements) in branches {
                     let condition = self.condition(condition);
+                    let mut rest = self.facts.clone();
+                    if let Some(condition) = &condition {
+                        self.facts.refine(condition, true);
+                        rest.refine(condition, false);
+                    }
                     let body = self.block_of(statements);
+                    ends.push(std::mem::replace(&mut self.facts, rest));
                     if let Some(condition) = condition {
                         lowered.push(Branch { condition, body });
                     }
                 }
                 let otherwise = self.block_of(otherwise);
+                ends.iter().for_each(|end| self.facts.join(end));
                 Some(StatementKind::If(lowered, otherwise))
             }
             S::Case(selector, cases, otherwise) => self.case(selector, cases, otherwise),
             S::For(written) => self.counted(written),
             S::While(condition, statements) => {
+                self.facts.forget();
                 let condition = self.condition(condition);
+                if let Some(condition) = &condition {
+                    self.facts.refine(condition, true);
+                }
                 let body = self.looped(statements);
                 Some(StatementKind::While(condition?, body))
             }
             S::Repeat(statements, condition) => {
+                self.facts.forget();
                 let body = self.looped(statements);
                 Some(StatementKind::Repeat(body, self.condition(condition)?))
             }
@@ -114,6 +128,7 @@ impl Lowering<'_> {
         self.scope.loops += 1;
         let body = self.block_of(statements);
         self.scope.loops -= 1;
+        self.facts.forget();
         body
     }
 
@@ -135,10 +150,11 @@ impl Lowering<'_> {
             Some(of) => self.operand_for(value, of),
             None => self.operand(value, None),
         };
-        let value = self.coerce(operand, &hint?, &value.span)?;
+        let span = value.span.clone();
+        let value = self.coerce(operand, &hint?, &span)?;
         writable?;
         self.has_no_references(&value.of, &path.span)?;
-        Some(self.store(target?, value))
+        self.store(target?, value, &span)
     }
 
     /// A block whose VAR_IN_OUT stand for variables cannot be copied.
@@ -156,14 +172,22 @@ impl Lowering<'_> {
     }
 
     /// Writes a value of the target's type.
-    pub(super) fn store(&mut self, target: Target, value: Expression) -> StatementKind {
-        match target.bits {
+    pub(super) fn store(
+        &mut self,
+        target: Target,
+        value: Expression,
+        span: &Span,
+    ) -> Option<StatementKind> {
+        let value = match target.bits {
             Some((part, at)) => {
                 let old = load(target.place.clone());
-                StatementKind::Assign(target.place, insert(old, value, part, at))
+                insert(old, value, part, at)
             }
-            None => StatementKind::Assign(target.place, value),
-        }
+            None => value,
+        };
+        self.within(&value, &target.place, span)?;
+        self.facts.stored(&target.place, &value);
+        Some(StatementKind::Assign(target.place, value))
     }
 
     fn case(
@@ -185,6 +209,8 @@ impl Lowering<'_> {
         }
         let mut lowered = Vec::with_capacity(cases.len());
         let mut known = Labels::default();
+        let before = self.facts.clone();
+        let mut known_at_ends = Vec::with_capacity(cases.len());
         for (labels, statements) in cases {
             let mut ranges = Vec::with_capacity(labels.len());
             for label in labels {
@@ -195,10 +221,19 @@ impl Lowering<'_> {
                     ranges.push(range);
                 }
             }
+            self.facts.clone_from(&before);
+            let ends = ranges.iter().map(|(first, last)| (i128::from(*first), i128::from(*last)));
+            let ends = ends.reduce(|one, other| (one.0.min(other.0), one.1.max(other.1)));
+            if let Some((value, ends)) = value.as_ref().zip(ends) {
+                self.facts.is_in(value, ends);
+            }
             let body = self.block_of(statements);
+            known_at_ends.push(self.facts.clone());
             lowered.push(Case { ranges, body });
         }
+        self.facts = before;
         let otherwise = self.block_of(otherwise);
+        known_at_ends.iter().for_each(|end| self.facts.join(end));
         elementary?;
         let mut value = value?;
         if let Some(of) = elementary.filter(|of| of.is_bit_string()) {
@@ -301,12 +336,20 @@ impl Lowering<'_> {
         }
         let counter = as_integer(of);
         let wanted = Type::Elementary(of);
-        let from = self.expression(&written.from, &wanted);
+        let whole = Place { of: wanted, ..target.place.clone() };
+        let from = self.stored_at(&written.from, &whole);
         let to = self.bound(&written.to, counter);
+        let to = to.filter(|to| self.within(to, &target.place, &written.to.span).is_some());
         let by = match &written.by {
             Some(by) => self.bound(by, counter),
             None => Some(number(Type::Elementary(counter), 1)),
         };
+        self.facts.forget();
+        if let (Some(from), Some(to)) = (&from, &to) {
+            let (from, to) = (ranges(from, Some(&self.facts)), ranges(to, Some(&self.facts)));
+            let turns = from.possible.hull(to.possible).ends();
+            self.facts.is_in(&load(target.place.clone()), turns);
+        }
         let statements = self.looped(&written.body);
         let (from, to, by) = (from?, to?, by?);
         writable?;

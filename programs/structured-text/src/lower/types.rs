@@ -22,7 +22,7 @@ pub(super) const DEFAULT_CAPACITY: u16 = 254;
 pub(super) struct Resolved {
     pub(super) of: Type,
     pub(super) image: Image,
-    /// The bounds of a subrange.
+    /// The bounds of a subrange, or of that of an array's elements.
     pub(super) range: Option<(i128, i128)>,
 }
 
@@ -272,6 +272,7 @@ impl<'a> Lowering<'a> {
             }
         }
         let element = element?;
+        let range = element.range;
         let array = Array { ranges, element: element.of };
         let (length, stride) = (array.length(), array.stride());
         let of = Type::Array(Arc::new(array));
@@ -286,7 +287,7 @@ impl<'a> Lowering<'a> {
                 image.put(at * stride, &array.element, &element.image);
             }
         }
-        Some(Resolved::new(of, image.done()))
+        Some(Resolved { range, ..Resolved::new(of, image.done()) })
     }
 
     fn structure_type(
@@ -352,9 +353,6 @@ impl<'a> Lowering<'a> {
     /// The type of a declaration with its own initial value in the image.
     pub(super) fn declared_type(&mut self, declaration: &syntax::Declaration) -> Option<Resolved> {
         let mut resolved = self.resolve(&declaration.of)?;
-        if let Some(range) = resolved.range {
-            self.ranges.insert(declaration.name.span(), range);
-        }
         if let Some(initial) = &declaration.initial {
             resolved.image = self.initial_image(initial, &resolved)?;
         }

@@ -10,8 +10,8 @@ mod places;
 use std::sync::Arc;
 
 use understudy_typed::{
-    Array, Elementary, Enumeration, EnumerationId, Field, Initial, Place, Program, Root, Routine,
-    RoutineId, RoutineKind, Structure, StructureId, Task, Type, Variable,
+    Array, Declared, Elementary, Enumeration, EnumerationId, Field, Initial, Place, Program, Root,
+    Routine, RoutineId, RoutineKind, Structure, StructureId, Task, Type, Variable,
 };
 
 /// Random numbers from a seed (splitmix64).
@@ -185,6 +185,16 @@ impl Generator {
         slot
     }
 
+    /// Of every other whole number.
+    fn subrange(&mut self, of: Elementary) -> Option<(i128, i128)> {
+        let is_whole = of.is_integer() || of.is_bit_string() && of != Elementary::Bool;
+        if !is_whole || self.random.below(2) == 0 {
+            return None;
+        }
+        let ends = [0; 2].map(|_| of.signed(self.random.value(of)));
+        Some((ends[0].min(ends[1]), ends[0].max(ends[1])))
+    }
+
     fn declare_globals(&mut self) {
         for index in 0..6 {
             let of = self.random.elementary();
@@ -194,7 +204,8 @@ impl Generator {
         for index in 0..6 {
             let of = self.random.elementary();
             let slot = self.global(format!("y{index}"), Type::Elementary(of));
-            self.program.outputs.push(format!("y{index}"), of, slot);
+            let range = self.subrange(of);
+            self.program.outputs.push_declared(format!("y{index}"), Declared { of, range }, slot);
         }
         for index in 0..8 {
             let of = self.random.pick(&self.types).clone();

@@ -126,7 +126,7 @@ pub(super) fn value(
     match value_within(&value.value, declared) {
         Ok(stored) => Some(stored),
         Err(expected) => {
-            let message = format!("`{key}` of a {declared}: {expected}");
+            let message = format!("`{key}` of {} {declared}: {expected}", declared.of.article());
             diagnostics.push(Diagnostic::error("U0204", message, value.span.clone()));
             None
         }

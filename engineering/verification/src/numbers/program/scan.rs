@@ -111,6 +111,7 @@ impl System {
         }
         for point in &program.outputs {
             execution.finite(point.slot, point.of);
+            execution.limit(point.slot, point.declared());
         }
         let faulted = execution.faulted;
         let memory = execution.written();

@@ -91,7 +91,7 @@ impl Unrolling<'_> {
             }
             None => {
                 let (name, _) = self.name(address, of);
-                Err(self.refuse(format!("it uses `{name}`, a {of}")))
+                Err(self.refuse(format!("it uses `{name}`, {} {of}", of.article())))
             }
         }
     }
@@ -264,7 +264,9 @@ impl Unrolling<'_> {
         let mut variables = self.program.variables.iter();
         let found = variables.find(|variable| 64 * u64::from(variable.slot) == address);
         match found.and_then(|found| Some((&found.name, found.address.as_ref()?))) {
-            Some((name, place)) => Err(self.refuse(format!("`{name}` at {place} is a {of}"))),
+            Some((name, place)) => {
+                Err(self.refuse(format!("`{name}` at {place} is {} {of}", of.article())))
+            }
             None => Ok(()),
         }
     }

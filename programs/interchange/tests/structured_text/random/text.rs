@@ -285,6 +285,8 @@ impl fmt::Display for Statement {
         };
         match self {
             Self::SetTruth(name, value) => writeln!(out, "{name} := {value};"),
+            // A constant outside the subrange is refused; a number that is calculated may leave it.
+            Self::SetNumber(name @ "n1", value) => writeln!(out, "{name} := u - u + ({value});"),
             Self::SetNumber(name, value) => writeln!(out, "{name} := {value};"),
             Self::If(branches, otherwise) => {
                 for (place, (condition, branch)) in branches.iter().enumerate() {
