@@ -101,7 +101,7 @@ fn push_moves(text: &mut String, stub: &Stub<'_>, moving: &[&Named<'_>], period:
     }
 }
 
-/// The usual and the other value of a number: the nearest to 0 and to 100 that it can have. Nothing for a BOOL.
+/// The usual and the other value of a number: the nearest to 0 and to 100 that it can have, or to -100 where these are one. Nothing for a BOOL.
 fn values(signal: &Signal) -> Option<(String, String)> {
     let of = signal.declared.of;
     let pair = |usual: &str, other: &str| Some((usual.to_owned(), other.to_owned()));
@@ -113,8 +113,10 @@ fn values(signal: &Signal) -> Option<(String, String)> {
         Elementary::DateAndTime => pair("DT#1970-01-01-00:00:00", "DT#2000-01-01-00:00:00"),
         _ if of.is_real() => pair("0.0", "100.0"),
         _ => {
-            let number = |wanted: i128| format!("{of}#{}", signal.nearest(wanted));
-            Some((number(0), number(100)))
+            let (usual, above) = (signal.nearest(0), signal.nearest(100));
+            let other = if above == usual { signal.nearest(-100) } else { above };
+            let number = |value: i128| format!("{of}#{value}");
+            Some((number(usual), number(other)))
         }
     }
 }

@@ -142,6 +142,10 @@ fn bound(
     let signals = signals(section);
     let (plant, mut problems) =
         Plant::following(kind, interface, &signals, &terminals, fed_by.is_some());
+    // What an error left out could be the source of an input.
+    if diagnostics.iter().any(super::is_error) {
+        problems.retain(|problem| !matches!(problem, BindingProblem::InputStaysZero { .. }));
+    }
     let stays_zero = |problem: &BindingProblem, name: &str| matches!(problem, BindingProblem::InputStaysZero { input } if input == name);
     for source in &remote_io.inputs {
         let is_driven = !problems.iter().any(|problem| stays_zero(problem, &source.name));
