@@ -142,7 +142,7 @@ impl Found {
         let own = match format {
             Some(Format::Digraph) => stem,
             _ if are_several && is_name(&stem) => stem,
-            _ => unit.as_str().into(),
+            _ => unit.split(',').next().unwrap_or(&unit).into(),
         };
         let name = given.controller(&own, written.is_none());
         let (ending, bytes) = match written {
