@@ -1,9 +1,10 @@
 //! Proofs about programs with numbers, and about the programs of a cluster together.
 
+use understudy_bits::{Code, Member, Source, Unsupported};
 use understudy_cluster::{Cluster, InputSourceKind, RemoteIo};
 use understudy_text::Report;
 use understudy_typed::{Point, Program};
-use understudy_verification::numbers::{Code, Member, Model, Source, Unsupported};
+use understudy_verification::numbers::Model;
 use understudy_verification::program::Bounds;
 use understudy_verification::property::{Property, read_one};
 use understudy_verification::symbolic::Resolved;

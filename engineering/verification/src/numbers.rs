@@ -1,7 +1,6 @@
 //! Properties of programs with numbers, and of several programs that read each other's signals.
 //!
-//! A program becomes a *system*: terms for the value of each cell of memory after a scan (`execute`). Its *abstraction* is a circuit that has
-//! every run of the system and more (`abstraction`), which the methods for Boolean programs decide:
+//! The circuit of a [`System`] has every run of it and more; the methods for Boolean programs decide about the circuit:
 //!
 //! ```text
 //! circuit: holds, property of all runs      holds
@@ -9,85 +8,20 @@
 //! the property depends on no free value     what is true of the circuit is true of the system
 //! ```
 
-mod abstraction;
-mod execute;
-mod program;
 mod replay;
-mod term;
 #[cfg(test)]
 mod tests;
 
-use std::ops::RangeInclusive;
-
+use understudy_bits::{Derivation, Meaning, Member, Node, System, Unsupported, Variable};
 use understudy_logic::Circuit;
 use understudy_text::Diagnostic;
-use understudy_typed::Elementary;
+use understudy_typed::Program;
 
 use crate::program::{Answer as CircuitAnswer, Bounds, Subject};
 use crate::property::{Formula, Path, Property};
 use crate::symbolic::{Cone, Resolved, Signal, Trace};
-use abstraction::{Abstraction, Meaning};
-pub use execute::Unsupported;
-pub use program::{Code, Member};
 use replay::Replay;
 pub use replay::Row;
-use term::{Term, Terms, Variable};
-
-/// An input of a system.
-#[derive(Debug, Clone)]
-struct Input {
-    name: String,
-    of: Elementary,
-    term: Term,
-    /// Positions between which its values lie.
-    limits: (i128, i128),
-}
-
-/// A number that a scan keeps for the next one.
-#[derive(Debug, Clone)]
-struct Cell {
-    name: String,
-    of: Elementary,
-    initial: u64,
-    term: Term,
-    next: Term,
-}
-
-/// Programs on terms, one step a cycle.
-#[derive(Debug)]
-pub struct System {
-    name: String,
-    terms: Terms,
-    inputs: Vec<Input>,
-    cells: Vec<Cell>,
-    /// BOOLs that properties can name.
-    observed: Vec<(String, Term)>,
-    /// Values that a run shows beside them.
-    shown: Vec<(String, Term)>,
-}
-
-/// An input of a program in a system.
-#[derive(Debug, Clone)]
-pub enum Source {
-    /// Any value of its type between two stored ones; reals are finite.
-    Any(Option<RangeInclusive<u64>>),
-    /// An output of a program of the system in the cycle before.
-    Signal {
-        /// Number of the program, in the order in which they are given.
-        program: usize,
-        /// Its output.
-        output: String,
-        /// Stored value while the signal is not valid.
-        default: u64,
-        /// Cycles for which the newest value is kept.
-        stale_after: u32,
-    },
-    /// Whether the signal that another input takes is valid.
-    Valid {
-        /// The name of the other input.
-        of: String,
-    },
-}
 
 /// What came of one property.
 #[derive(Debug, Clone, PartialEq)]
@@ -109,68 +43,34 @@ pub struct Run {
     pub numbers: Vec<Row>,
 }
 
-impl System {
-    fn new(name: &str) -> Self {
-        Self {
-            name: name.to_owned(),
-            terms: Terms::default(),
-            inputs: Vec::new(),
-            cells: Vec::new(),
-            observed: Vec::new(),
-            shown: Vec::new(),
-        }
-    }
-
-    fn input(&mut self, name: String, of: Elementary, range: Option<&RangeInclusive<u64>>) -> Term {
-        let number = self.inputs.len() as u32;
-        let term = self.terms.variable(of, Variable::Input(number));
-        let position = |stored| abstraction::boundaries::position(of, stored).unwrap_or(0);
-        let limits = match range {
-            Some(range) => (position(*range.start()), position(*range.end())),
-            None => match of {
-                Elementary::Real => {
-                    (position(f32::MIN.to_bits().into()), position(f32::MAX.to_bits().into()))
-                }
-                Elementary::Lreal => (position(f64::MIN.to_bits()), position(f64::MAX.to_bits())),
-                _ => execute::range(of),
-            },
-        };
-        self.inputs.push(Input { name, of, term, limits });
-        term
-    }
-
-    /// A cell that keeps its value until [`Cell::next`] is set.
-    fn cell(&mut self, name: String, of: Elementary, initial: u64) -> u32 {
-        let number = self.cells.len() as u32;
-        let term = self.terms.variable(of, Variable::Cell(number));
-        self.cells.push(Cell { name, of, initial: initial & of.mask(), term, next: term });
-        number
-    }
-
-    fn name_of(&self, variable: Variable) -> String {
-        match variable {
-            Variable::Input(number) => self.inputs[number as usize].name.clone(),
-            Variable::Cell(number) => self.cells[number as usize].name.clone(),
-        }
-    }
-
-    fn describe(&self, term: Term) -> String {
-        self.terms.describe(term, &|variable| self.name_of(variable))
-    }
-}
-
-/// A system and its abstraction, ready for questions.
+/// A system and its derivation, ready for questions.
 pub struct Model {
     system: System,
-    abstraction: Abstraction,
+    derivation: Derivation,
     subject: Subject,
 }
 
 impl Model {
+    /// One program. Its properties name its BOOL points and variables.
+    ///
+    /// # Errors
+    /// What of the program cannot be followed.
+    pub fn of_program(program: &Program) -> Result<Self, Unsupported> {
+        Self::of(System::of_program(program)?)
+    }
+
+    /// All programs of a cluster; their signals stand behind the names of their controllers and a dot.
+    ///
+    /// # Errors
+    /// What of a program cannot be followed.
+    pub fn of_cluster(name: &str, members: &[Member<'_>]) -> Result<Self, Unsupported> {
+        Self::of(System::of_cluster(name, members)?)
+    }
+
     fn of(system: System) -> Result<Self, Unsupported> {
-        let abstraction = Abstraction::new(&system)?;
-        let subject = Subject::of(abstraction.circuit.clone());
-        Ok(Self { system, abstraction, subject })
+        let derivation = Derivation::new(&system)?;
+        let subject = Subject::of(derivation.circuit.clone());
+        Ok(Self { system, derivation, subject })
     }
 
     /// The circuit that stands for the programs.
@@ -208,7 +108,7 @@ impl Model {
     ) -> Answer {
         let cone = Cone::of(self.circuit(), fair.iter().chain([property]));
         let is_exact = cone.variables.iter().all(|variable| self.is_exact(*variable));
-        let replay = Replay::new(&self.system, &self.abstraction, bounds.go_on);
+        let replay = Replay::new(&self.system, &self.derivation, bounds.go_on);
         match answer {
             CircuitAnswer::Holds(None) if is_exact || is_of_all_runs(property) => {
                 Answer::Holds(None)
@@ -256,10 +156,10 @@ impl Model {
         let understudy_logic::Variable::Input(input) = variable else {
             return true;
         };
-        match self.abstraction.meanings[input as usize] {
+        match self.derivation.meanings[input as usize] {
             Meaning::Bit(..) => true,
             Meaning::Boundary(term, _) => {
-                matches!(self.system.terms.node(term), term::Node::Variable(Variable::Input(_)))
+                matches!(self.system.terms.node(term), Node::Variable(Variable::Input(_)))
             }
             Meaning::NotANumber(_) | Meaning::Less(..) | Meaning::Equal(..) | Meaning::Free(..) => {
                 false

@@ -1,13 +1,13 @@
-//! Runs with numbers: a run of the abstraction is repeated, or one that breaks an invariant is searched.
+//! Runs with numbers: a run of the derivation is repeated, or one that breaks an invariant is searched.
 
 use std::collections::BTreeSet;
 
+use understudy_bits::{
+    Derivation, Meaning, Node, System, Term, Terms, Variable, between, boundary_text, position,
+};
 use understudy_typed::Elementary;
 
-use super::abstraction::boundaries::{between, boundary_text, position};
-use super::abstraction::{Abstraction, Meaning};
-use super::term::{Node, Term, Terms, Variable};
-use super::{Run, System, holds_in};
+use super::{Run, holds_in};
 use crate::effort::{GoOn, Work};
 use crate::symbolic::{Resolved, ScanRow, Signal, Trace};
 
@@ -39,7 +39,7 @@ pub(super) struct Followed {
 
 pub(super) struct Replay<'s> {
     system: &'s System,
-    abstraction: &'s Abstraction,
+    derivation: &'s Derivation,
     go_on: GoOn<'s>,
 }
 
@@ -50,8 +50,8 @@ struct Scan {
 }
 
 impl<'s> Replay<'s> {
-    pub(super) fn new(system: &'s System, abstraction: &'s Abstraction, go_on: GoOn<'s>) -> Self {
-        Self { system, abstraction, go_on }
+    pub(super) fn new(system: &'s System, derivation: &'s Derivation, go_on: GoOn<'s>) -> Self {
+        Self { system, derivation, go_on }
     }
 
     /// Repeats `trace`; it ends where one of `kept` is broken.
@@ -129,7 +129,7 @@ impl<'s> Replay<'s> {
             return vec![0, 1];
         }
         let (least, greatest) = input.limits;
-        let boundaries = self.abstraction.boundaries.get(&input.term);
+        let boundaries = self.derivation.boundaries.get(&input.term);
         let mut ends: Vec<i128> = boundaries.into_iter().flatten().copied().collect();
         ends.push(greatest);
         let mut above = least - 1;
@@ -188,7 +188,7 @@ impl<'s> Replay<'s> {
             Signal::Output(output) => {
                 scan.values[Terms::index(self.system.observed[output].1)] != 0
             }
-            Signal::Input(input) => match self.abstraction.meanings[input] {
+            Signal::Input(input) => match self.derivation.meanings[input] {
                 Meaning::Bit(number, bit) => scan.inputs[number as usize] >> bit & 1 == 1,
                 _ => row.inputs.get(input).copied().unwrap_or(false),
             },
@@ -233,7 +233,7 @@ impl<'s> Replay<'s> {
         let count = self.system.inputs.len();
         let mut inputs = vec![0_u64; count];
         let mut at_most: Vec<Option<i128>> = vec![None; count];
-        for (input, meaning) in self.abstraction.meanings.iter().enumerate() {
+        for (input, meaning) in self.derivation.meanings.iter().enumerate() {
             let is = row.inputs.get(input).copied().unwrap_or(false);
             match *meaning {
                 Meaning::Bit(number, bit) if is => inputs[number as usize] |= 1 << bit,
@@ -248,8 +248,8 @@ impl<'s> Replay<'s> {
         }
         let mut choice = attempt;
         for (number, input) in self.system.inputs.iter().enumerate() {
-            let Some(boundaries) = self.abstraction.boundaries.get(&input.term) else {
-                let is_followed = self.abstraction.meanings.iter().any(
+            let Some(boundaries) = self.derivation.boundaries.get(&input.term) else {
+                let is_followed = self.derivation.meanings.iter().any(
                     |meaning| matches!(meaning, Meaning::Bit(of, _) if *of as usize == number),
                 );
                 if !is_followed {
@@ -276,7 +276,7 @@ impl<'s> Replay<'s> {
     fn mismatch(&self, row: &ScanRow, relevant: &BTreeSet<usize>, scan: &Scan) -> Option<String> {
         let terms = &self.system.terms;
         let mut so_far: Option<(Term, bool)> = None;
-        for (input, meaning) in self.abstraction.meanings.iter().enumerate() {
+        for (input, meaning) in self.derivation.meanings.iter().enumerate() {
             let is = row.inputs.get(input).copied().unwrap_or(false);
             let (agrees, text) = match *meaning {
                 Meaning::Boundary(term, boundary) => {
@@ -320,7 +320,7 @@ impl<'s> Replay<'s> {
     fn run(&self, trace: &Trace, scans: &[Scan], is_broken: bool) -> Run {
         let is_bool = |signal: &Signal| match signal {
             Signal::Output(_) => true,
-            Signal::Input(input) => match self.abstraction.meanings[*input] {
+            Signal::Input(input) => match self.derivation.meanings[*input] {
                 Meaning::Bit(number, _) => {
                     self.system.inputs[number as usize].of == Elementary::Bool
                 }
@@ -331,7 +331,7 @@ impl<'s> Replay<'s> {
         let rows = scans.iter().enumerate().map(|(place, scan)| {
             let empty = ScanRow { inputs: Vec::new(), outputs: Vec::new() };
             let row = trace.scans.get(place).unwrap_or(&empty);
-            let inputs = 0..self.abstraction.meanings.len();
+            let inputs = 0..self.derivation.meanings.len();
             let outputs = 0..self.system.observed.len();
             ScanRow {
                 inputs: inputs.map(|input| self.value(Signal::Input(input), scan, row)).collect(),

@@ -8,7 +8,7 @@ use understudy_testing::random::Dice;
 use understudy_text::Diagnostic;
 
 use self::text::Text;
-use crate::execution::{check, typed};
+use crate::execution::{check, check_bits, typed};
 use crate::support::{program, read};
 
 proptest! {
@@ -24,5 +24,21 @@ proptest! {
         let ladder = program(&source);
         let typed = typed(&source, &parse(&source).0).expect("a sound program");
         check(&source, &ladder, &typed, seed);
+    }
+
+    #[test]
+    fn an_exact_circuit_scans_as_its_text_executes(seed: u64) {
+        let mut dice = Dice::new(seed);
+        let source = Text::random(&mut dice).to_string();
+        let typed = typed(&source, &parse(&source).0).expect("a sound program");
+        match understudy_bits::exact(&typed) {
+            Ok(circuit) => check_bits(&source, &circuit, &typed, seed),
+            // The number of turns of a loop is not known.
+            Err(understudy_bits::Inexact::Unsupported(reason)) => {
+                prop_assume!(!reason.what.contains("number of turns"));
+                panic!("{reason}\n{source}");
+            }
+            Err(gaps) => panic!("{gaps}\n{source}"),
+        }
     }
 }

@@ -16,7 +16,7 @@ use understudy_typed::{
     StatementKind,
 };
 
-use super::term::{Term, Terms};
+use crate::term::{Term, Terms};
 
 /// Turns of a loop whose condition depends on values.
 const UNKNOWN_TURNS: u32 = 64;
@@ -425,13 +425,4 @@ impl<'a> Execution<'a> {
 enum Either<T> {
     Only(T),
     Both(T, T),
-}
-
-/// The least and the greatest number of an integer type.
-pub(super) fn range(of: Elementary) -> (i128, i128) {
-    let mask = i128::from(of.mask());
-    match of.is_signed() {
-        true => (-(mask >> 1) - 1, mask >> 1),
-        false => (0, mask),
-    }
 }

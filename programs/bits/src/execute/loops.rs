@@ -4,8 +4,8 @@ use std::collections::HashMap;
 
 use understudy_typed::{Comparison, Elementary, For, Operation};
 
-use super::{ALL_TURNS, Context, Execution, Left, Loop, Result, Test, UNKNOWN_TURNS, range};
-use crate::numbers::term::Term;
+use super::{ALL_TURNS, Context, Execution, Left, Loop, Result, Test, UNKNOWN_TURNS};
+use crate::term::Term;
 
 impl Execution<'_> {
     pub(super) fn repeat_for(&mut self, context: Context, each: &For) -> Result<Term> {
@@ -53,7 +53,7 @@ impl Execution<'_> {
                 let (address, of) = *counter;
                 let value = self.get(address, of);
                 let step = self.terms.value(*by).map_or(0, |by| of.signed(by));
-                let (least, greatest) = range(of);
+                let (least, greatest) = of.limits();
                 let fits = match step >= 0 {
                     true => self.between(value, least, greatest - step),
                     false => self.between(value, least - step, greatest),

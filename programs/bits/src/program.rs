@@ -7,6 +7,7 @@
 //!
 //! In every cycle each sample may be missing, and each signal may be lost: what is proved holds whatever fails.
 
+mod moments;
 mod scan;
 
 use std::collections::HashMap;
@@ -14,9 +15,9 @@ use std::collections::HashMap;
 use understudy_logic::{Circuit, Operation as Gate, Variable as Bit};
 use understudy_typed::{Comparison, Elementary, Operation, Points, Program};
 
-use super::execute::Unsupported;
-use super::term::Term;
-use super::{Model, Source, System};
+use crate::execute::Unsupported;
+use crate::system::{Source, System};
+use crate::term::Term;
 use scan::Scan;
 
 /// A program of a system.
@@ -45,7 +46,7 @@ struct Outputs {
     can_be_read: Term,
 }
 
-impl Model {
+impl System {
     /// One program. Its properties name its BOOL points and variables.
     ///
     /// # Errors
@@ -56,7 +57,7 @@ impl Model {
         let runs = system.terms.boolean(true);
         let inputs = sources_as_terms(&mut system, "", &program.inputs, &sources);
         system.add_program("", program, &inputs, runs)?;
-        Self::of(system)
+        Ok(system)
     }
 
     /// All programs of a cluster; their signals stand behind the names of their controllers and a dot.
@@ -80,7 +81,7 @@ impl Model {
             };
             system.keep_outputs(&before[place], &outputs, sampled);
         }
-        Self::of(system)
+        Ok(system)
     }
 }
 
@@ -332,16 +333,18 @@ impl System {
         let was_stopped = self.cells[stopped as usize].term;
         let scans = self.cell(format!("{prefix}scans"), Elementary::Ulint, 0);
         let was_scans = self.cells[scans as usize].term;
-        let first = Scan { prefix, program, inputs, scans: was_scans, stopped: None };
+        let none = HashMap::new();
+        let mut how =
+            Scan { prefix, program, inputs, scans: was_scans, stopped: None, ages: &none };
         let mut numbers = HashMap::new();
-        let mut scan = self.scan(&first, &mut numbers)?;
-        let mut can_fault = scan.faulted;
-        if !self.terms.is(can_fault, false) {
+        let mut scan = self.scan(&how, &mut numbers)?;
+        if !self.terms.is(scan.faulted, false) {
             // It can stop: a scan may begin with the initial values.
-            let again = Scan { stopped: Some(was_stopped), ..first };
-            scan = self.scan(&again, &mut numbers)?;
-            can_fault = scan.faulted;
+            how.stopped = Some(was_stopped);
+            scan = self.scan(&how, &mut numbers)?;
         }
+        let (scan, ages) = self.scan_with_ages(&how, scan, &mut numbers)?;
+        let can_fault = scan.faulted;
         let resets = program.inputs.iter().zip(inputs);
         let mut reset = resets.filter(|(point, _)| point.slot == 0).map(|(_, &term)| term);
         let reset = reset.next().unwrap_or_else(|| self.terms.boolean(false));
@@ -350,6 +353,15 @@ impl System {
         let begins = self.terms.and(runs, begins);
         // What a fault leaves: the state before the scan.
         let is_restart = self.terms.and(was_stopped, reset);
+        for (&address, &age) in &ages {
+            let new = self.next_age(program, &scan, age, address, how.stopped);
+            let cell = self.cells[age.cell as usize].term;
+            let left = self.age(age, how.stopped);
+            let left = self.terms.choose(is_restart, left, cell);
+            let kept = self.terms.choose(can_fault, left, new);
+            let next = self.terms.choose(begins, kept, cell);
+            self.cells[age.cell as usize].next = next;
+        }
         let mut after = HashMap::new();
         for (&address, &cell) in &numbers {
             let (term, initial, of) = {

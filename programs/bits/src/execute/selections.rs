@@ -4,8 +4,8 @@ use std::collections::HashMap;
 
 use understudy_typed::{Case, Comparison, Statement};
 
-use super::{Context, Execution, Left, Result, range};
-use crate::numbers::term::Term;
+use super::{Context, Execution, Left, Result};
+use crate::term::Term;
 
 impl Execution<'_> {
     pub(super) fn branches(
@@ -68,7 +68,7 @@ impl Execution<'_> {
     /// Whether an integer lies between two numbers, which may lie outside its type.
     pub(super) fn between(&mut self, value: Term, low: i128, high: i128) -> Term {
         let of = self.terms.of(value);
-        let (least, greatest) = range(of);
+        let (least, greatest) = of.limits();
         if low > greatest || high < least || low > high {
             return self.terms.boolean(false);
         }

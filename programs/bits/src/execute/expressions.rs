@@ -5,7 +5,7 @@ use understudy_typed::{
 };
 
 use super::{Context, Either, Execution, Result, Value};
-use crate::numbers::term::Term;
+use crate::term::Term;
 
 impl Execution<'_> {
     pub(super) fn number(&mut self, context: Context, expression: &Expression) -> Result<Term> {

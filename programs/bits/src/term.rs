@@ -10,11 +10,11 @@ use understudy_typed::{Comparison, Elementary, Operation};
 
 /// A value; refers only to terms before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) struct Term(u32);
+pub struct Term(u32);
 
 /// What a term is.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(crate) enum Node {
+pub enum Node {
     /// A stored value.
     Constant(u64),
     /// An input, or the value of a cell before the scan.
@@ -29,7 +29,7 @@ pub(crate) enum Node {
 
 /// Where a value comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) enum Variable {
+pub enum Variable {
     /// An input, by its number in the system.
     Input(u32),
     /// A cell of memory, by its number in the system.
@@ -38,7 +38,7 @@ pub(crate) enum Variable {
 
 /// The owner of terms.
 #[derive(Debug, Default)]
-pub(crate) struct Terms {
+pub struct Terms {
     nodes: Vec<(Elementary, Node)>,
     known: HashMap<(Elementary, Node), Term>,
     unknowns: u32,
@@ -49,21 +49,32 @@ pub(crate) struct Terms {
 
 impl Terms {
     /// How many there are.
-    pub(crate) fn len(&self) -> usize {
+    pub fn len(&self) -> usize {
         self.nodes.len()
     }
 
-    pub(crate) fn node(&self, term: Term) -> &Node {
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// The term at a place, below [`Terms::len`]; its operands stand before it.
+    pub(crate) fn at(&self, place: usize) -> Term {
+        Term(place as u32)
+    }
+
+    /// What it is.
+    pub fn node(&self, term: Term) -> &Node {
         &self.nodes[term.0 as usize].1
     }
 
     /// Its type.
-    pub(crate) fn of(&self, term: Term) -> Elementary {
+    pub fn of(&self, term: Term) -> Elementary {
         self.nodes[term.0 as usize].0
     }
 
     /// Its stored value, of a constant.
-    pub(crate) fn value(&self, term: Term) -> Option<u64> {
+    pub fn value(&self, term: Term) -> Option<u64> {
         match self.node(term) {
             Node::Constant(stored) => Some(*stored),
             _ => None,
@@ -96,7 +107,7 @@ impl Terms {
     }
 
     /// Terms that others depend on, the others included, each after its operands; the terms behind cells are asked for.
-    pub(crate) fn reached(&self, roots: Vec<Term>, next: impl Fn(u32) -> Term) -> Vec<Term> {
+    pub fn reached(&self, roots: Vec<Term>, next: impl Fn(u32) -> Term) -> Vec<Term> {
         let mut seen = vec![false; self.nodes.len()];
         let mut pending = roots;
         while let Some(term) = pending.pop() {
@@ -132,7 +143,8 @@ impl Terms {
         self.intern(of, Node::Unknown(self.unknowns))
     }
 
-    pub(crate) fn is(&self, term: Term, value: bool) -> bool {
+    /// Whether it is this truth value, whatever happens.
+    pub fn is(&self, term: Term, value: bool) -> bool {
         self.value(term) == Some(u64::from(value))
     }
 
@@ -211,6 +223,15 @@ impl Terms {
                     None
                 }
             }
+            (Operation::Reinterpret(_, to), &[inner]) => match self.node(inner) {
+                Node::Apply(Operation::Reinterpret(from, _), known) if *from == to => {
+                    Some(known[0])
+                }
+                _ => None,
+            },
+            (Operation::Subtract(of), &[left, right]) if !of.is_real() => {
+                self.difference(of, left, right)
+            }
             (Operation::Or(Elementary::Bool), &[left, right]) => {
                 if self.is(left, false) || left == right {
                     Some(right)
@@ -224,6 +245,41 @@ impl Terms {
                 } else {
                     None
                 }
+            }
+            _ => None,
+        }
+    }
+
+    /// left − (left − x) is x, and left − left is 0; so is it behind a selection.
+    fn difference(&mut self, of: Elementary, left: Term, right: Term) -> Option<Term> {
+        if left == right {
+            return Some(self.constant(of, 0));
+        }
+        let reinterpreted = |this: &Self, term: Term| match this.node(term) {
+            Node::Apply(Operation::Reinterpret(from, _), inner) if !from.is_real() => {
+                Some((*from, inner[0]))
+            }
+            _ => None,
+        };
+        // Times are subtracted as whole numbers.
+        if let (Some((from, one)), Some((other_from, other))) =
+            (reinterpreted(self, left), reinterpreted(self, right))
+            && from == other_from
+        {
+            let difference = self.apply(Operation::Subtract(from), from, &[one, other]);
+            return Some(self.apply(Operation::Reinterpret(from, of), of, &[difference]));
+        }
+        match *self.node(right) {
+            Node::Apply(Operation::Subtract(kind), ref operands)
+                if kind == of && operands[0] == left =>
+            {
+                Some(operands[1])
+            }
+            Node::Choose([condition, then, otherwise]) => {
+                let is_time = matches!(self.node(left), Node::Apply(Operation::Elapsed, _));
+                let then = is_time.then(|| self.difference(of, left, then)).flatten()?;
+                let otherwise = self.difference(of, left, otherwise)?;
+                Some(self.choose(condition, then, otherwise))
             }
             _ => None,
         }
@@ -263,7 +319,7 @@ impl Terms {
     }
 
     /// The values of all terms, for values of the variables. Where an unknown value is reached it is 0.
-    pub(crate) fn evaluate(&self, variable: impl Fn(Variable) -> u64) -> Vec<u64> {
+    pub fn evaluate(&self, variable: impl Fn(Variable) -> u64) -> Vec<u64> {
         let mut values: Vec<u64> = Vec::with_capacity(self.nodes.len());
         for (of, node) in &self.nodes {
             let of_term = |term: &Term| values[term.0 as usize];
@@ -285,19 +341,22 @@ impl Terms {
     }
 
     /// Its place in what [`Terms::evaluate`] answers.
-    pub(crate) fn index(term: Term) -> usize {
+    pub fn index(term: Term) -> usize {
         term.0 as usize
     }
 
+    /// The stored values that stand in the programs, each once, with their types.
+    pub(crate) fn all_constants(&self) -> impl Iterator<Item = (Elementary, u64)> {
+        self.nodes.iter().filter_map(|(of, node)| match node {
+            Node::Constant(stored) => Some((*of, *stored)),
+            _ => None,
+        })
+    }
+
     /// Stored values of a type that stand in the programs, each once.
-    pub(crate) fn constants(&self, of: Elementary) -> Vec<u64> {
-        let nodes = self.nodes.iter().filter(|(known, _)| *known == of);
-        nodes
-            .filter_map(|(_, node)| match node {
-                Node::Constant(stored) => Some(*stored),
-                _ => None,
-            })
-            .collect()
+    pub fn constants(&self, of: Elementary) -> Vec<u64> {
+        let all = self.all_constants().filter(|(known, _)| *known == of);
+        all.map(|(_, stored)| stored).collect()
     }
 
     /// The term as a person reads it, cut at a length.

@@ -7,33 +7,9 @@ use understudy_typed::{Comparison, Elementary, Operation};
 
 use super::boundaries::{boundary, boundary_text, position};
 use super::{Meaning, Pass, Pending};
-use crate::numbers::execute::range;
-use crate::numbers::term::{Node, Term, Variable};
+use crate::term::{Node, Term, Variable};
 
 impl Pass<'_> {
-    /// Whether one number is less than the other, both of bits.
-    pub(super) fn less(
-        &mut self,
-        of: Elementary,
-        left: &[Expression],
-        right: &[Expression],
-    ) -> Expression {
-        let last = left.len() - 1;
-        let is_signed = of.is_signed();
-        let graph = self.builder.graph();
-        let mut less = graph.constant(false);
-        for (place, (&one, &other)) in left.iter().zip(right).enumerate() {
-            // The sign weighs the other way.
-            let (one, other) = match is_signed && place == last {
-                true => (other, one),
-                false => (one, other),
-            };
-            let differ = graph.xor(one, other);
-            less = graph.if_then_else(differ, other, less);
-        }
-        less
-    }
-
     pub(super) fn compare(
         &mut self,
         comparison: Comparison,
@@ -42,30 +18,7 @@ impl Pass<'_> {
     ) -> Expression {
         let of = self.system.terms.of(left);
         if self.is_bits(left) && self.is_bits(right) {
-            let (one, other) = (self.bits(left), self.bits(right));
-            return match comparison {
-                Comparison::Equal | Comparison::NotEqual => {
-                    let graph = self.builder.graph();
-                    let pairs = one.iter().zip(&other);
-                    let differ: Vec<Expression> =
-                        pairs.map(|(&one, &other)| graph.xor(one, other)).collect();
-                    let differ = graph.any(differ);
-                    match comparison {
-                        Comparison::Equal => graph.not(differ),
-                        _ => differ,
-                    }
-                }
-                Comparison::Less => self.less(of, &one, &other),
-                Comparison::Greater => self.less(of, &other, &one),
-                Comparison::LessOrEqual => {
-                    let greater = self.less(of, &other, &one);
-                    self.builder.graph().not(greater)
-                }
-                Comparison::GreaterOrEqual => {
-                    let less = self.less(of, &one, &other);
-                    self.builder.graph().not(less)
-                }
-            };
+            return self.compare_bits(comparison, left, right);
         }
         // less, equal; neither where one of them is NaN.
         let (less, equal, nan) =
@@ -169,19 +122,11 @@ impl Pass<'_> {
             return self.constant(is);
         }
         if self.is_bits(term) {
-            let (least, greatest) = range(of);
-            if boundary < least || boundary >= greatest {
-                return self.constant(boundary >= greatest);
-            }
-            let bits = self.bits(term);
-            let limit: Vec<Expression> =
-                (0..of.bits()).map(|bit| self.constant(boundary as u64 >> bit & 1 == 1)).collect();
-            let greater = self.less(of, &limit, &bits);
-            return self.builder.graph().not(greater);
+            return self.number(term).is_at_most(self.builder.graph(), boundary);
         }
         match self.system.terms.node(term).clone() {
             Node::Choose([condition, then, otherwise]) => {
-                let condition = self.bits(condition)[0];
+                let condition = self.truth(condition);
                 let then = self.at_most(then, boundary);
                 let otherwise = self.at_most(otherwise, boundary);
                 self.builder.graph().if_then_else(condition, then, otherwise)
@@ -222,7 +167,7 @@ impl Pass<'_> {
             // Infinity is a number here, and it can be computed.
             return (i128::MIN, i128::MAX);
         }
-        range(of)
+        of.limits()
     }
 
     pub(super) fn cell_at_most(&mut self, cell: u32, of: Elementary, boundary: i128) -> Expression {
@@ -231,8 +176,9 @@ impl Pass<'_> {
         }
         let initial = position(of, self.system.cells[cell as usize].initial);
         let initial = initial.is_some_and(|position| position <= boundary);
-        let name = format!("cell {cell} up to {boundary}");
-        let made = self.builder.register(name, initial);
+        let name = &self.system.cells[cell as usize].name;
+        let name = format!("{name} {}", boundary_text(of, boundary));
+        let made = self.register(&name, initial);
         self.cell_lines.insert((cell, boundary), made);
         self.pending.push(Pending::Boundary(cell, boundary));
         made.1
@@ -278,13 +224,14 @@ impl Pass<'_> {
             Node::Variable(Variable::Input(_)) => self.constant(false),
             Node::Variable(Variable::Cell(cell)) => {
                 let initial = position(of, self.system.cells[cell as usize].initial).is_none();
-                let made = self.builder.register(format!("cell {cell} is NaN"), initial);
+                let name = format!("{} is NaN", self.system.cells[cell as usize].name);
+                let made = self.register(&name, initial);
                 self.cell_nans.insert(cell, made);
                 self.pending.push(Pending::NotANumber(cell));
                 made.1
             }
             Node::Choose([condition, then, otherwise]) => {
-                let condition = self.bits(condition)[0];
+                let condition = self.truth(condition);
                 let then = self.nan(then);
                 let otherwise = self.nan(otherwise);
                 self.builder.graph().if_then_else(condition, then, otherwise)

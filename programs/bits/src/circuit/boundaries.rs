@@ -2,11 +2,9 @@
 
 use understudy_typed::Elementary;
 
-use crate::numbers::execute::range;
-
 /// A number as a position on a line: one is at most a boundary where its position is. Reals: below or at a constant are
 /// two boundaries. `None` for NaN.
-pub(in crate::numbers) fn position(of: Elementary, stored: u64) -> Option<i128> {
+pub fn position(of: Elementary, stored: u64) -> Option<i128> {
     match real(of, stored) {
         None => Some(of.signed(stored)),
         Some(value) if value.is_nan() => None,
@@ -15,7 +13,7 @@ pub(in crate::numbers) fn position(of: Elementary, stored: u64) -> Option<i128> 
 }
 
 /// The boundary of `< stored`, or of `<= stored`.
-pub(in crate::numbers) fn boundary(of: Elementary, stored: u64, is_included: bool) -> Option<i128> {
+pub(crate) fn boundary(of: Elementary, stored: u64, is_included: bool) -> Option<i128> {
     match real(of, stored) {
         None => Some(of.signed(stored) - i128::from(!is_included)),
         Some(value) if value.is_nan() => None,
@@ -23,7 +21,7 @@ pub(in crate::numbers) fn boundary(of: Elementary, stored: u64, is_included: boo
     }
 }
 
-pub(in crate::numbers) fn real(of: Elementary, stored: u64) -> Option<f64> {
+pub(crate) fn real(of: Elementary, stored: u64) -> Option<f64> {
     match of {
         Elementary::Real => Some(f64::from(f32::from_bits(stored as u32))),
         Elementary::Lreal => Some(f64::from_bits(stored)),
@@ -32,19 +30,15 @@ pub(in crate::numbers) fn real(of: Elementary, stored: u64) -> Option<f64> {
 }
 
 /// Reals in their order as integers; both zeros are 0.
-pub(in crate::numbers) fn rank(value: f64) -> i64 {
+pub(crate) fn rank(value: f64) -> i64 {
     let bits = value.to_bits() as i64;
     if bits < 0 { i64::MIN.wrapping_sub(bits) } else { bits }
 }
 
 /// A number of type `of` above one boundary and at most at the next.
-pub(in crate::numbers) fn between(
-    of: Elementary,
-    above: Option<i128>,
-    at_most: Option<i128>,
-) -> Option<u64> {
+pub fn between(of: Elementary, above: Option<i128>, at_most: Option<i128>) -> Option<u64> {
     if !of.is_real() {
-        let (least, greatest) = range(of);
+        let (least, greatest) = of.limits();
         let low = above.map_or(least, |above| above + 1).max(least);
         let high = at_most.unwrap_or(greatest).min(greatest);
         if low > high {
@@ -86,7 +80,7 @@ pub(in crate::numbers) fn between(
 }
 
 /// A number between two that has few digits.
-pub(in crate::numbers) fn readable(low: f64, high: f64) -> f64 {
+pub(crate) fn readable(low: f64, high: f64) -> f64 {
     if low <= 0.0 && 0.0 <= high {
         return 0.0;
     }
@@ -106,7 +100,7 @@ pub(in crate::numbers) fn readable(low: f64, high: f64) -> f64 {
 }
 
 /// A boundary as people write it.
-pub(in crate::numbers) fn boundary_text(of: Elementary, boundary: i128) -> String {
+pub fn boundary_text(of: Elementary, boundary: i128) -> String {
     if !of.is_real() {
         return format!("<= {}", of.text(boundary as u64 & of.mask()));
     }

@@ -3,7 +3,7 @@
 use understudy_typed::{Elementary, Place, Program, Root, Type};
 
 use super::{ALTERNATIVES, Context, Execution, Result, Value};
-use crate::numbers::term::Term;
+use crate::term::Term;
 
 impl Execution<'_> {
     /// The only address of a place.

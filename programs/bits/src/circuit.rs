@@ -1,8 +1,8 @@
 //! A system of terms as a circuit, whose runs contain those of the system.
 //!
 //! ```text
-//! BOOL, bit strings, integers of up to 32 bits    their bits; sums and comparisons bit by bit
-//! reals, times, integers of 64 bits               regions between the constants that they are compared with
+//! BOOL, bit strings, integers, times that are counted    as many bits as their values need; sums and comparisons bit by bit
+//! reals, and what takes more than 32 bits                regions between the constants that they are compared with
 //! ```
 //!
 //! A stored number of regions has one register for each boundary; the registers step together, so the regions of a value that is only
@@ -18,18 +18,22 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use understudy_logic::{Circuit, CircuitBuilder, Expression, RegisterId};
 use understudy_typed::Elementary;
 
-use super::System;
-use super::execute::Unsupported;
-use super::term::Term;
+use crate::System;
+use crate::execute::Unsupported;
+use crate::extent::Extents;
+use crate::number::Number;
+use crate::term::Term;
 
 /// Boundaries of one number.
 const BOUNDARIES: usize = 1_000;
 /// Widest operands of a product or a quotient of two variables.
 const PRODUCT: usize = 16;
+/// Most bits of a number of 64 bits that is followed bit by bit where it is stored.
+const WIDE: usize = 32;
 
 /// What an input of the circuit stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Meaning {
+pub enum Meaning {
     /// A bit of an input of the system.
     Bit(u32, u32),
     /// Whether a number is at most the boundary: TRUE at its lowest true boundary, and of no meaning behind it.
@@ -40,28 +44,36 @@ pub(super) enum Meaning {
     Less(Term, Term),
     /// Whether two numbers are equal; of no meaning where one is less.
     Equal(Term, Term),
-    /// A bit of a number that is not followed.
+    /// A bit of a number that is not followed, as a multiple of its unit; see [`Derivation::unit`].
     Free(Term, u32),
 }
 
 /// The circuit of a system.
-pub(super) struct Abstraction {
-    pub(super) circuit: Circuit,
+pub struct Derivation {
+    /// With the BOOLs that can be named as its outputs, in the order of [`System::observed`].
+    pub circuit: Circuit,
     /// One for each input of the circuit.
-    pub(super) meanings: Vec<Meaning>,
+    pub meanings: Vec<Meaning>,
     /// Boundaries of each number that has free inputs, in order.
-    pub(super) boundaries: HashMap<Term, BTreeSet<i128>>,
+    pub boundaries: HashMap<Term, BTreeSet<i128>>,
+    extents: Extents,
 }
 
-impl Abstraction {
+impl Derivation {
     /// # Errors
     /// Where a number has too many boundaries.
-    pub(super) fn new(system: &System) -> Result<Self, Unsupported> {
+    pub fn new(system: &System) -> Result<Self, Unsupported> {
+        Self::of(system, &[])
+    }
+
+    /// With bits of numbers as further outputs: each a name, and a number as the bits of its type.
+    pub(crate) fn of(system: &System, points: &[(String, Term)]) -> Result<Self, Unsupported> {
         // The first pass finds the boundaries of each number, the second one has them in order.
         let mut boundaries: HashMap<Term, BTreeSet<i128>> = HashMap::new();
+        let extents = Extents::new(system);
         loop {
-            let mut pass = Pass::new(system, boundaries);
-            pass.build();
+            let mut pass = Pass::new(system, &extents, boundaries);
+            pass.build(points);
             let found = pass.found;
             if let Some((&term, _)) = found.iter().find(|(_, all)| all.len() > BOUNDARIES) {
                 return Err(Unsupported {
@@ -79,10 +91,16 @@ impl Abstraction {
                     line: 0,
                     what: error.to_string(),
                 })?;
-                return Ok(Self { circuit, meanings: pass.meanings, boundaries: found });
+                let meanings = pass.meanings;
+                return Ok(Self { circuit, meanings, boundaries: found, extents });
             }
             boundaries = found;
         }
+    }
+
+    /// What a number is a multiple of.
+    pub fn unit(&self, term: Term) -> i128 {
+        self.extents.get(term).unit.max(1)
     }
 }
 
@@ -96,34 +114,48 @@ enum Pending {
 
 struct Pass<'s> {
     system: &'s System,
+    extents: &'s Extents,
     builder: CircuitBuilder,
     meanings: Vec<Meaning>,
     known: HashMap<Term, BTreeSet<i128>>,
     found: HashMap<Term, BTreeSet<i128>>,
     is_bits: HashMap<Term, bool>,
-    bits: HashMap<Term, Vec<Expression>>,
+    numbers: HashMap<Term, Number>,
     lines: HashMap<Term, BTreeMap<i128, Expression>>,
     at_most: HashMap<(Term, i128), Expression>,
     nans: HashMap<Term, Expression>,
     orders: HashMap<(Term, Term), (Expression, Expression)>,
-    cells: HashMap<u32, (Vec<RegisterId>, Vec<Expression>)>,
+    cells: HashMap<u32, Vec<RegisterId>>,
     cell_lines: HashMap<(u32, i128), (RegisterId, Expression)>,
     cell_nans: HashMap<u32, (RegisterId, Expression)>,
     pending: Vec<Pending>,
     names: HashSet<String>,
+    registers: HashSet<String>,
+}
+
+/// The name, with a number behind it where it is taken.
+fn unique(taken: &mut HashSet<String>, name: &str) -> String {
+    let mut unique = name.to_owned();
+    let mut number = 1;
+    while !taken.insert(unique.clone()) {
+        number += 1;
+        unique = format!("{name} #{number}");
+    }
+    unique
 }
 
 impl<'s> Pass<'s> {
-    fn new(system: &'s System, known: HashMap<Term, BTreeSet<i128>>) -> Self {
+    fn new(system: &'s System, extents: &'s Extents, known: HashMap<Term, BTreeSet<i128>>) -> Self {
         let name = system.name.clone();
         Self {
             system,
+            extents,
             builder: CircuitBuilder::new(name),
             meanings: Vec::new(),
             found: HashMap::new(),
             known,
             is_bits: HashMap::new(),
-            bits: HashMap::new(),
+            numbers: HashMap::new(),
             lines: HashMap::new(),
             at_most: HashMap::new(),
             nans: HashMap::new(),
@@ -133,38 +165,49 @@ impl<'s> Pass<'s> {
             cell_nans: HashMap::new(),
             pending: Vec::new(),
             names: HashSet::new(),
+            registers: HashSet::new(),
         }
     }
 
-    fn build(&mut self) {
+    fn build(&mut self, points: &[(String, Term)]) {
         // Inputs that people name come first, under their own names.
         for number in 0..self.system.inputs.len() as u32 {
             let input = &self.system.inputs[number as usize];
-            if input.of == Elementary::Bool {
-                let term = input.term;
-                self.bits(term);
+            let term = input.term;
+            if input.of == Elementary::Bool || !points.is_empty() && self.is_bits(term) {
+                self.number(term);
             }
         }
         // Operands first, so that no long chain of terms is walked at once.
-        let roots = self.system.observed.iter().map(|(_, term)| *term).collect();
+        let named = self.system.observed.iter().chain(points);
+        let roots = named.map(|(_, term)| *term).collect();
         let cells = &self.system.cells;
         let reached = self.system.terms.reached(roots, |cell| cells[cell as usize].next);
         for term in reached {
             if self.is_bits(term) {
-                self.bits(term);
+                self.number(term);
             }
         }
         for (name, term) in self.system.observed.clone() {
-            let value = self.bits(term)[0];
+            let value = self.truth(term);
             self.builder.output(name, value);
+        }
+        for (name, term) in points {
+            let of = self.system.terms.of(*term);
+            let number = self.number(*term);
+            let bits = number.scaled(self.builder.graph(), 1, of.bits() as usize);
+            for (bit, value) in bits.into_iter().enumerate() {
+                self.builder.output(format!("{name}.{bit}"), value);
+            }
         }
         while let Some(pending) = self.pending.pop() {
             match pending {
                 Pending::Bits(cell) => {
-                    let next = self.system.cells[cell as usize].next;
-                    let next = self.bits(next);
-                    let registers = self.cells[&cell].0.clone();
-                    for (register, next) in registers.into_iter().zip(next) {
+                    let cell_of = &self.system.cells[cell as usize];
+                    let coding = self.coding(cell_of.term);
+                    let next = self.number(cell_of.next).coded(self.builder.graph(), coding);
+                    let registers = self.cells[&cell].clone();
+                    for (register, next) in registers.into_iter().zip(next.bits) {
                         self.builder.set_next(register, next);
                     }
                 }
@@ -185,14 +228,14 @@ impl<'s> Pass<'s> {
     }
 
     fn input(&mut self, name: &str, meaning: Meaning) -> Expression {
-        let mut unique = name.to_owned();
-        let mut number = 1;
-        while !self.names.insert(unique.clone()) {
-            number += 1;
-            unique = format!("{name} #{number}");
-        }
+        let name = unique(&mut self.names, name);
         self.meanings.push(meaning);
-        self.builder.input(unique)
+        self.builder.input(name)
+    }
+
+    fn register(&mut self, name: &str, initial: bool) -> (RegisterId, Expression) {
+        let name = unique(&mut self.registers, name);
+        self.builder.register(name, initial)
     }
 
     fn constant(&mut self, value: bool) -> Expression {

@@ -4,18 +4,24 @@ use std::collections::HashMap;
 
 use understudy_typed::{Elementary, Operation, Program};
 
-use crate::numbers::System;
-use crate::numbers::execute::{Cells, Execution, Unsupported};
-use crate::numbers::term::{Term, Terms, Variable};
+use crate::System;
+use crate::execute::{Cells, Execution, Unsupported};
+use crate::program::moments::Age;
+use crate::term::{Term, Terms, Variable};
+
 /// Cells of one program, made when they are read first.
 struct ProgramCells<'s> {
     program: &'s Program,
     prefix: &'s str,
     initial: Vec<u64>,
-    cells: &'s mut Vec<crate::numbers::Cell>,
+    cells: &'s mut Vec<crate::system::Cell>,
     numbers: HashMap<u64, u32>,
     /// Whether the program is stopped, where it can be: a restart begins with the initial values.
     stopped: Option<Term>,
+    /// The scan's `TIME()`.
+    elapsed: Term,
+    /// The times since moments, in place of the moments.
+    ages: HashMap<u64, Term>,
 }
 
 impl ProgramCells<'_> {
@@ -30,7 +36,7 @@ impl ProgramCells<'_> {
         };
         let slot = self.initial.get((address / 64) as usize).copied();
         let term = terms.variable(of, Variable::Cell(number));
-        self.cells.push(crate::numbers::Cell {
+        self.cells.push(crate::system::Cell {
             name,
             of,
             initial: slot.unwrap_or(0) >> (address % 64) & of.mask(),
@@ -45,6 +51,10 @@ impl ProgramCells<'_> {
 impl Cells for ProgramCells<'_> {
     fn before(&mut self, terms: &mut Terms, address: u64, of: Elementary) -> Term {
         let number = self.number(terms, address, of);
+        if let Some(&age) = self.ages.get(&address) {
+            let since = Operation::Subtract(Elementary::Time);
+            return terms.apply(since, Elementary::Time, &[self.elapsed, age]);
+        }
         let cell = &self.cells[number as usize];
         let (term, initial, of) = (cell.term, cell.initial, cell.of);
         match self.stopped {
@@ -65,14 +75,8 @@ impl System {
         numbers: &mut HashMap<u64, u32>,
     ) -> Result<Scanned, Unsupported> {
         let Scan { prefix, program, inputs, .. } = *scan;
-        let mut cells = ProgramCells {
-            program,
-            prefix,
-            initial: program.initial_state(),
-            cells: &mut self.cells,
-            numbers: std::mem::take(numbers),
-            stopped: scan.stopped,
-        };
+        let ages = scan.ages.iter().map(|(&address, &age)| (address, self.age(age, scan.stopped)));
+        let ages = ages.collect();
         let count = match scan.stopped {
             Some(stopped) => {
                 let zero = self.terms.constant(Elementary::Ulint, 0);
@@ -82,6 +86,16 @@ impl System {
         };
         let period = self.terms.constant(Elementary::Time, program.period as u64);
         let elapsed = self.terms.apply(Operation::Elapsed, Elementary::Time, &[count, period]);
+        let mut cells = ProgramCells {
+            elapsed,
+            ages,
+            program,
+            prefix,
+            initial: program.initial_state(),
+            cells: &mut self.cells,
+            numbers: std::mem::take(numbers),
+            stopped: scan.stopped,
+        };
         // What is shown or read by others has a cell, whether the scan reads it or not.
         for point in &program.outputs {
             if point.slot != 0 {
@@ -116,7 +130,10 @@ impl System {
         let faulted = execution.faulted;
         let memory = execution.written();
         *numbers = cells.numbers;
-        Ok(Scanned { memory, faulted })
+        let written = memory.iter();
+        let written =
+            written.filter_map(|(address, &value)| Some((*numbers.get(address)?, value))).collect();
+        Ok(Scanned { memory, faulted, elapsed, written })
     }
 }
 
@@ -128,6 +145,8 @@ pub(super) struct Scan<'a> {
     pub(super) inputs: &'a [Term],
     pub(super) scans: Term,
     pub(super) stopped: Option<Term>,
+    /// Moments of which the time since them is followed.
+    pub(super) ages: &'a HashMap<u64, Age>,
 }
 
 /// How it ends, where no fault ends it.
@@ -135,6 +154,10 @@ pub(super) struct Scanned {
     pub(super) memory: HashMap<u64, Term>,
     /// Whether a fault ends it.
     pub(super) faulted: Term,
+    /// Its `TIME()`.
+    pub(super) elapsed: Term,
+    /// What it writes into cells.
+    pub(super) written: HashMap<u32, Term>,
 }
 
 /// Most BOOL variables that properties can name.

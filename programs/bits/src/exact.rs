@@ -1,0 +1,188 @@
+//! The circuit that does in every scan what the program does.
+
+use std::collections::BTreeSet;
+
+use understudy_logic::{Circuit, CircuitBuilder, Expression, Variable as Bit};
+use understudy_typed::{Elementary, Program};
+
+use crate::circuit::{Derivation, Meaning};
+use crate::execute::Unsupported;
+use crate::system::System;
+use crate::term::{Node, Term, Variable};
+
+/// Why a program has no exact circuit.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Inexact {
+    /// A statement cannot be followed.
+    #[error(transparent)]
+    Unsupported(#[from] Unsupported),
+    /// Values that are not followed bit by bit.
+    #[error("{}", gaps(.0))]
+    Gaps(Vec<Gap>),
+}
+
+/// A value that is not followed bit by bit.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Gap {
+    /// The variable or the expression.
+    pub what: String,
+    /// Its type.
+    pub of: Elementary,
+}
+
+fn gaps(gaps: &[Gap]) -> String {
+    let shown: Vec<String> =
+        gaps.iter().take(3).map(|gap| format!("`{}` : {}", gap.what, gap.of)).collect();
+    let more = match gaps.len().saturating_sub(shown.len()) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    format!("no bits for {}{more}", shown.join(", "))
+}
+
+/// The circuit of a program whose values are finite. Its inputs and outputs are the bits of the points, in their order: a BOOL under its own name, the
+/// bits of another point as `NAME.0` for the lowest and so on. A number has as many registers as its values need; the bits of a BOOL, of a
+/// timer or of a counter stand behind the name of the variable.
+///
+/// # Errors
+/// What of the program is not followed, or not bit by bit.
+pub fn exact(program: &Program) -> Result<Circuit, Inexact> {
+    let system = System::of_program(program)?;
+    let value = |name: &str| {
+        let mut known = system.observed.iter().chain(&system.shown);
+        known.find(|(known, _)| known == name).map(|(_, term)| *term)
+    };
+    let wide = program.outputs.iter().filter(|point| point.of != Elementary::Bool);
+    let wide: Vec<(String, Term)> =
+        wide.filter_map(|point| Some((point.name.clone(), value(&point.name)?))).collect();
+    let derivation = Derivation::of(&system, &wide)?;
+    let circuit = &derivation.circuit;
+    let outputs: Vec<(String, Expression)> = program
+        .outputs
+        .iter()
+        .flat_map(|point| match point.of {
+            Elementary::Bool => vec![point.name.clone()],
+            of => (0..of.bits()).map(|bit| format!("{}.{bit}", point.name)).collect(),
+        })
+        .filter_map(|name| {
+            let mut known = circuit.outputs().iter();
+            known.find(|output| output.name == name).map(|output| (name, output.value))
+        })
+        .collect();
+    let live = live(circuit, &outputs);
+    let mut gaps: BTreeSet<Gap> = BTreeSet::new();
+    for input in live.iter().filter_map(|variable| match variable {
+        Bit::Input(input) => Some(*input as usize),
+        Bit::Register(_) => None,
+    }) {
+        if let Some(term) = gap(&derivation.meanings[input]) {
+            gaps.insert(Gap { what: system.describe(term), of: system.terms.of(term) });
+        }
+    }
+    let stored = |of: Elementary| !of.is_real();
+    let points = program.inputs.iter().chain(&program.outputs);
+    for point in points.filter(|point| !stored(point.of)) {
+        gaps.insert(Gap { what: point.name.clone(), of: point.of });
+    }
+    if !gaps.is_empty() {
+        return Err(Inexact::Gaps(gaps.into_iter().collect()));
+    }
+    Ok(pruned(&system, &derivation, &outputs, &live))
+}
+
+/// The number that a free input stands for.
+fn gap(meaning: &Meaning) -> Option<Term> {
+    match *meaning {
+        Meaning::Bit(..) => None,
+        Meaning::Boundary(term, _)
+        | Meaning::NotANumber(term)
+        | Meaning::Less(term, _)
+        | Meaning::Equal(term, _)
+        | Meaning::Free(term, _) => Some(term),
+    }
+}
+
+/// Inputs and registers that the outputs depend on.
+fn live(circuit: &Circuit, outputs: &[(String, Expression)]) -> BTreeSet<Bit> {
+    let mut live = BTreeSet::new();
+    let mut roots: Vec<Expression> = outputs.iter().map(|(_, value)| *value).collect();
+    loop {
+        let reached = circuit.graph().reached(&roots);
+        let operations = circuit.graph().operations().iter().zip(reached);
+        let mut more = Vec::new();
+        for (operation, is_reached) in operations {
+            if let (understudy_logic::Operation::Variable(variable), true) = (operation, is_reached)
+                && live.insert(*variable)
+                && let Bit::Register(register) = variable
+            {
+                more.push(circuit.registers()[*register as usize].next);
+            }
+        }
+        if more.is_empty() {
+            return live;
+        }
+        roots.extend(more);
+    }
+}
+
+/// The circuit with the bits of points as its inputs and outputs, and the registers that they depend on.
+fn pruned(
+    system: &System,
+    derivation: &Derivation,
+    outputs: &[(String, Expression)],
+    live: &BTreeSet<Bit>,
+) -> Circuit {
+    let circuit = &derivation.circuit;
+    let mut builder = CircuitBuilder::new(circuit.name());
+    let mut places: Vec<Option<Expression>> = vec![None; circuit.inputs().len()];
+    let mut known: std::collections::HashMap<(u32, u32), usize> = std::collections::HashMap::new();
+    for (place, meaning) in derivation.meanings.iter().enumerate() {
+        if let Meaning::Bit(input, bit) = *meaning {
+            known.insert((input, bit), place);
+        }
+    }
+    for (number, input) in (0..).zip(&system.inputs) {
+        debug_assert!(matches!(system.terms.node(input.term), Node::Variable(Variable::Input(_))));
+        for bit in 0..input.of.bits() {
+            let name = match input.of {
+                Elementary::Bool => input.name.clone(),
+                _ => format!("{}.{bit}", input.name),
+            };
+            let value = builder.input(name);
+            if let Some(&place) = known.get(&(number, bit)) {
+                places[place] = Some(value);
+            }
+        }
+    }
+    let kept: Vec<usize> = live
+        .iter()
+        .filter_map(|variable| match variable {
+            Bit::Register(register) => Some(*register as usize),
+            Bit::Input(_) => None,
+        })
+        .collect();
+    let mut registers = vec![None; circuit.registers().len()];
+    for &place in &kept {
+        let register = &circuit.registers()[place];
+        registers[place] = Some(builder.register(&register.name, register.initial));
+    }
+    let mut roots: Vec<Expression> =
+        kept.iter().map(|&place| circuit.registers()[place].next).collect();
+    roots.extend(outputs.iter().map(|(_, value)| *value));
+    let copies = builder.graph().import(circuit.graph(), &roots, |graph, variable| {
+        let value = match variable {
+            Bit::Input(input) => places[input as usize],
+            Bit::Register(register) => registers[register as usize].map(|(_, value)| value),
+        };
+        value.unwrap_or_else(|| graph.constant(false))
+    });
+    for (&place, &next) in kept.iter().zip(&copies) {
+        if let Some((register, _)) = registers[place] {
+            builder.set_next(register, next);
+        }
+    }
+    for ((name, _), &value) in outputs.iter().zip(&copies[kept.len()..]) {
+        builder.output(name, value);
+    }
+    builder.finish().expect("names of points are unique, and every register has its next value")
+}

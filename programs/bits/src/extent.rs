@@ -1,0 +1,533 @@
+//! Between which numbers each value of a system lies, and of which number it is a multiple.
+//!
+//! The extents of cells grow from their initial values until no scan leaves them; a bound that keeps growing goes to the next constant of
+//! the programs, then to the end of its type. A selection restricts what stands behind its condition: `IF n < 5 THEN n := n + 1` keeps `n` within 5.
+
+use std::collections::BTreeSet;
+
+use understudy_typed::{Comparison, Elementary, Operation};
+
+use crate::System;
+use crate::term::{Node, Term, Terms, Variable};
+
+/// Scans after which a bound that grows goes to the next constant.
+const EXACT: usize = 3;
+/// Scans after which it goes to the end of its type.
+const CONSTANTS: usize = 24;
+/// Scans after which nothing is known of any cell.
+const ALL: usize = 60;
+/// Terms of which conditions are not followed.
+const MANY: usize = 60_000;
+/// Terms that are looked at again for one side of a selection.
+const LOOKS: u32 = 200;
+
+/// Numbers from `low` to `high` that are multiples of `unit`; of a unit of 0 the number is 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Extent {
+    pub(crate) low: i128,
+    pub(crate) high: i128,
+    pub(crate) unit: i128,
+}
+
+impl Extent {
+    pub(crate) fn new(low: i128, high: i128) -> Self {
+        let unit = if low == high { low.abs() } else { 1 };
+        Self { low, high, unit }
+    }
+
+    /// Every value of a type; reals by their bits.
+    pub(crate) fn of(of: Elementary) -> Self {
+        let (low, high) = if of.is_real() { (0, of.mask().into()) } else { of.limits() };
+        Self { low, high, unit: 1 }
+    }
+
+    fn is_of(self, of: Elementary) -> bool {
+        let (low, high) = of.limits();
+        !of.is_real() && low <= self.low && self.high <= high
+    }
+
+    /// The same where the type holds it, else every value of the type: past its end a number wraps.
+    fn wrapped(self, of: Elementary) -> Self {
+        if self.is_of(of) { self } else { Self::of(of) }
+    }
+
+    fn joined(self, other: Self) -> Self {
+        Self {
+            low: self.low.min(other.low),
+            high: self.high.max(other.high),
+            unit: divisor(self.unit, other.unit),
+        }
+    }
+
+    /// What of it lies between two numbers; as it is where nothing does, since no run comes there.
+    fn within(self, low: i128, high: i128) -> Self {
+        let unit = self.unit.max(1);
+        let low = low.max(self.low);
+        let high = high.min(self.high);
+        let low = low.div_euclid(unit) * unit + if low.rem_euclid(unit) == 0 { 0 } else { unit };
+        let high = high.div_euclid(unit) * unit;
+        match low.cmp(&high) {
+            std::cmp::Ordering::Less => Self { low, high, unit: self.unit },
+            std::cmp::Ordering::Equal => Self::new(low, high),
+            std::cmp::Ordering::Greater => self,
+        }
+    }
+
+    fn is_natural(self) -> bool {
+        self.low >= 0
+    }
+}
+
+/// The greatest common divisor; of 0 and a number that number.
+pub(crate) fn divisor(mut one: i128, mut other: i128) -> i128 {
+    while other != 0 {
+        (one, other) = (other, one % other);
+    }
+    one.abs()
+}
+
+/// The extent of each term of a system.
+pub(crate) struct Extents(Vec<Extent>);
+
+impl Extents {
+    pub(crate) fn new(system: &System) -> Self {
+        let cells = system.cells.iter();
+        let first = |stored, of: Elementary| {
+            if of.is_real() {
+                return Extent::of(of);
+            }
+            let number = of.signed(stored);
+            Extent::new(number, number)
+        };
+        let mut search = Search {
+            system,
+            cells: cells.map(|cell| first(cell.initial, cell.of)).collect(),
+            terms: Vec::new(),
+            follows: system.terms.len() <= MANY,
+        };
+        let ends = search.ends();
+        let mut round = 0;
+        while search.grow(round, &ends) {
+            round += 1;
+        }
+        // Bounds that grew too far come back, as far as a scan from them allows.
+        for _ in 0..2 {
+            let known = search.cells.clone();
+            search.shrink();
+            search.evaluate();
+            if !search.is_closed() {
+                search.cells = known;
+                search.evaluate();
+                break;
+            }
+        }
+        Self(search.terms)
+    }
+
+    pub(crate) fn get(&self, term: Term) -> Extent {
+        self.0[Terms::index(term)]
+    }
+}
+
+struct Search<'s> {
+    system: &'s System,
+    cells: Vec<Extent>,
+    terms: Vec<Extent>,
+    follows: bool,
+}
+
+/// What a condition says of a number.
+#[derive(Debug, Clone, Copy)]
+struct Fact {
+    term: Term,
+    low: i128,
+    high: i128,
+}
+
+impl Search<'_> {
+    /// Where bounds that grow are held: at the constants and beside them.
+    fn ends(&self) -> BTreeSet<i128> {
+        let mut ends = BTreeSet::new();
+        for (of, stored) in self.system.terms.all_constants() {
+            if !of.is_real() && of != Elementary::Bool {
+                let number = of.signed(stored);
+                ends.extend([number - 1, number, number + 1]);
+            }
+        }
+        ends
+    }
+
+    /// Extents of all terms for those of the cells.
+    fn evaluate(&mut self) {
+        self.terms.clear();
+        let terms = &self.system.terms;
+        for place in 0..terms.len() {
+            let term = terms.at(place);
+            let extent = self.extent(term);
+            self.terms.push(extent);
+        }
+    }
+
+    /// One scan more; whether a cell has left its extent.
+    fn grow(&mut self, round: usize, ends: &BTreeSet<i128>) -> bool {
+        self.evaluate();
+        let mut grew = false;
+        for (place, cell) in self.system.cells.iter().enumerate() {
+            let known = self.cells[place];
+            let mut next = known.joined(self.terms[Terms::index(cell.next)]);
+            if next == known {
+                continue;
+            }
+            grew = true;
+            let full = Extent::of(cell.of);
+            if round >= ALL {
+                next = full;
+            } else if round >= EXACT {
+                let is_held = round < CONSTANTS;
+                if next.high > known.high {
+                    let end = ends.range(next.high..).next().filter(|_| is_held);
+                    next.high = end.copied().unwrap_or(full.high).min(full.high);
+                }
+                if next.low < known.low {
+                    let end = ends.range(..=next.low).next_back().filter(|_| is_held);
+                    next.low = end.copied().unwrap_or(full.low).max(full.low);
+                }
+                // Bounds are multiples too.
+                next = next.within(next.low, next.high);
+            }
+            self.cells[place] = next;
+        }
+        grew
+    }
+
+    /// Whether a scan from the extents of the cells stays within them.
+    fn is_closed(&self) -> bool {
+        let mut cells = self.system.cells.iter().zip(&self.cells);
+        cells.all(|(cell, &known)| known.joined(self.terms[Terms::index(cell.next)]) == known)
+    }
+
+    /// The extents that one scan from the known ones leaves.
+    fn shrink(&mut self) {
+        for (place, cell) in self.system.cells.iter().enumerate() {
+            let next = self.terms[Terms::index(cell.next)];
+            let initial = cell.of.signed(cell.initial);
+            if !cell.of.is_real() {
+                self.cells[place] = Extent::new(initial, initial).joined(next);
+            }
+        }
+    }
+
+    /// The extent of a term whose operands have theirs.
+    fn extent(&self, term: Term) -> Extent {
+        let terms = &self.system.terms;
+        let of = terms.of(term);
+        match terms.node(term) {
+            Node::Constant(stored) if !of.is_real() => {
+                let number = of.signed(*stored);
+                Extent::new(number, number)
+            }
+            Node::Variable(Variable::Input(number)) if !of.is_real() => {
+                let (low, high) = self.system.inputs[*number as usize].limits;
+                Extent::new(low, high)
+            }
+            Node::Variable(Variable::Cell(cell)) => self.cells[*cell as usize],
+            Node::Apply(operation, operands) => {
+                let operands: Vec<Extent> =
+                    operands.iter().map(|operand| self.terms[Terms::index(*operand)]).collect();
+                applied(*operation, of, &operands)
+            }
+            Node::Choose([condition, then, otherwise]) if !of.is_real() => {
+                let sides = [(true, then), (false, otherwise)]
+                    .map(|(is, side)| self.side(*condition, is, *side));
+                either(sides).unwrap_or_else(|| Extent::of(of))
+            }
+            _ => Extent::of(of),
+        }
+    }
+
+    /// The extent of a term where a condition is so; `None` where it never is.
+    fn side(&self, condition: Term, value: bool, term: Term) -> Option<Extent> {
+        let known = self.terms[Terms::index(term)];
+        if !self.follows {
+            return Some(known);
+        }
+        let mut facts = Vec::new();
+        self.facts(condition, value, &mut facts, 0);
+        if self.is_contradicted(&facts) {
+            return None;
+        }
+        let mut looks = LOOKS;
+        let refined = self.refined(term, &mut facts, &mut looks, 0);
+        Some(Extent { unit: known.unit, ..refined })
+    }
+
+    fn is_contradicted(&self, facts: &[Fact]) -> bool {
+        facts.iter().any(|fact| {
+            let known = self.terms[Terms::index(fact.term)];
+            let is_number = !self.system.terms.of(fact.term).is_real();
+            is_number && (fact.low > known.high || fact.high < known.low || fact.low > fact.high)
+        })
+    }
+
+    /// What is known where a condition is so.
+    fn facts(&self, condition: Term, value: bool, facts: &mut Vec<Fact>, depth: u32) {
+        if depth > 24 || facts.len() > 64 {
+            return;
+        }
+        let terms = &self.system.terms;
+        let known = i128::from(value);
+        facts.push(Fact { term: condition, low: known, high: known });
+        let Node::Apply(operation, operands) = terms.node(condition) else {
+            return;
+        };
+        match (operation, &**operands) {
+            (Operation::Not(_), &[inner]) => self.facts(inner, !value, facts, depth + 1),
+            (Operation::And(Elementary::Bool), &[left, right]) if value => {
+                self.facts(left, true, facts, depth + 1);
+                self.facts(right, true, facts, depth + 1);
+            }
+            (Operation::Or(Elementary::Bool), &[left, right]) if !value => {
+                self.facts(left, false, facts, depth + 1);
+                self.facts(right, false, facts, depth + 1);
+            }
+            (Operation::Compare(comparison, of), &[left, right]) if !of.is_real() => {
+                let comparison = if value { *comparison } else { comparison.opposite() };
+                self.compared(comparison, left, right, facts);
+                self.compared(comparison.mirrored(), right, left, facts);
+            }
+            _ => {}
+        }
+    }
+
+    /// What a comparison says of its left side.
+    fn compared(&self, comparison: Comparison, left: Term, right: Term, facts: &mut Vec<Fact>) {
+        let (one, other) = (self.terms[Terms::index(left)], self.terms[Terms::index(right)]);
+        let (low, high) = match comparison {
+            Comparison::Equal => (other.low, other.high),
+            Comparison::Less => (one.low, other.high - 1),
+            Comparison::LessOrEqual => (one.low, other.high),
+            Comparison::Greater => (other.low + 1, one.high),
+            Comparison::GreaterOrEqual => (other.low, one.high),
+            Comparison::NotEqual if other.low == other.high && other.low == one.low => {
+                (one.low + 1, one.high)
+            }
+            Comparison::NotEqual if other.low == other.high && other.low == one.high => {
+                (one.low, one.high - 1)
+            }
+            Comparison::NotEqual => return,
+        };
+        self.bounded(left, low, high, facts, 0);
+    }
+
+    /// Notes bounds of a number, and of what it is made of.
+    fn bounded(&self, term: Term, low: i128, high: i128, facts: &mut Vec<Fact>, depth: u32) {
+        facts.push(Fact { term, low, high });
+        let terms = &self.system.terms;
+        let Node::Apply(operation, operands) = terms.node(term) else {
+            return;
+        };
+        if depth > 8 {
+            return;
+        }
+        let of = |term: Term| self.terms[Terms::index(term)];
+        match (*operation, &**operands) {
+            (Operation::Convert(_, to) | Operation::Reinterpret(_, to), &[inner])
+                if to != Elementary::Bool && of(inner).is_of(to) =>
+            {
+                self.bounded(inner, low, high, facts, depth + 1);
+            }
+            (Operation::Add(to), &[left, right]) => {
+                let (one, other) = (of(left), of(right));
+                let sum = Extent::new(one.low + other.low, one.high + other.high);
+                if other.low == other.high && sum.is_of(to) {
+                    self.bounded(left, low - other.low, high - other.low, facts, depth + 1);
+                }
+            }
+            (Operation::Subtract(to), &[left, right]) => {
+                let (one, other) = (of(left), of(right));
+                let difference = Extent::new(one.low - other.high, one.high - other.low);
+                if other.low == other.high && difference.is_of(to) {
+                    self.bounded(left, low + other.low, high + other.low, facts, depth + 1);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn refined(&self, term: Term, facts: &mut Vec<Fact>, looks: &mut u32, depth: u32) -> Extent {
+        let mut known = self.terms[Terms::index(term)];
+        let terms = &self.system.terms;
+        let of = terms.of(term);
+        if of.is_real() || known.low == known.high {
+            return known;
+        }
+        for fact in facts.iter().filter(|fact| fact.term == term) {
+            known = known.within(fact.low, fact.high);
+        }
+        if depth > 16 || *looks == 0 {
+            return known;
+        }
+        *looks -= 1;
+        let again = match terms.node(term) {
+            Node::Apply(operation, operands) if !matches!(operation, Operation::Compare(..)) => {
+                let mut inner = Vec::with_capacity(operands.len());
+                for &operand in operands {
+                    inner.push(self.refined(operand, facts, looks, depth + 1));
+                }
+                applied(*operation, of, &inner)
+            }
+            Node::Choose([condition, then, otherwise]) => {
+                let is = facts.iter().find(|fact| fact.term == *condition);
+                match is.map(|fact| fact.low) {
+                    Some(0) => self.refined(*otherwise, facts, looks, depth + 1),
+                    Some(_) => self.refined(*then, facts, looks, depth + 1),
+                    None => {
+                        let count = facts.len();
+                        let sides = [(true, then), (false, otherwise)].map(|(is, side)| {
+                            self.facts(*condition, is, facts, 0);
+                            let refined = (!self.is_contradicted(&facts[count..]))
+                                .then(|| self.refined(*side, facts, looks, depth + 1));
+                            facts.truncate(count);
+                            refined
+                        });
+                        match either(sides) {
+                            Some(extent) => extent,
+                            None => return known,
+                        }
+                    }
+                }
+            }
+            _ => return known,
+        };
+        let unit = known.unit;
+        let met = known.within(again.low, again.high);
+        if met.low == met.high { met } else { Extent { unit: unit.max(again.unit), ..met } }
+    }
+}
+
+/// The extent of a selection from those of its sides, of which one may never be taken.
+fn either(sides: [Option<Extent>; 2]) -> Option<Extent> {
+    match sides {
+        [Some(then), Some(otherwise)] => Some(then.joined(otherwise)),
+        [one, other] => one.or(other),
+    }
+}
+
+/// The extent of a BOOL that is known to be so, or not.
+fn known(value: bool) -> Extent {
+    Extent::new(value.into(), value.into())
+}
+
+/// The extent of the result of an operation.
+fn applied(operation: Operation, of: Elementary, operands: &[Extent]) -> Extent {
+    use Operation as O;
+    let full = Extent::of(of);
+    let between = |low: i128, high: i128, unit: i128| Extent { low, high, unit };
+    match (operation, operands) {
+        (O::Not(Elementary::Bool), &[one]) => Extent::new(1 - one.high, 1 - one.low),
+        (O::And(Elementary::Bool), &[one, other]) => {
+            Extent::new(one.low.min(other.low), one.high.min(other.high))
+        }
+        (O::Or(Elementary::Bool), &[one, other]) => {
+            Extent::new(one.low.max(other.low), one.high.max(other.high))
+        }
+        (O::Compare(comparison, kind), &[one, other]) if !kind.is_real() => {
+            let (least, most) = (one.low == one.high && one == other, one.high < other.low);
+            let apart = most || other.high < one.low;
+            let is = match comparison {
+                Comparison::Equal if apart => Some(false),
+                Comparison::Equal => least.then_some(true),
+                Comparison::NotEqual if apart => Some(true),
+                Comparison::NotEqual => least.then_some(false),
+                Comparison::Less if most => Some(true),
+                Comparison::Less => (one.low >= other.high).then_some(false),
+                Comparison::GreaterOrEqual if most => Some(false),
+                Comparison::GreaterOrEqual => (one.low >= other.high).then_some(true),
+                Comparison::Greater if other.high < one.low => Some(true),
+                Comparison::Greater => (one.high <= other.low).then_some(false),
+                Comparison::LessOrEqual if other.high < one.low => Some(false),
+                Comparison::LessOrEqual => (one.high <= other.low).then_some(true),
+            };
+            is.map_or(full, known)
+        }
+        (O::Add(kind), &[one, other]) if !kind.is_real() => {
+            let unit = divisor(one.unit, other.unit);
+            between(one.low + other.low, one.high + other.high, unit).wrapped(of)
+        }
+        (O::Subtract(kind), &[one, other]) if !kind.is_real() => {
+            let unit = divisor(one.unit, other.unit);
+            between(one.low - other.high, one.high - other.low, unit).wrapped(of)
+        }
+        (O::Negate(kind), &[one]) if !kind.is_real() => {
+            between(-one.high, -one.low, one.unit).wrapped(of)
+        }
+        (O::Absolute(kind), &[one]) if !kind.is_real() => {
+            let most = one.low.abs().max(one.high.abs());
+            let least = if one.low > 0 { one.low } else { 0.max(-one.high) };
+            between(least, most, one.unit).wrapped(of)
+        }
+        (O::Multiply(kind), &[one, other]) if !kind.is_real() => {
+            let corners =
+                [one.low, one.high].map(|a| [other.low, other.high].map(|b| a.checked_mul(b)));
+            let corners: Option<Vec<i128>> = corners.into_iter().flatten().collect();
+            let unit = one.unit.checked_mul(other.unit);
+            match (corners, unit) {
+                (Some(corners), Some(unit)) => {
+                    let low = corners.iter().copied().min().unwrap_or(0);
+                    let high = corners.iter().copied().max().unwrap_or(0);
+                    between(low, high, unit).wrapped(of)
+                }
+                _ => full,
+            }
+        }
+        (O::Divide(kind), &[one, other]) if !kind.is_real() => {
+            if other.low == other.high && other.low > 0 {
+                let by = other.low;
+                let unit = if one.unit % by == 0 { one.unit / by } else { 1 };
+                return between(one.low / by, one.high / by, unit).wrapped(of);
+            }
+            let most = one.low.abs().max(one.high.abs());
+            let least = if one.is_natural() && other.is_natural() { 0 } else { -most };
+            between(least, most, 1).wrapped(of)
+        }
+        (O::Modulo(kind), &[one, other]) if !kind.is_real() => {
+            let most = (other.low.abs().max(other.high.abs()) - 1).max(0);
+            let most = most.min(one.low.abs().max(one.high.abs()));
+            let least = if one.is_natural() { 0 } else { -most };
+            let high = if one.high <= 0 { 0 } else { most };
+            between(least, high, 1).wrapped(of)
+        }
+        (O::Minimum(kind) | O::Maximum(kind), [first, rest @ ..]) if !kind.is_real() => {
+            let take = |one: i128, other: i128| match operation {
+                O::Minimum(_) => one.min(other),
+                _ => one.max(other),
+            };
+            rest.iter().fold(*first, |known, next| Extent {
+                low: take(known.low, next.low),
+                high: take(known.high, next.high),
+                unit: divisor(known.unit, next.unit),
+            })
+        }
+        (O::Convert(from, to), &[one]) if !from.is_real() && !to.is_real() => {
+            if to == Elementary::Bool { full } else { one.wrapped(of) }
+        }
+        (O::Reinterpret(from, _), &[one]) if !from.is_real() && !of.is_real() => one.wrapped(of),
+        (O::And(kind), &[one, other]) if kind != Elementary::Bool => {
+            match (one.is_natural(), other.is_natural()) {
+                (true, true) => between(0, one.high.min(other.high), 1),
+                _ => full,
+            }
+        }
+        (O::Or(kind) | O::Xor(kind), &[one, other])
+            if kind != Elementary::Bool && one.is_natural() && other.is_natural() =>
+        {
+            let high = one.high.max(other.high);
+            let high = (1_i128 << (128 - high.leading_zeros())) - 1;
+            between(0, high, 1).wrapped(of)
+        }
+        (O::ShiftRight(_), &[one, by]) if one.is_natural() && (0..64).contains(&by.low) => {
+            between(0, one.high >> by.low, 1)
+        }
+        _ => full,
+    }
+}
