@@ -1,5 +1,6 @@
 //! Reads and writes the files of a command.
 
+use std::borrow::Cow;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -12,7 +13,8 @@ use understudy_interchange::{
 };
 use understudy_journal::{Members, RunDirectory, RunDirectoryError, named_file};
 use understudy_ladder::Program;
-use understudy_parity::ParityController;
+use understudy_logic::Circuit;
+use understudy_parity::{ParityController, generate};
 use understudy_scenarios::{Scenario, read as read_scenario};
 use understudy_text::spelling::nearest;
 use understudy_text::{Diagnostic, Report, decode, has_errors};
@@ -395,25 +397,30 @@ pub(crate) fn unwritable(path: &Path, error: &io::Error) -> Answer {
     Answer::failed(Status::Failed, "U0602", message)
 }
 
-/// The generated controller of a cluster whose programs are all Boolean, for a command that works on circuits.
+/// The generated controller of a cluster whose programs all have exact circuits, for a command that works on circuits.
 ///
 /// # Errors
-/// The answer of the command, where a program has numbers.
+/// The answer of the command: which program has none, and which of its values is in the way.
 pub(crate) fn parity_of<'a>(
     cluster: &'a Cluster,
     command: &str,
-) -> Result<&'a ParityController, Answer> {
-    cluster.parity().ok_or_else(|| {
-        let mut controllers = cluster.controllers().iter();
-        let typed = controllers.find_map(|controller| {
-            controller
-                .code
-                .typed()
-                .map(|program| (controller.name.as_str(), why_no_ladder(program)))
-        });
-        let (name, why) = typed.unwrap_or(("the cluster", "has numbers"));
-        let message =
-            format!("`{command}` works on Boolean programs, and the program of `{name}` {why}");
-        Answer::failed(Status::BadInput, "U0438", message)
-    })
+) -> Result<Cow<'a, ParityController>, Answer> {
+    if let Some(parity) = cluster.parity() {
+        return Ok(Cow::Borrowed(parity));
+    }
+    let bad = |code, message: String| Answer::failed(Status::BadInput, code, message);
+    let mut circuits = Vec::new();
+    for controller in cluster.controllers() {
+        let circuit = controller.code.exact_circuit().map_err(|inexact| {
+            let name = &controller.name;
+            let message = format!(
+                "`{command}` works on circuits, and the program of `{name}` has none: {inexact}"
+            );
+            bad("U0438", message)
+        })?;
+        circuits.push(circuit);
+    }
+    let circuits: Vec<&Circuit> = circuits.iter().map(AsRef::as_ref).collect();
+    let parity = generate(&circuits).map_err(|error| bad(error.code(), error.to_string()))?;
+    Ok(Cow::Owned(parity))
 }

@@ -62,7 +62,7 @@ fn made(cluster: &Cluster, form: Form) -> Result<(String, Value), Answer> {
         // Addresses of the members belong to other PLCs and would collide here.
         Form::St => circuit_as_structured_text(circuit, cluster.agreement().schedule.period()),
         Form::Equations | Form::Json => {
-            let equations = Equations::of(parity);
+            let equations = Equations::of(&parity);
             let value = serde_json::to_value(&equations).unwrap_or_default();
             let text = if form == Form::Json {
                 serde_json::to_string_pretty(&equations).unwrap_or_default()

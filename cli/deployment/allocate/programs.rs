@@ -91,7 +91,14 @@ impl Programs {
         }
         for cluster in clusters {
             let prefix = prefix(cluster.name());
-            files::parity_of(&cluster, "allocate")?;
+            let mut controllers = cluster.controllers().iter();
+            if let Some(other) = controllers.find(|controller| controller.ladder().is_none()) {
+                let message = format!(
+                    "`allocate` counts rungs, and the program of `{}` is written in statements",
+                    other.name
+                );
+                return Err(Answer::failed(Status::BadInput, "U0438", message));
+            }
             groups.push(of_cluster(cluster, prefix));
         }
         Ok(Self { groups, reports })

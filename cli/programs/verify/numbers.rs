@@ -1,5 +1,6 @@
 //! Proofs about programs with numbers, and about the programs of a cluster together.
 
+use serde_json::json;
 use understudy_bits::{Code, Member, Source, Unsupported};
 use understudy_cluster::{Cluster, InputSourceKind, RemoteIo};
 use understudy_text::Report;
@@ -7,12 +8,13 @@ use understudy_typed::{Point, Program};
 use understudy_verification::numbers::Model;
 use understudy_verification::program::Bounds;
 use understudy_verification::property::{Property, read_one};
+use understudy_verification::smv;
 use understudy_verification::symbolic::Resolved;
 
 use super::answer::{self, Finding, ProgramAnswer};
-use super::{Arguments, Asked, asked, bounds, used};
+use super::{Arguments, Asked, Smv, asked, bounds, used};
 use crate::answer::{Answer, Status};
-use crate::files::why_no_ladder;
+use crate::files;
 use crate::patience::Patience;
 
 /// The standard property of a program with numbers.
@@ -25,11 +27,9 @@ pub(super) fn of_program(
     report: Report,
     patience: &Patience<'_>,
 ) -> Result<Answer, Answer> {
-    if arguments.smv.is_some() || arguments.draw.is_some() {
-        let message = format!(
-            "--draw and --smv work on Boolean programs, and the program {}",
-            why_no_ladder(program)
-        );
+    if arguments.smv == Some(Smv::Rungs) || arguments.draw.is_some() {
+        let message =
+            "--draw and --smv rungs work on rungs, and the program is written in statements";
         return Err(Answer::failed(Status::BadInput, "U0438", message));
     }
     patience.turn_to("the statements of the program".to_owned());
@@ -41,6 +41,18 @@ pub(super) fn of_program(
             return Err(answer);
         }
     };
+    if arguments.smv.is_some() {
+        let circuit = model.exact_circuit().map_err(|inexact| {
+            let message = format!("--smv writes circuits, and the program has none: {inexact}");
+            Answer::failed(Status::BadInput, "U0438", message)
+        })?;
+        let formulas: Vec<Resolved> =
+            asked.properties.iter().map(|(_, formula)| formula.clone()).collect();
+        let text = smv::of_circuit(circuit, &formulas, &asked.fair);
+        let output = arguments.output.as_deref();
+        let answer = files::deliver(output, &text, json!({ "text": text }))?;
+        return Ok(answer.with_used(vec![report]));
+    }
     if asked.properties.is_empty() {
         asked.properties.extend(standard_property(&model, STANDARD));
     }

@@ -12,7 +12,7 @@ mod replay;
 #[cfg(test)]
 mod tests;
 
-use understudy_bits::{Derivation, Meaning, Member, Node, System, Unsupported, Variable};
+use understudy_bits::{Derivation, Inexact, Meaning, Member, Node, System, Unsupported, Variable};
 use understudy_logic::Circuit;
 use understudy_text::Diagnostic;
 use understudy_typed::Program;
@@ -71,6 +71,15 @@ impl Model {
         let derivation = Derivation::new(&system)?;
         let subject = Subject::of(derivation.circuit.clone());
         Ok(Self { system, derivation, subject })
+    }
+
+    /// The circuit, where it does what the programs do and nothing else.
+    ///
+    /// # Errors
+    /// The values of the programs that it does not follow bit by bit.
+    pub fn exact_circuit(&self) -> Result<&Circuit, Inexact> {
+        let gaps = self.derivation.gaps(&self.system);
+        if gaps.is_empty() { Ok(self.circuit()) } else { Err(Inexact::Gaps(gaps)) }
     }
 
     /// The circuit that stands for the programs.

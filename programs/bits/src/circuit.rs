@@ -98,6 +98,11 @@ impl Derivation {
         }
     }
 
+    /// Whether a BOOL is FALSE in every run.
+    pub(crate) fn is_never(&self, term: Term) -> bool {
+        self.extents.get(term).high == 0
+    }
+
     /// What a number is a multiple of.
     pub fn unit(&self, term: Term) -> i128 {
         self.extents.get(term).unit.max(1)

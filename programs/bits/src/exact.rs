@@ -42,7 +42,7 @@ fn gaps(gaps: &[Gap]) -> String {
 
 /// The circuit of a program whose values are finite. Its inputs and outputs are the bits of the points, in their order: a BOOL under its own name, the
 /// bits of another point as `NAME.0` for the lowest and so on. A number has as many registers as its values need; the bits of a BOOL, of a
-/// timer or of a counter stand behind the name of the variable.
+/// timer or of a counter stand behind the name of the variable. A program that never stops by a fault has neither the reset nor the fault among them.
 ///
 /// # Errors
 /// What of the program is not followed, or not bit by bit.
@@ -57,9 +57,12 @@ pub fn exact(program: &Program) -> Result<Circuit, Inexact> {
         wide.filter_map(|point| Some((point.name.clone(), value(&point.name)?))).collect();
     let derivation = Derivation::of(&system, &wide)?;
     let circuit = &derivation.circuit;
+    let never = |value: Term| system.terms.is(value, false) || derivation.is_never(value);
+    let stops = !value(Program::FAULT).is_some_and(never);
     let outputs: Vec<(String, Expression)> = program
         .outputs
         .iter()
+        .filter(|point| stops || point.slot != 0)
         .flat_map(|point| match point.of {
             Elementary::Bool => vec![point.name.clone()],
             of => (0..of.bits()).map(|bit| format!("{}.{bit}", point.name)).collect(),
@@ -69,25 +72,34 @@ pub fn exact(program: &Program) -> Result<Circuit, Inexact> {
             known.find(|output| output.name == name).map(|output| (name, output.value))
         })
         .collect();
-    let live = live(circuit, &outputs);
-    let mut gaps: BTreeSet<Gap> = BTreeSet::new();
-    for input in live.iter().filter_map(|variable| match variable {
-        Bit::Input(input) => Some(*input as usize),
-        Bit::Register(_) => None,
-    }) {
-        if let Some(term) = gap(&derivation.meanings[input]) {
-            gaps.insert(Gap { what: system.describe(term), of: system.terms.of(term) });
-        }
-    }
-    let stored = |of: Elementary| !of.is_real();
+    let live = live(circuit, outputs.iter().map(|(_, value)| *value).collect());
+    let mut gaps = derivation.gaps_among(&system, &live);
     let points = program.inputs.iter().chain(&program.outputs);
-    for point in points.filter(|point| !stored(point.of)) {
+    for point in points.filter(|point| point.of.is_real()) {
         gaps.insert(Gap { what: point.name.clone(), of: point.of });
     }
     if !gaps.is_empty() {
         return Err(Inexact::Gaps(gaps.into_iter().collect()));
     }
-    Ok(pruned(&system, &derivation, &outputs, &live))
+    Ok(pruned(&system, &derivation, &outputs, &live, stops))
+}
+
+impl Derivation {
+    /// The values of the system that the circuit does not follow bit by bit; none where it is exact.
+    pub fn gaps(&self, system: &System) -> Vec<Gap> {
+        let outputs = self.circuit.outputs().iter();
+        let live = live(&self.circuit, outputs.map(|output| output.value).collect());
+        self.gaps_among(system, &live).into_iter().collect()
+    }
+
+    fn gaps_among(&self, system: &System, live: &BTreeSet<Bit>) -> BTreeSet<Gap> {
+        let inputs = live.iter().filter_map(|variable| match variable {
+            Bit::Input(input) => Some(*input as usize),
+            Bit::Register(_) => None,
+        });
+        let terms = inputs.filter_map(|input| gap(&self.meanings[input]));
+        terms.map(|term| Gap { what: system.describe(term), of: system.terms.of(term) }).collect()
+    }
 }
 
 /// The number that a free input stands for.
@@ -102,10 +114,9 @@ fn gap(meaning: &Meaning) -> Option<Term> {
     }
 }
 
-/// Inputs and registers that the outputs depend on.
-fn live(circuit: &Circuit, outputs: &[(String, Expression)]) -> BTreeSet<Bit> {
+/// Inputs and registers that the roots depend on.
+fn live(circuit: &Circuit, mut roots: Vec<Expression>) -> BTreeSet<Bit> {
     let mut live = BTreeSet::new();
-    let mut roots: Vec<Expression> = outputs.iter().map(|(_, value)| *value).collect();
     loop {
         let reached = circuit.graph().reached(&roots);
         let operations = circuit.graph().operations().iter().zip(reached);
@@ -131,6 +142,7 @@ fn pruned(
     derivation: &Derivation,
     outputs: &[(String, Expression)],
     live: &BTreeSet<Bit>,
+    stops: bool,
 ) -> Circuit {
     let circuit = &derivation.circuit;
     let mut builder = CircuitBuilder::new(circuit.name());
@@ -141,7 +153,8 @@ fn pruned(
             known.insert((input, bit), place);
         }
     }
-    for (number, input) in (0..).zip(&system.inputs) {
+    let inputs = (0..).zip(&system.inputs);
+    for (number, input) in inputs.filter(|(_, input)| stops || input.name != Program::RESET) {
         debug_assert!(matches!(system.terms.node(input.term), Node::Variable(Variable::Input(_))));
         for bit in 0..input.of.bits() {
             let name = match input.of {

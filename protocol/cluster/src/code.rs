@@ -1,7 +1,9 @@
 //! What a controller runs, in the form in which it was read.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
+use understudy_bits::{Inexact, exact};
 use understudy_executable::{Executable, Interface};
 use understudy_ladder::Program as LadderProgram;
 use understudy_logic::Circuit;
@@ -33,6 +35,17 @@ impl Code {
         match self {
             Self::Ladder(_, circuit) => Some(circuit),
             Self::Typed(..) => None,
+        }
+    }
+
+    /// The circuit that does in every scan what the program does.
+    ///
+    /// # Errors
+    /// The values of the program that have no bits.
+    pub fn exact_circuit(&self) -> Result<Cow<'_, Circuit>, Inexact> {
+        match self {
+            Self::Ladder(_, circuit) => Ok(Cow::Borrowed(circuit)),
+            Self::Typed(program, _) => exact(program).map(Cow::Owned),
         }
     }
 

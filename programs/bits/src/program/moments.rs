@@ -36,7 +36,7 @@ impl System {
     ) -> Result<(Scanned, HashMap<u64, Age>), Unsupported> {
         let mut ages = HashMap::new();
         for address in self.moments(scan, &scanned, numbers) {
-            let name = format!("time since {}", self.cells[numbers[&address] as usize].name);
+            let name = format!("{}.age", self.cells[numbers[&address] as usize].name);
             let cell = self.cell(name, Elementary::Time, 0);
             ages.insert(address, Age { cell, most: 0 });
         }

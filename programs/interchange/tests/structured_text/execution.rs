@@ -70,12 +70,15 @@ pub(crate) fn check(what: &str, ladder: &Ladder, typed: &Program, seed: u64) {
 pub(crate) fn check_bits(what: &str, circuit: &Circuit, typed: &Program, seed: u64) {
     let inputs: Vec<&str> = circuit.inputs().iter().map(String::as_str).collect();
     let outputs: Vec<&str> = circuit.outputs().iter().map(|it| it.name.as_str()).collect();
+    // A program that never stops has neither reset nor fault.
+    let stops = outputs.contains(&Program::FAULT);
     let named = |points: &understudy_typed::Points| {
-        let names = points.bit_names().into_iter();
-        names.filter(|name| !name.is_empty()).count()
+        let own = points.iter().filter(|point| stops || point.slot != 0);
+        own.map(|point| point.of.bits() as usize).sum::<usize>()
     };
     assert_eq!(inputs.len(), named(&typed.inputs), "{what}");
     assert_eq!(outputs.len(), named(&typed.outputs), "{what}");
+    let mut stopped = false;
     let mut running = Running::new(circuit);
     let (into, from) = (places(&inputs, &typed.inputs), places(&outputs, &typed.outputs));
     let interpreter = Interpreter::new(typed);
@@ -97,7 +100,9 @@ pub(crate) fn check_bits(what: &str, circuit: &Circuit, typed: &Program, seed: u
             let expected = image_out[place / 64] >> (place % 64) & 1 == 1;
             assert_eq!(found, expected, "{what}: `{name}` in scan {scan}");
         }
+        stopped |= understudy_typed::Fault::read(&state).is_some();
     }
+    assert!(stops || !stopped, "{what}");
 }
 
 fn files(folder: &Path, found: &mut Vec<PathBuf>) {
