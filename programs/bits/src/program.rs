@@ -85,6 +85,15 @@ impl System {
     }
 }
 
+/// Scans after which all tasks of a program begin together again.
+fn together(program: &Program) -> u64 {
+    program.tasks.iter().map(|task| u64::from(task.every.max(1))).fold(1, |all, every| {
+        let divisor = crate::extent::divisor(all.into(), every.into()) as u64;
+        // Past every count of scans, the tasks do not meet again.
+        (all / divisor.max(1)).checked_mul(every).unwrap_or(u64::MAX)
+    })
+}
+
 /// Inputs of a program but for the reset, which has no source.
 fn points_but_reset(points: &Points) -> usize {
     points.iter().filter(|point| point.slot != 0).count()
@@ -333,9 +342,18 @@ impl System {
         let was_stopped = self.cells[stopped as usize].term;
         let scans = self.cell(format!("{prefix}scans"), Elementary::Ulint, 0);
         let was_scans = self.cells[scans as usize].term;
+        let phase = self.cell(format!("{prefix}phase"), Elementary::Ulint, 0);
+        let was_phase = self.cells[phase as usize].term;
         let none = HashMap::new();
-        let mut how =
-            Scan { prefix, program, inputs, scans: was_scans, stopped: None, ages: &none };
+        let mut how = Scan {
+            prefix,
+            program,
+            inputs,
+            scans: was_scans,
+            phase: was_phase,
+            stopped: None,
+            ages: &none,
+        };
         let mut numbers = HashMap::new();
         let mut scan = self.scan(&how, &mut numbers)?;
         if !self.terms.is(scan.faulted, false) {
@@ -381,11 +399,18 @@ impl System {
         self.cells[stopped as usize].next = faulted;
         let one = self.terms.constant(Elementary::Ulint, 1);
         let zero = self.terms.constant(Elementary::Ulint, 0);
-        let begun = self.terms.choose(is_restart, zero, was_scans);
-        let more = Operation::Add(Elementary::Ulint);
-        let more = self.terms.apply(more, Elementary::Ulint, &[begun, one]);
-        let counted = self.terms.choose(can_fault, begun, more);
-        self.cells[scans as usize].next = self.terms.choose(begins, counted, was_scans);
+        let together = self.terms.constant(Elementary::Ulint, together(program));
+        for (counter, was) in [(scans, was_scans), (phase, was_phase)] {
+            let begun = self.terms.choose(is_restart, zero, was);
+            let add = Operation::Add(Elementary::Ulint);
+            let mut more = self.terms.apply(add, Elementary::Ulint, &[begun, one]);
+            if counter == phase {
+                let less = self.terms.compare(Comparison::Less, more, together);
+                more = self.terms.choose(less, more, zero);
+            }
+            let counted = self.terms.choose(can_fault, begun, more);
+            self.cells[counter as usize].next = self.terms.choose(begins, counted, was);
+        }
         Ok(self.observe(prefix, program, &after, faulted))
     }
 

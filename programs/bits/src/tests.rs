@@ -292,3 +292,32 @@ fn timers_are_exact() {
         compare(&program, 3, 400);
     }
 }
+
+#[test]
+fn tasks_of_other_intervals_are_exact() {
+    let program = lowered(
+        "PROGRAM slow VAR_INPUT go : BOOL; END_VAR VAR_OUTPUT n : INT (0..9); q : BOOL; END_VAR VAR t : TON; END_VAR
+           t(IN := go, PT := T#90ms);
+           q := t.Q;
+           IF n < 9 THEN n := n + 1; ELSE n := 0; END_IF;
+         END_PROGRAM
+         PROGRAM fast VAR_INPUT come : BOOL; END_VAR VAR_OUTPUT k : BOOL; END_VAR k := NOT k AND come; END_PROGRAM
+         CONFIGURATION c RESOURCE r ON PLC
+           TASK a(INTERVAL := T#30ms, PRIORITY := 1); TASK b(INTERVAL := T#20ms, PRIORITY := 2);
+           PROGRAM one WITH a : slow; PROGRAM two WITH b : fast;
+         END_RESOURCE END_CONFIGURATION",
+    );
+    assert!(program.tasks.iter().any(|task| task.every == 3), "{:?}", program.tasks);
+    let circuit = crate::exact(&program).expect("a circuit");
+    assert!(circuit.registers().len() <= 20, "{:?}", circuit.registers());
+    compare(&program, 5, 400);
+}
+
+#[test]
+fn a_gap_is_named() {
+    let gaps = |text: &str| crate::exact(&lowered(text)).expect_err("no circuit").to_string();
+    let real = "PROGRAM p VAR_INPUT x : REAL; END_VAR VAR_OUTPUT q : BOOL; END_VAR q := x * x > 2.0; END_PROGRAM";
+    assert!(gaps(real).contains("`x * x` : REAL"), "{}", gaps(real));
+    let text = "PROGRAM p VAR_OUTPUT q : BOOL; END_VAR VAR t : TIME; END_VAR t := t + TIME(); q := t > T#1h; END_PROGRAM";
+    assert!(gaps(text).contains("TIME"), "{}", gaps(text));
+}

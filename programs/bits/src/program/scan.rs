@@ -77,13 +77,13 @@ impl System {
         let Scan { prefix, program, inputs, .. } = *scan;
         let ages = scan.ages.iter().map(|(&address, &age)| (address, self.age(age, scan.stopped)));
         let ages = ages.collect();
-        let count = match scan.stopped {
+        let [count, phase] = [scan.scans, scan.phase].map(|since| match scan.stopped {
             Some(stopped) => {
                 let zero = self.terms.constant(Elementary::Ulint, 0);
-                self.terms.choose(stopped, zero, scan.scans)
+                self.terms.choose(stopped, zero, since)
             }
-            None => scan.scans,
-        };
+            None => since,
+        });
         let period = self.terms.constant(Elementary::Time, program.period as u64);
         let elapsed = self.terms.apply(Operation::Elapsed, Elementary::Time, &[count, period]);
         let mut cells = ProgramCells {
@@ -117,7 +117,7 @@ impl System {
                 every => {
                     let every = execution.terms.constant(Elementary::Ulint, every.into());
                     let modulo = Operation::Modulo(Elementary::Ulint);
-                    let rest = execution.terms.apply(modulo, Elementary::Ulint, &[count, every]);
+                    let rest = execution.terms.apply(modulo, Elementary::Ulint, &[phase, every]);
                     execution.terms.equals(rest, 0)
                 }
             };
@@ -143,7 +143,10 @@ pub(super) struct Scan<'a> {
     pub(super) prefix: &'a str,
     pub(super) program: &'a Program,
     pub(super) inputs: &'a [Term],
+    /// Scans before it.
     pub(super) scans: Term,
+    /// The same, from 0 again where all tasks begin together.
+    pub(super) phase: Term,
     pub(super) stopped: Option<Term>,
     /// Moments of which the time since them is followed.
     pub(super) ages: &'a HashMap<u64, Age>,
