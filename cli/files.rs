@@ -18,7 +18,6 @@ use understudy_parity::{ParityController, generate};
 use understudy_scenarios::{Scenario, read as read_scenario};
 use understudy_text::spelling::nearest;
 use understudy_text::{Diagnostic, Report, decode, has_errors};
-use understudy_typed::Program as Typed;
 
 use crate::answer::{Answer, Status};
 use crate::kind::{self, Kind};
@@ -223,16 +222,6 @@ pub(crate) fn program(
     match read.source {
         Some(source) if !report.has_errors() => Ok((source, report, period(read.period))),
         _ => Err(Answer::bad_files(vec![report])),
-    }
-}
-
-/// Why a typed program is no ladder, behind its subject.
-pub(crate) fn why_no_ladder(program: &Typed) -> &'static str {
-    match program.tasks.iter().any(|task| task.every > 1) {
-        true => {
-            "does not run in every scan, since the interval of its task is longer than the period"
-        }
-        false => "has numbers",
     }
 }
 
