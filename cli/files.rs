@@ -247,7 +247,7 @@ pub(crate) fn ladder_at(
         let typed = read_source(&report.name, &report.text, Wanted::default()).source;
         let answer = Answer::bad_files(vec![report]);
         return Err(match typed {
-            Some(Source::Typed(_)) => {
+            Some(Source::Typed(typed)) if typed.tasks.len() == 1 => {
                 let message = "this command works on Boolean programs, and the program has numbers";
                 answer.and_failure(Status::BadInput, "U0438", message)
             }

@@ -84,8 +84,7 @@ fn typed(
     };
     let (text, found) = match form {
         Form::Digraph => {
-            let message =
-                "a digraph is made of a ladder, and the program has numbers: use --as svg";
+            let message = "a digraph is made of one ladder, and the program is none: use --as svg";
             let answer = Answer::failed(Status::BadInput, "U0438", message);
             return Err(answer.with_reports(vec![report]));
         }

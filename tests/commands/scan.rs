@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::understudy;
+use crate::{empty_folder, understudy, understudy_in};
 
 /// Outputs of the examples with numbers, bit for bit, as they were on x86-64 and on aarch64 (docs/evidence/performance.md).
 #[test]
@@ -17,10 +17,61 @@ fn digests_of_numeric_programs_are_those_of_every_processor() {
         names.sort();
         for name in names {
             let file = format!("examples/{example}/{name}");
-            let answer = understudy(&["scan", &file, "--digest", "1000"]);
+            let answer = understudy(&["scan", &file, "--digest", "1000", "--period", "10ms"]);
             assert_eq!(answer.status, 0, "{file}\n{}", answer.errors);
             lines.push(format!("{file}: {}", answer.output.trim_end()));
         }
     }
     insta::assert_snapshot!(lines.join("\n"));
+}
+
+#[test]
+fn an_input_outside_its_subrange_is_refused() {
+    let folder = empty_folder("scan_subrange");
+    let text = "PROGRAM p VAR_INPUT s : INT (0..9); u : UINT (3..5); END_VAR VAR_OUTPUT q : INT; END_VAR q := s + UINT_TO_INT(u); END_PROGRAM";
+    fs::write(folder.join("p.st"), text).expect("written");
+    for (line, expected) in
+        [("0 3", 0), ("9 5", 0), ("10 3", 1), ("-1 3", 1), ("9 6", 1), ("-1 2", 2)]
+    {
+        fs::write(folder.join("inputs.txt"), line).expect("written");
+        let answer = understudy_in(&folder, &["scan", "p.st", "--inputs", "inputs.txt"]);
+        assert_eq!(answer.errors.matches("U0439").count(), expected, "{line}: {}", answer.shown());
+        assert_eq!(answer.status, if expected == 0 { 0 } else { 2 }, "{line}");
+    }
+}
+
+/// What runs together is named, proved and drawn together, in each form.
+#[test]
+fn all_programs_of_a_file_are_meant() {
+    let folder = empty_folder("scan_several");
+    let text =
+        "PROGRAM one VAR_INPUT a : BOOL; END_VAR VAR_OUTPUT p : BOOL; END_VAR p := a; END_PROGRAM
+        PROGRAM two VAR_INPUT b : BOOL; END_VAR VAR_OUTPUT q : BOOL; END_VAR q := b; END_PROGRAM
+        CONFIGURATION c RESOURCE r ON x TASK t(INTERVAL := T#20ms, PRIORITY := 0);
+        PROGRAM one WITH t : one; PROGRAM two WITH t : two; END_RESOURCE END_CONFIGURATION";
+    fs::write(folder.join("two.st"), text).expect("written");
+    let run = |arguments: &[&str]| understudy_in(&folder, arguments);
+    assert_eq!(run(&["convert", "two.st", "two.xml"]).status, 0);
+    for file in ["two.st", "two.xml"] {
+        // What one of them does shows in the proof, and what counts the rungs of a ladder takes no part of a file.
+        let refuted = run(&["verify", file, "--property", "never two.q"]);
+        assert_eq!(refuted.status, 1, "{file}: {}", refuted.shown());
+        for command in ["allocate", "resources"] {
+            let refused = run(&[command, file]);
+            assert_eq!(refused.status, 2, "{command} {file}: {}", refused.shown());
+            let said = &refused.errors;
+            assert!(said.contains("U1013") && !said.contains("has numbers"), "{}", refused.shown());
+        }
+        for command in ["scan --digest 10", "verify", "draw"] {
+            let words: Vec<&str> = command.split(' ').collect();
+            let answer = run(&[&words[..1], &[file], &words[1..]].concat());
+            assert_eq!(answer.status, 0, "{command} {file}: {}", answer.shown());
+            let is_all = answer.output.contains("one") && answer.output.contains("two");
+            assert!(
+                is_all && !answer.errors.contains("U1023"),
+                "{command} {file}: {}",
+                answer.shown()
+            );
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! The forms that programs come in: recognised by their content, and read by one function.
 
+use std::ops::Range;
 use std::time::Duration;
 
 use understudy_ladder::{Program, parse};
@@ -7,7 +8,7 @@ use understudy_text::{Diagnostic, has_errors};
 
 use crate::plcopen::Fidelity;
 use crate::source::another_period;
-use crate::text::whole;
+use crate::text::{several, whole};
 use crate::{digraph, ldmicro, plcopen, text as written, twincat};
 
 /// A form of programs.
@@ -117,21 +118,27 @@ impl Format {
 
 /// Reads the program of the file `name`; `unit` chooses one where there are several.
 pub fn read(format: Format, name: &str, text: &str, unit: Option<&str>) -> Reading {
-    let mut reading = read_form(format, name, text, unit);
-    // Who writes a ladder sees what it has; from another form, it may have been lost on the way.
-    if let Some(program) = &reading.program
-        && format != Format::Ladder
-        && program.rungs.is_empty()
-    {
-        let message = format!("the program `{}` has no rungs: it does nothing", program.name);
-        let found = Diagnostic::warning("U1023", message, program.name.span());
-        reading.diagnostics.push(found);
+    let (mut reading, runs) = read_form(format, name, text, unit);
+    if let [(read, _), others @ ..] = runs.as_slice() {
+        reading.diagnostics.extend(others.iter().map(|(other, span)| {
+            let message = format!("a task runs `{other}` too, and only `{read}` is read");
+            let help = "`--unit NAME` of `understudy convert` reads another program; each controller runs one";
+            Diagnostic::warning("U1023", message, span.clone()).with_help(help)
+        }));
+        reading.diagnostics.sort_by_key(|found| found.span.start);
     }
     reading
 }
 
-fn read_form(format: Format, name: &str, text: &str, unit: Option<&str>) -> Reading {
-    match format {
+/// As [`read`], with all that the tasks run where this is more than the program that was read, which is the first.
+fn read_form(
+    format: Format,
+    name: &str,
+    text: &str,
+    unit: Option<&str>,
+) -> (Reading, Vec<(String, Range<usize>)>) {
+    let mut runs = Vec::new();
+    let mut reading = match format {
         Format::Ladder => {
             let parsed = parse(text);
             let is_right = !has_errors(&parsed.diagnostics);
@@ -141,18 +148,19 @@ fn read_form(format: Format, name: &str, text: &str, unit: Option<&str>) -> Read
                 ..Reading::default()
             }
         }
-        Format::PlcOpen => {
-            if let Some(parsed) = twincat::read(text) {
-                return whole(text, parsed, unit, None).reading();
+        Format::PlcOpen => match twincat::read(text) {
+            Some(parsed) => whole(text, parsed, unit, None).reading(),
+            None => {
+                let read = plcopen::read(text, unit);
+                runs = read.runs;
+                Reading {
+                    program: read.program,
+                    period: read.period,
+                    diagnostics: read.diagnostics,
+                    fidelity: read.fidelity,
+                }
             }
-            let read = plcopen::read(text, unit);
-            Reading {
-                program: read.program,
-                period: read.period,
-                diagnostics: read.diagnostics,
-                fidelity: read.fidelity,
-            }
-        }
+        },
         Format::Digraph => {
             let read = digraph::read(text);
             Reading { program: read.program, diagnostics: read.diagnostics, ..Reading::default() }
@@ -167,7 +175,17 @@ fn read_form(format: Format, name: &str, text: &str, unit: Option<&str>) -> Read
             }
         }
         Format::StructuredText => written::read(text, unit),
+    };
+    // Who writes a ladder sees what it has; from another form, it may have been lost on the way.
+    if let Some(program) = &reading.program
+        && format != Format::Ladder
+        && program.rungs.is_empty()
+    {
+        let message = format!("the program `{}` has no rungs: it does nothing", program.name);
+        let found = Diagnostic::warning("U1023", message, program.name.span());
+        reading.diagnostics.push(found);
     }
+    (reading, runs)
 }
 
 /// The name of a file without its folder and ending.
@@ -176,10 +194,20 @@ fn stem(name: &str) -> &str {
     file.split('.').next().unwrap_or(file)
 }
 
-/// Reads a program wherever a ladder is asked for, whatever its form; `period` is from one scan to the next, where that is known.
+/// Reads a program wherever a ladder is asked for, whatever its form; `period` is from one scan to the next, where that is known. A ladder is
+/// all that the file runs, or the file is no ladder.
 pub fn read_ladder(name: &str, text: &str, period: Option<Duration>) -> Reading {
     let mut reading = match Format::of(name, text) {
-        Some(format) => read(format, name, text, None),
+        Some(format) => {
+            let (mut reading, runs) = read_form(format, name, text, None);
+            if let [_, (_, second), ..] = runs.as_slice() {
+                let names = runs.iter().map(|(name, _)| name.as_str());
+                reading.diagnostics.push(several(runs.len(), names, second.clone()));
+                reading.diagnostics.sort_by_key(|found| found.span.start);
+                reading.program = None;
+            }
+            reading
+        }
         None => Reading { diagnostics: vec![unknown_form(text)], ..Reading::default() },
     };
     let ladder = reading.program.as_ref();

@@ -50,6 +50,8 @@ pub struct Reading {
     pub diagnostics: Vec<Diagnostic>,
     /// What was kept, and what was not.
     pub fidelity: Fidelity,
+    /// All that the tasks run, where this is more than the program that was read, which is the first: names with their places.
+    pub(crate) runs: Vec<(String, Range<usize>)>,
 }
 
 /// Reads the program that the file's first task runs, or the one called `unit`.
@@ -80,6 +82,7 @@ pub fn read(text: &str, unit: Option<&str>) -> Reading {
         translate(text, &project, pou, &mut reading);
         if unit.is_none() && project.instances.len() > 1 {
             errors_of_others(text, &mut reading.diagnostics);
+            reading.runs = runs(&project, pou);
         }
     }
     for found in &mut reading.diagnostics {
@@ -88,6 +91,9 @@ pub fn read(text: &str, unit: Option<&str>) -> Reading {
     }
     for note in &mut reading.fidelity.notes {
         within(text, &mut note.span);
+    }
+    for (_, span) in &mut reading.runs {
+        within(text, span);
     }
     reading.diagnostics.sort_by_key(|found| found.span.start);
     if has_errors(&reading.diagnostics) {
@@ -146,7 +152,6 @@ fn chosen<'a>(
     }
     for instance in &project.instances {
         if let Some(pou) = find(&instance.type_name) {
-            others(project, instance, diagnostics);
             return Some(pou);
         }
         let message = format!("the file has no unit `{}`", instance.type_name);
@@ -172,19 +177,12 @@ fn chosen<'a>(
     }
 }
 
-/// Reports the programs that the tasks run in addition to the one that is read.
-fn others(project: &Project, read: &Instance, diagnostics: &mut Vec<Diagnostic>) {
-    for other in &project.instances {
-        if !std::ptr::eq(other, read) {
-            let message = format!(
-                "a task runs `{}` too, and only `{}` is read",
-                other.type_name, read.type_name
-            );
-            let found = Diagnostic::warning("U1023", message, other.type_name.span());
-            let help = "`--unit NAME` of `understudy convert` reads another program; each controller runs one";
-            diagnostics.push(found.with_help(help));
-        }
-    }
+/// What the tasks run, the program that is read in front.
+fn runs(project: &Project, read: &Pou) -> Vec<(String, Range<usize>)> {
+    let mut runs: Vec<&Instance> = project.instances.iter().collect();
+    let first = runs.iter().position(|run| run.type_name.eq_ignore_ascii_case(&read.name));
+    runs[..=first.unwrap_or(0)].rotate_right(1);
+    runs.iter().map(|run| (run.type_name.to_string(), run.type_name.span())).collect()
 }
 
 /// The errors of everything that the tasks run: that one program is read hides none of another.

@@ -1,5 +1,6 @@
 //! From syntax to a program: a ladder where it is one, and the typed program that it comes from.
 
+use std::ops::Range;
 use std::time::Duration;
 
 use understudy_ladder::{PERIODS, Program as Ladder};
@@ -53,7 +54,11 @@ pub(crate) fn whole(
     let typed = typed.filter(|_| is_right);
     let (ladder, reasons) = match &typed {
         Some(typed) if typed.tasks.len() == 1 => ladders::ladder(text, &file, typed, &names),
-        Some(typed) => (None, vec![several(&file, typed)]),
+        Some(typed) => {
+            let programs = file.units.iter().filter(|unit| unit.kind == UnitKind::Program);
+            let names = programs.map(|unit| unit.name.as_str());
+            (None, vec![several(typed.tasks.len(), names, 0..0)])
+        }
         None => (None, Vec::new()),
     };
     Whole {
@@ -94,14 +99,24 @@ fn periods(file: &File, common: Option<i64>) -> Vec<Diagnostic> {
     found
 }
 
-fn several(file: &File, typed: &Typed) -> Diagnostic {
-    let programs = file.units.iter();
-    let programs = programs.filter(|unit| unit.kind == UnitKind::Program);
-    let names: Vec<String> = programs.map(|unit| format!("`{}`", unit.name)).collect();
-    let count = typed.tasks.len();
+/// The error on a file that runs more than the one program of a ladder.
+pub(crate) fn several<'a>(
+    count: usize,
+    names: impl Iterator<Item = &'a str>,
+    span: Range<usize>,
+) -> Diagnostic {
+    let mut listed: Vec<String> = Vec::new();
+    for name in names.map(|name| format!("`{name}`")) {
+        if !listed.contains(&name) {
+            listed.push(name);
+        }
+    }
     let message = format!("the file runs {count} programs, and a ladder is one");
-    let error = Diagnostic::error("U1013", message, 0..0);
-    error.with_help(format!("choose one of {}", names.join(", ")))
+    let help = format!(
+        "choose one of {}; `understudy convert --unit NAME` writes one as a file of its own",
+        listed.join(", ")
+    );
+    Diagnostic::error("U1013", message, span).with_help(help)
 }
 
 impl Whole {

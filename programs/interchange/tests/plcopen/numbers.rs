@@ -378,6 +378,19 @@ fn all_programs_of_the_tasks_run() {
         read.source,
         Some(understudy_interchange::Source::Ladder(ladder)) if ladder.name.as_str() == "second"
     ));
+    // A part of what runs is no ladder of the file; a conversion says what it leaves out.
+    let read = understudy_interchange::read_ladder("two.xml", &text, None);
+    let codes: Vec<&str> = read.diagnostics.iter().map(|found| found.code).collect();
+    assert!(read.program.is_none() && codes == ["U1013"], "{:#?}", read.diagnostics);
+    let read = understudy_interchange::read(
+        understudy_interchange::Format::PlcOpen,
+        "two.xml",
+        &text,
+        None,
+    );
+    assert_eq!(read.program.expect("a ladder").name.as_str(), "first");
+    let left_out: Vec<&str> = read.diagnostics.iter().map(|it| it.message.as_str()).collect();
+    assert_eq!(left_out, ["a task runs `second` too, and only `first` is read"]);
 }
 
 /// Bodies of which each has an error.
