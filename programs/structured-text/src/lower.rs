@@ -36,6 +36,7 @@ mod tasks;
 mod times;
 mod types;
 
+pub use called::roots;
 pub use standard::input_names;
 pub use tasks::{another_interval, event, has_event, intervals, period};
 

@@ -5,14 +5,24 @@ use std::rc::Rc;
 
 use understudy_typed::{Root, Type, Variable as Shown};
 
-use crate::syntax::{Body, Class, Name, Statement, StatementKind, Unit, UnitKind};
+use crate::syntax::{Body, Class, File, Name, Statement, StatementKind, Unit, UnitKind};
 
 use super::Lowering;
 use super::images::initial;
 use super::names::{Symbol, Variable};
 
+/// The programs that run where no task says which: those that no other calls, or all of them, where each is called.
+pub fn roots(file: &File) -> Vec<&Unit> {
+    let programs = file.units.iter().filter(|unit| unit.kind == UnitKind::Program);
+    let programs: Vec<&Unit> = programs.collect();
+    let called = called(&file.units);
+    let is_root = |unit: &&Unit| !called.contains(&unit.name.key());
+    let roots: Vec<&Unit> = programs.iter().copied().filter(is_root).collect();
+    if roots.is_empty() { programs } else { roots }
+}
+
 /// Names in capitals of what the bodies of units call by one name alone.
-pub(super) fn called(units: &[Unit]) -> HashSet<String> {
+fn called(units: &[Unit]) -> HashSet<String> {
     let mut found = HashSet::new();
     for unit in units {
         for body in unit.methods.iter().map(|method| &method.body).chain([&unit.body]) {

@@ -8,7 +8,7 @@ use understudy_typed::{Root, Task, Type, Variable as Shown};
 use crate::syntax::{Argument, Class, Declaration, Expression, File, Name, Span, Unit, UnitKind};
 
 use super::blocks::{Block, Key};
-use super::called::called;
+use super::called::roots;
 use super::images::initial;
 use super::names::{Owner, Symbol, Variable};
 use super::tasks::{interval, shortest, task};
@@ -191,13 +191,7 @@ impl<'a> Lowering<'a> {
             };
         }
         if file.instances.is_empty() {
-            // What others call does not run by itself.
-            let called = called(&file.units);
-            let mut roots: Vec<&Unit> = programs.to_vec();
-            roots.retain(|unit| !called.contains(&unit.name.key()));
-            if roots.is_empty() {
-                roots = programs.to_vec();
-            }
+            let roots = roots(file);
             if let [_, second, ..] = roots.as_slice() {
                 let list: Vec<&str> = roots.iter().map(|unit| unit.name.as_str()).collect();
                 let message = format!(
