@@ -97,6 +97,23 @@ impl ProgramText {
         }
     }
 
+    /// The same, where what it names must look like a program.
+    ///
+    /// # Errors
+    /// As [`Self::of`], and if the file is of another kind.
+    pub(crate) fn expected(path: &Path) -> Result<Self, Answer> {
+        let found = Self::of(path)?;
+        if found.is_one_file() {
+            kind::expect(Kind::Program, path, &found.text)?;
+        }
+        Ok(found)
+    }
+
+    /// Whether it is the text of one file.
+    pub(crate) fn is_one_file(&self) -> bool {
+        self.joined.is_none()
+    }
+
     /// The files of a TwinCAT project.
     pub(crate) fn together(name: String, files: &[PathBuf]) -> Result<Self, Answer> {
         let mut texts = Vec::new();
@@ -112,11 +129,30 @@ impl ProgramText {
         self.joined.as_ref().and_then(Joined::first).unwrap_or(&self.name)
     }
 
+    /// It with what was found in it.
+    pub(crate) fn found(self, diagnostics: Vec<Diagnostic>) -> ProgramFile {
+        let Self { name, text, joined } = self;
+        ProgramFile { report: Report { name, text, diagnostics }, joined }
+    }
+
     /// What was found, file by file.
     pub(crate) fn reports(self, diagnostics: Vec<Diagnostic>) -> Vec<Report> {
+        self.found(diagnostics).reports()
+    }
+}
+
+/// A program that was read, as one text, with what was found in it.
+pub(crate) struct ProgramFile {
+    pub(crate) report: Report,
+    joined: Option<Joined>,
+}
+
+impl ProgramFile {
+    /// What was found, file by file.
+    pub(crate) fn reports(self) -> Vec<Report> {
         match self.joined {
-            Some(joined) => joined.reports(diagnostics),
-            None => vec![Report { name: self.name, text: self.text, diagnostics }],
+            Some(joined) => joined.reports(self.report.diagnostics),
+            None => vec![self.report],
         }
     }
 }
@@ -195,57 +231,54 @@ pub(crate) fn listed_by_check(path: &Path) -> Vec<Report> {
     read.unwrap_or_default()
 }
 
-/// A program without errors, whatever it is written in, its file with the warnings, and its period.
+/// A program without errors, whatever it is written in, in one file or a TwinCAT project, with the warnings, and its period.
 ///
 /// # Errors
 /// If the file cannot be read, is no program or has errors.
 pub(crate) fn program(
     path: &Path,
     wanted: Wanted<'_>,
-) -> Result<(Source, Report, Duration), Answer> {
-    let text = text_of(Kind::Program, path)?;
-    let name = path.display().to_string();
+) -> Result<(Source, ProgramFile, Duration), Answer> {
+    let file = ProgramText::expected(path)?;
     let period = |found: Option<Duration>| wanted.period.or(found).unwrap_or(USUAL_PERIOD);
     // A Boolean program has stronger proofs than the same program with numbers. It runs in every scan.
     if wanted.program.is_none() {
-        let read = read_ladder(&name, &text, None);
+        let read = read_ladder(&file.name, &file.text, None);
         let is_every_scan = read.period.is_none_or(|interval| interval == period(read.period));
         if let Some(ladder) = read.program.filter(|_| is_every_scan)
             && !has_errors(&read.diagnostics)
         {
-            let report = Report { name, text, diagnostics: read.diagnostics };
-            return Ok((Source::Ladder(ladder), report, period(read.period)));
+            let file = file.found(read.diagnostics);
+            return Ok((Source::Ladder(ladder), file, period(read.period)));
         }
     }
-    let read = read_source(&name, &text, wanted);
-    let report = Report { name, text, diagnostics: read.diagnostics };
+    let read = read_source(&file.name, &file.text, wanted);
+    let file = file.found(read.diagnostics);
     match read.source {
-        Some(source) if !report.has_errors() => Ok((source, report, period(read.period))),
-        _ => Err(Answer::bad_files(vec![report])),
+        Some(source) if !file.report.has_errors() => Ok((source, file, period(read.period))),
+        _ => Err(Answer::bad_files(file.reports())),
     }
 }
 
-/// A ladder without errors, and its file with the warnings.
+/// A ladder without errors, in one file or a TwinCAT project, and its files with the warnings.
 ///
 /// # Errors
 /// If the file cannot be read, is not a ladder or has errors.
-pub fn ladder(path: &Path) -> Result<(Program, Report), Answer> {
-    ladder_at(path, None).map(|(program, report, _)| (program, report))
+pub fn ladder(path: &Path) -> Result<(Program, Vec<Report>), Answer> {
+    ladder_at(path, None).map(|(program, reports, _)| (program, reports))
 }
 
 /// As [`ladder`], for a period; with the interval that the file states.
 pub(crate) fn ladder_at(
     path: &Path,
     period: Option<Duration>,
-) -> Result<(Program, Report, Option<Duration>), Answer> {
-    let text = text_of(Kind::Program, path)?;
-    let name = path.display().to_string();
-    let read = read_ladder(&name, &text, period);
-    let report = Report { name, text, diagnostics: read.diagnostics };
-    let program = read.program.filter(|_| !report.has_errors());
+) -> Result<(Program, Vec<Report>, Option<Duration>), Answer> {
+    let file = ProgramText::expected(path)?;
+    let read = read_ladder(&file.name, &file.text, period);
+    let program = read.program.filter(|_| !has_errors(&read.diagnostics));
     let Some(program) = program else {
-        let typed = read_source(&report.name, &report.text, Wanted::default()).source;
-        let answer = Answer::bad_files(vec![report]);
+        let typed = read_source(&file.name, &file.text, Wanted::default()).source;
+        let answer = Answer::bad_files(file.reports(read.diagnostics));
         return Err(match typed {
             Some(Source::Typed(typed)) if typed.tasks.len() == 1 => {
                 let message = "this command works on Boolean programs, and the program has numbers";
@@ -254,7 +287,7 @@ pub(crate) fn ladder_at(
             _ => answer,
         });
     };
-    Ok((program, report, read.period))
+    Ok((program, file.reports(read.diagnostics), read.period))
 }
 
 /// Writes a file.

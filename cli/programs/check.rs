@@ -10,7 +10,9 @@ use std::time::Duration;
 use clap::Args;
 use serde::Serialize;
 use understudy_cluster::{Cluster, Overrides};
-use understudy_interchange::{Source, USUAL_PERIOD, Wanted, is_part, read_source, unknown_form};
+use understudy_interchange::{
+    Format, Source, SourceFile, USUAL_PERIOD, Wanted, is_part, read_source, unknown_form,
+};
 use understudy_journal::Members;
 use understudy_scenarios::read;
 use understudy_supervisor::ladder::read_map;
@@ -23,6 +25,7 @@ use understudy_typed::{Cost, Program};
 use crate::answer::{Answer, Failure, Status};
 use crate::files::{self, ProgramText, read_cluster};
 use crate::kind::Kind;
+use crate::programs::init::from::Known;
 use crate::supervisors::automata;
 use crate::supervisors::reconfigure::read_project;
 use remarks::{Looking, RungSize};
@@ -114,6 +117,8 @@ struct Found<'a> {
     cut_short: Vec<String>,
     sizes: Vec<(String, Size)>,
     libraries: Vec<(String, Vec<String>)>,
+    /// Programs of one file each.
+    known: Vec<Known<'a>>,
     reports: Vec<(Kind, Report)>,
     failures: Vec<Failure>,
     unreadable: Vec<String>,
@@ -136,7 +141,11 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
     }
     for path in arguments.files.iter().filter(|path| !are_together(path)) {
         if path.is_dir() || files::is_project(path) {
+            let libraries = found.libraries.len();
             found.add_joined(path, ProgramText::of(path), program, &looking);
+            if found.libraries.len() == libraries {
+                found.given.push((Kind::Program, path));
+            }
             continue;
         }
         let Some(text) = found.text(path) else {
@@ -160,7 +169,10 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
             Kind::Model => found.add_model(path),
             Kind::Program => {
                 let name = path.display().to_string();
-                let diagnostics = found.read_program(&name, &name, &text, program, &looking);
+                let (source, period, diagnostics) =
+                    found.read_program(&name, &name, &text, program, &looking);
+                let format = Format::of(&name, &text);
+                found.known.extend(source.map(|source| Known { path, format, source, period }));
                 found.add_file(Kind::Program, path, text, diagnostics);
             }
             Kind::Unknown => {
@@ -190,8 +202,10 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         found.add(Kind::Scenario, scenario.report);
     }
     let given = std::mem::take(&mut found.given);
+    let known = std::mem::take(&mut found.known);
     let libraries: Vec<PathBuf> = found.libraries.iter().map(|(name, _)| name.into()).collect();
-    next::after_check(found.answer(), &given, arguments.program.as_deref(), &libraries)
+    let files = next::Files { given: &given, known: &known, libraries: &libraries };
+    next::after_check(found.answer(), arguments.program.as_deref(), &files)
 }
 
 /// Members of the `cluster.toml` in the folder of a scenario, if it is valid.
@@ -203,7 +217,7 @@ fn members_beside(scenario: &Path) -> Option<Members> {
 }
 
 impl Found<'_> {
-    /// Reads a program; what is known of it is told of the file `shown`.
+    /// Reads a program, with the period that it states and what was found; what is known of it is told of the file `shown`.
     fn read_program(
         &mut self,
         name: &str,
@@ -211,22 +225,20 @@ impl Found<'_> {
         text: &str,
         program: Option<&str>,
         looking: &Looking,
-    ) -> Vec<Diagnostic> {
-        let file = read_source(name, text, Wanted { program, period: None });
-        let mut diagnostics = file.diagnostics;
-        let period = file.period.unwrap_or(USUAL_PERIOD);
+    ) -> (Option<Source>, Option<Duration>, Vec<Diagnostic>) {
+        let SourceFile { source, period, mut diagnostics } =
+            read_source(name, text, Wanted { program, period: None });
+        let every = period.unwrap_or(USUAL_PERIOD);
         let shown = shown.to_owned();
-        match &file.source {
-            Some(Source::Ladder(program))
-                if looking.at_rungs(program, period, &mut diagnostics) =>
-            {
+        match &source {
+            Some(Source::Ladder(program)) if looking.at_rungs(program, every, &mut diagnostics) => {
                 self.cut_short.push(shown);
             }
             Some(Source::Typed(program)) => self.sizes.push((shown, Size::of(program))),
             Some(Source::Library(units)) => self.libraries.push((shown, units.clone())),
             Some(Source::Ladder(_)) | None => {}
         }
-        diagnostics
+        (source, period, diagnostics)
     }
 
     /// Reports on the files of a TwinCAT project, which are one program.
@@ -240,7 +252,8 @@ impl Found<'_> {
         let reports = match text {
             Ok(text) => {
                 let first = text.first_file().to_owned();
-                let found = self.read_program(&text.name, &first, &text.text, program, looking);
+                let (_, _, found) =
+                    self.read_program(&text.name, &first, &text.text, program, looking);
                 text.reports(found)
             }
             Err(answer) => {

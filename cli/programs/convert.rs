@@ -17,7 +17,6 @@ use understudy_text::{Diagnostic, Lines, MAXIMUM_SHOWN, Report, shortened};
 
 use crate::answer::{Answer, Status};
 use crate::files::{self, ProgramText};
-use crate::kind::{self, Kind};
 
 /// Convert a program between formats
 #[derive(Debug, Args)]
@@ -81,11 +80,11 @@ impl Form {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
-    let joined = ProgramText::of(&arguments.from_file)?;
+    let joined = match arguments.from {
+        None => ProgramText::expected(&arguments.from_file)?,
+        Some(_) => ProgramText::of(&arguments.from_file)?,
+    };
     let (name, source) = (joined.name.clone(), joined.text.clone());
-    if arguments.from.is_none() {
-        kind::expect(Kind::Program, &arguments.from_file, &source)?;
-    }
     let form = arguments.from.map(Form::format);
     let reading = match form.or_else(|| Format::of(&name, &source)) {
         Some(format) => read(format, &name, &source, arguments.unit.as_deref()),

@@ -51,15 +51,15 @@ enum Form {
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let path = arguments.file.as_path();
     let wanted = Wanted { program: arguments.program.as_deref(), period: None };
-    let (source, report, _) = files::program(path, wanted)?;
-    let (text, report, is_ladder) = match (source, arguments.form) {
-        (Source::Ladder(program), Form::Text) => (draw_text(&program), report, true),
-        (Source::Ladder(program), Form::Svg) => (draw_svg(&program), report, true),
-        (Source::Ladder(program), Form::Digraph) => (digraph::draw_svg(&program), report, true),
-        (_, form) => {
-            let (text, report) = typed(path, report, wanted, form)?;
-            (text, report, false)
-        }
+    let (source, mut file, _) = files::program(path, wanted)?;
+    let (text, is_ladder) = match (source, arguments.form) {
+        (Source::Ladder(program), Form::Text) => (draw_text(&program), true),
+        (Source::Ladder(program), Form::Svg) => (draw_svg(&program), true),
+        (Source::Ladder(program), Form::Digraph) => (digraph::draw_svg(&program), true),
+        (_, form) => match typed(path, &mut file.report, wanted, form) {
+            Ok(text) => (text, false),
+            Err(answer) => return Err(answer.with_reports(file.reports())),
+        },
     };
     let output = arguments.output.as_deref();
     let answer = files::deliver(output, &text, json!({ "text": text }))?;
@@ -67,16 +67,16 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         Some(_) if is_ladder => answer.and_next(&[&"verify", &path]),
         _ => answer,
     };
-    Ok(answer.with_reports(vec![report]))
+    Ok(answer.with_reports(file.reports()))
 }
 
 /// A program with numbers, or one that is drawn in another language than that of ladders.
 fn typed(
     path: &Path,
-    mut report: Report,
+    report: &mut Report,
     wanted: Wanted<'_>,
     form: Form,
-) -> Result<(String, Report), Answer> {
+) -> Result<String, Answer> {
     let name = &report.name;
     let bodies = match form {
         Form::Fbd => Bodies::Blocks,
@@ -85,8 +85,7 @@ fn typed(
     let (text, found) = match form {
         Form::Digraph => {
             let message = "a digraph is made of one ladder, and the program is none: use --as svg";
-            let answer = Answer::failed(Status::BadInput, "U0438", message);
-            return Err(answer.with_reports(vec![report]));
+            return Err(Answer::failed(Status::BadInput, "U0438", message));
         }
         Form::Text => listing(name, &report.text, wanted),
         Form::Svg | Form::Fbd => draw_typed(name, &report.text, wanted, bodies),
@@ -96,9 +95,8 @@ fn typed(
             "{} has no statements to be drawn as function blocks: use --as svg",
             path.display()
         );
-        let answer = Answer::failed(Status::BadInput, "U0438", message);
-        return Err(answer.with_reports(vec![report]));
+        return Err(Answer::failed(Status::BadInput, "U0438", message));
     };
     report.diagnostics = found;
-    Ok((text, report))
+    Ok(text)
 }

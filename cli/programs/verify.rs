@@ -105,11 +105,11 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         return cluster(arguments, &patience);
     }
     let wanted = Wanted { period: arguments.period, program: arguments.program.as_deref() };
-    let (program, mut report, period) = match files::program(&arguments.file, wanted)? {
-        (Source::Typed(program), report, _) => {
-            return numbers::of_program(arguments, &program, report, &patience);
+    let (program, mut file, period) = match files::program(&arguments.file, wanted)? {
+        (Source::Typed(program), file, _) => {
+            return numbers::of_program(arguments, &program, file, &patience);
         }
-        (Source::Ladder(program), report, period) => (program, report, period),
+        (Source::Ladder(program), file, period) => (program, file, period),
         (Source::Library(_), _, _) => {
             let message = "the file has no PROGRAM: properties are of programs";
             return Err(Answer::failed(Status::BadInput, "U0436", message));
@@ -119,7 +119,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     let asked = match asked(arguments, &|property| subject.resolve(property)) {
         Ok(asked) => asked,
         Err(mut answer) => {
-            answer.reports.insert(0, report);
+            answer.reports.splice(0..0, file.reports());
             return Err(answer);
         }
     };
@@ -135,13 +135,13 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
             let remarks = subject.remarks(&program, period, bounds).map_err(not_lowered)?;
             let told = remarks.found.iter().map(|remark| remark.diagnostic.clone());
             let told: Vec<Diagnostic> = told.collect();
-            report.diagnostics.extend(told.iter().cloned());
+            file.report.diagnostics.extend(told.iter().cloned());
             proved(arguments, (&program, period), &subject, &remarks, &asked, &patience, bounds)?
                 .and_next(&[&"init", &"cell", &"--from", &arguments.file])
                 .and_told(told)
         }
     };
-    Ok(answer.with_used(vec![report]))
+    Ok(answer.with_used(file.reports()))
 }
 
 /// The failure of a program that does not become a circuit.

@@ -231,6 +231,52 @@ fn programs_of_a_file_are_apart_where_they_do_the_same_apart() {
     assert_eq!(controllers("memory", &text), ["memory"]);
 }
 
+/// A program reads another one, or both call a third, which has one memory: apart, each would have that memory for itself.
+#[test]
+fn programs_that_name_each_other_stay_together() {
+    let both = ["fill", "drain"];
+    let runs = configuration("", &both);
+    let reads = DRAIN.replace("IF high", "IF high AND fill.valve");
+    assert_eq!(controllers("reads", &format!("{FILL}{reads}{runs}")), ["reads"]);
+    let block = "FUNCTION_BLOCK b\n  VAR_OUTPUT q : BOOL; END_VAR\n  q := fill.valve;\nEND_FUNCTION_BLOCK\n";
+    let within = DRAIN.replace("  VAR_INPUT", "  VAR call : b; END_VAR\n  VAR_INPUT");
+    let within = within.replace("  IF high", "  call();\n  IF high AND call.q");
+    assert_eq!(controllers("within", &format!("{FILL}{block}{within}{runs}")), ["within"]);
+    let third = "PROGRAM third\n  VAR_INPUT step : BOOL; END_VAR\n  VAR sum : INT; END_VAR\n  IF step AND sum < 9 THEN sum := sum + 1; END_IF;\nEND_PROGRAM\n";
+    let call = |program: &str, step: &str| {
+        program.replace("END_PROGRAM", &format!("  third(step := {step});\nEND_PROGRAM"))
+    };
+    let (fill, drain) = (call(FILL, "low"), call(DRAIN, "high"));
+    assert_eq!(controllers("third", &format!("{fill}{drain}{third}{runs}")), ["third"]);
+    // A third that only one of them calls is its own.
+    assert_eq!(controllers("caller", &format!("{fill}{DRAIN}{third}{runs}")), both);
+    // A variable with an address is the memory there.
+    let mark = "VAR_GLOBAL mark AT %QX0.3 : BOOL; END_VAR\n";
+    let external = "  VAR_EXTERNAL mark : BOOL; END_VAR\n  VAR_INPUT";
+    let writes = FILL.replace("  VAR_INPUT", external);
+    let writes = writes.replace("END_PROGRAM", "  mark := low;\nEND_PROGRAM");
+    let reads = DRAIN.replace("IF high", "IF high AND %QX0.3");
+    let text = format!("{writes}{reads}{}", configuration(mark, &both));
+    assert_eq!(controllers("alias", &text), ["alias"]);
+}
+
+/// A program that another one calls does not run by itself, without a configuration too.
+#[test]
+fn a_called_program_is_no_controller() {
+    let folder = empty_folder("draft_called_program");
+    for (name, class) in [("inner.st", "VAR"), ("outer.st", "VAR_OUTPUT")] {
+        let main = "PROGRAM main\n  VAR_INPUT a : BOOL; END_VAR\n  VAR_OUTPUT q : BOOL; END_VAR\n  called(step := a);\n  q := called.full;\nEND_PROGRAM\n";
+        let called = format!(
+            "PROGRAM called\n  VAR_INPUT step : BOOL; END_VAR\n  {class} full : BOOL; END_VAR\n  full := step OR full;\nEND_PROGRAM\n"
+        );
+        fs::write(folder.join(name), format!("{main}{called}")).expect("written");
+        assert_eq!(draft(&folder, name), (true, true), "{name}");
+        let text = fs::read_to_string(folder.join("cell/cluster.toml")).expect("written");
+        assert_eq!(text.matches("[[controller]]").count(), 1, "{text}");
+        fs::remove_dir_all(folder.join("cell")).expect("removed");
+    }
+}
+
 #[test]
 fn check_proposes_only_what_runs() {
     let folder = empty_folder("draft_refused");
@@ -260,4 +306,24 @@ fn check_proposes_only_what_runs() {
     check("fill.st", FILL, (true, true));
     let checked = understudy_in(&folder, &["check", "fill.st"]);
     assert!(!checked.errors.contains("init"), "{}", checked.shown());
+}
+
+/// The copies of a file with several programs are each right, and nothing is said of the other programs.
+#[test]
+fn copies_of_several_programs_have_no_findings() {
+    let folder = empty_folder("draft_several");
+    let text = "PROGRAM one VAR_INPUT a : REAL; END_VAR VAR_OUTPUT p : REAL; END_VAR p := a; END_PROGRAM
+        PROGRAM two VAR_INPUT n : INT (-100..-50); END_VAR VAR_OUTPUT q : BOOL; END_VAR q := n > -70; END_PROGRAM
+        CONFIGURATION c RESOURCE r ON x TASK t(INTERVAL := T#20ms, PRIORITY := 0);
+        PROGRAM one WITH t : one; PROGRAM two WITH t : two; END_RESOURCE END_CONFIGURATION";
+    fs::write(folder.join("both.st"), text).expect("written");
+    let answer = understudy_in(&folder, &["init", "cell", "--from", "both.st"]);
+    assert_eq!(answer.status, 0, "{}", answer.shown());
+    for name in ["one", "two"] {
+        let answer = understudy_in(&folder, &["check", &format!("cell/{name}.st")]);
+        assert!(answer.status == 0 && !answer.errors.contains("warning"), "{}", answer.shown());
+    }
+    // Each input of the stand-in has two values.
+    let plant = fs::read_to_string(folder.join("cell/two-plant.st")).expect("a plant");
+    assert!(plant.contains("n := INT#-100") && plant.contains("n := INT#-50"), "{plant}");
 }

@@ -144,3 +144,65 @@ fn a_whole_project_runs_and_shows_every_error() {
     let scanned = run(&["scan", ".", "--inputs", "inputs.txt"]);
     assert_eq!(scanned.output, "1 -> 0\n1 -> 0\n0 -> 1\n0 -> 1\n", "{}", scanned.shown());
 }
+
+/// Each command that takes a program takes a project: its file, its folder, or the only file of one.
+#[test]
+fn every_command_takes_a_project() {
+    let folder = empty_folder("twincat-commands");
+    for name in ["bits", "bits/DUTs", "numbers"] {
+        fs::create_dir(folder.join(name)).expect("a folder");
+    }
+    let write = |name: &str, text: &str| fs::write(folder.join(name), text).expect("written");
+    write("bits/MAIN.TcPOU", MAIN);
+    write("bits/DUTs/E_Mode.TcDUT", MODE);
+    write("bits/plc.plcproj", PROJECT);
+    let main = "PROGRAM MAIN\nVAR_INPUT a : INT; END_VAR\nVAR_OUTPUT q : INT; END_VAR\nVAR scale : INT := 2; text : STRING := 'GVL.limit'; END_VAR";
+    let body = "q := MIN(a, GVL.limit) * scale / GVL.steps[1] + LEN(text);";
+    write("numbers/MAIN.TcPOU", &object("POU", "MAIN", main, body));
+    write(
+        "numbers/GVL.TcGVL",
+        &object(
+            "GVL",
+            "GVL",
+            "VAR_GLOBAL\n  limit : INT := 400;\n  steps : ARRAY [0..1] OF INT := [2(2)];\nEND_VAR",
+            "",
+        ),
+    );
+    let run = |arguments: &[&str]| understudy_in(&folder, arguments);
+    for (place, project) in ["bits", "bits/plc.plcproj", "numbers"].into_iter().enumerate() {
+        for command in ["check", "verify", "draw", "convert --to st", "scan --digest 10"] {
+            let words: Vec<&str> = command.split(' ').collect();
+            let answer = run(&[&words[..1], &[project], &words[1..]].concat());
+            assert_eq!(answer.status, 0, "{command} {project}: {}", answer.shown());
+            let proposed = format!("understudy init cell --from {project}\n");
+            assert!(command != "check" || answer.errors.contains(&proposed), "{}", answer.shown());
+        }
+        let cell = format!("cell{place}");
+        for from in [project.to_owned(), format!("feeder={project}")] {
+            let cell = format!("{cell}{}", from.len());
+            let answer = run(&["init", &cell, "--from", &from]);
+            assert_eq!(answer.status, 0, "{from}: {}", answer.shown());
+            let drafted = [format!("{cell}/cluster.toml"), format!("{cell}/kill.toml")];
+            let answer = run(&["check", &drafted[0], &drafted[1]]);
+            assert_eq!(answer.status, 0, "{from}: {}", answer.shown());
+            let text = fs::read_to_string(folder.join(&drafted[0])).expect("a cluster file");
+            let name = if from.starts_with("feeder") { "\"feeder\"" } else { "\"MAIN\"" };
+            assert!(text.contains(name), "{text}");
+        }
+    }
+    assert_eq!(run(&["allocate", "bits"]).status, run(&["allocate", "cell04/MAIN.ladder"]).status);
+    // Another compiler has no list of that name, and no block that nothing uses.
+    for form in ["st", "plcopen"] {
+        let written = run(&["convert", "numbers", "--to", form]).output;
+        assert!(written.contains("limit") && written.contains("GVL.limit"), "{written}");
+        assert_eq!(written.matches("GVL.").count(), 1, "{written}");
+        assert!(!written.contains("SCALE"), "{written}");
+    }
+    // What is wrong is said in its own file, by each of them.
+    write("bits/DUTs/E_Mode.TcDUT", &MODE.replace("(off, on)", "(off, an)"));
+    for command in ["verify bits", "draw bits", "init other --from bits", "allocate bits"] {
+        let answer = run(&command.split(' ').collect::<Vec<_>>());
+        assert_eq!(answer.status, 2, "{command}: {}", answer.shown());
+        assert!(answer.errors.contains("MAIN.TcPOU:"), "{command}: {}", answer.shown());
+    }
+}

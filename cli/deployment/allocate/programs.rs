@@ -67,8 +67,8 @@ impl Programs {
                     clusters.push(cluster);
                 })
             } else {
-                ladder(path, period).map(|(member, report)| {
-                    reports.push(report);
+                ladder(path, period).map(|(member, found)| {
+                    reports.extend(found);
                     ladders.push(member);
                 })
             };
@@ -117,12 +117,12 @@ impl Programs {
     }
 }
 
-fn ladder(path: &Path, period: Duration) -> Result<(Member, Report), Answer> {
-    let (program, report, _) = files::ladder_at(path, Some(period))?;
+fn ladder(path: &Path, period: Duration) -> Result<(Member, Vec<Report>), Answer> {
+    let (program, reports, _) = files::ladder_at(path, Some(period))?;
     let circuit =
         program.lower(period).map_err(|error| Answer::failed(Status::BadInput, "U0436", error))?;
     let member = Member { name: program.name.to_string(), ladder: program, circuit };
-    Ok((member, report))
+    Ok((member, reports))
 }
 
 fn of_ladders(members: Vec<Member>, period: Duration, prefix: String) -> Result<Group, Answer> {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::answer::{Answer, Status};
 use crate::kind::Kind;
-use crate::programs::init::from::can_draft;
+use crate::programs::init::from::{Known, can_draft};
 
 /// A command with more files is not shown.
 const READABLE: usize = 8;
@@ -13,13 +13,19 @@ const READABLE: usize = 8;
 /// The folder that is proposed for a new cluster.
 const FOLDER: &str = "cell";
 
-/// `program` is the one that was chosen of a file with several; `libraries` are files without a program.
-pub(super) fn after_check(
-    answer: Answer,
-    given: &[(Kind, &Path)],
-    program: Option<&str>,
-    libraries: &[PathBuf],
-) -> Answer {
+/// The files of a check.
+pub(super) struct Files<'a> {
+    /// All that were named.
+    pub(super) given: &'a [(Kind, &'a Path)],
+    /// What was read of those of one program.
+    pub(super) known: &'a [Known<'a>],
+    /// Those without a program.
+    pub(super) libraries: &'a [PathBuf],
+}
+
+/// `program` is the one that was chosen of a file with several.
+pub(super) fn after_check(answer: Answer, program: Option<&str>, files: &Files<'_>) -> Answer {
+    let Files { given, known, libraries } = files;
     if answer.status != Status::Done {
         return answer;
     }
@@ -45,7 +51,7 @@ pub(super) fn after_check(
         }
         (None, None) if !programs.is_empty() => match program {
             Some(program) => answer.and_next(&[&"verify", &programs[0], &"--program", &program]),
-            None => with_draft(answer.and_next(&[&"verify", &programs[0]]), &programs),
+            None => with_draft(answer.and_next(&[&"verify", &programs[0]]), &programs, known),
         },
         (None, None) => {
             let command = |kind| match kind {
@@ -63,10 +69,10 @@ pub(super) fn after_check(
 }
 
 /// Adds the command that drafts a cluster of these programs, where it does so.
-fn with_draft(answer: Answer, programs: &[&Path]) -> Answer {
+fn with_draft(answer: Answer, programs: &[&Path], known: &[Known<'_>]) -> Answer {
     let folder = Path::new(FOLDER);
     let files: Vec<PathBuf> = programs.iter().map(|path| path.to_path_buf()).collect();
-    if files.len() > READABLE || folder.exists() || !can_draft(folder, &files) {
+    if files.len() > READABLE || folder.exists() || !can_draft(folder, &files, known) {
         return answer;
     }
     let mut from: Vec<&dyn AsRef<OsStr>> = vec![&"init", &FOLDER, &"--from"];

@@ -10,14 +10,13 @@ use std::time::Duration;
 use understudy_cluster::{
     Draft, DraftProgram, MAXIMUM_PROGRAM_NAME, is_name, read as read_cluster,
 };
-use understudy_interchange::{Apart, Format, Source, USUAL_PERIOD, read_apart};
+use understudy_interchange::{Apart, Copies, Format, Source, USUAL_PERIOD, read_apart};
 use understudy_text::{Report, Severity, decode, duration};
 use understudy_wire::MAXIMUM_PROGRAMS;
 
 use super::written;
 use crate::answer::{Answer, Failure};
-use crate::files::{self, NewFile};
-use crate::kind::{self, Kind};
+use crate::files::{self, NewFile, ProgramText};
 use crate::programs::convert::code;
 
 pub(super) fn run(folder: &Path, arguments: &[PathBuf]) -> Result<Answer, Answer> {
@@ -35,9 +34,38 @@ pub(super) fn run(folder: &Path, arguments: &[PathBuf]) -> Result<Answer, Answer
     Ok(written(folder, &paths, marks).with_used(found.reports))
 }
 
-/// Whether a cluster can be drafted from these files.
-pub(crate) fn can_draft(folder: &Path, arguments: &[PathBuf]) -> bool {
-    drafted(folder, arguments).is_ok()
+/// A file of one program or several that has been read.
+pub(crate) struct Known<'a> {
+    pub(crate) path: &'a Path,
+    pub(crate) format: Option<Format>,
+    pub(crate) source: Source,
+    /// Its scan period, where the file states one.
+    pub(crate) period: Option<Duration>,
+}
+
+/// Whether a cluster can be drafted from these files, all of which are right. It is drafted only where this does not follow from what
+/// is known of them.
+pub(crate) fn can_draft(folder: &Path, arguments: &[PathBuf], known: &[Known<'_>]) -> bool {
+    let at_once = if arguments.len() == known.len() { follows(known) } else { None };
+    at_once.unwrap_or_else(|| drafted(folder, arguments).is_ok())
+}
+
+/// Whether a cluster can be drafted; nothing where this does not follow.
+fn follows(known: &[Known<'_>]) -> Option<bool> {
+    let mut found = Found::default();
+    for Known { path, format, source, period } in known {
+        let is_one = !matches!(source, Source::Typed(typed) if typed.tasks.len() > 1);
+        let is_ordinary = is_one && DraftProgram::is_ordinary(source, *period);
+        if !is_ordinary || *period != known.first()?.period {
+            return None;
+        }
+        let given = Given::new(path);
+        let (unit, name) = given.names(source, *format, true)?;
+        let program = DraftProgram::new(name, String::new(), String::new(), source);
+        found.take(&given, program, &unit, source);
+    }
+    found.check();
+    Some(!found.is_wrong())
 }
 
 /// The texts of the draft, which was checked, and what was found.
@@ -76,6 +104,30 @@ impl<'a> Given<'a> {
         }
     }
 
+    /// The name of a program of the file there, and that of its controller; nothing for a library.
+    fn names(
+        &self,
+        source: &Source,
+        format: Option<Format>,
+        is_only: bool,
+    ) -> Option<(String, String)> {
+        let unit = match source {
+            Source::Ladder(ladder) => ladder.name.to_string(),
+            Source::Typed(typed) => typed.name.clone(),
+            Source::Library(_) => return None,
+        };
+        // Digraphs are unnamed, and several programs have no common name.
+        let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
+        let are_several = matches!(source, Source::Typed(typed) if typed.tasks.len() > 1);
+        let own = match format {
+            Some(Format::Digraph) => stem,
+            _ if are_several && is_name(&stem) => stem,
+            _ => unit.split(',').next().unwrap_or(&unit).into(),
+        };
+        let name = self.controller(&own, is_only);
+        Some((unit, name))
+    }
+
     /// Controller name for one program of the file.
     fn controller(&self, program: &str, is_only: bool) -> String {
         match self.name {
@@ -106,47 +158,40 @@ struct Found {
 impl Found {
     fn read(&mut self, given: &Given<'_>) {
         let path = &given.path;
-        let read = files::bytes(path).and_then(|bytes| {
-            let text = files::decoded(path, bytes.clone())?;
-            kind::expect(Kind::Program, path, &text)?;
-            Ok((bytes, text))
-        });
-        let (bytes, text) = match read {
+        let file = match ProgramText::expected(path) {
             Ok(read) => read,
             Err(answer) => {
                 self.failures.extend(answer.failures);
+                self.reports.extend(answer.reports);
                 return;
             }
         };
-        let name = path.display().to_string();
-        let (programs, diagnostics) = read_apart(&name, &text);
-        let mut report = Report { name, text, diagnostics };
+        // The files of a project become one text.
+        let copies = if file.is_one_file() { Copies::AsRead } else { Copies::Written };
+        let (programs, diagnostics) = read_apart(&file.name, &file.text, copies);
+        let mut file = file.found(diagnostics);
+        let is_only = programs.len() == 1;
         for program in programs {
-            self.add(given, program, &bytes, &mut report);
+            self.add(given, program, is_only, &mut file.report);
         }
-        self.reports.push(report);
+        self.reports.extend(file.reports());
     }
 
     /// A program of a file: a copy of the file, or a text of its own where the file has several.
-    fn add(&mut self, given: &Given<'_>, program: Apart, whole: &[u8], report: &mut Report) {
+    fn add(&mut self, given: &Given<'_>, program: Apart, is_only: bool, report: &mut Report) {
         let Apart { source, period, written } = program;
-        let unit = match &source {
-            Source::Ladder(ladder) => ladder.name.to_string(),
-            Source::Typed(typed) => typed.name.clone(),
-            Source::Library(_) => return,
-        };
         let format = Format::of(&report.name, &report.text);
-        // Digraphs are unnamed, and several programs have no common name.
-        let stem = given.path.file_stem().unwrap_or_default().to_string_lossy();
-        let are_several = matches!(&source, Source::Typed(typed) if typed.tasks.len() > 1);
-        let own = match format {
-            Some(Format::Digraph) => stem,
-            _ if are_several && is_name(&stem) => stem,
-            _ => unit.split(',').next().unwrap_or(&unit).into(),
+        let Some((unit, name)) = given.names(&source, format, is_only) else {
+            return;
         };
-        let name = given.controller(&own, written.is_none());
         let (ending, bytes) = match written {
-            None => (ending(&given.path, format), whole.to_vec()),
+            None => match files::bytes(&given.path) {
+                Ok(whole) => (ending(&given.path, format), whole),
+                Err(answer) => {
+                    self.failures.extend(answer.failures);
+                    return;
+                }
+            },
             Some(Ok((format, written))) => {
                 report.diagnostics.extend(written.losses);
                 (format.ending().to_owned(), written.text.into_bytes())
@@ -160,19 +205,24 @@ impl Found {
         let file = format!("{name}.{ending}");
         let origin = format!("{}, program {unit}", report.name);
         let drafted = DraftProgram::new(name, file.clone(), origin, &source);
+        self.periods.extend(period);
+        self.copies
+            .push(Copied { source: given.path.clone(), file: NewFile { name: file, bytes } });
+        self.take(given, drafted, &unit, &source);
+    }
+
+    /// Takes a program of a file, with the name that it has there.
+    fn take(&mut self, given: &Given<'_>, drafted: DraftProgram, unit: &str, source: &Source) {
         if !drafted.has_outputs() {
-            let such_as = memory(&source).map(|name| format!(", such as `{name}`"));
+            let such_as = memory(source).map(|name| format!(", such as `{name}`"));
             let message = format!(
                 "{}: the program `{unit}` has no outputs to protect; declare what it computes{} as outputs (VAR_OUTPUT, or AT %Q…) or omit the program",
-                report.name,
+                given.path.display(),
                 such_as.unwrap_or_default()
             );
             self.fail("U0622", message);
         }
-        self.periods.extend(period);
         self.sources.push(given.path.clone());
-        self.copies
-            .push(Copied { source: given.path.clone(), file: NewFile { name: file, bytes } });
         self.programs.push(drafted);
     }
 

@@ -3,7 +3,6 @@
 use serde_json::json;
 use understudy_bits::{Code, Member, Source, Unsupported};
 use understudy_cluster::{Cluster, InputSourceKind, RemoteIo};
-use understudy_text::Report;
 use understudy_typed::{Point, Program};
 use understudy_verification::numbers::Model;
 use understudy_verification::program::Bounds;
@@ -14,7 +13,7 @@ use understudy_verification::symbolic::Resolved;
 use super::answer::{self, Finding, ProgramAnswer};
 use super::{Arguments, Asked, Smv, asked, bounds, used};
 use crate::answer::{Answer, Status};
-use crate::files;
+use crate::files::{self, ProgramFile};
 use crate::patience::Patience;
 
 /// The standard property of a program with numbers.
@@ -24,7 +23,7 @@ const STANDARD: &str = "never program.fault";
 pub(super) fn of_program(
     arguments: &Arguments,
     program: &Program,
-    report: Report,
+    file: ProgramFile,
     patience: &Patience<'_>,
 ) -> Result<Answer, Answer> {
     if arguments.smv == Some(Smv::Rungs) || arguments.draw.is_some() {
@@ -37,7 +36,7 @@ pub(super) fn of_program(
     let mut asked = match asked(arguments, &|property| model.resolve(property)) {
         Ok(asked) => asked,
         Err(mut answer) => {
-            answer.reports.insert(0, report);
+            answer.reports.splice(0..0, file.reports());
             return Err(answer);
         }
     };
@@ -51,7 +50,7 @@ pub(super) fn of_program(
         let text = smv::of_circuit(circuit, &formulas, &asked.fair);
         let output = arguments.output.as_deref();
         let answer = files::deliver(output, &text, json!({ "text": text }))?;
-        return Ok(answer.with_used(vec![report]));
+        return Ok(answer.with_used(file.reports()));
     }
     if asked.properties.is_empty() {
         asked.properties.extend(standard_property(&model, STANDARD));
@@ -59,7 +58,7 @@ pub(super) fn of_program(
     let go_on = |work| patience.goes_on(work);
     let proved = prove(&model, &program.name, asked, bounds(arguments, &go_on), patience);
     Ok(answer::of_programs(vec![proved], None, None, used(arguments, patience))
-        .with_used(vec![report])
+        .with_used(file.reports())
         .and_next(&[&"init", &"cell", &"--from", &arguments.file]))
 }
 

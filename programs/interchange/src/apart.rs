@@ -1,11 +1,11 @@
 //! The programs of a file, each for a controller of its own.
 //!
-//! Programs that share a variable, and a program that runs twice, stay together: apart they would do something else.
+//! Programs that share a variable or read each other, and a program that runs twice, stay together: apart they would do something else.
 
 use std::collections::{HashMap, HashSet};
 use std::time::Duration;
 
-use understudy_structured_text::lower::{event, has_event};
+use understudy_structured_text::lower::{event, has_event, roots};
 use understudy_structured_text::print;
 use understudy_structured_text::syntax::{Declaration, File, Name, Unit, UnitKind};
 use understudy_text::{Diagnostic, has_errors};
@@ -24,18 +24,35 @@ pub struct Apart {
     pub source: Source,
     /// Its scan period, where the file states one.
     pub period: Option<Duration>,
-    /// A text of its own and its form, where the file has other programs too.
+    /// A text of its own and its form, where the file has other programs too, or no file has the text that was read.
     pub written: Option<Result<(Format, Written), WriteError>>,
 }
 
+/// Where the program of a file that has no other is kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Copies {
+    /// In the text as it was read.
+    AsRead,
+    /// In a text that is written, since what was read is no file: the parts of a project.
+    Written,
+}
+
+/// A text that was read, and its syntax where it is not only a ladder.
+struct Text<'a> {
+    name: &'a str,
+    text: &'a str,
+    parsed: Option<File>,
+}
+
 /// Reads each program of the file `name` that a controller can run, and everything that is wrong with them.
-pub fn read_apart(name: &str, text: &str) -> (Vec<Apart>, Vec<Diagnostic>) {
+pub fn read_apart(name: &str, text: &str, copies: Copies) -> (Vec<Apart>, Vec<Diagnostic>) {
     let whole = read_source(name, text, Wanted::default());
-    let parsed = parsed(name, text).map(|(file, _)| file);
-    let units = parsed.as_ref().map_or_else(Vec::new, |file| programs(name, text, file));
-    let belong_together = parsed.as_ref().is_some_and(|file| belong_together(file, &units));
+    let file = Text { name, text, parsed: parsed(name, text).map(|(file, _)| file) };
+    let parsed = file.parsed.as_ref();
+    let units = parsed.map_or_else(Vec::new, |parsed| programs(name, text, parsed));
+    let belong_together = parsed.is_some_and(|parsed| belong_together(parsed, &units));
     if units.len() < 2 || whole.source.is_some() && belong_together {
-        return together(whole);
+        return file.together(whole, copies);
     }
     let mut apart = Vec::new();
     let mut diagnostics = Vec::new();
@@ -53,35 +70,15 @@ pub fn read_apart(name: &str, text: &str) -> (Vec<Apart>, Vec<Diagnostic>) {
                 diagnostics.push(finding);
             }
         }
-        let has_event = parsed.as_ref().is_some_and(|file| has_event(file, Some(unit)));
-        let is_document =
-            Format::of(name, text) == Some(Format::PlcOpen) && twincat::read(text).is_none();
-        let to = match &source {
-            // A ladder states neither interval nor event.
-            Some(Source::Ladder(_)) if period.is_none() && !has_event => Format::Ladder,
-            Some(Source::Ladder(_)) if is_document => Format::PlcOpen,
-            Some(Source::Ladder(_) | Source::Typed(_)) => Format::StructuredText,
-            Some(Source::Library(_)) | None => continue,
+        let Some(source @ (Source::Ladder(_) | Source::Typed(_))) = source else {
+            continue;
         };
-        let written = match &source {
-            Some(Source::Ladder(ladder)) if to == Format::Ladder => write(to, ladder, None),
-            _ => match typed_text_with(name, text, wanted, (to, Bodies::AsRead), None) {
-                Ok((Some(written), _)) => Ok(written),
-                Ok((None, _)) => Err(WriteError::NotHeld("it has errors".to_owned())),
-                Err(error) => Err(error),
-            },
-        };
-        // What is drafted is what will be read of the text.
-        let read = written.as_ref().ok().and_then(|written| {
-            let name = format!("{unit}.{}", to.ending());
-            read_source(&name, &written.text, Wanted::default()).source
-        });
+        let (alone, is_read) = file.alone(source, period, Some(unit));
         // Where the programs cannot be written apart, one controller runs them all.
-        if read.is_none() && whole.source.is_some() {
-            return together(whole);
+        if !is_read && whole.source.is_some() {
+            return file.together(whole, copies);
         }
-        let written = Some(written.map(|written| (to, written)));
-        apart.extend(read.or(source).map(|source| Apart { source, period, written }));
+        apart.push(alone);
     }
     (apart, diagnostics)
 }
@@ -111,70 +108,143 @@ pub(crate) fn alone(file: &mut File, program: &str) {
     file.globals.retain(|global| global.constant || used.contains(&global.name.key()));
 }
 
-/// One controller for all that the file runs.
-fn together(whole: SourceFile) -> (Vec<Apart>, Vec<Diagnostic>) {
-    let SourceFile { source, period, mut diagnostics } = whole;
-    let is_program = matches!(source, Some(Source::Ladder(_) | Source::Typed(_)));
-    if !is_program && !has_errors(&diagnostics) {
-        diagnostics.push(no_program());
+impl Text<'_> {
+    /// A program in a text of its own, and whether this could be read: what is drafted is what will be read of it.
+    fn alone(
+        &self,
+        source: Source,
+        period: Option<Duration>,
+        program: Option<&str>,
+    ) -> (Apart, bool) {
+        let Self { name, text, parsed } = self;
+        let has_event = parsed.as_ref().is_some_and(|file| has_event(file, program));
+        let is_document =
+            Format::of(name, text) == Some(Format::PlcOpen) && twincat::read(text).is_none();
+        let to = match &source {
+            // A ladder states neither interval nor event.
+            Source::Ladder(_) if period.is_none() && !has_event => Format::Ladder,
+            Source::Ladder(_) if is_document => Format::PlcOpen,
+            _ => Format::StructuredText,
+        };
+        let wanted = Wanted { program, period: None };
+        let written = match &source {
+            Source::Ladder(ladder) if to == Format::Ladder => write(to, ladder, None),
+            _ => match typed_text_with(name, text, wanted, (to, Bodies::AsRead), None) {
+                Ok((Some(written), _)) => Ok(written),
+                Ok((None, _)) => Err(WriteError::NotHeld("it has errors".to_owned())),
+                Err(error) => Err(error),
+            },
+        };
+        let read = written.as_ref().ok().and_then(|written| {
+            let name = format!("alone.{}", to.ending());
+            read_source(&name, &written.text, Wanted::default()).source
+        });
+        let is_read = read.is_some();
+        let written = Some(written.map(|written| (to, written)));
+        (Apart { source: read.unwrap_or(source), period, written }, is_read)
     }
-    let source = source.filter(|_| is_program);
-    let apart = source.map(|source| Apart { source, period, written: None });
-    (apart.into_iter().collect(), diagnostics)
+
+    /// One controller for all that the file runs.
+    fn together(&self, whole: SourceFile, copies: Copies) -> (Vec<Apart>, Vec<Diagnostic>) {
+        let SourceFile { source, period, mut diagnostics } = whole;
+        let is_program = matches!(source, Some(Source::Ladder(_) | Source::Typed(_)));
+        if !is_program && !has_errors(&diagnostics) {
+            diagnostics.push(no_program());
+        }
+        let apart = source.filter(|_| is_program).map(|source| match copies {
+            Copies::AsRead => Apart { source, period, written: None },
+            Copies::Written => self.alone(source, period, None).0,
+        });
+        (apart.into_iter().collect(), diagnostics)
+    }
 }
 
-/// Names of the programs that the tasks of a file run; of all its programs, where it has no tasks.
+/// Names of the programs that the tasks of a file run; of those that no other calls, where it has no tasks.
 fn programs(name: &str, text: &str, file: &File) -> Vec<String> {
-    if Format::of(name, text) == Some(Format::PlcOpen) {
-        let programs = plcopen::programs(text);
-        if !programs.is_empty() {
-            return programs;
+    let mut names = match Format::of(name, text) {
+        Some(Format::PlcOpen) => plcopen::programs(text),
+        _ => Vec::new(),
+    };
+    if names.is_empty() {
+        names.extend(file.instances.iter().map(|instance| instance.of.to_string()));
+    }
+    if file.instances.is_empty() {
+        let roots = roots(file);
+        names.retain(|name| roots.iter().any(|unit| unit.name.is(name)));
+        if names.is_empty() {
+            names.extend(roots.iter().map(|unit| unit.name.to_string()));
         }
     }
-    let run = file.instances.iter().map(|instance| &instance.of);
-    let declared = file.units.iter().filter(|unit| unit.kind == UnitKind::Program);
-    let declared = declared.map(|unit| &unit.name);
-    let names: Vec<_> = match file.instances.is_empty() {
-        true => declared.collect(),
-        false => run.collect(),
-    };
     let mut seen = HashSet::new();
-    let names = names.into_iter().filter(|name| seen.insert(name.key()));
-    names.map(|name| name.as_str().to_owned()).collect()
+    names.retain(|name| seen.insert(name.to_ascii_uppercase()));
+    names
 }
 
-/// Whether programs share a variable, run twice or are connected to variables.
+/// Whether programs share memory, run twice or are connected to variables.
 fn belong_together(file: &File, programs: &[String]) -> bool {
     let mut seen = HashSet::new();
     let mut instances = file.instances.iter();
     let is_more = instances
         .any(|instance| !instance.connections.is_empty() || !seen.insert(instance.of.key()));
-    let words_of = |unit: &Unit| (unit.name.key(), words(&print::unit(unit)));
-    let (main, called): (Vec<&Unit>, Vec<&Unit>) =
-        file.units.iter().partition(|unit| unit.kind == UnitKind::Program);
+    let is_program = |unit: &Unit| unit.kind == UnitKind::Program;
+    let all = file.units.iter().filter(|unit| is_program(unit));
+    let all: HashSet<String> = all.map(|unit| unit.name.key()).collect();
+    let words_of = |unit: &Unit| (unit.name.key(), words_of(unit, &all));
+    let is_main = |unit: &&Unit| is_program(unit) && programs.iter().any(|name| unit.name.is(name));
+    let (main, called): (Vec<&Unit>, Vec<&Unit>) = file.units.iter().partition(is_main);
     let main: HashMap<String, HashSet<String>> = main.into_iter().map(words_of).collect();
     let called: HashMap<String, HashSet<String>> = called.into_iter().map(words_of).collect();
     // Each controller has inputs of its own, whatever else reads them.
     let is_input = |address: &str| address.to_ascii_uppercase().starts_with("%I");
-    let is_at_input =
-        |global: &&Declaration| global.address.as_ref().is_some_and(|it| is_input(it.as_str()));
+    // A variable at an address is the memory there.
+    let place = |global: &Declaration| {
+        let printed = words(&print::declarations(std::slice::from_ref(global)));
+        printed.into_iter().find(|word| word.starts_with('%'))
+    };
     let globals = file.globals.iter().filter(|global| !global.constant);
-    let globals = globals.filter(|global| !is_at_input(global));
-    let globals: HashSet<String> = globals.map(|global| global.name.key()).collect();
+    let globals: HashMap<String, String> = globals
+        .map(|global| (global.name.key(), place(global).unwrap_or_else(|| global.name.key())))
+        .collect();
     let mut users: HashMap<String, usize> = HashMap::new();
     for program in programs {
         let mut own = main.get(&program.to_ascii_uppercase()).cloned().unwrap_or_default();
+        own.insert(memory_of(&program.to_ascii_uppercase()));
         let runs = file.instances.iter().filter(|run| run.of.is(program));
-        let events = runs.filter_map(|run| event(file, run));
-        own.extend(events.flat_map(|event| words(&print::expression(event))));
-        for word in reached(&own, &called) {
-            let is_memory = word.starts_with('%') && !is_input(word);
-            if globals.contains(word) || is_memory {
-                *users.entry(word.to_owned()).or_default() += 1;
-            }
+        for event in runs.filter_map(|run| event(file, run)) {
+            let event = words(&print::expression(event));
+            own.extend(event.intersection(&all).map(|name| memory_of(name)));
+            own.extend(event);
+        }
+        let shared =
+            reached(&own, &called).into_iter().filter_map(|word| match globals.get(word) {
+                Some(place) => Some(place.as_str()),
+                None => (word.starts_with('%') || word.starts_with(MEMORY)).then_some(word),
+            });
+        let shared: HashSet<&str> = shared.filter(|word| !is_input(word)).collect();
+        for word in shared {
+            *users.entry(word.to_owned()).or_default() += 1;
         }
     }
     is_more || users.values().any(|users| *users > 1)
+}
+
+/// In front of the name of a program, the word for its memory. No name has a space.
+const MEMORY: &str = "PROGRAM ";
+
+fn memory_of(program: &str) -> String {
+    format!("{MEMORY}{program}")
+}
+
+/// Names and addresses in a unit, and the memory of each other program that it names.
+fn words_of(unit: &Unit, programs: &HashSet<String>) -> HashSet<String> {
+    let mut found = words(&print::unit(unit));
+    let parts = std::iter::once(unit).chain(&unit.methods);
+    let own = parts.flat_map(|part| &part.declarations).map(|declared| declared.name.key());
+    let own: HashSet<String> = own.chain([unit.name.key()]).collect();
+    let others = programs.iter().filter(|name| found.contains(*name) && !own.contains(*name));
+    let others: Vec<String> = others.map(|name| memory_of(name)).collect();
+    found.extend(others);
+    found
 }
 
 /// Words, and those of the blocks and functions that they name.

@@ -7,7 +7,9 @@ use std::time::Duration;
 
 use understudy_executable::{Executable, Interface, digest};
 use understudy_structured_text::lower::{event, intervals};
-use understudy_structured_text::syntax::{Body, File, Name, ProgramInstance, Task, Unit, UnitKind};
+use understudy_structured_text::syntax::{
+    Body, Declaration, File, Name, ProgramInstance, Task, TypeKind, TypeName, Unit, UnitKind,
+};
 use understudy_structured_text::{control_blocks, parse, print};
 use understudy_text::{Diagnostic, Severity, has_errors};
 use understudy_typed::Program;
@@ -15,6 +17,7 @@ use understudy_typed::Program;
 use crate::apart::alone;
 use crate::diagrams::Style;
 use crate::format::Format;
+use crate::lists::without_lists;
 use crate::plcopen;
 use crate::source::Wanted;
 use crate::text::{Whole, whole};
@@ -65,14 +68,17 @@ pub(crate) fn typed_text_with(
     };
     let wanted = Wanted { period, ..wanted };
     let read = whole(text, (file.clone(), found), wanted.program, wanted.period);
-    let diagnostics = read.diagnostics.clone();
+    let mut diagnostics = read.diagnostics.clone();
+    diagnostics.extend_from_slice(&read.subranges);
+    diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
     if has_errors(&diagnostics) || (read.typed.is_none() && read.checked.is_empty()) {
         return Ok((None, diagnostics));
     }
     if read.typed.is_some() {
         configure(&mut file, wanted, wanted.period.or(read.period).or(usual));
     }
-    let file = with_library(file);
+    let mut file = with_library(file);
+    without_lists(&mut file);
     let as_text = print::file(&file);
     let (printed, scans) = match to {
         Format::StructuredText => {
@@ -233,20 +239,45 @@ fn configure(file: &mut File, wanted: Wanted<'_>, interval: Option<Duration>) {
 
 /// The file with the control blocks that it uses: other compilers do not have them.
 fn with_library(mut file: File) -> File {
+    let mut names = Vec::new();
+    declared_types(&file.globals, &mut names);
+    file.types.iter().for_each(|definition| types_of(&definition.of, &mut names));
     let mut looked_at = 0;
-    while looked_at < file.units.len() {
-        let text = print::unit(&file.units[looked_at]);
-        looked_at += 1;
-        let words = text.split(|letter: char| !letter.is_alphanumeric() && letter != '_');
-        for word in words {
-            let is_known = file.units.iter().any(|unit| unit.name.is(word));
-            let found = control_blocks().find(|unit| unit.name.is(word));
+    while looked_at < file.units.len() || !names.is_empty() {
+        if let Some(unit) = file.units.get(looked_at) {
+            types_in(unit, &mut names);
+            looked_at += 1;
+        }
+        for name in std::mem::take(&mut names) {
+            let is_known = file.units.iter().any(|unit| unit.name == name);
+            let found = control_blocks().find(|unit| unit.name == name);
             if let Some(found) = found.filter(|_| !is_known) {
                 file.units.push(found.clone());
             }
         }
     }
     file
+}
+
+/// The types that a unit names; a variable may have the name of a block.
+fn types_in(unit: &Unit, names: &mut Vec<Name>) {
+    names.extend(unit.extends.clone());
+    declared_types(&unit.declarations, names);
+    unit.methods.iter().for_each(|method| types_in(method, names));
+}
+
+fn declared_types(declarations: &[Declaration], names: &mut Vec<Name>) {
+    declarations.iter().for_each(|declaration| types_of(&declaration.of, names));
+}
+
+fn types_of(of: &TypeName, names: &mut Vec<Name>) {
+    match &of.kind {
+        TypeKind::Named(name) => names.push(name.clone()),
+        TypeKind::Array(_, element) | TypeKind::OpenArray(_, element) => types_of(element, names),
+        TypeKind::Pointer(element) => types_of(element, names),
+        TypeKind::Structure(fields) => declared_types(fields, names),
+        TypeKind::Subrange(..) | TypeKind::Text { .. } | TypeKind::Enumeration(..) => {}
+    }
 }
 
 /// The text with names that can be written: the reader of drawn networks makes names with a dot, which no user can have declared.

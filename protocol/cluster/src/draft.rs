@@ -12,13 +12,14 @@ use std::time::Duration;
 use understudy_interchange::Source;
 use understudy_text::duration;
 use understudy_typed::Elementary;
+use understudy_wire::MAXIMUM_STATE_BITS;
 
 use crate::fields::MAXIMUM_NAME_LENGTH;
 use crate::format::{LONGEST_PERIOD, SHORTEST_PERIOD};
 use crate::read::MARK;
 use crate::value::value_text;
 use signals::{Signal, Signals};
-use stub::Stub;
+use stub::{FAILED, Stub};
 
 /// The name of the drafted understudy.
 const UNDERSTUDY: &str = "understudy";
@@ -28,6 +29,12 @@ const LONGEST_SUFFIX: &str = "-plant";
 
 /// The most characters of a comment behind a signal.
 const MAXIMUM_COMMENT: usize = 70;
+
+/// Bits of inputs or of outputs with which frames are far from full.
+const ORDINARY_BITS: usize = 2048;
+
+/// More than the state of any block of a ladder.
+const BLOCK_BITS: usize = 128;
 
 /// Parts of an interval that are tried as the period of a cluster.
 const MAXIMUM_PARTS: usize = 100_000;
@@ -56,6 +63,36 @@ impl DraftProgram {
     /// A program that names its controller, the file that the cluster file names, where it comes from, for people, and what it is.
     pub fn new(name: String, file: String, origin: String, source: &Source) -> Self {
         Self { name, file, origin, signals: Signals::of(source) }
+    }
+
+    /// Whether a program is so far from every bound that its draft has no error, if its names and its outputs are those that a draft needs:
+    /// less than what is drafted, and known without reading the draft.
+    pub fn is_ordinary(source: &Source, interval: Option<Duration>) -> bool {
+        let state = match source {
+            Source::Ladder(ladder) => {
+                let bits = [&ladder.inputs, &ladder.outputs].map(Vec::len).iter().sum::<usize>();
+                bits + ladder.memory.len() + ladder.blocks().len() * BLOCK_BITS
+            }
+            Source::Typed(program) => program.state as usize * 64,
+            Source::Library(_) => return false,
+        };
+        let Signals { inputs, outputs } = Signals::of(source);
+        let fits = |signals: &[Signal]| {
+            let bits = signals.iter().map(|signal| signal.declared.of.bits() as usize);
+            bits.sum::<usize>() <= ORDINARY_BITS
+        };
+        let is_plain = |signal: &Signal| {
+            let name = signal.name.as_str();
+            let mut letters = name.chars();
+            letters.all(|letter| letter.is_ascii_alphanumeric() || "._".contains(letter))
+                && name.len() <= MAXIMUM_NAME_LENGTH
+                && !name.ends_with(FAILED)
+        };
+        interval.is_none_or(|interval| possible(interval) == interval)
+            && state <= MAXIMUM_STATE_BITS / 2
+            && fits(&inputs)
+            && fits(&outputs)
+            && inputs.iter().chain(&outputs).all(is_plain)
     }
 
     /// The name of its controller.

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use understudy_executable::{Executable, Interface, Scratch, declared};
 use understudy_interchange::{
-    Bodies, Format, Joined, Source, SourceFile, Wanted, read_apart, read_ladder, read_source,
-    typed_text,
+    Bodies, Copies, Format, Joined, Source, SourceFile, Wanted, read_apart, read_ladder,
+    read_source, typed_text,
 };
 use understudy_text::{Diagnostic, has_errors};
 
@@ -265,7 +265,7 @@ fn a_program_alone_keeps_its_interval() {
             let Some((name, text)) = file(language, runs) else {
                 continue;
             };
-            let (apart, found) = read_apart(&name, &text);
+            let (apart, found) = read_apart(&name, &text, Copies::AsRead);
             assert!(!has_errors(&found), "{language:?} {runs:?}: {found:#?}");
             assert_eq!(apart.len(), runs.len(), "{language:?} {runs:?}");
             for period in PERIODS {
