@@ -81,7 +81,7 @@ enum Operation {
     },
     /// Drawing of the net, alone or controlled by supervisors
     #[command(
-        after_help = "Example:\n  understudy petri draw examples/assembly-cell/net.toml -o net.svg\n  understudy petri draw examples/assembly-cell/net.toml --supervisor keeper.toml --as arcs"
+        after_help = "Example:\n  understudy petri draw examples/assembly-cell/net.toml -o net.svg\n  understudy synth examples/assembly-cell/model.toml --reduce --name keeper -o keeper.toml\n  understudy petri draw examples/assembly-cell/net.toml --supervisor keeper.toml --as arcs"
     )]
     Draw {
         #[arg(value_name = "NET.toml")]
