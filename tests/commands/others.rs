@@ -82,6 +82,69 @@ fn a_program_with_numbers_is_drawn_in_its_language() {
     assert!(loops.errors.contains("U1018"), "{}", loops.shown());
 }
 
+/// A program with finite values is a circuit, whatever it is written in; a REAL is named.
+#[test]
+fn a_program_with_whole_numbers_has_equations_and_a_scan() {
+    let folder = empty_folder("parity_of_numbers");
+    let filler = "PROGRAM a
+VAR_INPUT n : INT (0..100); go : BOOL; END_VAR
+VAR_OUTPUT high : BOOL; late : BOOL; full : BOOL; END_VAR
+VAR t : TON; c : CTU; END_VAR
+t(IN := go, PT := T#200ms);
+c(CU := go, R := FALSE, PV := 3);
+high := n > 50;
+late := t.Q;
+full := c.Q;
+END_PROGRAM
+";
+    let real = filler.replace("INT (0..100)", "REAL").replace("50", "50.0");
+    let light = "PROGRAM b
+VAR_INPUT stop : BOOL; END_VAR
+VAR_OUTPUT run : BOOL; END_VAR
+run := NOT stop;
+END_PROGRAM
+";
+    for (name, text) in [("a.st", filler), ("real.st", &real), ("b.st", light)] {
+        fs::write(folder.join(name), text).expect("written");
+    }
+    for (name, program) in [("numbers.toml", "a.st"), ("real.toml", "real.st")] {
+        let cluster = format!(
+            "[cluster]
+name = \"numbers\"
+period = \"10ms\"
+[[controller]]
+name = \"a\"
+ladder = \"{program}\"
+[[controller]]
+name = \"b\"
+ladder = \"b.st\"
+[[understudy]]
+name = \"u\"
+[[remote_io]]
+name = \"a-io\"
+controller = \"a\"
+[[remote_io]]
+name = \"b-io\"
+controller = \"b\"
+"
+        );
+        fs::write(folder.join(name), cluster).expect("written");
+    }
+    let parity = understudy_in(&folder, &["parity", "numbers.toml"]);
+    assert_eq!(parity.status, 0, "{}", parity.shown());
+    for word in ["a.n.0", "a.t.Q", "a.c.CV.1", "b.stop", "Outputs over GF(2)"] {
+        assert!(parity.output.contains(word), "{word}: {}", parity.shown());
+    }
+    let scan = understudy_in(&folder, &["verify", "a.st", "--smv", "scan"]);
+    assert_eq!(scan.status, 0, "{}", scan.shown());
+    assert!(scan.output.contains("MODULE main"), "{}", scan.shown());
+    let real = understudy_in(&folder, &["parity", "real.toml"]);
+    assert_eq!(real.status, 2, "{}", real.shown());
+    for word in ["error[U0438]", "`a`", "`n` : REAL"] {
+        assert!(real.errors.contains(word), "{word}: {}", real.shown());
+    }
+}
+
 #[test]
 fn programs_of_other_tools_are_ladders() {
     for file in ["press.st", "light.ld", "vents.xml"] {
