@@ -34,6 +34,9 @@ pub(crate) struct Arguments {
     /// Maximum number of simultaneously failed inputs, overrides the project
     #[arg(long, value_name = "COUNT")]
     simultaneous: Option<usize>,
+    /// Prevent events after which only the operator's release leads back, where other outputs can do it
+    #[arg(long)]
+    trim: bool,
     /// Output folder; default: print the report
     #[arg(long, short, value_name = "DIR")]
     output: Option<PathBuf>,
@@ -102,6 +105,7 @@ fn narrow(arguments: &Arguments, project: &mut Project) -> Result<(), Answer> {
     if let Some(count) = arguments.simultaneous {
         project.simultaneous = count.clamp(1, project.channels.len().max(1));
     }
+    project.trim = arguments.trim;
     Ok(())
 }
 

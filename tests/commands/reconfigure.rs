@@ -46,6 +46,23 @@ fn the_example_runs_what_is_generated() {
     }
 }
 
+#[test]
+fn trimming_is_an_option_with_the_states_before_and_after() {
+    let sorter = "examples/filling-line/sorter.toml";
+    let plain = understudy(&["reconfigure", sorter, "--json"]).json();
+    let before = &plain["result"]["trimming"];
+    assert_eq!(before["before"], serde_json::json!({ "states": 19, "dangling": 2 }));
+    assert!(before["after"].is_null(), "{before}");
+    let trimmed = understudy(&["reconfigure", sorter, "--trim", "--json"]).json();
+    let after = &trimmed["result"]["trimming"];
+    assert_eq!(after["before"], before["before"]);
+    assert_eq!(after["after"], serde_json::json!({ "states": 17, "dangling": 0 }));
+    assert_eq!(after["prevented"], before["prevented"]);
+    let told = understudy(&["reconfigure", sorter, "--trim"]);
+    let said = "2 transitions lead there, of which outputs now prevent 2. Before trimming 19 states could be reached, 2 of them";
+    assert!(told.output.contains(said), "{}", told.shown());
+}
+
 /// Sensors that flicker and stick, nobody who says so, and a controller or the remote I/O that is killed meanwhile.
 #[test]
 fn the_diagnosed_line_needs_nobody() {

@@ -6,7 +6,7 @@ use crate::command::Posed;
 use crate::controller::Controller;
 use crate::diagnosis::{Ground, diagnose};
 use crate::explore::{Bounds, Explored, MAXIMUM_FREE_INPUTS, Unexplored, explore};
-use crate::mega::{MegaController, Question, Unbuilt, failed_channels};
+use crate::mega::{MegaController, Question, Reached, Trimming, Unbuilt, failed_channels};
 use crate::module_two::{Combined, MAXIMUM_RUNGS, combine};
 use crate::project::{Project, RelationEntry};
 use crate::proof::{Claim, NotProved, Proof, prove};
@@ -40,6 +40,12 @@ pub struct Outcome {
     pub question: Question,
     /// Θ.
     pub mega: MegaController,
+    /// What leads to the states that only the operator's release leaves.
+    pub trimming: Trimming,
+    /// How many states can be reached before trimming.
+    pub reached: Reached,
+    /// The same after it, where it is applied.
+    pub trimmed: Option<Reached>,
     /// What is commanded outside of the model.
     pub lost_outputs: Bits,
     /// Module 1 with module 2.
@@ -136,8 +142,14 @@ pub fn analyse(project: &Project) -> Result<Outcome, Failure> {
         objective: project.objective.clone(),
         maximum_states: MAXIMUM_MEGA_STATES,
     };
-    let mega = MegaController::build(&controller, &relation, &question)
+    let mut mega = MegaController::build(&controller, &relation, &question)
         .map_err(|unbuilt| not_built(unbuilt, &controller, &question))?;
+    let trimming = mega.trim(&controller, &relation, &question);
+    let reached = mega.reached(&controller, &relation, &question);
+    let trimmed = project.trim.then(|| {
+        mega.apply(&trimming);
+        mega.reached(&controller, &relation, &question)
+    });
     let lost_outputs = MegaController::outputs_for_any(&controller, &relation, &question)
         .map_err(|none| not_built(Unbuilt::NoCommand(vec![none]), &controller, &question))?;
     let combined = combine(&project.ladder, &controller, &mega, &question, &lost_outputs)
@@ -181,6 +193,9 @@ pub fn analyse(project: &Project) -> Result<Outcome, Failure> {
         idle,
         question,
         mega,
+        trimming,
+        reached,
+        trimmed,
         lost_outputs,
         combined,
         proof,

@@ -31,7 +31,8 @@ pub use analysis::{Failure, Outcome, analyse};
 pub use controller::{Controller, Move, State};
 pub use diagnosis::Patience;
 pub use mega::{
-    Analysis, Label, MegaController, MegaState, Question, Trimming, Unbuilt, failed_channels,
+    Analysis, Label, MegaController, MegaState, Question, Reached, Trimming, Unbuilt,
+    failed_channels,
 };
 pub use relation::{Feedback, Relation, Row, feedback, joint_feedback};
 pub use settle::{Command, NoCommand};

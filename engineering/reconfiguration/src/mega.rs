@@ -14,7 +14,7 @@ use std::collections::BTreeSet;
 
 use rustc_hash::FxHashMap;
 
-pub use self::trim::Trimming;
+pub use self::trim::{Reached, Trimming};
 use crate::command::Objective;
 use crate::controller::{Controller, Move, reach};
 use crate::relation::{Feedback, Relation, joint_feedback};
@@ -57,6 +57,21 @@ pub struct MegaState {
     pub failed: u64,
     /// What module 2 commands; none where the ladder's own outputs are right.
     pub command: Option<Command>,
+}
+
+impl MegaState {
+    /// Unseen events that would lead out of its members, each with its member: its command prevents them.
+    pub(crate) fn blocked(
+        &self,
+        ground: &Ground<'_>,
+        question: &Question,
+    ) -> BTreeSet<(u32, Event)> {
+        let unseen = |step: &Move| {
+            let mut events = step.events.iter();
+            !step.events.is_empty() && events.all(|&event| is_unseen(question, self.failed, event))
+        };
+        ground.blocked(&self.members.iter().copied().collect(), &unseen)
+    }
 }
 
 /// What leads from one state of Θ to another.
@@ -132,26 +147,63 @@ impl MegaController {
         if !builder.without.is_empty() {
             return Err(Unbuilt::NoCommand(builder.without));
         }
-        let marked = controller.marked();
-        let mut backward = vec![Vec::new(); builder.states.len()];
-        for (source, edges) in builder.edges.iter().enumerate() {
-            for (label, target) in edges {
-                if builder.can_happen(source, label) {
-                    backward[*target].push(source);
-                }
-            }
-        }
-        let home = builder.states.iter().enumerate().filter(|(_, state)| {
-            state.failed == 0 && state.members.len() == 1 && marked[state.members[0] as usize]
-        });
-        let alive = reach(&backward, home.map(|(place, _)| place));
-        Ok(Self {
-            dangling: alive.iter().map(|alive| !alive).collect(),
+        let mut mega = Self {
+            dangling: Vec::new(),
             programs: builder.ground.program_count(),
             states: builder.states,
             edges: builder.edges,
             places: builder.places,
             seeds: builder.seeds,
+        };
+        mega.dangling = mega.without_return(controller, relation, question);
+        Ok(mega)
+    }
+
+    /// The states from which nothing that can happen leads back to a marked state with all channels working.
+    fn without_return(
+        &self,
+        controller: &Controller,
+        relation: &Relation,
+        question: &Question,
+    ) -> Vec<bool> {
+        let marked = controller.marked();
+        let mut backward = vec![Vec::new(); self.states.len()];
+        for (source, edges) in self.edges.iter().enumerate() {
+            for (label, target) in edges {
+                let is_way = match label {
+                    // Only a second failure of the same channel would decide this.
+                    Label::Break(_) => question.analysis == Analysis::Section2,
+                    _ => self.lets(controller, relation, question, source, label),
+                };
+                if is_way {
+                    backward[*target].push(source);
+                }
+            }
+        }
+        let home = self.states.iter().enumerate().filter(|(_, state)| {
+            state.failed == 0 && state.members.len() == 1 && marked[state.members[0] as usize]
+        });
+        let alive = reach(&backward, home.map(|(place, _)| place));
+        alive.iter().map(|alive| !alive).collect()
+    }
+
+    /// Whether the outputs in force in a state let its plant do what `label` says. What they prevent is followed all the same,
+    /// should it be seen.
+    fn lets(
+        &self,
+        controller: &Controller,
+        relation: &Relation,
+        question: &Question,
+        place: usize,
+        label: &Label,
+    ) -> bool {
+        let state = &self.states[place];
+        let (Label::Seen(events), Some(command)) = (label, &state.command) else {
+            return true;
+        };
+        happenings(controller, question, state, events).any(|(member, step)| {
+            let is_let = |&event: &Event| relation.allows(member, event, &command.outputs);
+            step.events.iter().all(is_let)
         })
     }
 
@@ -210,6 +262,33 @@ pub fn failed_channels(channels: &[usize], failed: u64) -> impl Iterator<Item = 
     places.filter(move |(bit, _)| failed >> bit & 1 == 1).map(|(_, &input)| input)
 }
 
+/// Whether the channel of `event` is failed.
+fn is_unseen(question: &Question, failed: u64, event: Event) -> bool {
+    event.channel().is_some_and(|input| {
+        let bit = question.channels.iter().position(|&known| known == input);
+        bit.is_some_and(|bit| failed >> bit & 1 == 1)
+    })
+}
+
+/// The moves of the members of a state that its working channels show as `events`, each with its member.
+fn happenings<'a>(
+    controller: &'a Controller,
+    question: &'a Question,
+    state: &'a MegaState,
+    events: &'a [Event],
+) -> impl Iterator<Item = (usize, &'a Move)> {
+    let members = state.members.iter().map(|&member| member as usize);
+    let moves =
+        members.flat_map(|member| controller.moves(member).iter().map(move |step| (member, step)));
+    moves.filter(move |(_, step)| {
+        let seen = step.events.iter().filter(|&&event| !is_unseen(question, state.failed, event));
+        match question.analysis {
+            Analysis::Section2 => events.iter().all(|event| seen.clone().any(|it| it == event)),
+            Analysis::Prompt | Analysis::Late => seen.eq(events),
+        }
+    })
+}
+
 struct Builder<'a> {
     ground: Ground<'a>,
     question: &'a Question,
@@ -222,36 +301,7 @@ struct Builder<'a> {
 
 impl Builder<'_> {
     fn is_unseen(&self, failed: u64, event: Event) -> bool {
-        event.channel().is_some_and(|input| {
-            let bit = self.question.channels.iter().position(|&known| known == input);
-            bit.is_some_and(|bit| failed >> bit & 1 == 1)
-        })
-    }
-
-    /// Whether the command of a state lets its plant do what `label` says. What it prevents is followed all the same, should
-    /// it be seen, but is no way to come back.
-    fn can_happen(&self, place: usize, label: &Label) -> bool {
-        let state = &self.states[place];
-        let (Label::Seen(events), Some(command)) = (label, &state.command) else {
-            // Only a second failure of the same channel would decide this.
-            return self.question.analysis == Analysis::Section2
-                || !matches!(label, Label::Break(_));
-        };
-        state.members.iter().any(|&member| {
-            let mut moves = self.ground.controller.moves(member as usize).iter();
-            moves.any(|step| {
-                let mut seen = step.events.clone();
-                seen.retain(|&event| !self.is_unseen(state.failed, event));
-                let is_let = |&event: &Event| {
-                    self.ground.relation.allows(member as usize, event, &command.outputs)
-                };
-                let is_this = match self.question.analysis {
-                    Analysis::Section2 => events.iter().all(|event| seen.contains(event)),
-                    Analysis::Prompt | Analysis::Late => seen == *events,
-                };
-                is_this && step.events.iter().all(is_let)
-            })
-        })
+        is_unseen(self.question, failed, event)
     }
 
     /// Settles `seed` and numbers the state; nothing where no command is safe.

@@ -77,6 +77,8 @@ pub struct Project {
     pub analysis: Analysis,
     /// Which of several safe commands.
     pub objective: Objective,
+    /// Whether commands also prevent what leads to states that only the operator's release leaves.
+    pub trim: bool,
     /// Λ, entry by entry.
     pub relation: Vec<RelationEntry>,
     /// How patient a diagnosing ladder is, where one is asked for.
@@ -228,6 +230,7 @@ impl Reader<'_> {
             channels: chosen,
             analysis: if analysis == 1 { Analysis::Prompt } else { Analysis::Late },
             objective,
+            trim: false,
             relation,
             patience,
             ladder,

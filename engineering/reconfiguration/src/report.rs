@@ -7,8 +7,8 @@ use serde_json::{Value, json};
 use understudy_ladder::{Program, print};
 
 use crate::analysis::Outcome;
-use crate::controller::{Controller, Move};
-use crate::mega::{Label, MegaState, failed_channels};
+use crate::controller::Controller;
+use crate::mega::{Label, MegaState, Reached, Trimming, failed_channels};
 use crate::record::Missed;
 use crate::relation::{Feedback, feedback};
 use crate::settle::Ground;
@@ -113,13 +113,8 @@ impl Outcome {
                 continue;
             }
             let _ = write!(text, "\n## {}\n\n", self.describe(state));
-            let channels: Vec<usize> =
-                failed_channels(&self.question.channels, state.failed).collect();
-            let is_unseen =
-                |event: &Event| event.channel().is_some_and(|input| channels.contains(&input));
-            let unseen = |step: &Move| !step.events.is_empty() && step.events.iter().all(is_unseen);
-            let members = state.members.iter().copied().collect();
-            let blocked = ground.blocked(&members, &unseen);
+            let mut blocked = state.blocked(&ground, &self.question);
+            blocked.extend(&command.trimmed);
             for posed in ground.posed(&state.members, &blocked) {
                 let rows: Vec<String> =
                     posed.demand.rows.iter().map(|row| format!("[{}]", row.text())).collect();
@@ -139,6 +134,15 @@ impl Outcome {
                     "- given up: {} in state {}",
                     signals.event_name(given.event),
                     Controller::number(given.state)
+                );
+            }
+            let trimmed: BTreeSet<Event> =
+                command.trimmed.iter().map(|(_, event)| *event).collect();
+            for event in trimmed {
+                let _ = writeln!(
+                    text,
+                    "- trimmed: {}, because only the operator's release leaves the state that it leads to",
+                    signals.event_name(event)
                 );
             }
             let _ = writeln!(
@@ -222,13 +226,7 @@ impl Outcome {
         }
         let dangling = self.mega.dangling.iter().filter(|dangling| **dangling).count();
         if dangling > 0 {
-            let trimming = self.mega.trim(controller, &self.relation);
-            let _ = writeln!(
-                text,
-                "{dangling} states of the mega-controller are left by the operator's release only; {} transitions lead there, of which outputs could prevent {}.\n",
-                trimming.disabled.len() + trimming.unavoidable.len(),
-                trimming.disabled.len()
-            );
+            text.push_str(&self.trimmed_text(dangling));
         }
         let minimum = self.minimum_channels();
         let _ = writeln!(
@@ -277,6 +275,33 @@ impl Outcome {
             }
             text.push('\n');
         }
+        text
+    }
+
+    /// What leads to the states that only the operator's release leaves, and what trimming changes.
+    fn trimmed_text(&self, dangling: usize) -> String {
+        let Trimming { prevented, kept, unavoidable, .. } = &self.trimming;
+        let mut text = format!(
+            "{dangling} states of the mega-controller are left by the operator's release only; {} transitions lead there, of which outputs {} {}.",
+            prevented.len() + kept.len() + unavoidable.len(),
+            if self.trimmed.is_some() { "now prevent" } else { "could prevent" },
+            prevented.len()
+        );
+        if !kept.is_empty() {
+            let _ = write!(
+                text,
+                " To prevent {} more would stop what leads back, or would not be safe.",
+                kept.len()
+            );
+        }
+        if let Some(after) = self.trimmed {
+            let _ = write!(
+                text,
+                " Before trimming {} states could be reached, {} of them left by the release only; now {}, and {} of them.",
+                self.reached.states, self.reached.dangling, after.states, after.dangling
+            );
+        }
+        text.push_str("\n\n");
         text
     }
 
@@ -332,9 +357,27 @@ impl Outcome {
             "states": states.collect::<Vec<_>>(), "mega_states": mega.collect::<Vec<_>>(),
             "missed": self.missed.as_ref().map(|missed| json!({ "states": missed.states, "moves": missed.moves })),
             "advice": self.advice(), "minimum_channels": self.minimum_channels(),
-            "lost_outputs": self.lost_outputs.to_string(),
+            "lost_outputs": self.lost_outputs.to_string(), "trimming": self.trimming_json(),
             "rungs": self.combined.program.rungs.len(), "module_2_rungs": self.combined.program.rungs.len() - self.combined.first_rung,
             "proof": { "states": self.proof.states, "scans": self.proof.scans, "outside": self.proof.outside, "latched": self.proof.latched },
+        })
+    }
+
+    fn trimming_json(&self) -> Value {
+        let events = |list: &[(usize, Vec<Event>)]| -> Vec<Value> {
+            let signals = &self.controller.signals;
+            let pair =
+                |(place, events): &(usize, Vec<Event>)| json!([place, signals.event_names(events)]);
+            list.iter().map(pair).collect()
+        };
+        let labels = self.trimming.unavoidable.iter();
+        let reached =
+            |reached: Reached| json!({ "states": reached.states, "dangling": reached.dangling });
+        json!({
+            "prevented": events(&self.trimming.prevented), "kept": events(&self.trimming.kept),
+            "stopped": events(&self.trimming.stopped),
+            "unavoidable": labels.map(|(place, label)| json!([place, self.label(label)])).collect::<Vec<_>>(),
+            "before": reached(self.reached), "after": self.trimmed.map(reached),
         })
     }
 

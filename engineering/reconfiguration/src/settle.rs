@@ -24,6 +24,8 @@ pub struct Command {
     pub going: BTreeSet<Event>,
     /// Demands to let an event happen that had to be given up, because with them no outputs are safe.
     pub given_up: Vec<Posed>,
+    /// Events that trimming prevents, each with its member.
+    pub trimmed: BTreeSet<(u32, Event)>,
 }
 
 /// No outputs are safe for all states in which the plant may be.
@@ -222,6 +224,11 @@ impl<'a> Ground<'a> {
             }
             Err(unsolved) => return Err(no_command(members, failed, &posed, unsolved)),
         };
+        Ok(self.judged(members, outputs, given_up))
+    }
+
+    /// These outputs with what they stop and let happen.
+    pub(crate) fn judged(&self, members: &[u32], outputs: Bits, given_up: Vec<Posed>) -> Command {
         let mut stopped = BTreeSet::new();
         let mut going = BTreeSet::new();
         for &state in members {
@@ -234,7 +241,7 @@ impl<'a> Ground<'a> {
                 }
             }
         }
-        Ok(Command { outputs, stopped, going, given_up })
+        Command { outputs, stopped, going, given_up, trimmed: BTreeSet::new() }
     }
 
     fn weights(&self, members: &[u32]) -> Vec<f64> {

@@ -1,5 +1,7 @@
 //! The filling line of the examples, from its ladder to the proof of its second module.
 
+mod trimming;
+
 use std::sync::Arc;
 use std::time::Duration;
 

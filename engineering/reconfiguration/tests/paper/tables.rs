@@ -129,14 +129,15 @@ fn trimming_disables_what_leads_to_where_nothing_leads_back() {
     let (controller, relation) = (controller(), relation());
     for analysis in [Analysis::Section2, Analysis::Late] {
         let mega = build(analysis, &[1, 3]);
-        let trimming = mega.trim(&controller, &relation);
+        let trimming = mega.trim(&controller, &relation, &question(analysis, &[1, 3]));
         let crossing = mega.edges.iter().enumerate().flat_map(|(source, edges)| {
             let to = edges.iter().map(move |(_, target)| (source, *target));
             to.filter(|(source, target)| !mega.dangling[*source] && mega.dangling[*target])
         });
-        let told = trimming.disabled.len() + trimming.unavoidable.len();
+        let events = [&trimming.prevented, &trimming.kept, &trimming.stopped].into_iter().flatten();
+        let told = events.count() + trimming.unavoidable.len();
         assert_eq!(told, crossing.count(), "{analysis:?}");
-        for (state, events) in &trimming.disabled {
+        for (state, events) in trimming.prevented.iter().chain(&trimming.kept) {
             for &member in &mega.states[*state].members {
                 let defined =
                     events.iter().filter(|&&event| controller.is_defined(member as usize, event));
