@@ -166,12 +166,12 @@ impl Reader<'_> {
         top.finish(found);
         let mut fields = project?;
         fields.require(&["ladder"], found);
+        let ladder = fields.text("ladder", found);
+        let plant = fields.text("plant", found);
+        let records = fields.texts("records", found);
         let period = fields.time("period", TIMES, found).unwrap_or(PERIOD);
-        let ladder = fields.text("ladder", &mut self.diagnostics);
         let ladder = ladder.and_then(|name| self.ladder(&name, period));
-        let plant = fields.text("plant", &mut self.diagnostics);
         let plant = plant.and_then(|name| self.ladder(&name, period));
-        let records = fields.texts("records", &mut self.diagnostics);
         let mut read_records = Vec::new();
         for record in &records {
             match (self.open)(record.value) {
