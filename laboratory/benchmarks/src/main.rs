@@ -6,6 +6,7 @@ mod exchange;
 mod failover;
 mod join;
 mod kills;
+mod log;
 mod memory;
 mod scan;
 mod simulate;
@@ -31,6 +32,7 @@ Example:
   understudy-bench failover --figure failover.svg
   understudy-bench scan examples/press-cell/robot.ladder
   understudy-bench join --trials 50 --loss 10%
+  understudy-bench log --cycles 2000
 
 Exit status: 0 if the targets are met, 1 if not, 2 for invalid input."
 )]
@@ -49,6 +51,7 @@ enum Benchmark {
     Kills(Box<kills::Arguments>),
     Join(Box<join::Arguments>),
     Failover(Box<failover::Arguments>),
+    Log(Box<log::Arguments>),
     Memory(memory::Arguments),
     Scan(scan::Arguments),
     #[command(hide = true)]
@@ -71,6 +74,7 @@ impl Benchmark {
             Self::Kills(arguments) => ("kills", kills::run(arguments, console).into()),
             Self::Join(arguments) => ("join", join::run(arguments, console).into()),
             Self::Failover(arguments) => ("failover", failover::run(arguments, console).into()),
+            Self::Log(arguments) => ("log", log::run(arguments, console).into()),
             Self::Memory(arguments) => ("memory", memory::run(arguments).into()),
             Self::Scan(arguments) => ("scan", scan::run(arguments).into()),
             Self::Member(arguments) => ("member", exchange::run_member(arguments)),

@@ -85,6 +85,19 @@ fn the_scan_of_a_program_is_measured() {
 }
 
 #[test]
+fn the_log_costs_every_station_something() {
+    let rows = on_processes("log", &["log", "--cycles", "60"]);
+    let rows = rows.as_array().expect("stations");
+    assert_eq!(rows.len(), 3, "{rows:?}");
+    for row in rows {
+        // At least a Sync and the turns of the other stations are received, and a turn is sent.
+        assert!(row["places_per_cycle"].as_f64() > Some(5.0), "{row}");
+        assert!(row["processor_us_per_cycle"].as_f64() > Some(0.0), "{row}");
+        assert!(row["nanoseconds_per_place"].as_f64() > Some(0.0), "{row}");
+    }
+}
+
+#[test]
 fn each_carrier_completes_its_exchanges() {
     let (_, document) = answer(&["exchange", "--cycles", "20", "--no-real-time"]);
     let carriers = document["result"].as_array().expect("carriers");
