@@ -19,7 +19,7 @@ use crate::format::{LONGEST_PERIOD, SHORTEST_PERIOD};
 use crate::read::MARK;
 use crate::value::value_text;
 use signals::{Signal, Signals};
-use stub::{FAILED, Stub};
+use stub::Stub;
 
 /// The name of the drafted understudy.
 const UNDERSTUDY: &str = "understudy";
@@ -86,7 +86,6 @@ impl DraftProgram {
             let mut letters = name.chars();
             letters.all(|letter| letter.is_ascii_alphanumeric() || "._".contains(letter))
                 && name.len() <= MAXIMUM_NAME_LENGTH
-                && !name.ends_with(FAILED)
         };
         interval.is_none_or(|interval| possible(interval) == interval)
             && state <= MAXIMUM_STATE_BITS / 2

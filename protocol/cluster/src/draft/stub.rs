@@ -19,7 +19,7 @@ const SPECIAL: [&str; 4] = ["part_arrives", "handed_over", "finished", "plant_fa
 const ROUND_CYCLES: usize = 100;
 
 /// An input of a program with this suffix says that its channel is failed.
-pub(super) const FAILED: &str = ".failed";
+const FAILED: &str = ".failed";
 
 pub(super) struct Stub<'a> {
     pub(super) program: &'a DraftProgram,
