@@ -1,8 +1,8 @@
 //! `understudy-bench log`: what the log costs a station while it is switched off.
 //!
-//! A place is a span or an event in the code. For each frame that a station receives or sends there is one of each, and one more
-//! span for each cycle. The time of a place is measured here, with the subscriber of a member; the number of places and the
-//! processor time of a station come from a run of the press cell.
+//! A place is a span or an event in the code. For each frame that a station receives or sends there is one of each, and
+//! one more span for each cycle. The time of a place is measured here, with the subscriber of a member; the number of
+//! places and the processor time of a station come from a run of the press cell.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -33,7 +33,8 @@ const CYCLES: u64 = 2000;
 /// Share of a station's processor time that is allowed.
 const ALLOWED_SHARE: f64 = 0.01;
 
-/// Frames of a round, so few that it is over before another process gets the processor; the fastest of all rounds counts.
+/// Frames of a round, so few that it is over before another process gets the processor; the fastest of all rounds
+/// counts.
 const FRAMES: u64 = 1000;
 const ROUNDS: usize = 1000;
 

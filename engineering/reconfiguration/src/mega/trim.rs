@@ -1,10 +1,12 @@
 //! Trimming, step 7: Φ is revised so that no string leads to where nothing leads back from.
 //!
-//! A state that only the operator's release leaves is *dangling*. An event that leads from another state to one is prevented where
-//! module 2 commands the outputs and other outputs can do it: they keep back everything that was kept back, and let everything
-//! else happen that was let. So no state becomes dangling by it, and a second trimming finds nothing more.
+//! A state that only the operator's release leaves is *dangling*. An event that leads from another state to one is
+//! prevented where module 2 commands the outputs and other outputs can do it: they keep back everything that was kept
+//! back, and let everything else happen that was let. So no state becomes dangling by it, and a second trimming finds
+//! nothing more.
 //!
-//! Failures and repairs of channels cannot be prevented, and where module 2 is transparent the outputs are those of the ladder.
+//! Failures and repairs of channels cannot be prevented, and where module 2 is transparent the outputs are those of the
+//! ladder.
 
 use std::collections::BTreeSet;
 
@@ -20,12 +22,13 @@ use crate::signals::{Bits, Event};
 pub struct Trimming {
     /// Events that the revised commands prevent.
     pub prevented: Vec<(usize, Vec<Event>)>,
-    /// Events that outputs can prevent, but not without letting another one happen that must not, or stopping another one.
+    /// Events that outputs can prevent, but not without letting another one happen that must not, or stopping another
+    /// one.
     pub kept: Vec<(usize, Vec<Event>)>,
     /// Events that the commands prevented before.
     pub stopped: Vec<(usize, Vec<Event>)>,
-    /// What no output prevents: failures, repairs, ω, events that are uncontrollable where they happen, and those of the
-    /// ladder's own outputs.
+    /// What no output prevents: failures, repairs, ω, events that are uncontrollable where they happen, and those of
+    /// the ladder's own outputs.
     pub unavoidable: Vec<(usize, Label)>,
     /// The revised commands, with their states.
     pub commands: Vec<(usize, Command)>,
