@@ -90,7 +90,7 @@ fn together(program: &Program) -> u64 {
     program.tasks.iter().map(|task| u64::from(task.every.max(1))).fold(1, |all, every| {
         let divisor = crate::extent::divisor(all.into(), every.into()) as u64;
         // Past every count of scans, the tasks do not meet again.
-        (all / divisor.max(1)).checked_mul(every).unwrap_or(u64::MAX)
+        (all / divisor.max(1)).saturating_mul(every)
     })
 }
 

@@ -184,9 +184,9 @@ impl System {
         // Operands stand first, so what carries the time further is known before it is used.
         let mut carries = HashSet::from([age]);
         let mut most = 0_i64;
-        for place in first..is_reached.len() {
+        for (place, &is_reached) in is_reached.iter().enumerate().skip(first) {
             let term = self.terms.at(place);
-            if !is_reached[place] || term == age {
+            if !is_reached || term == age {
                 continue;
             }
             match self.terms.node(term) {
