@@ -54,6 +54,8 @@ pub(crate) struct Replica {
     remembered: Remembered,
     /// Stations that were accounted for when this one gave them its state, and that may prove outputs with it from then on.
     given: StationSet,
+    /// Stations that are accounted for by what they reported to this one since the newest sample.
+    witnessed: StationSet,
     history: usize,
 }
 
@@ -128,6 +130,7 @@ impl Replica {
             snapshots: Vec::new(),
             remembered: Remembered::Nothing,
             given: StationSet::EMPTY,
+            witnessed: StationSet::EMPTY,
             history,
         }
     }
@@ -198,6 +201,10 @@ impl Replica {
         };
         if inputs.width() == program.executable.input_count() {
             if let Remembered::Received(known) = &mut self.remembered {
+                // A copy of it, or of one before it, says nothing of who has been heard since.
+                if moment.epoch == known.sampled.epoch && moment <= known.sampled {
+                    return;
+                }
                 if known.sampled < moment {
                     known.received = SamplesReceived::Later;
                 }
@@ -206,6 +213,7 @@ impl Replica {
                 known.excluded = sample.excluded;
                 known.accounted_for = sample.gone;
                 self.given = StationSet::EMPTY;
+                self.witnessed = StationSet::EMPTY;
                 known.writes.clone_from(&sample.writes);
                 known.pulses.clone_from(&sample.pulses);
                 known.inputs.clone_from(inputs);
@@ -247,16 +255,37 @@ impl Replica {
             SamplesReceived::First => was_given && theirs.sampled <= recalled.sampled,
             SamplesReceived::Nothing => was_given,
         });
-        if stepped > recalled.sampled {
+        // With a state that the next sample's history reaches, it follows without one from another station, however long the remote I/O has not
+        // received it.
+        let is_fresh = now <= recalled.sampled && stepped.plus(self.history as u64) >= now;
+        if stepped > recalled.sampled || is_fresh {
             recalled.accounted_for.remove(station);
             self.given.remove(station);
+            self.witnessed.remove(station);
         } else if let Some(theirs) = theirs
             && now >= recalled.sampled.plus(u64::from(silent_after))
             && !gives_to
         {
+            if !recalled.accounted_for.contains(station) {
+                self.witnessed.insert(station);
+            }
             recalled.accounted_for.insert(station);
             recalled.applied = recalled.applied.max(theirs.applied);
         }
+    }
+
+    /// A station asks for the state and has no part of it: it may have proved outputs with the one that it was given here, and have lost its memory.
+    pub(crate) fn asked(&mut self, station: StationId) {
+        self.given.remove(station);
+    }
+
+    /// This station has heard nobody for a cycle: meanwhile others may have proved newer outputs.
+    pub(crate) fn was_isolated(&mut self) {
+        if let Remembered::Received(recalled) = &mut self.remembered {
+            recalled.accounted_for = recalled.accounted_for.without(self.witnessed);
+        }
+        self.witnessed = StationSet::EMPTY;
+        self.given = StationSet::EMPTY;
     }
 
     /// Takes what another station remembers, where this one has received no sample.

@@ -43,6 +43,8 @@ pub struct Station {
     replicas: SmallVec<[Replica; 2]>,
     scratch: Scratch,
     cycle: CycleNotes,
+    /// The cycle that ended last.
+    closed: Option<Moment>,
     started: Time,
     role: Role,
     wanted: ProgramSet,
@@ -106,6 +108,8 @@ struct CycleNotes {
     others_have: ProgramSet,
     /// Stations that asked to join.
     joiners: StationSet,
+    /// A remote I/O or another station was received.
+    hears_others: bool,
     /// The samples of this cycle, from their remote I/Os or relayed.
     samples: SmallVec<[Arc<Frame>; 2]>,
     /// Programs whose samples came from their remote I/Os.
@@ -138,6 +142,7 @@ impl Station {
             replicas,
             scratch: Scratch::default(),
             cycle: CycleNotes::default(),
+            closed: None,
             started: now,
             role: Role::Listening,
             wanted: ProgramSet::EMPTY,
@@ -209,6 +214,7 @@ impl Station {
         match (&frame.body, frame.header.sender) {
             (Body::Sample(sample), Member::RemoteIo(program)) => {
                 self.cycle.direct.insert(program);
+                self.cycle.hears_others = true;
                 self.follow(program, frame, sample);
             }
             (Body::Turn(turn), Member::Station(station)) => {
@@ -330,6 +336,7 @@ impl Hash for Station {
             replicas,
             scratch: _,
             cycle,
+            closed,
             started,
             role,
             wanted,
@@ -342,7 +349,7 @@ impl Hash for Station {
             looked_at: _,
         } = self;
         (member, replicas).hash(hasher);
-        (cycle, started, role, wanted).hash(hasher);
+        (cycle, closed, started, role, wanted).hash(hasher);
         (joining, differed, lacked, awaited).hash(hasher);
     }
 }

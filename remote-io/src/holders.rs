@@ -32,6 +32,9 @@ struct Holder {
     silent: u32,
     /// Cycles since any frame of it came, one that was too late for its cycle too; `u32::MAX` for never.
     unheard: u32,
+    /// Cycles since any frame of it came, or a turn that names it among those that published; `u32::MAX` for never. A station that is cut off
+    /// from this remote I/O follows the samples that others relay.
+    absent: u32,
 }
 
 impl Holders {
@@ -51,6 +54,7 @@ impl Holders {
                 recalled: None,
                 silent: u32::MAX,
                 unheard: u32::MAX,
+                absent: u32::MAX,
             })
             .collect();
         Self {
@@ -74,6 +78,7 @@ impl Holders {
             // A station that has restarted recalls nothing of its earlier life.
             entry.recalled = recalled.cloned();
             entry.silent = 0;
+            entry.absent = 0;
             self.recalled_gone.remove(station);
         }
     }
@@ -84,9 +89,17 @@ impl Holders {
         let mut entries = self.entries.iter_mut();
         if let Some(entry) = entries.find(|entry| entry.station == station) {
             entry.unheard = 0;
+            entry.absent = 0;
             if entry.silent > living_for && holding.is_some() {
                 entry.holding = holding.copied();
             }
+        }
+    }
+
+    /// Takes the stations that another one says have published.
+    pub(crate) fn hear_of(&mut self, stations: StationSet) {
+        for entry in self.entries.iter_mut().filter(|entry| stations.contains(entry.station)) {
+            entry.absent = 0;
         }
     }
 
@@ -102,16 +115,17 @@ impl Holders {
         for entry in &mut self.entries {
             entry.silent = entry.silent.saturating_add(1);
             entry.unheard = entry.unheard.saturating_add(1);
+            entry.absent = entry.absent.saturating_add(1);
         }
     }
 
     /// Stations that cannot come back without a state from another one.
     pub(crate) fn gone(&self) -> StationSet {
-        let silent = self
+        let absent = self
             .entries
             .iter()
-            .filter(|entry| self.listened > self.gone_after && entry.silent > self.gone_after);
-        silent.map(|entry| entry.station).collect::<StationSet>().or(self.recalled_gone)
+            .filter(|entry| self.listened > self.gone_after && entry.absent > self.gone_after);
+        absent.map(|entry| entry.station).collect::<StationSet>().or(self.recalled_gone)
     }
 
     /// Whether no output can have been applied that came of a newer state than `holding`, as far as living stations

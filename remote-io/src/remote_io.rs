@@ -227,6 +227,7 @@ impl RemoteIo {
         match &frame.body {
             Body::Turn(turn) if self.member.attendance.receive_turn(station) => {
                 self.note(station, &turn.holdings, &turn.recalled);
+                self.holders.hear_of(turn.heard);
                 self.turns[station.index()] = Some(Arc::clone(frame));
             }
             Body::Join(join) => self.note(station, &join.holdings, &join.recalled),

@@ -10,6 +10,7 @@ use understudy_wire::{Body, Member, Moment, StationSet, Time};
 
 use super::{CycleNotes, Role, Station, Token};
 use crate::event::Event;
+use crate::replica::Replica;
 
 /// Cycles of a second, and at least three.
 fn missing_after(period: Duration) -> u32 {
@@ -27,6 +28,11 @@ impl Station {
             self.member.attendance.receive_turn(self.own());
         }
         self.member.close_cycle();
+        let follows = self.closed.is_some_and(|closed| moment <= closed.plus(1));
+        self.closed = Some(moment);
+        if !follows || !self.cycle.hears_others {
+            self.replicas.iter_mut().for_each(Replica::was_isolated);
+        }
         for replica in &mut self.replicas {
             if replica.close_cycle(moment) {
                 let program = replica.id();
