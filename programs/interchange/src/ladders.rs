@@ -19,12 +19,14 @@ mod unroll;
 
 use std::collections::BTreeMap;
 
-use understudy_ladder::{Name, Program as Ladder};
+use understudy_ladder::{Name, Program as Ladder, Relation};
 use understudy_structured_text::lower::Names;
 use understudy_structured_text::syntax::{Body, File, Statement, StatementKind, Unit, UnitKind};
 use understudy_text::{Diagnostic, Lines, has_errors};
 use understudy_typed::Program;
 
+use self::bounds::Interval;
+use self::program::{Action, Cell, Number, Resolved, Role, Step, Truth};
 use self::unroll::Surroundings;
 
 /// A program as a ladder, with what is odd about it; nothing where it is none, with the reason.
@@ -65,6 +67,9 @@ pub(crate) fn ladder(
         }
     };
     let (mut intervals, mut diagnostics) = bounds::bounds(&resolved);
+    if limit_outputs(program, &mut resolved, &intervals) {
+        (intervals, diagnostics) = bounds::bounds(&resolved);
+    }
     diagnostics.extend(timers::place(&mut resolved, &mut intervals));
     let mut made = None;
     if !has_errors(&diagnostics) {
@@ -89,6 +94,46 @@ pub(crate) fn ladder(
         diagnostics.extend(lost::lost(text, file, program));
     }
     (made, diagnostics)
+}
+
+/// Ends a scan as a program does: an output that may leave its subrange becomes the end of it. Whether there is one.
+fn limit_outputs(program: &Program, resolved: &mut Resolved, intervals: &[Interval]) -> bool {
+    let mut limits = Vec::new();
+    for point in &program.outputs {
+        let Some((low, high)) = point.range else {
+            continue;
+        };
+        let is_it = |cell: &Cell| cell.role == Role::Output && cell.name == point.name;
+        let Some(cell) = resolved.cells.iter().position(is_it) else {
+            continue;
+        };
+        let interval = &intervals[cell];
+        let (Ok(least), Ok(most)) = (i64::try_from(low), i64::try_from(high)) else {
+            continue;
+        };
+        if interval.low >= low && interval.high <= high {
+            continue;
+        }
+        let beyond = |relation, end| {
+            let (own, end) = (Number::Cell(cell), Number::Constant(end));
+            Box::new(Truth::Compare(relation, Box::new(own), Box::new(end)))
+        };
+        let within = Number::Choice(
+            beyond(Relation::Greater, most),
+            Box::new(Number::Constant(most)),
+            Box::new(Number::Cell(cell)),
+        );
+        let limited = Number::Choice(
+            beyond(Relation::Less, least),
+            Box::new(Number::Constant(least)),
+            Box::new(within),
+        );
+        let action = Action::SetNumber(cell, limited);
+        limits.push(Step { action, span: 0..0, comments: Vec::new() });
+    }
+    let is_limited = !limits.is_empty();
+    resolved.steps.extend(limits);
+    is_limited
 }
 
 /// The comments below the last statement.

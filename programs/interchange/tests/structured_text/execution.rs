@@ -66,6 +66,26 @@ pub(crate) fn check(what: &str, ladder: &Ladder, typed: &Program, seed: u64) {
     }
 }
 
+/// An output beyond its subrange is the end of it from the end of the scan on, in the program too.
+#[test]
+fn ladders_keep_outputs_within_their_subranges() {
+    for body in [
+        "IF go THEN n := n + 2; END_IF; q := n = 11;",
+        "q := n > 8; IF go THEN n := n + m; ELSE n := n - 3; END_IF;",
+        "n := m; IF go THEN m := m - 1; ELSE m := m + 5; END_IF; q := m > 0;",
+    ] {
+        let text = format!(
+            "PROGRAM p VAR_INPUT go : BOOL; END_VAR VAR_OUTPUT n : INT (0..9); m : INT (-2..20) := 1; q : BOOL; END_VAR {body} END_PROGRAM"
+        );
+        let ladder = read(Format::StructuredText, "p.st", &text, None).program;
+        let ladder = ladder.unwrap_or_else(|| panic!("no ladder: {text}"));
+        let typed = typed(&text, &parse(&text).0).expect("a sound program");
+        check(&text, &ladder, &typed, 3);
+        let circuit = understudy_bits::exact(&typed).expect("a circuit");
+        check_bits(&text, &circuit, &typed, 3);
+    }
+}
+
 /// Compares the scans of an exact circuit with those of its program, bit by bit.
 pub(crate) fn check_bits(what: &str, circuit: &Circuit, typed: &Program, seed: u64) {
     let inputs: Vec<&str> = circuit.inputs().iter().map(String::as_str).collect();
