@@ -60,9 +60,9 @@ pub(super) fn of(
 pub(super) fn best_of_each(offers: &[Offer], fits: &[Fit]) -> Vec<usize> {
     let key = |place: usize| (fits[place].verdict, offers[place].parts());
     let mut best: Vec<usize> = Vec::new();
-    for place in 0..fits.len() {
+    for (place, offer) in offers.iter().enumerate().take(fits.len()) {
         // The controllers alone come first, by number.
-        match best.get_mut(offers[place].model) {
+        match best.get_mut(offer.model) {
             None => best.push(place),
             Some(known) if key(place) < key(*known) => *known = place,
             Some(_) => {}

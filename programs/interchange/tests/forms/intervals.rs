@@ -206,7 +206,7 @@ fn check(source: &Source, period: Duration, runs: &[(Runs, u64, &str)], about: &
         for (run, every, output) in runs {
             let count = match run {
                 // On in the scans 1, 4, 7 …
-                Event => (scan + 2) / 3,
+                Event => scan.div_ceil(3),
                 _ => scan / every + 1,
             };
             let (_, value) = found.iter().find(|(name, _)| name == output).expect("the output");

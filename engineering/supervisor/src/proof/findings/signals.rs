@@ -1,5 +1,6 @@
 //! What the signals of a map cannot tell: commands that are latched twice, and events that come faster than scans.
 
+use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap, VecDeque};
 
 use super::closed_loop::ClosedLoop;
@@ -115,8 +116,8 @@ impl ClosedLoop {
                     _ => at,
                 };
                 let next = (edge.target, next);
-                if !parents.contains_key(&next) {
-                    parents.insert(next, Some((node, event)));
+                if let Entry::Vacant(place) = parents.entry(next) {
+                    place.insert(Some((node, event)));
                     pending.push_back(next);
                 }
             }
