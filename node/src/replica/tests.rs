@@ -5,7 +5,8 @@ use std::collections::HashMap;
 use proptest::prelude::*;
 use understudy_logic::{Circuit, CircuitBuilder};
 use understudy_wire::{
-    ClusterHash, ConfigurationHash, Cycle, Epoch, Header, Member, ProgramHash, Transfer,
+    ClusterHash, ConfigurationHash, Cycle, Epoch, Header, Member, ProgramHash, SamplesReceived,
+    Transfer,
 };
 
 use super::*;

@@ -20,18 +20,17 @@ impl Station {
         self.cycle.lacked = self.cycle.lacked.or(join.lacks);
         let mut budget = SEGMENTS_A_CYCLE.saturating_sub(self.cycle.segments);
         for program in join.wants.iter() {
-            let partial = join.partial.iter().find(|partial| partial.program == program);
-            if let Some(replica) = replica_mut(&mut self.replicas, program)
-                && partial.is_none()
-            {
-                replica.asked(station);
-            }
-            if self.cycle.others_have.contains(program) && self.own().0 != program.0 {
-                continue;
-            }
+            let others_give = self.cycle.others_have.contains(program) && self.own().0 != program.0;
             let Some(replica) = replica_mut(&mut self.replicas, program) else {
                 continue;
             };
+            let partial = join.partial.iter().find(|partial| partial.program == program);
+            if partial.is_none() {
+                replica.asked(station);
+            }
+            if others_give {
+                continue;
+            }
             let program = &self.settings.programs[program.index()];
             for transfer in replica.transfer(program, station, partial, &mut budget) {
                 self.member.send(Body::Transfer(transfer));
