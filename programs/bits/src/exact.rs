@@ -1,6 +1,6 @@
 //! The circuit that does in every scan what the program does.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 
 use understudy_logic::{Circuit, CircuitBuilder, Expression, Variable as Bit};
 use understudy_typed::{Elementary, Program};
@@ -48,10 +48,11 @@ fn gaps(gaps: &[Gap]) -> String {
 /// What of the program is not followed, or not bit by bit.
 pub fn exact(program: &Program) -> Result<Circuit, Inexact> {
     let system = System::of_program(program)?;
-    let value = |name: &str| {
-        let mut known = system.observed.iter().chain(&system.shown);
-        known.find(|(known, _)| known == name).map(|(_, term)| *term)
-    };
+    let mut values: HashMap<&str, Term> = HashMap::new();
+    for (name, term) in system.observed.iter().chain(&system.shown) {
+        values.entry(name).or_insert(*term);
+    }
+    let value = |name: &str| values.get(name).copied();
     let wide = program.outputs.iter().filter(|point| point.of != Elementary::Bool);
     let wide: Vec<(String, Term)> =
         wide.filter_map(|point| Some((point.name.clone(), value(&point.name)?))).collect();
@@ -59,6 +60,10 @@ pub fn exact(program: &Program) -> Result<Circuit, Inexact> {
     let circuit = &derivation.circuit;
     let never = |value: Term| system.terms.is(value, false) || derivation.is_never(value);
     let stops = !value(Program::FAULT).is_some_and(never);
+    let mut known: HashMap<&str, Expression> = HashMap::new();
+    for output in circuit.outputs() {
+        known.entry(&output.name).or_insert(output.value);
+    }
     let outputs: Vec<(String, Expression)> = program
         .outputs
         .iter()
@@ -67,10 +72,7 @@ pub fn exact(program: &Program) -> Result<Circuit, Inexact> {
             Elementary::Bool => vec![point.name.clone()],
             of => (0..of.bits()).map(|bit| format!("{}.{bit}", point.name)).collect(),
         })
-        .filter_map(|name| {
-            let mut known = circuit.outputs().iter();
-            known.find(|output| output.name == name).map(|output| (name, output.value))
-        })
+        .filter_map(|name| known.get(name.as_str()).map(|&value| (name, value)))
         .collect();
     let live = live(circuit, outputs.iter().map(|(_, value)| *value).collect());
     let mut gaps = derivation.gaps_among(&system, &live);
@@ -147,7 +149,7 @@ fn pruned(
     let circuit = &derivation.circuit;
     let mut builder = CircuitBuilder::new(circuit.name());
     let mut places: Vec<Option<Expression>> = vec![None; circuit.inputs().len()];
-    let mut known: std::collections::HashMap<(u32, u32), usize> = std::collections::HashMap::new();
+    let mut known: HashMap<(u32, u32), usize> = HashMap::new();
     for (place, meaning) in derivation.meanings.iter().enumerate() {
         if let Meaning::Bit(input, bit) = *meaning {
             known.insert((input, bit), place);
