@@ -240,6 +240,18 @@ fn any_relation() -> impl Strategy<Value = Vec<Vec<Vec<Option<bool>>>>> {
     prop::collection::vec(prop::collection::vec(row, 0..=2), 10)
 }
 
+/// Of every event the same rows in all states.
+pub(crate) fn uniform(controller: &Controller, rows: Vec<Vec<Vec<Option<bool>>>>) -> Relation {
+    let mut relation = Relation::new(controller.states().len());
+    for (event, rows) in controller.signals.events().zip(rows) {
+        let rows: Arc<[Row]> = rows.into_iter().map(Row).collect();
+        for state in 0..controller.states().len() {
+            relation.set(state, event, rows.clone());
+        }
+    }
+    relation
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 
@@ -250,13 +262,7 @@ proptest! {
     ) {
         let found = explored(PERIOD);
         let controller = &found.controller;
-        let mut relation = Relation::new(controller.states().len());
-        for (event, rows) in controller.signals.events().zip(rows) {
-            let rows: Arc<[Row]> = rows.into_iter().map(Row).collect();
-            for state in 0..controller.states().len() {
-                relation.set(state, event, rows.clone());
-            }
-        }
+        let relation = uniform(controller, rows);
         let analysis = if late { Analysis::Late } else { Analysis::Prompt };
         if let Some(proof) = prove_with(controller, &relation, analysis, 1, |_| {}) {
             prop_assert!(proof.is_ok(), "{}", proof.unwrap_err());

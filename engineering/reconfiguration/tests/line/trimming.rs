@@ -1,7 +1,6 @@
 //! Trimming, step 7: what it prevents, and that it takes nothing else away.
 
 use std::path::Path;
-use std::sync::Arc;
 
 use proptest::prelude::*;
 use proptest::strategy::ValueTree as _;
@@ -14,7 +13,7 @@ use understudy_reconfiguration::{
     Signals, State, Trimming, analyse, project,
 };
 
-use crate::{LADDER, PERIOD, any_relation, explored, program};
+use crate::{LADDER, PERIOD, any_relation, explored, program, uniform};
 
 fn question(late: bool) -> Question {
     Question {
@@ -24,18 +23,6 @@ fn question(late: bool) -> Question {
         objective: Objective::Fewest,
         maximum_states: 100_000,
     }
-}
-
-/// Of every event the same rows in all states.
-fn uniform(controller: &Controller, rows: Vec<Vec<Vec<Option<bool>>>>) -> Relation {
-    let mut relation = Relation::new(controller.states().len());
-    for (event, rows) in controller.signals.events().zip(rows) {
-        let rows: Arc<[Row]> = rows.into_iter().map(Row).collect();
-        for state in 0..controller.states().len() {
-            relation.set(state, event, rows.clone());
-        }
-    }
-    relation
 }
 
 /// What the outputs in force in a state let happen: members with moves, by their places.

@@ -15,43 +15,10 @@ fn lowered(text: &str) -> Program {
 }
 
 /// A chart of steps in a number, an enumeration.
-const CHART: &str = "TYPE phase : (idle, filling, full); END_TYPE
-     PROGRAM p
-       VAR_INPUT start : BOOL; level : REAL; END_VAR
-       VAR_OUTPUT pump : BOOL; done : BOOL; END_VAR
-       VAR now : phase; step : DINT; END_VAR
-       CASE now OF
-         idle: IF start THEN now := filling; END_IF;
-         filling: IF level > 90.0 THEN now := full; END_IF;
-         full: IF level < 20.0 THEN now := idle; END_IF;
-       END_CASE;
-       IF step = 0 AND start THEN step := 10;
-       ELSIF step = 10 THEN step := 20;
-       ELSIF step = 20 THEN step := 0;
-       END_IF;
-       pump := now = filling;
-       done := step = 20;
-     END_PROGRAM";
+const CHART: &str = include_str!("../../../../programs/bits/src/tests/chart.st");
 
 /// Blocks, references, reals that are kept.
-const BLOCKS: &str = "FUNCTION_BLOCK step
-       VAR_IN_OUT value : REAL; END_VAR
-       VAR_INPUT plus : REAL; END_VAR
-       VAR_OUTPUT high : BOOL; END_VAR
-       VAR last : REAL; END_VAR
-       high := value > 80.0 AND last <= 90.0;
-       last := value;
-       IF plus > 0.0 THEN value := value + plus; ELSE value := 0.0; END_IF;
-     END_FUNCTION_BLOCK
-     PROGRAM p
-       VAR_INPUT plus : REAL; hold : BOOL; END_VAR
-       VAR_OUTPUT level : REAL; alarm : BOOL; worst : BOOL; END_VAR
-       VAR one : step; two : step; kept : REAL; END_VAR
-       IF NOT hold THEN one(value := level, plus := plus); END_IF;
-       two(value := kept, plus := level);
-       alarm := one.high;
-       worst := kept >= level OR two.high;
-     END_PROGRAM";
+const BLOCKS: &str = include_str!("../../../../programs/bits/src/tests/blocks.st");
 
 fn ask(model: &Model, property: &str) -> Answer {
     let property = read_one(property).expect("a property");

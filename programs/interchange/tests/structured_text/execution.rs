@@ -28,20 +28,24 @@ pub(crate) fn typed(text: &str, file: &File) -> Option<Program> {
     lower(file, &options).program
 }
 
-/// Compares the scans of both.
+/// Compares the scans of a ladder with those of its program.
 pub(crate) fn check(what: &str, ladder: &Ladder, typed: &Program, seed: u64) {
-    let inputs: Vec<&str> = ladder.inputs.iter().map(|it| it.name.as_str()).collect();
-    let outputs: Vec<&str> = ladder.outputs.iter().map(|it| it.name.as_str()).collect();
-    let circuit = match ladder.lower(PERIOD) {
-        Ok(circuit) => circuit,
-        Err(error) => panic!("{what}: {error:?}\n{}", understudy_ladder::print(ladder)),
-    };
-    let mut running = Running::new(&circuit);
+    let shown = format!("{what}\n{}", understudy_ladder::print(ladder));
+    let circuit = ladder.lower(PERIOD).unwrap_or_else(|error| panic!("{error:?}: {shown}"));
+    compare(&shown, &circuit, typed, seed);
+}
+
+/// Compares the scans of a circuit with those of a program, for each bit that the circuit has; whether the program stopped by a fault.
+fn compare(what: &str, circuit: &Circuit, typed: &Program, seed: u64) -> bool {
+    let inputs: Vec<&str> = circuit.inputs().iter().map(String::as_str).collect();
+    let outputs: Vec<&str> = circuit.outputs().iter().map(|it| it.name.as_str()).collect();
+    let mut running = Running::new(circuit);
     let (into, from) = (places(&inputs, &typed.inputs), places(&outputs, &typed.outputs));
     let interpreter = Interpreter::new(typed);
     let mut state = interpreter.initial().to_vec();
     let mut dice = Dice::new(seed);
     let mut bits = dice.bits(inputs.len());
+    let mut stopped = false;
     for scan in 0..400 {
         // Inputs stay for a while, so that timers run out.
         if scan % 7 == 0 || scan > 250 {
@@ -56,14 +60,11 @@ pub(crate) fn check(what: &str, ladder: &Ladder, typed: &Program, seed: u64) {
         interpreter.step(&mut state, &image, &mut image_out);
         for ((name, place), found) in outputs.iter().zip(&from).zip(found) {
             let expected = image_out[place / 64] >> (place % 64) & 1 == 1;
-            assert_eq!(
-                found,
-                expected,
-                "{what}: `{name}` in scan {scan}\n{}",
-                understudy_ladder::print(ladder)
-            );
+            assert_eq!(found, expected, "`{name}` in scan {scan}: {what}");
         }
+        stopped |= understudy_typed::Fault::read(&state).is_some();
     }
+    stopped
 }
 
 /// An output beyond its subrange is the end of it from the end of the scan on, in the program too.
@@ -88,40 +89,15 @@ fn ladders_keep_outputs_within_their_subranges() {
 
 /// Compares the scans of an exact circuit with those of its program, bit by bit.
 pub(crate) fn check_bits(what: &str, circuit: &Circuit, typed: &Program, seed: u64) {
-    let inputs: Vec<&str> = circuit.inputs().iter().map(String::as_str).collect();
-    let outputs: Vec<&str> = circuit.outputs().iter().map(|it| it.name.as_str()).collect();
     // A program that never stops has neither reset nor fault.
-    let stops = outputs.contains(&Program::FAULT);
+    let stops = circuit.outputs().iter().any(|output| output.name == Program::FAULT);
     let named = |points: &understudy_typed::Points| {
         let own = points.iter().filter(|point| stops || point.slot != 0);
         own.map(|point| point.of.bits() as usize).sum::<usize>()
     };
-    assert_eq!(inputs.len(), named(&typed.inputs), "{what}");
-    assert_eq!(outputs.len(), named(&typed.outputs), "{what}");
-    let mut stopped = false;
-    let mut running = Running::new(circuit);
-    let (into, from) = (places(&inputs, &typed.inputs), places(&outputs, &typed.outputs));
-    let interpreter = Interpreter::new(typed);
-    let mut state = interpreter.initial().to_vec();
-    let mut dice = Dice::new(seed);
-    let mut bits = dice.bits(inputs.len());
-    for scan in 0..400 {
-        if scan % 7 == 0 || scan > 250 {
-            bits = dice.bits(inputs.len());
-        }
-        let found = running.step(&bits);
-        let mut image = vec![0; typed.inputs.width().div_ceil(64)];
-        for (place, bit) in into.iter().zip(&bits) {
-            image[place / 64] |= u64::from(*bit) << (place % 64);
-        }
-        let mut image_out = vec![0; typed.outputs.width().div_ceil(64)];
-        interpreter.step(&mut state, &image, &mut image_out);
-        for ((name, place), found) in outputs.iter().zip(&from).zip(found) {
-            let expected = image_out[place / 64] >> (place % 64) & 1 == 1;
-            assert_eq!(found, expected, "{what}: `{name}` in scan {scan}");
-        }
-        stopped |= understudy_typed::Fault::read(&state).is_some();
-    }
+    assert_eq!(circuit.inputs().len(), named(&typed.inputs), "{what}");
+    assert_eq!(circuit.outputs().len(), named(&typed.outputs), "{what}");
+    let stopped = compare(what, circuit, typed, seed);
     assert!(stops || !stopped, "{what}");
 }
 
