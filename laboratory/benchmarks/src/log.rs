@@ -51,7 +51,7 @@ struct Row {
     places_per_cycle: f64,
     nanoseconds_per_place: f64,
     processor_us_per_cycle: f64,
-    /// Of the processor time.
+    /// The part of the processor time of a cycle that the places of the log take.
     share: f64,
 }
 

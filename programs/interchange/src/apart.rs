@@ -31,9 +31,9 @@ pub struct Apart {
 /// Where the program of a file that has no other is kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Copies {
-    /// In the text as it was read.
+    /// The programs stand in copies of the text that was read.
     AsRead,
-    /// In a text that is written, since what was read is no file: the parts of a project.
+    /// The programs stand in a text that is written, since what was read is no file: the parts of a project.
     Written,
 }
 

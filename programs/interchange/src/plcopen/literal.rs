@@ -75,7 +75,7 @@ pub(crate) fn interval(text: &str) -> Option<Duration> {
     found.filter(|interval| PERIODS.contains(interval))
 }
 
-/// The finding on an interval that is none.
+/// The finding on an interval that is not a time within the bounds.
 pub(crate) fn no_interval(text: &str, span: Range<usize>) -> Diagnostic {
     let message = format!(
         "the interval `{text}` of the task is not a time from {} to {}",

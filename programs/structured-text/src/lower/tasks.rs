@@ -1,7 +1,7 @@
 //! How often programs run: the intervals of tasks.
 //!
 //! One rule for every language: the period of a file is the longest one of which the intervals of all tasks that run programs are
-//! multiples, and each program runs in every so many scans. A period from outside keeps the intervals where it divides them all.
+//! multiples, and each program runs in every n-th scan. A period from outside keeps the intervals where it divides them all.
 
 use std::ops::Range;
 
@@ -95,7 +95,7 @@ pub(super) struct Base {
 }
 
 impl Base {
-    /// In each so many scans a program with this interval runs.
+    /// The number of scans from one run of a program with this interval to the next.
     pub(super) fn every(self, interval: i64) -> u32 {
         let scans = (interval / self.common).saturating_mul(self.scans);
         u32::try_from(scans).unwrap_or(u32::MAX).max(1)

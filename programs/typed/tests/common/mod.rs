@@ -185,7 +185,7 @@ impl Generator {
         slot
     }
 
-    /// Of every other whole number.
+    /// A subrange for about every other output that is a whole number.
     fn subrange(&mut self, of: Elementary) -> Option<(i128, i128)> {
         let is_whole = of.is_integer() || of.is_bit_string() && of != Elementary::Bool;
         if !is_whole || self.random.below(2) == 0 {

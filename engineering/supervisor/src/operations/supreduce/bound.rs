@@ -14,7 +14,7 @@ use crate::explicit::{Joint, Product, TooLarge};
 /// States of the product that are compared pair by pair; of a larger product only the first different ones, without what follows them.
 const MOST: usize = 1_000;
 
-/// From so many states a set is begun.
+/// The number of states from each of which a set of states that are told apart in pairs is grown.
 const SEEDS: usize = 64;
 
 /// What a supervisor asks for after the words of one state of the product.
