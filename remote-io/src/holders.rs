@@ -32,8 +32,9 @@ struct Holder {
     silent: u32,
     /// Cycles since any frame of it came, one that was too late for its cycle too; `u32::MAX` for never.
     unheard: u32,
-    /// Cycles since any frame of it came, or a turn that names it among those that published; `u32::MAX` for never. A station that is cut off
-    /// from this remote I/O follows the samples that others relay.
+    /// Cycles since a frame of it came in time or with a state, or a turn that names it among those that published; `u32::MAX` for never. A
+    /// station that is cut off from this remote I/O follows the samples that others relay; a second process with its keys, to which no
+    /// sample goes, holds no state.
     absent: u32,
 }
 
@@ -89,9 +90,11 @@ impl Holders {
         let mut entries = self.entries.iter_mut();
         if let Some(entry) = entries.find(|entry| entry.station == station) {
             entry.unheard = 0;
-            entry.absent = 0;
-            if entry.silent > living_for && holding.is_some() {
-                entry.holding = holding.copied();
+            if holding.is_some() {
+                entry.absent = 0;
+                if entry.silent > living_for {
+                    entry.holding = holding.copied();
+                }
             }
         }
     }
