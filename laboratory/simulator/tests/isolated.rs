@@ -110,3 +110,20 @@ fn what_was_heard_before_an_isolation_counts_no_more() {
         }
     }
 }
+
+/// A station was gone when another one was isolated; then the program started cold with it.
+#[test]
+fn a_station_that_was_gone_may_have_started_cold_since() {
+    for (remote_io, gone, isolated) in holders() {
+        for (length, phase) in (16..40).flat_map(|length| [0.0, 0.7].map(|phase| (length, phase))) {
+            let mut cell = Cell::new(11);
+            cell.fault((20, 0.8), gone, Action::Crash);
+            cell.fault((31, 0.8), gone, Action::Restart);
+            let ends = (32 + length, phase);
+            cell.isolate((32, 0.7), ends, isolated);
+            cell.restart((ends.0, 0.9), remote_io);
+            cell.restart((ends.0, 0.9), gone);
+            cell.runs_without_going_back(&format!("{isolated:?} for {length} {phase}"));
+        }
+    }
+}

@@ -109,10 +109,15 @@ impl Replica {
         self.given.remove(station);
     }
 
-    /// This station has received no other member for a cycle: meanwhile others may have proved newer outputs.
-    pub(crate) fn was_isolated(&mut self) {
+    /// This station has received no other member for a cycle: meanwhile others may have proved newer outputs, and one that was gone may have
+    /// started cold.
+    ///
+    /// Where the program is the cluster's only one (`is_only`), its station that is left receives no other member as soon as the remote I/O is away:
+    /// that is no isolation, and a station that was gone stays gone.
+    pub(crate) fn was_isolated(&mut self, is_only: bool) {
         if let Remembered::Received(recalled) = &mut self.remembered {
-            recalled.accounted_for = recalled.accounted_for.without(self.witnessed);
+            let known = if is_only { recalled.accounted_for } else { StationSet::EMPTY };
+            recalled.accounted_for = known.without(self.witnessed);
         }
         self.witnessed = StationSet::EMPTY;
         self.given = StationSet::EMPTY;

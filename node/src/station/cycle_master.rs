@@ -10,7 +10,6 @@ use understudy_wire::{Body, Member, Moment, StationSet, Time};
 
 use super::{CycleNotes, Role, Station, Token};
 use crate::event::Event;
-use crate::replica::Replica;
 
 /// Cycles of a second, and at least three.
 fn missing_after(period: Duration) -> u32 {
@@ -31,7 +30,8 @@ impl Station {
         let follows = self.closed.is_some_and(|closed| moment <= closed.plus(1));
         self.closed = Some(moment);
         if !follows || !self.cycle.hears_others {
-            self.replicas.iter_mut().for_each(Replica::was_isolated);
+            let is_only = self.settings.agreement.schedule.controllers() == 1;
+            self.replicas.iter_mut().for_each(|replica| replica.was_isolated(is_only));
         }
         for replica in &mut self.replicas {
             if replica.close_cycle(moment) {
