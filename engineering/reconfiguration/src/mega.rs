@@ -8,12 +8,14 @@
 //! unseen events from happening where outputs can ([`crate::settle`]), reads a repaired channel's value (*disaggregation*), and
 //! sees all inputs of a scan at once. They differ in how much may have happened unseen before a failure is known.
 
+mod entry;
 mod trim;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use rustc_hash::FxHashMap;
 
+use self::entry::{Entry, overlaps};
 pub use self::trim::{Reached, Trimming};
 use crate::command::Objective;
 use crate::controller::{Controller, Move, reach};
@@ -98,6 +100,7 @@ pub struct MegaController {
     pub programs: usize,
     places: FxHashMap<(Vec<u32>, u64), usize>,
     seeds: FxHashMap<(Vec<u32>, u64), Option<usize>>,
+    entries: BTreeMap<Entry, usize>,
 }
 
 /// Why Θ could not be built.
@@ -130,19 +133,24 @@ impl MegaController {
             edges: Vec::new(),
             places: FxHashMap::default(),
             seeds: FxHashMap::default(),
+            entries: BTreeMap::new(),
             without: Vec::new(),
         };
         builder.place(vec![0], 0);
+        let overlaps = overlaps(controller, question);
         let mut next = 0;
-        while next < builder.states.len() {
-            builder.expand(next);
-            if builder.states.len() > question.maximum_states {
-                return Err(Unbuilt::TooLarge(question.maximum_states));
+        loop {
+            while next < builder.states.len() && builder.without.len() < MAXIMUM_TOLD {
+                builder.expand(next);
+                if builder.states.len() > question.maximum_states {
+                    return Err(Unbuilt::TooLarge(question.maximum_states));
+                }
+                next += 1;
             }
-            if builder.without.len() >= MAXIMUM_TOLD {
+            let is_literal = question.analysis == Analysis::Section2;
+            if is_literal || builder.without.len() >= MAXIMUM_TOLD || !builder.enter(&overlaps) {
                 break;
             }
-            next += 1;
         }
         if !builder.without.is_empty() {
             return Err(Unbuilt::NoCommand(builder.without));
@@ -154,6 +162,7 @@ impl MegaController {
             edges: builder.edges,
             places: builder.places,
             seeds: builder.seeds,
+            entries: builder.entries,
         };
         mega.dangling = mega.without_return(controller, relation, question);
         Ok(mega)
@@ -296,6 +305,7 @@ struct Builder<'a> {
     edges: Vec<Vec<(Label, usize)>>,
     places: FxHashMap<(Vec<u32>, u64), usize>,
     seeds: FxHashMap<(Vec<u32>, u64), Option<usize>>,
+    entries: BTreeMap<Entry, usize>,
     without: Vec<NoCommand>,
 }
 

@@ -134,7 +134,7 @@ impl MegaController {
                 open.map(|(_, target)| *target).collect()
             })
             .collect();
-        let reached = reach(&forward, [0]);
+        let reached = reach(&forward, self.entries.values().copied().chain([0]));
         let both = reached.iter().zip(&self.dangling).filter(|(reached, _)| **reached);
         Reached {
             states: both.clone().count(),

@@ -129,6 +129,8 @@ impl Writer<'_> {
                         .try_fold(home, |place, bit| mega.follow(place, &Label::Break(bit)))
                 });
                 let stale = mega.settled(&seed, failed).or(fresh);
+                let fresh = mega.entry(seed[0], failed, true).or(fresh);
+                let stale = mega.entry(seed[0], failed, false).or(stale);
                 let mut network = vec![off(&self.names.held), on(at)];
                 let pattern = self.names.failed.iter().enumerate();
                 network.extend(pattern.map(|(bit, name)| contact(name, failed >> bit & 1 == 1)));

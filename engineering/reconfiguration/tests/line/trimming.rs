@@ -15,7 +15,7 @@ use understudy_reconfiguration::{
 
 use crate::{LADDER, PERIOD, any_relation, explored, program, uniform};
 
-fn question(late: bool) -> Question {
+pub(crate) fn question(late: bool) -> Question {
     Question {
         channels: vec![0, 1, 2, 3, 4],
         simultaneous: 1,
@@ -109,7 +109,7 @@ fn the_sorter_stops_where_it_can_go_on_by_itself() {
 }
 
 /// Automata of two inputs and two outputs, with relations of their own in every state.
-fn any_automaton() -> impl Strategy<Value = (Controller, Relation)> {
+pub(crate) fn any_automaton() -> impl Strategy<Value = (Controller, Relation)> {
     (4_usize..=7).prop_flat_map(|count| {
         let states = prop::collection::vec((0_u8..4, 0_u8..4), count);
         let pairs = prop::collection::vec((0..count, 0..count), 1..=count);
