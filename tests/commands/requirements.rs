@@ -1,6 +1,6 @@
 //! The requirements of an example: each property that its page runs is proved, and its alarms occur in the cycles that it names.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
@@ -27,11 +27,13 @@ fn listed<'a>(page: &'a str, letter: &str) -> BTreeSet<&'a str> {
 }
 
 /// Runs every `understudy verify` and `understudy simulate` of a page. What a block `sh` proves holds, and each requirement R has a
-/// property; what a block `console` asks fails, and there is one for each N, a requirement that is not kept.
+/// property; what a block `console` asks fails, and there is one for each N, a requirement that a printed program does not keep. It
+/// names the requirement R as which another program keeps it.
 fn check(folder: &str) {
     let page = page(folder);
-    let mut proved = BTreeSet::new();
+    let mut proved: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     let (mut count, mut refuted, mut runs, mut fails) = (0, 0, 0, false);
+    let mut faulty = BTreeSet::new();
     for line in page.lines() {
         fails = if line.starts_with("```") { line == "```console" } else { fails };
         let Some(command) = line.strip_prefix("understudy ") else { continue };
@@ -56,19 +58,28 @@ fn check(folder: &str) {
             let expected = if fails { "fails" } else { "holds" };
             assert_eq!(property["verdict"], expected, "{property:#}");
         }
+        let ladder = arguments[1].to_owned();
         if fails {
             refuted += found.len();
+            faulty.insert(ladder);
             continue;
         }
         count += found.len();
         let (_, file) = command.split_once("--properties ").expect("a file of properties");
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
         let lines = fs::read_to_string(path).expect("properties");
-        proved.extend(lines.lines().filter_map(number).map(str::to_owned));
+        for requirement in lines.lines().filter_map(number) {
+            proved.entry(requirement.to_owned()).or_default().insert(ladder.clone());
+        }
     }
-    let proved: BTreeSet<&str> = proved.iter().map(String::as_str).collect();
-    assert_eq!(listed(&page, "R"), proved, "{folder}");
+    let numbers: BTreeSet<&str> = proved.keys().map(String::as_str).collect();
+    assert_eq!(listed(&page, "R"), numbers, "{folder}");
     assert_eq!(listed(&page, "N").len(), refuted, "{folder}");
+    for row in page.lines().filter(|line| line.starts_with("| N")) {
+        let kept = row.trim_end_matches(" |").rsplit("| ").next().unwrap_or_default();
+        let by = proved.get(kept).unwrap_or_else(|| panic!("{folder}: no program keeps {row}"));
+        assert!(by.iter().any(|ladder| !faulty.contains(ladder)), "{folder}: {row}: {by:?}");
+    }
     assert!(page.contains(&format!("{count} properties are proved")), "{folder}: {count}");
     let has_cluster = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("examples")
