@@ -10,8 +10,8 @@ use std::collections::{BTreeMap, VecDeque};
 pub(crate) type Point = (f64, f64);
 
 /// Pixels between columns besides the labels, and between what stands in one.
-const COLUMN_GAP: f64 = 46.0;
-const ROW_GAP: f64 = 26.0;
+const COLUMN_GAP: f64 = 64.0;
+const ROW_GAP: f64 = 34.0;
 
 /// How often orders and heights are bettered.
 const SWEEPS: usize = 12;

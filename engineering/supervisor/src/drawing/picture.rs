@@ -3,12 +3,15 @@
 use std::fmt::Write as _;
 use understudy_text::markup::escaped;
 
-use super::labels::{Area, Label, free_place};
+use super::labels::{Area, Label, Spot, on_curves};
 use super::layout::Point;
 
 /// Pixels that a letter and a line of text take.
 const LETTER: f64 = 7.0;
 pub(crate) const LINE: f64 = 15.0;
+
+/// On how many parts of an arrow a label is kept from covering it.
+const SAMPLES: u8 = 40;
 
 /// The width and height of lines of text.
 pub(crate) fn text_size(lines: &[String]) -> Point {
@@ -55,6 +58,9 @@ pub(crate) struct Picture {
     labels: Vec<Label>,
     /// Areas without labels.
     taken: Vec<Area>,
+    /// Points of arrows.
+    spots: Vec<Spot>,
+    arrows: usize,
     low: Point,
     high: Point,
 }
@@ -65,6 +71,8 @@ impl Default for Picture {
             shapes: String::new(),
             labels: Vec::new(),
             taken: Vec::new(),
+            spots: Vec::new(),
+            arrows: 0,
             low: (-40.0, -40.0),
             high: (40.0, 40.0),
         }
@@ -112,6 +120,11 @@ impl Picture {
         self.reach((x, y), (width / 2.0 + 6.0, height / 2.0 + 6.0));
     }
 
+    /// Lines of text at the first of some points where they cover no arrow, or else where they cover the least.
+    pub(crate) fn note(&mut self, places: &[Point], lines: &[String]) {
+        self.labels.push(Label::at(places, lines));
+    }
+
     /// A smooth arrow from one shape by some points to another, with its label at the middle of it, or near where that is free.
     pub(crate) fn arrow(
         &mut self,
@@ -141,7 +154,13 @@ impl Picture {
             pieces.push((start, middle(start, end), end));
         }
         self.line(&path, style);
-        self.labels.push(Label::along(&pieces, label));
+        let arrow = self.arrows;
+        self.arrows += 1;
+        for step in 0..=SAMPLES {
+            let place = on_curves(&pieces, f64::from(step) / f64::from(SAMPLES));
+            self.spots.push(Spot { place, arrow, is_head: step == SAMPLES });
+        }
+        self.labels.push(Label::along(arrow, &pieces, label));
         for bend in bends {
             self.reach(*bend, (8.0, 8.0));
         }
@@ -168,7 +187,7 @@ impl Picture {
         self.line(&path, style);
         let (_, height) = text_size(label);
         let place = (x, bottom - rise - height / 2.0 + 4.0);
-        self.labels.push(Label::at(place, label));
+        self.labels.push(Label::at(&[place], label));
     }
 
     fn line(&mut self, path: &str, style: Style) {
@@ -180,14 +199,15 @@ impl Picture {
         );
     }
 
-    /// Labels come last, so that no line crosses them: first those with a single possible position.
+    /// Labels come last, so that no line crosses them: first those with the fewest possible positions.
     fn place_labels(&mut self) {
         let mut labels = std::mem::take(&mut self.labels);
-        labels.sort_by_key(|label| label.places.len() > 1);
+        labels.sort_by_key(|label| label.places.len());
         for label in labels {
             let (width, height) = text_size(&label.lines);
-            let place = free_place(&label.places, (width / 2.0, height / 2.0), &self.taken);
-            self.keep_free(place, (width / 2.0, height / 2.0));
+            let half = (width / 2.0, height / 2.0);
+            let place = label.free_place(half, &self.taken, &self.spots);
+            self.keep_free(place, half);
             if !label.lines.is_empty() {
                 // A letter is narrower on average than the room that is kept for it.
                 let (width, height) = (0.85 * width, height - 3.0);

@@ -125,8 +125,8 @@ pub fn draw_net_svg(net: &Net) -> Result<String, TooLargeToDraw> {
             None => ("white", PLACE),
         };
         picture.shape(place, shape(node), fill);
-        let below = half + text.len() as f64 * LINE / 2.0 + 2.0;
-        picture.text((place.0, place.1 + below), text);
+        let away = half + text.len() as f64 * LINE / 2.0 + 2.0;
+        picture.note(&[(place.0, place.1 + away), (place.0, place.1 - away)], text);
         if let Some(content) = places.get(node) {
             picture.text(place, &[tokens(content)]);
         }

@@ -1,7 +1,8 @@
 //! What people see of an automaton.
 
 use insta::assert_snapshot;
-use understudy_supervisor::{Alphabet, Automaton, draw_automaton_svg, draw_dot};
+use understudy_supervisor::petri::{draw_net_svg, read_net};
+use understudy_supervisor::{Alphabet, Automaton, draw_automaton_svg, draw_dot, read_ads};
 
 use crate::families::line;
 use crate::models::Model;
@@ -43,4 +44,62 @@ fn a_picture_has_all_states_and_events_and_a_bound() {
     let parts: Vec<&Automaton> = plants.iter().chain(&buffers).collect();
     let error = draw_automaton_svg(&sync(&parts, Default::default()).expect("it fits"));
     assert_eq!(error.expect_err("too large").code(), "U0808");
+}
+
+/// The number behind a name and `="`.
+fn number(line: &str, name: &str) -> f64 {
+    let (_, rest) = line.split_once(&format!("{name}=\"")).expect("an attribute");
+    rest.split('"').next().and_then(|text| text.parse().ok()).expect("a number")
+}
+
+/// The texts of a picture, each with its middle and half of its size.
+fn texts(picture: &str) -> Vec<(&str, [f64; 2], [f64; 2])> {
+    let lines = picture.lines().filter(|line| line.starts_with("<text"));
+    let texts = lines.map(|line| {
+        let (_, text) = line.split_once('>').expect("a text");
+        let text = text.trim_end_matches("</text>");
+        let half = [text.chars().count() as f64 * 3.0, 5.0];
+        (text, [number(line, "x"), number(line, "y") - 4.0], half)
+    });
+    texts.collect()
+}
+
+/// Where the arrows of a picture end.
+fn heads(picture: &str) -> Vec<[f64; 2]> {
+    let lines = picture.lines().filter(|line| line.contains("marker-end"));
+    let heads = lines.map(|line| {
+        let path = line.split('"').nth(1).expect("a path");
+        let numbers = path.split(' ').filter_map(|word| word.parse().ok());
+        let numbers: Vec<f64> = numbers.collect();
+        [numbers[numbers.len() - 2], numbers[numbers.len() - 1]]
+    });
+    heads.collect()
+}
+
+/// In the pictures of the papers, texts cover neither each other nor the heads of arrows.
+#[test]
+fn the_texts_of_the_papers_pictures_are_legible() {
+    let automaton = read_ads(include_str!("../../../../examples/avalanche/TEST.ADS")).automaton;
+    let motivating = include_str!("../../../../examples/motivating-example/supervisor.ADS");
+    let motivating = read_ads(motivating).automaton;
+    let net = read_net(include_str!("../../../../examples/assembly-cell/net.toml")).file;
+    let pictures = [
+        draw_automaton_svg(&automaton.expect("an automaton")),
+        draw_automaton_svg(&motivating.expect("an automaton")),
+        draw_net_svg(&net.expect("a net").net),
+    ];
+    for picture in pictures.map(|picture| picture.expect("it fits")) {
+        let texts = texts(&picture);
+        for (number, (text, middle, half)) in texts.iter().enumerate() {
+            let is_near = |other: &[f64; 2], size: &[f64; 2]| {
+                (0..2).all(|axis| (middle[axis] - other[axis]).abs() < half[axis] + size[axis])
+            };
+            for (other, place, size) in &texts[number + 1..] {
+                assert!(!is_near(place, size), "{text} covers {other}\n{picture}");
+            }
+            for head in heads(&picture) {
+                assert!(!is_near(&head, &[0.0; 2]), "{text} covers a head\n{picture}");
+            }
+        }
+    }
 }
