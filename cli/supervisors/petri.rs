@@ -21,7 +21,7 @@ use crate::console::Console;
 use crate::files;
 use crate::kind::Kind;
 use crate::supervisors::automata::{self, Sources, description, summary};
-use crate::supervisors::supervisor_to_ladder::{listed, notes, withheld};
+use crate::supervisors::supervisor_to_ladder::{has_error, listed, notes, withheld};
 
 /// Analyse automation Petri nets and convert them to ladder
 #[derive(Debug, Args)]
@@ -279,7 +279,9 @@ fn ladder(
             failed("U0875", message)
         }
         Ok(HybridVerdict::Proved(proof)) => {
-            if let (None, Ok(found)) = (output, &found) {
+            if let (None, Ok(found)) = (output, &found)
+                && !has_error(found)
+            {
                 // The answer is the ladder alone.
                 notes(found).lines().for_each(|line| console.note(line));
             }

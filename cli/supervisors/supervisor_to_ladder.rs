@@ -126,7 +126,8 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         settings,
         &mut report,
     )?;
-    if arguments.output.is_none() && matches!(verdict, Verdict::Proved(_)) {
+    let is_written = matches!(verdict, Verdict::Proved(_)) && !has_error(&found);
+    if arguments.output.is_none() && is_written {
         // The answer is the ladder alone.
         notes(&found).lines().for_each(|line| console.note(line));
     }
@@ -239,6 +240,11 @@ pub(crate) fn listed(found: &[Finding]) -> Value {
         })
     });
     listed.collect()
+}
+
+/// Whether a finding is an error.
+pub(crate) fn has_error(found: &[Finding]) -> bool {
+    found.iter().any(|finding| finding.severity == FindingSeverity::Error)
 }
 
 /// Answer with findings that are errors: each is a failure, and the ladder is withheld.

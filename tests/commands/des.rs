@@ -241,3 +241,17 @@ fn a_reduction_that_ends_early_keeps_its_result() {
     let kept = counts(&des(&["convert", &out]));
     assert!(kept.0 <= states, "{kept:?} after {states}");
 }
+
+/// A ladder that is withheld for a finding leaves nothing on standard output but the other findings, each once.
+#[test]
+fn a_finding_is_printed_once() {
+    let supervisor = "examples/avalanche/FIG4.ADS";
+    for more in [&[][..], &["-o", "absent.ladder"]] {
+        let answer = understudy(&[&["supervisor-to-ladder", supervisor], more].concat());
+        assert_eq!(answer.status, 1, "{}", answer.shown());
+        let all = [answer.output.as_str(), answer.errors.as_str()].concat();
+        for code in ["U0882", "U0885", "U0876", "U0886"] {
+            assert_eq!(all.matches(&format!("[{code}]")).count(), 1, "{code}: {all}");
+        }
+    }
+}
