@@ -80,7 +80,7 @@ fn what_only_the_first_scan_can_show() {
     check("rung\n    /y +a ( y ) (/ y )\n", &[("U0445", 1)]);
 }
 
-/// The automaton of figure 4 of Uzam, Gelen and Saleh: a second `a` is to lead on, and the first one does.
+/// The automaton of figure 4 of Uzam and Gelen: a second `a` is to lead on, and the first one does.
 #[test]
 fn an_avalanche() {
     let steps = |second: &str| {
