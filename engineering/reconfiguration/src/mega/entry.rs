@@ -1,9 +1,9 @@
 //! Where Θ is entered by a ladder that took part of what happened for all of it.
 //!
-//! Module 2 is transparent while one state is possible, and then it reads that state from the ladder. In the scan in which
-//! several inputs change, one of them on a failed channel, the ladder sees the others alone. If these are events of their own
-//! in the state where it was, it comes to the state where they lead. The plant is in another one, and nothing that happens
-//! later tells this. So what stands for such a state contains both.
+//! Module 2 is transparent while one state is possible, and then it reads that state from the ladder. In the scan in
+//! which several inputs change, one of them on a failed channel, the ladder sees the others alone. If these are events of
+//! their own in the state where it was, it comes to the state where they lead. The plant is in another one, and nothing
+//! that happens later tells this. So what stands for such a state contains both.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -124,8 +124,8 @@ impl Builder<'_> {
 }
 
 impl MegaController {
-    /// The state of Θ that stands for a ladder in `state` with these channels failed, where it stands for another one as
-    /// well; `fresh` if one of them has failed in this scan.
+    /// The state of Θ that stands for a ladder in `state` with these channels failed, where it stands for another one
+    /// as well; `fresh` if one of them has failed in this scan.
     pub fn entry(&self, state: u32, failed: u64, fresh: bool) -> Option<usize> {
         self.entries.get(&(state, failed, fresh)).copied()
     }

@@ -63,8 +63,8 @@ fn shown(events: &[Event], failed: u64) -> Vec<Event> {
     events.iter().filter(is_seen).copied().collect()
 }
 
-/// In every state in which module 2 reads the state from the ladder, and for everything that the plant does then: the ladder comes
-/// to a state that stands for the one in which the plant is.
+/// In every state in which module 2 reads the state from the ladder, and for everything that the plant does then: the
+/// ladder comes to a state that stands for the one in which the plant is.
 #[test]
 fn what_a_ladder_takes_for_another_event_is_among_what_it_stands_for() {
     let mut runner = TestRunner::deterministic();
