@@ -45,6 +45,8 @@ pub struct Station {
     cycle: CycleNotes,
     /// The cycle that ended last.
     closed: Option<Moment>,
+    /// Whom it received in the last two cycles in which it received somebody, the last one first.
+    company: [Company; 2],
     started: Time,
     role: Role,
     wanted: ProgramSet,
@@ -108,8 +110,8 @@ struct CycleNotes {
     others_have: ProgramSet,
     /// Stations that asked to join.
     joiners: StationSet,
-    /// A remote I/O or another station was received.
-    hears_others: bool,
+    /// Another station was received.
+    receives_station: bool,
     /// The samples of this cycle, from their remote I/Os or relayed.
     samples: SmallVec<[Arc<Frame>; 2]>,
     /// Programs whose samples came from their remote I/Os.
@@ -118,6 +120,31 @@ struct CycleNotes {
     lacked: ProgramSet,
     /// Programs whose samples a station has relayed.
     relayed: ProgramSet,
+}
+
+/// The members that a station received.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+struct Company {
+    remote_ios: ProgramSet,
+    stations: bool,
+}
+
+impl Company {
+    fn is_none(self) -> bool {
+        self == Self::default()
+    }
+
+    fn or(self, other: Self) -> Self {
+        Self {
+            remote_ios: self.remote_ios.or(other.remote_ios),
+            stations: self.stations || other.stations,
+        }
+    }
+
+    /// Whether it is more than the remote I/O of `program`.
+    fn exceeds(self, program: ProgramId) -> bool {
+        self.stations || !self.remote_ios.without(ProgramSet::only(program)).is_empty()
+    }
 }
 
 /// Outputs that a controller published of its own program, with the state that they are computed from.
@@ -143,6 +170,7 @@ impl Station {
             scratch: Scratch::default(),
             cycle: CycleNotes::default(),
             closed: None,
+            company: [Company::default(); 2],
             started: now,
             role: Role::Listening,
             wanted: ProgramSet::EMPTY,
@@ -214,7 +242,6 @@ impl Station {
         match (&frame.body, frame.header.sender) {
             (Body::Sample(sample), Member::RemoteIo(program)) => {
                 self.cycle.direct.insert(program);
-                self.cycle.hears_others = true;
                 self.follow(program, frame, sample);
             }
             (Body::Turn(turn), Member::Station(station)) => {
@@ -337,6 +364,7 @@ impl Hash for Station {
             scratch: _,
             cycle,
             closed,
+            company,
             started,
             role,
             wanted,
@@ -349,7 +377,7 @@ impl Hash for Station {
             looked_at: _,
         } = self;
         (member, replicas).hash(hasher);
-        (cycle, closed, started, role, wanted).hash(hasher);
+        (cycle, closed, company, started, role, wanted).hash(hasher);
         (joining, differed, lacked, awaited).hash(hasher);
     }
 }

@@ -87,6 +87,8 @@ pub struct Simulation {
     synchronised: Vec<Synchronised>,
     /// For each remote I/O, what is known of it while it has a wrong program.
     misled: Vec<Option<Misled>>,
+    /// Stations that have sent nothing since they were restarted: no member can know that they run.
+    unannounced: StationSet,
     violations: Vec<Violation>,
     faults: Vec<Fault>,
     pace: Pace,
@@ -141,6 +143,7 @@ impl Simulation {
             holders: vec![[StationSet::EMPTY; 2]; parts.remote_ios.len()],
             synchronised: vec![Synchronised::new(parts.stations.len()); parts.remote_ios.len()],
             misled: vec![None; parts.remote_ios.len()],
+            unannounced: StationSet::EMPTY,
             violations: Vec::new(),
             faults: Vec::new(),
             pace: Pace::new(parts.stations[0].agreement.schedule.period()),
@@ -458,6 +461,9 @@ impl Simulation {
     }
 
     fn send(&mut self, frame: Arc<Frame>) {
+        if let Member::Station(station) = frame.header.sender {
+            self.unannounced.remove(station);
+        }
         let configuration = self.parts.stations[0].agreement.configuration;
         if frame.header.configuration == configuration {
             self.pace.saw(self.now, frame.header.moment);

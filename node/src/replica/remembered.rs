@@ -109,14 +109,13 @@ impl Replica {
         self.given.remove(station);
     }
 
-    /// This station has received no other member for a cycle: meanwhile others may have proved newer outputs, and one that was gone may have
-    /// started cold.
+    /// This station has received no other member for a cycle: others may have proved newer outputs meanwhile.
     ///
-    /// Where the program is the cluster's only one (`is_only`), its station that is left receives no other member as soon as the remote I/O is away:
-    /// that is no isolation, and a station that was gone stays gone.
-    pub(crate) fn was_isolated(&mut self, is_only: bool) {
+    /// Where it received others than the program's remote I/O until then (`from_several`), one that was gone may have started cold meanwhile. Where it
+    /// received the remote I/O alone, only that one may be away, and a station that was gone stays gone.
+    pub(crate) fn was_isolated(&mut self, from_several: bool) {
         if let Remembered::Received(recalled) = &mut self.remembered {
-            let known = if is_only { recalled.accounted_for } else { StationSet::EMPTY };
+            let known = if from_several { StationSet::EMPTY } else { recalled.accounted_for };
             recalled.accounted_for = known.without(self.witnessed);
         }
         self.witnessed = StationSet::EMPTY;

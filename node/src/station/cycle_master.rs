@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use understudy_wire::{Body, Member, Moment, StationSet, Time};
 
-use super::{CycleNotes, Role, Station, Token};
+use super::{Company, CycleNotes, Role, Station, Token};
 use crate::event::Event;
 
 /// Cycles of a second, and at least three.
@@ -29,9 +29,16 @@ impl Station {
         self.member.close_cycle();
         let follows = self.closed.is_some_and(|closed| moment <= closed.plus(1));
         self.closed = Some(moment);
-        if !follows || !self.cycle.hears_others {
-            let is_only = self.settings.agreement.schedule.controllers() == 1;
-            self.replicas.iter_mut().for_each(|replica| replica.was_isolated(is_only));
+        let [last, earlier] = self.company;
+        let remote_ios = self.cycle.direct;
+        let now = Company { remote_ios, stations: self.cycle.receives_station };
+        if !follows || now.is_none() {
+            for replica in &mut self.replicas {
+                replica.was_isolated(last.or(earlier).exceeds(replica.id()));
+            }
+        }
+        if !now.is_none() {
+            self.company = [now, last];
         }
         for replica in &mut self.replicas {
             if replica.close_cycle(moment) {

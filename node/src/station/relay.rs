@@ -54,7 +54,7 @@ impl Station {
         holdings: &[Holding],
         recalled: &[Recalled],
     ) {
-        self.cycle.hears_others = true;
+        self.cycle.receives_station = true;
         let now = self.member.moment();
         let silent_after = self.settings.agreement.flag_after;
         for holding in holdings {

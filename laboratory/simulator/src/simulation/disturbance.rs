@@ -101,6 +101,7 @@ impl Simulation {
                     settings.programs = settings.programs.iter().map(wrong_program).collect();
                     settings.generated = None;
                 }
+                self.unannounced.insert(station);
                 let slot = &mut self.stations[station.index()];
                 slot.restart(Station::new(self.now, settings));
                 self.wakeups.set(member, slot.due());

@@ -25,13 +25,15 @@ impl Hash for Simulation {
             arrived,
             holders,
             misled,
+            unannounced,
             violations,
             faults,
             pace,
             founded,
         } = self;
         (links, stations, remote_ios, plants, referees).hash(hasher);
-        (ready, arrived, holders, misled, violations.len(), pace, founded).hash(hasher);
+        (ready, arrived, holders, misled, unannounced).hash(hasher);
+        (violations.len(), pace, founded).hash(hasher);
         for fault in faults {
             (fault.at_cycle, fault.phase.to_bits(), fault.member, fault.action).hash(hasher);
         }

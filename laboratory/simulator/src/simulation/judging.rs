@@ -9,7 +9,8 @@ use crate::referee::Violation;
 /// A remote I/O with a wrong program, as the referee knows it: by who runs and whom it can receive, and not by what it says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub(super) struct Misled {
-    /// Stations with another configuration that it could receive at its last deadline, and at the one before.
+    /// Stations with another configuration that had sent something since they started and that it could receive at its last deadline, and at the
+    /// one before.
     contradicted_by: [StationSet; 2],
     /// Whether the wrong program may run: the operator has chosen its cold start, or it has started where the remote I/O can receive more
     /// stations with its configuration than with another one. No member can tell then which of the two is right.
@@ -135,6 +136,7 @@ impl Simulation {
         match event {
             Event::Applied { .. } => {
                 let (_, others) = self.received_by(program);
+                let others = others.without(self.unannounced);
                 let [last, _] = misled.contradicted_by;
                 misled.contradicted_by = [others, last];
             }
