@@ -73,8 +73,8 @@ impl Default for Picture {
             taken: Vec::new(),
             spots: Vec::new(),
             arrows: 0,
-            low: (-40.0, -40.0),
-            high: (40.0, 40.0),
+            low: (f64::INFINITY, f64::INFINITY),
+            high: (f64::NEG_INFINITY, f64::NEG_INFINITY),
         }
     }
 }
@@ -223,6 +223,9 @@ impl Picture {
 
     pub(crate) fn finish(mut self) -> String {
         self.place_labels();
+        if self.low.0 > self.high.0 {
+            self.reach((0.0, 0.0), (40.0, 40.0));
+        }
         let (width, height) = (self.high.0 - self.low.0, self.high.1 - self.low.1);
         format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" viewBox=\"{:.1} {:.1} {width:.1} {height:.1}\">\n\
