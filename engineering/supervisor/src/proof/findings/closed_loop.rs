@@ -167,3 +167,12 @@ impl ClosedLoop {
         states.filter(|state| !reaching[state.index()]).collect()
     }
 }
+
+/// Where a finding is: `in state 5,`, or of several states their number and the first.
+pub(super) fn in_states(states: &[State]) -> String {
+    match states {
+        [one] => format!("in state {one},"),
+        [first, ..] => format!("in {} states, {first} the first,", states.len()),
+        [] => "in no state".to_owned(),
+    }
+}

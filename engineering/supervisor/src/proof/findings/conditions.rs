@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::closed_loop::ClosedLoop;
+use super::closed_loop::{ClosedLoop, in_states};
 use super::{Finding, FindingKind, FindingSeverity};
 use crate::{Label, State};
 
@@ -42,9 +42,8 @@ impl ClosedLoop {
         }
         let findings = pairs.into_iter().map(|((first, second), states)| {
             let message = format!(
-                "in {} states, {} the first, {} and {} are both enabled, and which of them comes first makes a difference; in automatic mode it is the one whose rung comes first",
-                states.len(),
-                states[0],
+                "{} {} and {} are both enabled, and which of them comes first makes a difference; in automatic mode it is the one whose rung comes first",
+                in_states(&states),
                 self.name(first),
                 self.name(second)
             );
@@ -160,9 +159,8 @@ impl ClosedLoop {
         }
         let findings = pairs.into_iter().map(|((first, second, reason), states)| {
             let message = format!(
-                "in {} states, {} the first, {} and {} {reason}",
-                states.len(),
-                states[0],
+                "{} {} and {} {reason}",
+                in_states(&states),
                 self.name(first),
                 self.name(second)
             );

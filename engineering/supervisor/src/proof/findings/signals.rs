@@ -3,7 +3,7 @@
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap, VecDeque};
 
-use super::closed_loop::ClosedLoop;
+use super::closed_loop::{ClosedLoop, in_states};
 use super::{Finding, FindingKind, FindingSeverity};
 use crate::ladder::{
     InputOutputMap, Meaning, Modules, OneEvent, Partition, Positions, repetitions,
@@ -43,14 +43,16 @@ impl ClosedLoop {
             let signal = &map.switches[switch].positions[position - 1].signal;
             let name = self.name(label);
             let effect = if modules.len() == 1 {
-                format!("{name} then occurs without an edge of `{signal}`, which the plant cannot see")
+                format!(
+                    "{name} then occurs without an edge of `{signal}`, which the plant cannot see"
+                )
             } else {
                 format!("{name} is then not generated")
             };
             let words: Vec<String> = run.iter().map(|&label| self.name(label)).collect();
             let message = format!(
-                "in {} states, {state} the first, {name} is enabled while its signal `{signal}` is on, as after {}; {effect}",
-                states.len(),
+                "{} {name} is enabled while its signal `{signal}` is on, as after {}; {effect}",
+                in_states(&states),
                 words.join(" ")
             );
             let (kind, severity) = (FindingKind::LatchedAgain, FindingSeverity::Warning);
