@@ -64,17 +64,15 @@ pub(super) fn overlaps(controller: &Controller, question: &Question) -> BTreeSet
 impl Builder<'_> {
     /// Puts the entries that overlaps need among the states; whether there is a new one.
     pub(super) fn enter(&mut self, overlaps: &BTreeSet<Overlap>) -> bool {
+        let mut transparent: BTreeMap<u32, Vec<u64>> = BTreeMap::new();
+        for state in self.states.iter().filter(|state| state.command.is_none()) {
+            if let [one] = state.members[..] {
+                transparent.entry(one).or_default().push(state.failed);
+            }
+        }
         let mut wanted: BTreeMap<Entry, Vec<u32>> = BTreeMap::new();
         for overlap in overlaps {
-            let transparent: Vec<u64> = self
-                .places
-                .iter()
-                .filter(|((members, _), place)| {
-                    members[..] == [overlap.source] && self.states[**place].command.is_none()
-                })
-                .map(|((_, failed), _)| *failed)
-                .collect();
-            for before in transparent {
+            for &before in transparent.get(&overlap.source).into_iter().flatten() {
                 for entry in self.entries_of(overlap, before) {
                     wanted.entry(entry).or_default().push(overlap.true_state);
                 }
