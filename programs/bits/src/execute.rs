@@ -199,7 +199,7 @@ impl<'a> Execution<'a> {
         self.fault(outside);
     }
 
-    /// Gives an output beyond its subrange the end of it, as the end of a scan does.
+    /// Gives a point beyond its subrange the end of it, as the begin of a scan does with inputs and its end with outputs.
     pub(super) fn limit(&mut self, slot: u32, declared: Declared) {
         let Declared { of, range: Some(range) } = declared else {
             return;

@@ -13,7 +13,7 @@ mod scan;
 use std::collections::HashMap;
 
 use understudy_logic::{Circuit, Operation as Gate, Variable as Bit};
-use understudy_typed::{Comparison, Elementary, Operation, Points, Program};
+use understudy_typed::{Comparison, Elementary, Operation, Point, Points, Program};
 
 use crate::execute::Unsupported;
 use crate::system::{Source, System};
@@ -47,13 +47,26 @@ struct Outputs {
 }
 
 impl System {
-    /// One program. Its properties name its BOOL points and variables.
+    /// One program, whose inputs are whatever their bits are. Its properties name its BOOL points and variables.
     ///
     /// # Errors
     /// What of the program cannot be followed.
     pub fn of_program(program: &Program) -> Result<Self, Unsupported> {
+        Self::alone(program, |_| Source::Any(None))
+    }
+
+    /// One program, whose inputs are within their subranges; see [`Source::declared`].
+    ///
+    /// # Errors
+    /// What of the program cannot be followed.
+    pub fn within_subranges(program: &Program) -> Result<Self, Unsupported> {
+        Self::alone(program, Source::declared)
+    }
+
+    fn alone(program: &Program, source: fn(&Point) -> Source) -> Result<Self, Unsupported> {
         let mut system = System::new(&program.name);
-        let sources = vec![Source::Any(None); points_but_reset(&program.inputs)];
+        let points = program.inputs.iter().filter(|point| point.slot != 0);
+        let sources: Vec<Source> = points.map(source).collect();
         let runs = system.terms.boolean(true);
         let inputs = sources_as_terms(&mut system, "", &program.inputs, &sources);
         system.add_program("", program, &inputs, runs)?;
@@ -92,11 +105,6 @@ fn together(program: &Program) -> u64 {
         // Past every count of scans, the tasks do not meet again.
         (all / divisor.max(1)).saturating_mul(every)
     })
-}
-
-/// Inputs of a program but for the reset, which has no source.
-fn points_but_reset(points: &Points) -> usize {
-    points.iter().filter(|point| point.slot != 0).count()
 }
 
 /// Free inputs for all points.
@@ -353,6 +361,7 @@ impl System {
             phase: was_phase,
             stopped: None,
             ages: &none,
+            clock: None,
         };
         let mut numbers = HashMap::new();
         let mut scan = self.scan(&how, &mut numbers)?;
@@ -362,6 +371,8 @@ impl System {
             scan = self.scan(&how, &mut numbers)?;
         }
         let (scan, ages) = self.scan_with_ages(&how, scan, &mut numbers)?;
+        let (scan, clock) = self.scan_with_clock(&how, scan, &ages, &mut numbers)?;
+        let sums = self.sums(&how, &scan, &ages, &numbers);
         let can_fault = scan.faulted;
         let resets = program.inputs.iter().zip(inputs);
         let mut reset = resets.filter(|(point, _)| point.slot == 0).map(|(_, &term)| term);
@@ -371,7 +382,8 @@ impl System {
         let begins = self.terms.and(runs, begins);
         // What a fault leaves: the state before the scan.
         let is_restart = self.terms.and(was_stopped, reset);
-        for (&address, &age) in &ages {
+        let ages = ages.into_iter().map(|(address, age)| (Some(address), age));
+        for (address, age) in ages.chain(clock.map(|clock| (None, clock))) {
             let new = self.next_age(program, &scan, age, address, how.stopped);
             let cell = self.cells[age.cell as usize].term;
             let left = self.age(age, how.stopped);
@@ -389,7 +401,10 @@ impl System {
             let initial = self.terms.constant(of, initial);
             let left = self.terms.choose(is_restart, initial, term);
             let new = scan.memory.get(&address).copied().unwrap_or(left);
-            let new = self.terms.as_type(new, of);
+            let mut new = self.terms.as_type(new, of);
+            if let Some(&most) = sums.get(&address) {
+                new = self.stopped_at(new, most);
+            }
             let kept = self.terms.choose(can_fault, left, new);
             let next = self.terms.choose(begins, kept, term);
             self.cells[cell as usize].next = next;

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use understudy_typed::Elementary;
+use understudy_typed::{Elementary, Point};
 
 use crate::circuit::boundaries::position;
 use crate::term::{Term, Terms, Variable};
@@ -72,6 +72,14 @@ pub enum Source {
         /// The name of the other input.
         of: String,
     },
+}
+
+impl Source {
+    /// Every value of the declaration of a point. A scan makes values of the subrange of all others, so no run of the program is missing.
+    pub fn declared(point: &Point) -> Self {
+        let stored = |end: i128| end as u64 & point.of.mask();
+        Self::Any(point.range.map(|(low, high)| stored(low)..=stored(high)))
+    }
 }
 
 impl System {

@@ -276,7 +276,12 @@ impl Terms {
                 Some(operands[1])
             }
             Node::Choose([condition, then, otherwise]) => {
-                let is_time = matches!(self.node(left), Node::Apply(Operation::Elapsed, _));
+                // `TIME()`, or the cell that counts it.
+                let is_time = match self.node(left) {
+                    Node::Apply(Operation::Elapsed, _) => true,
+                    Node::Variable(Variable::Cell(_)) => of == Elementary::Time,
+                    _ => false,
+                };
                 let then = is_time.then(|| self.difference(of, left, then)).flatten()?;
                 let otherwise = self.difference(of, left, otherwise)?;
                 Some(self.choose(condition, then, otherwise))

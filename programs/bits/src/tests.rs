@@ -37,10 +37,17 @@ fn value(random: &mut Dice, of: Elementary, constants: &[u64]) -> u64 {
     }
 }
 
-/// Runs machine, system and circuit side by side; whether a fault was among the scans.
+/// Runs machine, system and circuit side by side; whether a fault was among the scans. A system within the subranges of the inputs is given the
+/// values of the subranges that are nearest to those of the machine.
 fn compare(program: &Program, seed: u64, scans: usize) -> bool {
-    let system = System::of_program(program).expect("a program that is followed");
-    let derivation = Derivation::new(&system).expect("a circuit");
+    let any = System::of_program(program).expect("a program that is followed");
+    let within = System::within_subranges(program).expect("followed too");
+    compare_with(program, &within, seed, scans);
+    compare_with(program, &any, seed, scans)
+}
+
+fn compare_with(program: &Program, system: &System, seed: u64, scans: usize) -> bool {
+    let derivation = Derivation::new(system).expect("a circuit");
     let machine = Machine::new(program);
     let mut random = Dice::new(seed);
     let mut state = machine.initial().to_vec();
@@ -58,7 +65,10 @@ fn compare(program: &Program, seed: u64, scans: usize) -> bool {
                 stored = u64::from(random.number().is_multiple_of(5));
             }
             point.set(&mut image, stored);
-            given.push(stored);
+            let (least, greatest) = system.inputs[given.len()].limits;
+            let is_within =
+                position(point.of, stored).is_some_and(|at| least <= at && at <= greatest);
+            given.push(if is_within { stored } else { point.declared().limited(stored) });
         }
         let mut outputs = vec![0; machine.output_count().div_ceil(64)];
         machine.step(&mut scratch, &mut state, &image, &mut outputs);
@@ -113,7 +123,16 @@ fn compare(program: &Program, seed: u64, scans: usize) -> bool {
     faulted
 }
 
-const PROGRAMS: [&str; 7] = [
+const PROGRAMS: [&str; 8] = [
+    // Inputs with subranges, of all widths and signs; one is compared with what it never is.
+    "PROGRAM p
+       VAR_INPUT a : INT (10..100); b : SINT (-7..-2); c : LINT (-5..5000000000); d : USINT (3..3); e : WORD; END_VAR
+       VAR_OUTPUT y : INT; z : LINT; on : BOOL; never : BOOL; END_VAR
+       y := a * 2 + b - USINT_TO_INT(d);
+       z := c / 3;
+       on := c > 4999999999 OR b = -7 AND a < 20;
+       never := a > 120 OR a < 5 OR b > -2 OR d <> 3;
+     END_PROGRAM",
     // Outputs with subranges, one of them read again.
     "PROGRAM p
        VAR_INPUT a : INT; u : UINT; END_VAR
@@ -227,6 +246,31 @@ fn examples_do_what_the_machine_does() {
     }
 }
 
+/// Every value of an input: a scan reads the nearest one of the subrange, and a property of the declared values is about no other.
+#[test]
+fn inputs_are_within_their_subranges() {
+    for (declared, least, most) in [("-5..7", -5, 7), ("3..9", 3, 9), ("-128..127", -128, 127)] {
+        let program = lowered(&format!(
+            "PROGRAM p VAR_INPUT x : SINT ({declared}); END_VAR VAR_OUTPUT y : SINT; END_VAR y := x; END_PROGRAM"
+        ));
+        let machine = Machine::new(&program);
+        let circuit = crate::exact(&program).expect("finite");
+        let system = System::within_subranges(&program).expect("followed");
+        assert_eq!(system.inputs[0].limits, (least, most));
+        for stored in 0..256_u64 {
+            let mut outputs = [0];
+            let mut state = machine.initial().to_vec();
+            machine.step(&mut Scratch::default(), &mut state, &[stored], &mut outputs);
+            let expected = i128::from(stored as u8 as i8).clamp(least, most);
+            assert_eq!(Elementary::Sint.signed(outputs[0] & 255), expected);
+            let bits: Vec<bool> = (0..8).map(|bit| stored >> bit & 1 == 1).collect();
+            let told = understudy_logic::Running::new(&circuit).step(&bits);
+            let told = told.iter().rev().fold(0, |number, &bit| number << 1 | u64::from(bit));
+            assert_eq!(Elementary::Sint.signed(told & 255), expected);
+        }
+    }
+}
+
 #[test]
 fn terms_are_made_once_and_simplified() {
     let mut terms = Terms::default();
@@ -249,6 +293,14 @@ fn timers_are_exact() {
         "t : TON; END_VAR t(IN := go, PT := SEL(stop, T#30ms, T#70ms)); q := t.Q;",
         "t : TON; END_VAR t(IN := go, PT := T#55ms); q := t.ET > T#15ms;",
         "t : TIME; END_VAR IF go THEN t := TIME(); END_IF; q := TIME() - t > T#15ms;",
+        "k : BOOL; END_VAR q := TIME() > T#155ms;",
+        "k : BOOL; END_VAR IF TIME() >= T#70ms AND go THEN k := NOT k; END_IF; q := k OR T#2s < TIME() OR TIME() = T#1s;",
+        "t : TIME; END_VAR IF go THEN t := TIME(); END_IF; q := TIME() - t > T#15ms OR TIME() < T#150ms;",
+        "t : TIME; END_VAR IF go THEN t := t + T#10ms; END_IF; IF stop THEN t := T#0s; END_IF; q := t > T#45ms;",
+        "t : TIME; END_VAR IF go THEN t := T#10ms + t; END_IF; q := t >= T#1s;",
+        "t : TIME := T#20ms; END_VAR IF t < T#90ms THEN t := t + T#5ms; ELSIF stop THEN t := T#0s; END_IF; q := t = T#85ms;",
+        "t : TIME; END_VAR IF go THEN t := t + T#10ms; IF t + T#10ms > T#80ms THEN t := T#30ms; q := TRUE; END_IF; ELSE q := FALSE; END_IF;",
+        "t : TIME; u : TIME; END_VAR t := t + T#10ms; IF go THEN u := u + T#10ms; END_IF; q := t > T#1s AND u > T#250ms;",
     ] {
         let text = format!(
             "PROGRAM p VAR_INPUT go : BOOL; stop : BOOL; END_VAR VAR_OUTPUT q : BOOL; END_VAR VAR {text} END_PROGRAM"

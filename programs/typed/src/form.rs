@@ -6,6 +6,7 @@
 //!
 //! The first slots of the state are the program's own: [`Program::HEADER`].
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use crate::image::Points;
@@ -62,8 +63,8 @@ impl Program {
     /// The name of the output that is TRUE while the program is stopped by a fault.
     pub const FAULT: &str = "program.fault";
 
-    /// Appends the two points that every program has, [`Program::RESET`] and [`Program::FAULT`], both of type BOOL, unless they are there. A front end
-    /// calls it after the declared points.
+    /// Appends the two points that every program has, [`Program::RESET`] and [`Program::FAULT`], both of type BOOL, unless they are there, and gives
+    /// all points the initial values of their variables. A front end calls it after the declared points and the initial state.
     ///
     /// They stand at slot 0, which no variable has: the input there is the reset and is not stored, the output there is whether slot 0 holds a fault.
     pub fn seal_points(&mut self) {
@@ -73,6 +74,9 @@ impl Program {
         if self.outputs.iter().all(|point| point.slot != 0) {
             self.outputs.push(Self::FAULT, Elementary::Bool, 0);
         }
+        let state = self.initial_state();
+        self.inputs.begin_with(&state);
+        self.outputs.begin_with(&state);
     }
 
     /// The routine of an id.
@@ -271,6 +275,11 @@ impl Place {
     /// A variable.
     pub fn new(root: Root, of: Type) -> Self {
         Self { root, offset: 0, bit: 0, is_packed: false, indices: Vec::new(), of, range: None }
+    }
+
+    /// What it may mean, whatever the values of its indices, in bits from its root.
+    pub fn extent(&self) -> Range<u64> {
+        64 * u64::from(self.offset) + u64::from(self.bit)..self.reach()
     }
 
     /// Bits from its root to the end of what it may mean, whatever the values of its indices; saturates.

@@ -20,6 +20,8 @@ pub struct Point {
     pub bit: u32,
     /// Where it stands in the program's state, as a slot.
     pub slot: u32,
+    /// The stored value of its variable before the first scan: that of an input that nothing drives.
+    pub initial: u64,
 }
 
 /// Type and subrange, as a declaration writes them: `INT`, `INT (0..7)`.
@@ -108,7 +110,23 @@ impl Points {
         let Declared { of, range } = declared;
         let bit = self.width.next_multiple_of(of.bits());
         self.width = bit + of.bits();
-        self.points.push(Point { name: name.into(), of, range, bit, slot });
+        self.points.push(Point { name: name.into(), of, range, bit, slot, initial: 0 });
+    }
+
+    /// Gives each point the initial value of its variable.
+    pub(crate) fn begin_with(&mut self, state: &[u64]) {
+        for point in self.points.iter_mut().filter(|point| point.slot != 0) {
+            point.initial = state.get(point.slot as usize).copied().unwrap_or(0) & point.of.mask();
+        }
+    }
+
+    /// The image of all initial values.
+    pub fn initial_image(&self) -> Vec<u64> {
+        let mut image = vec![0; self.width().div_ceil(64)];
+        for point in &self.points {
+            point.set(&mut image, point.initial);
+        }
+        image
     }
 
     /// The point of a name.

@@ -40,3 +40,4 @@ pub use self::types::{
     Array, Elementary, Enumeration, EnumerationId, Field, Structure, StructureId, Type,
 };
 pub use self::validate::Violation;
+pub use self::visit::Uses;

@@ -1,7 +1,7 @@
 //! The frame of a scan, which both engines share: inputs, tasks, outputs, and what a fault leaves behind.
 //!
 //! ```text
-//! running   inputs → tasks → outputs are finite and within their subranges → count → outputs        x(t+1), y(t)
+//! running   inputs within their subranges → tasks → outputs are finite and within theirs → count → outputs        x(t+1), y(t)
 //! fault     the state before the scan, with slots 0 to 2 set; the outputs that this state holds
 //! faulted   the reset is FALSE: nothing changes; TRUE: the initial state, then as running
 //! ```
@@ -29,8 +29,10 @@ pub(crate) struct Frame {
     faults: Vec<Wire>,
     /// Outputs that may be no finite number: their places in the image, slots and types.
     reals: Vec<(u64, u32, Elementary)>,
-    /// Outputs with a subrange: their slots and declarations.
-    limited: Vec<(u32, Declared)>,
+    /// Inputs with a subrange: their slots and declarations.
+    limited_inputs: Vec<(u32, Declared)>,
+    /// Outputs with a subrange: the same.
+    limited_outputs: Vec<(u32, Declared)>,
     initial: Vec<u64>,
     tasks: Vec<Task>,
     period: i64,
@@ -56,6 +58,12 @@ impl Wire {
     }
 }
 
+/// Slots and declarations of the points with a subrange.
+fn limited(points: &Points) -> Vec<(u32, Declared)> {
+    let points = points.iter().filter(|point| point.range.is_some());
+    points.map(|point| (point.slot, point.declared())).collect()
+}
+
 /// The points of each word of an image that are variables.
 fn words(points: &Points) -> Vec<Vec<Wire>> {
     let mut words = vec![Vec::new(); points.width().div_ceil(64)];
@@ -71,13 +79,13 @@ impl Frame {
         let faults = program.outputs.iter().filter(|point| point.slot == 0);
         let outputs = program.outputs.iter().zip(0..);
         let reals = outputs.filter(|(point, _)| point.of.is_real());
-        let limited = program.outputs.iter().filter(|point| point.range.is_some());
         Self {
             given: stored.map(Wire::new).collect(),
             taken: words(&program.outputs),
             faults: faults.map(Wire::new).collect(),
             reals: reals.map(|(point, output)| (output, point.slot, point.of)).collect(),
-            limited: limited.map(|point| (point.slot, point.declared())).collect(),
+            limited_inputs: limited(&program.inputs),
+            limited_outputs: limited(&program.outputs),
             inputs: program.inputs.clone(),
             outputs: program.outputs.clone(),
             initial: program.initial_state(),
@@ -122,11 +130,15 @@ impl Frame {
         is_reset
     }
 
-    /// Stores the inputs into the slots of their variables.
+    /// Stores the inputs into the slots of their variables; one beyond its subrange becomes the end of it.
     #[inline]
     pub(crate) fn unpack<R: Row + ?Sized>(&self, inputs: &[u64], memory: &mut R) {
         for wire in &self.given {
             *memory.slot(wire.slot) = inputs[wire.word as usize] >> wire.shift & wire.mask;
+        }
+        for (slot, declared) in &self.limited_inputs {
+            let value = memory.slot(*slot);
+            *value = declared.limited(*value);
         }
     }
 
@@ -154,7 +166,7 @@ impl Frame {
                 });
             }
         }
-        for (slot, declared) in &self.limited {
+        for (slot, declared) in &self.limited_outputs {
             let value = &mut memory[*slot as usize];
             *value = declared.limited(*value);
         }

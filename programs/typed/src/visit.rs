@@ -41,6 +41,56 @@ pub(crate) fn expressions<'a>(statements: &'a [Statement], show: &mut dyn FnMut(
     }
 }
 
+/// The places that a body names, by what it does with them; one that is handed on by reference is among both.
+#[derive(Debug, Clone, Default)]
+pub struct Uses<'a> {
+    /// Places that it reads.
+    pub reads: Vec<&'a Place>,
+    /// Places that it writes.
+    pub writes: Vec<&'a Place>,
+}
+
+impl<'a> Uses<'a> {
+    /// The places that `statements` name, but for those in the routines that they call.
+    pub fn of(statements: &'a [Statement]) -> Self {
+        let mut uses = Self::default();
+        expressions(statements, &mut |expression| match &expression.kind {
+            ExpressionKind::Load(place) => uses.reads.push(place),
+            ExpressionKind::Call(call) => {
+                let references = call.arguments.iter().filter_map(|argument| match argument {
+                    Argument::Reference(_, place) => Some(place),
+                    Argument::Value(..) => None,
+                });
+                for place in references.chain(&call.own) {
+                    uses.reads.push(place);
+                    uses.writes.push(place);
+                }
+                uses.writes.extend(call.outputs.iter().map(|(_, to)| to));
+            }
+            _ => {}
+        });
+        uses.in_statements(statements);
+        uses
+    }
+
+    fn in_statements(&mut self, statements: &'a [Statement]) {
+        for statement in statements {
+            match &statement.kind {
+                StatementKind::Assign(place, _) => self.writes.push(place),
+                StatementKind::For(each) => self.writes.push(&each.counter),
+                StatementKind::Bind(_, place) | StatementKind::Invoke(_, place) => {
+                    self.reads.push(place);
+                    self.writes.push(place);
+                }
+                _ => {}
+            }
+            for body in bodies(statement) {
+                self.in_statements(body);
+            }
+        }
+    }
+}
+
 /// The bodies within a statement.
 pub(crate) fn bodies(statement: &Statement) -> Vec<&[Statement]> {
     match &statement.kind {

@@ -1,7 +1,8 @@
 //! Moments: variables that hold `TIME()` of a scan, such as the start of a timer.
 //!
 //! A moment grows with every scan; the time since it does not have to. Where a program asks for nothing but whether this time has
-//! reached a bound, the time is counted up to the bound, and the program has finitely many states.
+//! reached a bound, the time is counted up to the bound, and the program has finitely many states. The same holds for `TIME()` itself, and for a
+//! TIME to which a program adds at most a period in a scan.
 
 use std::collections::{HashMap, HashSet};
 
@@ -48,7 +49,8 @@ impl System {
             let scanned = self.scan(&again, numbers)?;
             let mut counted = HashMap::new();
             for (&address, age) in &ages {
-                if let Some(most) = self.most(scan, &scanned, &ages, address) {
+                let carrier = Carrier::Age(address, self.age(*age, scan.stopped));
+                if let Some(most) = self.most(scan, &scanned, &ages, carrier) {
                     counted.insert(address, Age { most, ..*age });
                 }
             }
@@ -58,6 +60,100 @@ impl System {
                 return Ok((scanned, ages));
             }
         }
+    }
+
+    /// Scans a program again with a `TIME()` that is counted up to the last bound that it is compared with, where there is one. The scan is one of a
+    /// program that no fault stops.
+    pub(super) fn scan_with_clock(
+        &mut self,
+        scan: &Scan<'_>,
+        scanned: Scanned,
+        ages: &HashMap<u64, Age>,
+        numbers: &mut HashMap<u64, u32>,
+    ) -> Result<(Scanned, Option<Age>), Unsupported> {
+        let elapsed = scanned.elapsed;
+        let is_compared = |term: Term| match self.terms.node(term) {
+            Node::Apply(Operation::Compare(..), operands) => operands.contains(&elapsed),
+            _ => false,
+        };
+        let mut terms = (0..self.terms.len()).map(|place| self.terms.at(place));
+        if scan.stopped.is_some() || !terms.any(is_compared) {
+            return Ok((scanned, None));
+        }
+        let cell = self.cell(format!("{}TIME()", scan.prefix), Elementary::Time, 0);
+        let clock = self.cells[cell as usize].term;
+        let again = self.scan(&Scan { ages, clock: Some(clock), ..*scan }, numbers)?;
+        match self.most(scan, &again, ages, Carrier::Clock(clock)) {
+            Some(most) => Ok((again, Some(Age { cell, most }))),
+            None => Ok((scanned, None)),
+        }
+    }
+
+    /// TIMEs that a scan adds to, with the value at which each stops: past it no answer changes. The scan is one of a program that no fault stops.
+    pub(super) fn sums(
+        &mut self,
+        scan: &Scan<'_>,
+        scanned: &Scanned,
+        ages: &HashMap<u64, Age>,
+        numbers: &HashMap<u64, u32>,
+    ) -> HashMap<u64, i64> {
+        let outputs = scan.program.outputs.iter();
+        let outputs: HashSet<u64> = outputs.map(|point| 64 * u64::from(point.slot)).collect();
+        let mut sums = HashMap::new();
+        for (&address, &number) in numbers {
+            let cell = &self.cells[number as usize];
+            let (of, sum) = (cell.of, cell.term);
+            if scan.stopped.is_none()
+                && of == Elementary::Time
+                && cell.initial as i64 >= 0
+                && !outputs.contains(&address)
+                && !ages.contains_key(&address)
+                && let Some(&next) = scanned.memory.get(&address)
+                && self.added(next, sum, scan.program.period, &mut Vec::new()) == Some(true)
+                && let Some(most) = self.most(scan, scanned, ages, Carrier::Sum(address, sum))
+            {
+                sums.insert(address, most);
+            }
+        }
+        sums
+    }
+
+    /// A sum that stops at a value.
+    pub(super) fn stopped_at(&mut self, sum: Term, most: i64) -> Term {
+        let most = self.terms.constant(Elementary::Time, most as u64);
+        let is_past = self.terms.compare(Comparison::GreaterOrEqual, sum, most);
+        self.terms.choose(is_past, most, sum)
+    }
+
+    /// Whether something is added to a sum for its next value, and what that depends on; nothing where it is not itself, a constant or one of them
+    /// with something added to it.
+    fn added(&self, next: Term, own: Term, period: i64, found: &mut Vec<Term>) -> Option<bool> {
+        if next == own {
+            return Some(false);
+        }
+        match self.terms.node(next) {
+            Node::Constant(stored) => (*stored as i64 >= 0).then_some(false),
+            &Node::Choose([condition, then, otherwise]) => {
+                found.push(condition);
+                let then = self.added(then, own, period, found)?;
+                Some(self.added(otherwise, own, period, found)? || then)
+            }
+            // Times are added as whole numbers.
+            Node::Apply(Operation::Reinterpret(..), operands) => {
+                self.added(operands[0], own, period, found)
+            }
+            Node::Apply(Operation::Add(Elementary::Time | Elementary::Lint), operands) => {
+                let sides = [(operands[0], operands[1]), (operands[1], operands[0])];
+                let mut sides = sides.into_iter().filter(|side| self.is_step(side.1, period));
+                self.added(sides.next()?.0, own, period, found).map(|_| true)
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether a term is a constant from 0 to a period: what is added in each scan takes as long as `TIME()` until it wraps.
+    fn is_step(&self, term: Term, period: i64) -> bool {
+        matches!(self.terms.node(term), Node::Constant(stored) if (0..=period).contains(&(*stored as i64)))
     }
 
     /// The time since a moment at the beginning of a scan: 0 where the program restarts.
@@ -78,7 +174,7 @@ impl System {
         program: &Program,
         scanned: &Scanned,
         age: Age,
-        address: u64,
+        address: Option<u64>,
         stopped: Option<Term>,
     ) -> Term {
         let before = self.age(age, stopped);
@@ -88,7 +184,7 @@ impl System {
         let add = Operation::Add(Elementary::Time);
         let more = self.terms.apply(add, Elementary::Time, &[before, period]);
         let more = self.terms.choose(is_full, most, more);
-        match scanned.memory.get(&address) {
+        match address.and_then(|address| scanned.memory.get(&address)) {
             Some(&moment) => self.since(moment, scanned.elapsed, (period, more)),
             None => more,
         }
@@ -144,17 +240,26 @@ impl System {
         }
     }
 
-    /// The time from which on nothing changes that the program asks of the time since a moment.
+    /// The time from which on nothing changes that the program asks of a time that grows.
     fn most(
         &mut self,
         scan: &Scan<'_>,
         scanned: &Scanned,
         ages: &HashMap<u64, Age>,
-        address: u64,
+        carrier: Carrier,
     ) -> Option<i64> {
-        let age = self.age(*ages.get(&address)?, scan.stopped);
+        let period = scan.program.period.max(1);
+        let (age, own_address, is_sum) = match carrier {
+            Carrier::Age(address, age) => (age, Some(address), false),
+            Carrier::Clock(clock) => (clock, None, false),
+            Carrier::Sum(address, sum) => (sum, Some(address), true),
+        };
         let mut pending = vec![scanned.faulted];
         for (other, &value) in &scanned.memory {
+            if is_sum && own_address == Some(*other) {
+                self.added(value, age, period, &mut pending)?;
+                continue;
+            }
             let own = ages.get(other).map(|&own| self.age(own, scan.stopped));
             let mut found = Vec::new();
             let is_moment = own.is_some_and(|own| {
@@ -162,7 +267,7 @@ impl System {
             });
             match is_moment {
                 true => pending.append(&mut found),
-                false if *other == address => return None,
+                false if own_address == Some(*other) => return None,
                 false => pending.push(value),
             }
         }
@@ -201,10 +306,23 @@ impl System {
                     let bound = self.bound(other, scanned, &mut Open::default())?;
                     most = most.max(needed(comparison, bound)?);
                 }
-                Node::Apply(_, operands) => {
-                    if operands.iter().any(|operand| carries.contains(operand)) {
+                Node::Apply(operation, operands) => {
+                    if !operands.iter().any(|operand| carries.contains(operand)) {
+                        continue;
+                    }
+                    let grows = match operation {
+                        Operation::Add(Elementary::Time | Elementary::Lint) => {
+                            operands.iter().any(|&term| self.is_step(term, period))
+                        }
+                        Operation::Reinterpret(_, to) => {
+                            matches!(to, Elementary::Time | Elementary::Lint)
+                        }
+                        _ => false,
+                    };
+                    if !is_sum || !grows {
                         return None;
                     }
+                    carries.insert(term);
                 }
                 &Node::Choose([condition, then, otherwise]) => {
                     for (value, side) in [(true, then), (false, otherwise)] {
@@ -226,7 +344,6 @@ impl System {
             // A use that no comparison bounds.
             return None;
         }
-        let period = scan.program.period.max(1);
         most.max(period).checked_add(period - 1).map(|most| most / period * period)
     }
 
@@ -320,6 +437,17 @@ impl System {
             _ => None,
         }
     }
+}
+
+/// What carries a time that grows.
+#[derive(Debug, Clone, Copy)]
+enum Carrier {
+    /// The time since the moment at an address.
+    Age(u64, Term),
+    /// `TIME()`.
+    Clock(Term),
+    /// The TIME at an address, to which the program adds.
+    Sum(u64, Term),
 }
 
 /// Cells whose greatest value is being sought, and how many terms may still be looked at.

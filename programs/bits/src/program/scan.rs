@@ -2,12 +2,12 @@
 
 use std::collections::HashMap;
 
-use understudy_typed::{Elementary, Operation, Program};
+use understudy_typed::{Elementary, Operation, Point, Program};
 
-use crate::System;
 use crate::execute::{Cells, Execution, Unsupported};
 use crate::program::moments::Age;
-use crate::term::{Term, Terms, Variable};
+use crate::term::{Node, Term, Terms, Variable};
+use crate::{Input, System};
 
 /// Cells of one program, made when they are read first.
 struct ProgramCells<'s> {
@@ -85,7 +85,10 @@ impl System {
             None => since,
         });
         let period = self.terms.constant(Elementary::Time, program.period as u64);
-        let elapsed = self.terms.apply(Operation::Elapsed, Elementary::Time, &[count, period]);
+        let elapsed = match scan.clock {
+            Some(clock) => clock,
+            None => self.terms.apply(Operation::Elapsed, Elementary::Time, &[count, period]),
+        };
         let mut cells = ProgramCells {
             elapsed,
             ages,
@@ -109,6 +112,9 @@ impl System {
         for (point, &input) in program.inputs.iter().zip(inputs) {
             if point.slot != 0 {
                 execution.put(point.slot, input);
+                if !within_subrange(execution.terms, &self.inputs, point, input) {
+                    execution.limit(point.slot, point.declared());
+                }
             }
         }
         for task in &program.tasks {
@@ -137,6 +143,15 @@ impl System {
     }
 }
 
+/// Whether every value that an input of the system takes is one of the point's subrange.
+fn within_subrange(terms: &Terms, inputs: &[Input], point: &Point, input: Term) -> bool {
+    let Node::Variable(Variable::Input(number)) = terms.node(input) else {
+        return false;
+    };
+    let (least, most) = inputs[*number as usize].limits;
+    point.range.is_none_or(|(low, high)| low <= least && most <= high)
+}
+
 /// How a scan begins.
 #[derive(Clone, Copy)]
 pub(super) struct Scan<'a> {
@@ -150,6 +165,8 @@ pub(super) struct Scan<'a> {
     pub(super) stopped: Option<Term>,
     /// Moments of which the time since them is followed.
     pub(super) ages: &'a HashMap<u64, Age>,
+    /// The scan's `TIME()`, where it is counted by a cell of its own.
+    pub(super) clock: Option<Term>,
 }
 
 /// How it ends, where no fault ends it.

@@ -185,7 +185,7 @@ impl Generator {
         slot
     }
 
-    /// A subrange for about every other output that is a whole number.
+    /// A subrange for about every other point that is a whole number.
     fn subrange(&mut self, of: Elementary) -> Option<(i128, i128)> {
         let is_whole = of.is_integer() || of.is_bit_string() && of != Elementary::Bool;
         if !is_whole || self.random.below(2) == 0 {
@@ -199,7 +199,8 @@ impl Generator {
         for index in 0..6 {
             let of = self.random.elementary();
             let slot = self.global(format!("u{index}"), Type::Elementary(of));
-            self.program.inputs.push(format!("u{index}"), of, slot);
+            let range = self.subrange(of);
+            self.program.inputs.push_declared(format!("u{index}"), Declared { of, range }, slot);
         }
         for index in 0..6 {
             let of = self.random.elementary();
