@@ -64,15 +64,8 @@ pub fn prove_always(
     let mut base = Unrolling::new(circuit, &cone, true, patience.clone());
     let mut step = Unrolling::new(circuit, &cone, false, patience);
     for scans in 0..=depth.scans {
-        base.scan();
-        let right = base.literal(invariant, scans as usize);
-        match base.satisfiable(!right) {
-            Some(true) => {
-                let inputs = (0..=scans as usize).map(|scan| base.inputs(scan));
-                return Some(Induction::Fails(rows(circuit, &cone, inputs.collect())));
-            }
-            Some(false) => base.require(right),
-            None => return Some(Induction::Undecided(scans)),
+        if let Some(found) = base.breaks(circuit, &cone, invariant, scans) {
+            return Some(found);
         }
         step.scan();
         let right = step.literal(invariant, scans as usize);
@@ -84,6 +77,49 @@ pub fn prove_always(
         }
     }
     Some(Induction::Undecided(depth.scans + 1))
+}
+
+/// Searches a run of at most `depth.scans` scans that ends with a scan without `invariant`, the shortest one.
+///
+/// Nothing for a formula that speaks of more than one scan.
+pub fn search(circuit: &Circuit, invariant: &Resolved, depth: Depth<'_>) -> Option<Induction> {
+    if !invariant.is_of_one_scan() {
+        return None;
+    }
+    let cone = Cone::of(circuit, [invariant]);
+    let patience = Patience { go_on: depth.go_on, scans: 0, steps: Cell::new(depth.steps) };
+    let mut base = Unrolling::new(circuit, &cone, true, patience);
+    for scans in 0..depth.scans {
+        if let Some(found) = base.breaks(circuit, &cone, invariant, scans) {
+            return Some(found);
+        }
+    }
+    Some(Induction::Undecided(depth.scans))
+}
+
+impl Unrolling<'_> {
+    /// One scan more: the run that breaks the invariant in it, or the end of the search; nothing where no run does.
+    fn breaks(
+        &mut self,
+        circuit: &Circuit,
+        cone: &Cone,
+        invariant: &Resolved,
+        scans: u32,
+    ) -> Option<Induction> {
+        self.scan();
+        let right = self.literal(invariant, scans as usize);
+        match self.satisfiable(!right) {
+            Some(true) => {
+                let inputs = (0..=scans as usize).map(|scan| self.inputs(scan));
+                Some(Induction::Fails(rows(circuit, cone, inputs.collect())))
+            }
+            Some(false) => {
+                self.require(right);
+                None
+            }
+            None => Some(Induction::Undecided(scans)),
+        }
+    }
 }
 
 /// The part under AG of `formula`, where that speaks of one scan.

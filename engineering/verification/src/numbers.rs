@@ -51,12 +51,12 @@ pub struct Model {
 }
 
 impl Model {
-    /// One program. Its properties name its BOOL points and variables.
+    /// One program, whose inputs are within their subranges. Its properties name its BOOL points and variables.
     ///
     /// # Errors
     /// What of the program cannot be followed.
     pub fn of_program(program: &Program) -> Result<Self, Unsupported> {
-        Self::of(System::of_program(program)?)
+        Self::of(System::within_subranges(program)?)
     }
 
     /// All programs of a cluster; their signals stand behind the names of their controllers and a dot.
@@ -85,6 +85,12 @@ impl Model {
     /// The circuit that stands for the programs.
     pub fn circuit(&self) -> &Circuit {
         self.subject.circuit()
+    }
+
+    /// Names of the inputs that are assumed to be finite numbers: those of type REAL and LREAL.
+    pub fn finite_inputs(&self) -> impl Iterator<Item = &str> {
+        let inputs = self.system.inputs.iter().filter(|input| input.of.is_real());
+        inputs.map(|input| input.name.as_str())
     }
 
     /// The formula of `property` over the signals of the circuit.

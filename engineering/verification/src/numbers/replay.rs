@@ -248,18 +248,21 @@ impl<'s> Replay<'s> {
         }
         let mut choice = attempt;
         for (number, input) in self.system.inputs.iter().enumerate() {
+            let (least, greatest) = input.limits;
             let Some(boundaries) = self.derivation.boundaries.get(&input.term) else {
                 let is_followed = self.derivation.meanings.iter().any(
                     |meaning| matches!(meaning, Meaning::Bit(of, _) if *of as usize == number),
                 );
-                if !is_followed {
-                    let (least, greatest) = input.limits;
+                if is_followed {
+                    // As the circuit does with its bits.
+                    let limited = input.of.signed(inputs[number]).clamp(least, greatest);
+                    inputs[number] = limited as u64 & input.of.mask();
+                } else {
                     inputs[number] = some_value(input.of, least - 1, greatest, choice % 3);
                     choice /= 3;
                 }
                 continue;
             };
-            let (least, greatest) = input.limits;
             let end = at_most[number];
             let above = match end {
                 Some(end) => boundaries.range(..end).next_back(),

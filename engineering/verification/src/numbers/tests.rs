@@ -80,6 +80,51 @@ fn what_no_number_does_is_undecided_with_the_comparison() {
     assert!(reason.contains("a * a < 0.0"), "{reason}");
 }
 
+/// No counterexample has an input outside of its declaration, alone or in a cluster.
+#[test]
+fn inputs_keep_their_subranges() {
+    let program = lowered(
+        "PROGRAM p
+           VAR_INPUT x : INT (10..100); END_VAR
+           VAR_OUTPUT low : BOOL; at_end : BOOL; high : BOOL; END_VAR
+           low := x < 10;
+           at_end := x = 100;
+           high := x > 100;
+         END_PROGRAM",
+    );
+    let alone = Model::of_program(&program).expect("followed");
+    let member = |source| Member {
+        name: "p".to_owned(),
+        code: Code::Typed(&program),
+        sources: vec![source],
+    };
+    let of_cluster = |source| Model::of_cluster("cell", &[member(source)]).expect("followed");
+    let x = program.inputs.find("x").expect("an input");
+    // Whatever the source is: a scan makes values of the subrange of all others.
+    let models = [
+        (alone, ""),
+        (of_cluster(Source::declared(x)), "p."),
+        (of_cluster(Source::Any(None)), "p."),
+    ];
+    for (model, prefix) in models {
+        let never = |name: &str| ask(&model, &format!("never {prefix}{name}"));
+        assert_eq!(never("low"), Answer::Holds(None));
+        assert_eq!(never("high"), Answer::Holds(None));
+        assert!(matches!(never("at_end"), Answer::Fails(Some(_))), "it is the greatest value");
+    }
+    let model = Model::of_program(&program).expect("followed");
+    for property in ["never at_end", "always at_end"] {
+        let Answer::Fails(Some(run)) = ask(&model, property) else {
+            panic!("{property} fails");
+        };
+        let values = run.numbers.iter().filter(|row| row.name == "x").flat_map(|row| &row.values);
+        for value in values {
+            let value: i64 = value.parse().expect("a number");
+            assert!((10..=100).contains(&value), "{value}");
+        }
+    }
+}
+
 fn signal(program: usize, output: &str, default: u64) -> Source {
     Source::Signal { program, output: output.to_owned(), default, stale_after: 0 }
 }
@@ -122,4 +167,39 @@ fn two_programs_keep_what_each_alone_does_not() {
     assert_eq!(ask_of(careful), Answer::Holds(None));
     let careless = careful.replace("inside OR granted", "inside OR wants_in");
     assert!(matches!(ask_of(&careless), Answer::Fails(Some(_))));
+}
+
+/// Three tasks with counters: what a run of 26 scans shows is found without diagrams and lists, for which it is large.
+#[test]
+fn a_run_that_breaks_an_invariant_soon_is_searched_first() {
+    let program = lowered(
+        "PROGRAM fast VAR_INPUT go : BOOL; END_VAR VAR_OUTPUT n : INT; f : BOOL; END_VAR
+           IF go THEN n := n + 1; END_IF;
+           IF n > 1000 THEN n := 0; END_IF;
+           f := n = 10;
+         END_PROGRAM
+         PROGRAM mid VAR_INPUT up : BOOL; END_VAR VAR_OUTPUT m : INT; g : BOOL; END_VAR
+           IF up THEN m := m + 2; ELSE m := m - 1; END_IF;
+           IF m > 500 THEN m := 0; END_IF;
+           g := m > 20;
+         END_PROGRAM
+         PROGRAM slow VAR_INPUT x : BOOL; END_VAR VAR_OUTPUT k : INT; h : BOOL; END_VAR
+           IF x THEN k := k + 3; END_IF;
+           IF k > 3000 THEN k := 0; END_IF;
+           h := k > 15;
+         END_PROGRAM
+         CONFIGURATION c RESOURCE r ON PLC
+           TASK a(INTERVAL := T#10ms, PRIORITY := 1); TASK b(INTERVAL := T#20ms, PRIORITY := 2); TASK d(INTERVAL := T#50ms, PRIORITY := 3);
+           PROGRAM one WITH a : fast; PROGRAM two WITH b : mid; PROGRAM three WITH d : slow;
+         END_RESOURCE END_CONFIGURATION",
+    );
+    let model = Model::of_program(&program).expect("followed");
+    let bounds = Bounds { nodes: 1_000, states: 10, scans: 1, ..Bounds::default() };
+    let property = read_one("never one.f and two.g and three.h").expect("a property");
+    let resolved = model.resolve(&property).expect("known names");
+    let answers = model.check(&[resolved], &[], bounds, &mut || {});
+    let [Answer::Fails(Some(run))] = answers.as_slice() else {
+        panic!("{answers:?}");
+    };
+    assert_eq!(run.trace.scans.len(), 26, "the shortest run");
 }

@@ -1,6 +1,7 @@
 //! Properties of a program by several methods, the cheap ones first:
 //!
 //! ```text
+//! runs of a few scans            invariants of large programs that break soon
 //! diagrams of few nodes          most properties of most ladders, with runs that show why
 //! induction over few scans       invariants, however large the program is
 //! few states listed one by one   programs in steps: few of many states can be reached
@@ -17,13 +18,19 @@ use understudy_logic::bdd::BddError;
 use super::{Answer, Bounds, Subject};
 use crate::effort::{Stopped, Work};
 use crate::explicit::{Explicit, ExplicitError};
-use crate::induction::{Depth, Induction, invariant, prove_always};
+use crate::induction::{Depth, Induction, invariant, prove_always, search};
 use crate::symbolic::{Checker, Cone, Resolved, Verdict, rows};
+use understudy_logic::Variable;
 
 /// Nodes of the first and the second try.
 const NODES: [usize; 2] = [1 << 17, 1 << 20];
 /// Parts of a program that may be too large before diagrams of that many nodes are given up.
 const REFUSED: u32 = 3;
+/// The search before all others: registers from which on a property needs it, the scans of its runs, operations of all scans together, and steps.
+const LARGE: usize = 30;
+const SOON: u32 = 40;
+const OPERATIONS: usize = 2_000_000;
+const SOON_STEPS: u64 = 50_000;
 /// The first induction: its scans, and the steps of each search.
 const FEW_SCANS: u32 = 2;
 const FEW_STEPS: u64 = 200_000;
@@ -94,6 +101,7 @@ impl<'s, 'b> Stages<'s, 'b> {
     pub(super) fn run(mut self) -> Vec<Answer> {
         let [few, more] = NODES;
         let all = self.bounds.nodes;
+        self.search();
         self.diagrams(few.min(all));
         self.induction(FEW_SCANS.min(self.bounds.scans), FEW_STEPS);
         let few_states = Explicit::few(&self.subject.circuit).min(self.bounds.states);
@@ -148,6 +156,46 @@ impl<'s, 'b> Stages<'s, 'b> {
                         return;
                     }
                 }
+            }
+        }
+    }
+
+    /// Invariants that break within a few scans: diagrams of large programs take long to find what a run of few scans shows.
+    fn search(&mut self) {
+        if !self.fair.is_empty() {
+            return;
+        }
+        let circuit = &self.subject.circuit;
+        for place in self.left() {
+            let Some(kept) = invariant(&self.properties[place]) else {
+                continue;
+            };
+            let cone = Cone::of(circuit, [kept]);
+            let registers = cone.variables.iter();
+            let registers: Vec<_> = registers
+                .filter_map(|variable| match variable {
+                    Variable::Register(register) => Some(&circuit.registers()[*register as usize]),
+                    Variable::Input(_) => None,
+                })
+                .collect();
+            if registers.len() < LARGE {
+                continue;
+            }
+            let next: Vec<_> = registers.iter().map(|register| register.next).collect();
+            let operations = circuit.graph().reached(&next).into_iter().filter(|is| *is).count();
+            let scans = (OPERATIONS / operations.max(1)).min(SOON as usize) as u32;
+            let depth = Depth { scans, steps: SOON_STEPS, go_on: self.bounds.go_on };
+            match search(circuit, kept, depth) {
+                Some(Induction::Fails(trace)) => self.answer(place, Answer::Fails(Some(trace))),
+                Some(Induction::Undecided(scans)) if scans > 0 => {
+                    self.so_far[place].unbroken = Some(scans);
+                }
+                _ => {}
+            }
+            if !(depth.go_on)(Work::Scans(0)) {
+                self.so_far[place].why = Stopped::Time;
+                self.over = true;
+                return;
             }
         }
     }
