@@ -157,10 +157,10 @@ impl RemoteIo {
             knowledge: Knowledge::default(),
             question: None,
             authority: Authority::Proof,
-            sensors: Some(Image::zero(settings.inputs)),
-            field: Image::zero(settings.inputs),
+            sensors: Some(settings.undriven.clone()),
+            field: settings.undriven.clone(),
             diagnosing: Diagnosing::new(settings.diagnosis.as_deref()),
-            diagnosed: Image::zero(settings.inputs),
+            diagnosed: Image::zero(settings.undriven.width()),
             looked: now,
             protection: Protection::default(),
             forcing: Forcing::default(),
@@ -238,7 +238,7 @@ impl RemoteIo {
     fn take(&mut self, now: Time, input: RemoteIoInput<'_>) {
         match input {
             RemoteIoInput::Field(sensors) => {
-                if sensors.width() == self.settings.inputs {
+                if sensors.width() == self.settings.undriven.width() {
                     self.sensors = Some(sensors.clone());
                 }
             }
@@ -275,7 +275,7 @@ impl RemoteIo {
         let program = self.settings.program;
         let own = Holding::of(holdings, program);
         let recalled = recalled.iter().find(|recalled| {
-            recalled.program == program && recalled.inputs.width() == self.settings.inputs
+            recalled.program == program && recalled.inputs.width() == self.settings.undriven.width()
         });
         self.holders.note(station, own, recalled);
         if let (Some(run), Some(holding)) = (self.knowledge.run_mut(), own)

@@ -20,8 +20,8 @@ pub struct Settings {
     pub agreement: Arc<Agreement>,
     /// Hash of the program's circuit.
     pub hash: ProgramHash,
-    /// Width of u(i) in bits.
-    pub inputs: usize,
+    /// u(i) where nothing drives it: the initial values of its variables.
+    pub undriven: Image,
     /// Inputs that operators write; no two share a bit with each other or with a signal.
     pub operator_inputs: Vec<OperatorInput>,
     /// Inputs that are outputs of other programs.

@@ -99,7 +99,7 @@ fn settings() -> Settings {
         program: ProgramId(0),
         agreement: agreement(),
         hash: ProgramHash(9),
-        inputs: 2,
+        undriven: Image::zero(2),
         operator_inputs: Vec::new(),
         signals: Vec::new(),
         signal_sources: Vec::new(),

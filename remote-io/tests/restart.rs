@@ -40,7 +40,7 @@ fn run(held: [Held; 3], release: Release, released_at: u64, cycles: u64) -> Vec<
             program: ProgramId(0),
             agreement,
             hash: ProgramHash(1),
-            inputs: 1,
+            undriven: Image::zero(1),
             operator_inputs: Vec::new(),
             signals: Vec::new(),
             signal_sources: Vec::new(),

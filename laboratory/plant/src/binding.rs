@@ -2,13 +2,14 @@
 //!
 //! A terminal without an entry in [`Signals`] is bound to the signal of its own name. Every sensor must be an input of
 //! the controller and every actuator an output, except those that follow another plant; an input that no sensor drives
-//! stays 0.
+//! keeps its initial value.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
 use understudy_executable::Interface;
 use understudy_typed::{Declared, Point, Points, Program};
+use understudy_wire::Image;
 
 use crate::model::{Direction, Terminal, Terminals};
 
@@ -59,8 +60,8 @@ pub enum BindingProblem {
         /// The terminal.
         terminal: String,
     },
-    /// No sensor drives this input of the controller: it stays 0.
-    InputStaysZero {
+    /// No sensor drives this input of the controller: it keeps its initial value.
+    InputNotDriven {
         /// The input.
         input: String,
     },
@@ -85,8 +86,8 @@ pub(crate) enum Driver {
 pub(crate) struct Binding {
     pub(crate) sensors: Vec<(usize, usize)>,
     pub(crate) actuators: Vec<(Driver, usize)>,
-    /// Bits of u(i).
-    pub(crate) inputs: usize,
+    /// u(i) without sensors: the initial values.
+    pub(crate) undriven: Image,
 }
 
 impl Binding {
@@ -178,7 +179,7 @@ impl Binding {
         if fits {
             for input in unbound(inputs, &sensors) {
                 if !terminals.always_zero.contains(&input) {
-                    problems.push(BindingProblem::InputStaysZero { input });
+                    problems.push(BindingProblem::InputNotDriven { input });
                 }
             }
             for output in unbound(outputs, &driven) {
@@ -197,7 +198,8 @@ impl Binding {
                 .into_iter()
                 .zip(terminals.sensors.iter().map(Terminal::bits))
                 .collect(),
-            inputs: inputs.width(),
+            undriven: Image::from_words(inputs.width(), &inputs.initial_image())
+                .unwrap_or_default(),
         };
         (fits.then_some(binding), problems)
     }

@@ -299,7 +299,7 @@ impl Plant {
     fn show(&mut self) -> Field {
         let model = self.inside.model();
         model.sensors(&mut self.sensors);
-        let mut sensors = Image::zero(self.binding.inputs);
+        let mut sensors = self.binding.undriven.clone();
         let mut shown = self.sensors.iter();
         for &(place, bits) in &self.binding.sensors {
             for (bit, &sensor) in shown.by_ref().take(bits).enumerate() {

@@ -284,7 +284,7 @@ fn a_program_can_be_a_plant() {
     assert!(kind.takes_parts() && kind.hands_over());
     let (plant, problems) = Plant::new(&kind, &(&controller).into(), &Signals::new(), true);
     let expected = [
-        BindingProblem::InputStaysZero { input: "lid_closed".into() },
+        BindingProblem::InputNotDriven { input: "lid_closed".into() },
         BindingProblem::OutputHasNoEffect { output: "lamp".into() },
     ];
     assert_eq!(problems, expected);

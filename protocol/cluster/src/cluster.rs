@@ -8,6 +8,7 @@ use crate::alarm::AlarmDeclaration;
 use crate::code::Code;
 use crate::device::FieldDevice;
 use crate::source::{InputSource, OperatorDeclaration, SignalDeclaration};
+use crate::undriven::initial_image;
 use serde::{Deserialize, Serialize};
 use understudy_cycle::{Agreement, Mode};
 use understudy_executable::Interface;
@@ -370,7 +371,7 @@ impl Cluster {
             program,
             agreement: Arc::clone(&self.agreement),
             hash: controller.hash,
-            inputs: controller.interface.inputs.width(),
+            undriven: initial_image(&controller.interface.inputs),
             operator_inputs: remote_io.operator_inputs().map(|it| it.input).collect(),
             signals: remote_io.signals().map(|signal| signal.input).collect(),
             signal_sources: self.signal_sources(remote_io),

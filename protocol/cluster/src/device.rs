@@ -5,6 +5,7 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 use understudy_typed::Declared;
+use understudy_wire::Image;
 
 use crate::place::Place;
 
@@ -19,7 +20,7 @@ pub struct FieldDevice {
     pub timeout: Duration,
     /// Age at which its last answer is too old.
     pub stale_after: Duration,
-    /// Inputs of the program with a place; all others stay 0.
+    /// Inputs of the program with a place; all others keep their initial values.
     pub inputs: Side,
     /// Outputs of the program with a place; all others reach no actuator.
     pub outputs: Side,
@@ -74,8 +75,8 @@ impl fmt::Display for Connection {
 /// The inputs or the outputs of a program, as far as they have a place in the device.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Side {
-    /// Width of the process image in bits.
-    pub width: usize,
+    /// The process image with the initial values of all signals without a place.
+    pub rest: Image,
     /// In order of declaration.
     pub bindings: Vec<Binding>,
 }

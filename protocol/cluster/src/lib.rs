@@ -22,6 +22,7 @@ mod read;
 mod schema;
 mod source;
 mod template;
+mod undriven;
 mod value;
 
 pub use alarm::{AlarmCondition, AlarmDeclaration, MAXIMUM_ALARMS, Priority};

@@ -49,7 +49,10 @@ pub fn stored_value(value: &Constant, of: Elementary) -> Result<u64, String> {
         (of.signed(stored) == i128::from(number)).then_some(stored)
     };
     let real = |number: f64| match of {
-        Elementary::Real => Some(u64::from((number as f32).to_bits())),
+        Elementary::Real => {
+            let number = number as f32;
+            number.is_finite().then_some(u64::from(number.to_bits()))
+        }
         _ => Some(number.to_bits()),
     };
     let found = match (of, value) {

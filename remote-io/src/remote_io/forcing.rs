@@ -83,7 +83,7 @@ impl RemoteIo {
     /// A force of a signal that the program does not have, or without an end, is refused.
     pub(super) fn force(&mut self, now: Time, force: &Force) {
         let width = match force.signal {
-            SignalPlace::Input(_) => self.settings.inputs,
+            SignalPlace::Input(_) => self.settings.undriven.width(),
             SignalPlace::Output(_) => self.settings.fail_safe.width(),
         };
         if !force.fits(width) || force.check().is_err() {

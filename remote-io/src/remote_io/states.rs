@@ -86,7 +86,7 @@ impl Bench {
             program: PROGRAM,
             agreement: Arc::new(agreement),
             hash: ProgramHash(1),
-            inputs: 1,
+            undriven: Image::zero(1),
             operator_inputs: Vec::new(),
             signals: Vec::new(),
             signal_sources: Vec::new(),

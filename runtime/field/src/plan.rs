@@ -42,8 +42,8 @@ impl Run {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Plan {
     pub(crate) runs: Vec<Run>,
-    /// Width of the process image in bits.
-    width: usize,
+    /// The process image with the initial values of all signals without a place.
+    rest: Image,
     signals: Vec<Signal>,
 }
 
@@ -99,12 +99,16 @@ impl Plan {
                 at: usize::from(span.start - runs[run].start),
             })
         };
-        Self { width: side.width, signals: side.bindings.iter().filter_map(signal).collect(), runs }
+        Self {
+            rest: side.rest.clone(),
+            signals: side.bindings.iter().filter_map(signal).collect(),
+            runs,
+        }
     }
 
     /// The image of the signals, from a word for each address of each run.
     pub(crate) fn image(&self, answers: &[Vec<u16>]) -> Result<Image, Unread> {
-        let mut image = Image::zero(self.width);
+        let mut image = self.rest.clone();
         for Signal { binding, run, at } in &self.signals {
             let words = answers.get(*run).and_then(|answer| answer.get(*at..));
             let words = words.ok_or(Unread::Short)?;
@@ -234,7 +238,7 @@ mod tests {
             })
         };
         Side {
-            width: points.width(),
+            rest: Image::zero(points.width()),
             bindings: points.iter().zip(places).filter_map(binding).collect(),
         }
     }
@@ -320,7 +324,7 @@ mod tests {
             let places: Vec<_> = places.into_iter().zip(numbers).map(|(at, is)| place(at, is)).collect();
             let side = side(&places);
             let plan = Plan::new(&side);
-            let mut image = Image::zero(side.width);
+            let mut image = Image::zero(side.rest.width());
             for (binding, word) in side.bindings.iter().zip(words) {
                 image.words_mut()[binding.bit / 64] |= (word & binding.declared.of.mask()) << (binding.bit % 64);
             }

@@ -72,7 +72,7 @@ pub(crate) fn parts(understudies: usize) -> Parts {
         program: ProgramId(index),
         agreement: Arc::clone(&agreement),
         hash: program.hash,
-        inputs: 1,
+        undriven: Image::zero(1),
         operator_inputs: Vec::new(),
         signals: Vec::new(),
         signal_sources: Vec::new(),

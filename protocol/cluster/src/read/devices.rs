@@ -13,6 +13,7 @@ use crate::device::{Binding, FieldDevice, Side};
 use crate::fields::{MAXIMUM_MISFITS, PlaceEntry, Placed, SourceEntry};
 use crate::file::FieldSection;
 use crate::place::{BitPlace, Place, Registers};
+use crate::undriven::{initial_image, remains};
 
 /// The device of a remote I/O; nothing where its section has errors. `read` are the outputs that other programs read.
 pub(super) fn device(
@@ -28,23 +29,28 @@ pub(super) fn device(
     let outputs = side(&section.outputs, &interface.outputs, "output", member, diagnostics);
     check_driven(&section.outputs, diagnostics);
     let mut warned = false;
-    for (points, entries, side, code, effect) in [
-        (&interface.inputs, &section.inputs, "input", "U0251", "it stays 0"),
-        (&interface.outputs, &section.outputs, "output", "U0252", "it moves nothing"),
+    for (points, entries, side, code) in [
+        (&interface.inputs, &section.inputs, "input", "U0251"),
+        (&interface.outputs, &section.outputs, "output", "U0252"),
     ] {
         // The points of a program fault are for the operator and need no wire.
         let optional = [TypedProgram::RESET, TypedProgram::FAULT];
         let lacking = points
-            .names()
-            .filter(|name| !entries.contains_key(*name) && !optional.contains(name))
-            .filter(|name| !is_sourced(sources, name))
-            .filter(|name| !read.contains(&format!("{}.{name}", member.name)));
+            .iter()
+            .filter(|Point { name, .. }| !entries.contains_key(name))
+            .filter(|Point { name, .. }| !optional.contains(&name.as_str()))
+            .filter(|Point { name, .. }| !is_sourced(sources, name))
+            .filter(|Point { name, .. }| !read.contains(&format!("{}.{name}", member.name)));
         // Where names were misspelt, that was said.
         if diagnostics.len() == before || warned {
-            for name in lacking.take(MAXIMUM_MISFITS) {
+            for point in lacking.take(MAXIMUM_MISFITS) {
+                let effect = match side {
+                    "input" => remains(&[point]),
+                    _ => "it moves nothing".to_owned(),
+                };
                 let message = format!(
-                    "the {side} `{name}` of `{}` has no place in the device: {effect}",
-                    member.name
+                    "the {side} `{}` of `{}` has no place in the device: {effect}",
+                    point.name, member.name
                 );
                 diagnostics.push(Diagnostic::warning(code, message, section.span.clone()));
                 warned = true;
@@ -168,7 +174,12 @@ fn side(
             place: *place,
         });
     }
-    Side { width: points.width(), bindings }
+    let mut rest = initial_image(points);
+    let placed = bindings.iter().filter_map(|binding| points.find(&binding.name));
+    for point in placed {
+        point.set(rest.words_mut(), 0);
+    }
+    Side { rest, bindings }
 }
 
 /// Whether values of a signal and of its place convert into each other.

@@ -24,6 +24,7 @@ use crate::code::Code;
 use crate::configuration::plant_text;
 use crate::fields::{MAXIMUM_MISFITS, Placed};
 use crate::file::{ModelSection, PlantSection};
+use crate::undriven::remains;
 
 /// The plants by program, and what the configuration hash has to know of each.
 pub(crate) struct Plants {
@@ -144,11 +145,11 @@ fn bound(
         Plant::following(kind, interface, &signals, &terminals, fed_by.is_some());
     // What an error left out could be the source of an input.
     if diagnostics.iter().any(super::is_error) {
-        problems.retain(|problem| !matches!(problem, BindingProblem::InputStaysZero { .. }));
+        problems.retain(|problem| !matches!(problem, BindingProblem::InputNotDriven { .. }));
     }
-    let stays_zero = |problem: &BindingProblem, name: &str| matches!(problem, BindingProblem::InputStaysZero { input } if input == name);
+    let not_driven = |problem: &BindingProblem, name: &str| matches!(problem, BindingProblem::InputNotDriven { input } if input == name);
     for source in &remote_io.inputs {
-        let is_driven = !problems.iter().any(|problem| stays_zero(problem, &source.name));
+        let is_driven = !problems.iter().any(|problem| not_driven(problem, &source.name));
         if is_driven && plant.is_some() {
             let message = format!(
                 "the plant `{}` drives the input `{}`, which has another source",
@@ -160,7 +161,7 @@ fn bound(
         }
         let mut names: Vec<String> = names_of_valid(&source.name).collect();
         names.push(source.name.clone());
-        problems.retain(|it| !names.iter().any(|name| stays_zero(it, name)));
+        problems.retain(|it| !names.iter().any(|name| not_driven(it, name)));
     }
     let is_read = |output: &str| {
         let mut readers = remote_ios.iter().flat_map(RemoteIo::signals);
@@ -172,13 +173,13 @@ fn bound(
     });
     if let Some(diagnosis) = &remote_io.diagnosis {
         problems.retain(|problem| match problem {
-            BindingProblem::InputStaysZero { input } => !diagnosis.drives(input),
+            BindingProblem::InputNotDriven { input } => !diagnosis.drives(input),
             _ => true,
         });
     }
     let more = problems.len().saturating_sub(MAXIMUM_MISFITS);
     let problems = problems.into_iter().take(MAXIMUM_MISFITS);
-    diagnostics.extend(problems.map(|problem| describe(problem, draft)));
+    diagnostics.extend(problems.map(|problem| describe(problem, draft, interface)));
     if more > 0 {
         let message = format!("{more} more signals of the plant `{}` do not fit", draft.name);
         let span = section.span.clone();
@@ -258,7 +259,7 @@ pub(crate) fn of_other_type(
     Diagnostic::error("U0227", message, span).with_help(help)
 }
 
-fn describe(problem: BindingProblem, draft: &Draft) -> Diagnostic {
+fn describe(problem: BindingProblem, draft: &Draft, interface: &Interface) -> Diagnostic {
     let section = &draft.section;
     let controller =
         section.controller.as_ref().map(|controller| controller.value.clone()).unwrap_or_default();
@@ -325,10 +326,12 @@ fn describe(problem: BindingProblem, draft: &Draft) -> Diagnostic {
             Diagnostic::error("U0217", message, span)
                 .with_help("keep one: in `signals`, or in `follows`")
         }
-        BindingProblem::InputStaysZero { input } => {
+        BindingProblem::InputNotDriven { input } => {
+            let point = interface.inputs.find(&input);
             let message = format!(
-                "no sensor of the plant `{}` drives the input `{input}` of `{controller}`: it stays 0",
-                draft.name
+                "no sensor of the plant `{}` drives the input `{input}` of `{controller}`: {}",
+                draft.name,
+                remains(point.as_slice())
             );
             Diagnostic::warning("U0251", message, model)
         }

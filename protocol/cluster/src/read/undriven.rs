@@ -1,12 +1,13 @@
 //! Programs whose inputs nothing drives: no plant, no device, no operator and no other program.
 
 use understudy_text::Diagnostic;
-use understudy_typed::Program as TypedProgram;
+use understudy_typed::{Point, Program as TypedProgram};
 
 use super::Member;
 use super::inputs::names_of_valid;
 use crate::cluster::RemoteIo;
 use crate::fields::Placed;
+use crate::undriven::remains;
 
 /// Names that the warning lists at most.
 const MOST_NAMES: usize = 8;
@@ -27,28 +28,27 @@ pub(super) fn check(
         if is_simulated || remote_io.field.is_some() {
             continue;
         }
-        let names: Vec<&str> =
-            interface.inputs.names().filter(|name| !is_driven(remote_io, name)).collect();
-        let Some(first) = names.first() else {
+        let inputs = interface.inputs.iter();
+        let inputs: Vec<&Point> =
+            inputs.filter(|point| !is_driven(remote_io, &point.name)).collect();
+        let Some(first) = inputs.first() else {
             continue;
         };
-        let listed = names.iter().take(MOST_NAMES);
-        let mut list: Vec<String> = listed.map(|name| format!("`{name}`")).collect();
-        if let more @ 1.. = names.len().saturating_sub(MOST_NAMES) {
+        let listed = inputs.iter().take(MOST_NAMES);
+        let mut list: Vec<String> = listed.map(|point| format!("`{}`", point.name)).collect();
+        if let more @ 1.. = inputs.len().saturating_sub(MOST_NAMES) {
             list.push(format!("{more} more"));
         }
-        let (noun, verb) = match names.len() {
-            1 => ("input", "remains"),
-            _ => ("inputs", "remain"),
-        };
+        let noun = if inputs.len() == 1 { "input" } else { "inputs" };
         let message = format!(
-            "nothing drives the {noun} {} of `{}`: no plant, no device, no operator and no other program; {verb} 0",
+            "nothing drives the {noun} {} of `{}`: no plant, no device, no operator and no other program; {}",
             list.join(", "),
-            member.name
+            member.name,
+            remains(&inputs[..inputs.len().min(MOST_NAMES)])
         );
         let help = format!(
-            "declare a [[plant]], a device in [remote_io.field] or a source in [remote_io.inputs]; a scenario sets an input with action = \"set\", station = \"{}\", input = \"{first}\" and a value",
-            remote_io.name
+            "declare a [[plant]], a device in [remote_io.field] or a source in [remote_io.inputs]; a scenario sets an input with action = \"set\", station = \"{}\", input = \"{}\" and a value",
+            remote_io.name, first.name
         );
         let span = member.section.span.clone();
         diagnostics.push(Diagnostic::warning("U0256", message, span).with_help(help));

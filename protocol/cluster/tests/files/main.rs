@@ -9,3 +9,4 @@ mod meeting;
 mod press_cell;
 mod schema;
 mod template;
+mod undriven;
