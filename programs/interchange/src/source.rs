@@ -73,6 +73,8 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
         return SourceFile { diagnostics: parsed.1, ..ladder };
     }
     let read = whole(text, parsed, wanted.program, wanted.period);
+    let missing = read.diagnostics.iter().filter(|found| found.code == "U1085").cloned();
+    let missing: Vec<Diagnostic> = missing.collect();
     let is_more = |typed: &Typed| {
         let is_every_scan = matches!(typed.tasks.as_slice(), [task] if task.every == 1);
         !is_every_scan || has_numbers_as_points(typed)
@@ -80,7 +82,8 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
     let has_bits =
         matches!(&ladder.source, Some(Source::Ladder(ladder)) if has_bits_of_numbers(ladder));
     if is_ladder && !has_bits && !read.typed.as_ref().is_some_and(is_more) {
-        return ladder;
+        let diagnostics = [ladder.diagnostics, missing].concat();
+        return SourceFile { diagnostics, ..ladder };
     }
     let mut found = source(read);
     // Of two readings of a document that both have errors, the one with fewer is nearer to what was meant; a ladder has

@@ -20,6 +20,7 @@ mod expand;
 mod expressions;
 mod facts;
 mod fold;
+mod idle;
 mod images;
 mod initial;
 mod names;

@@ -109,29 +109,6 @@ impl<'a> Lowering<'a> {
         Some(symbol)
     }
 
-    /// Looks for errors in programs that nothing runs and nothing calls. Nothing of them is kept.
-    pub(super) fn check_idle(&mut self, programs: &[&'a Unit]) {
-        for program in programs {
-            let Some(&unit) = self.unit_names.get(&program.name.key()) else {
-                continue;
-            };
-            if self.running.contains(&unit) || self.named_programs.contains_key(&unit) {
-                continue;
-            }
-            let message = format!("nothing runs the PROGRAM `{}`: it is not kept", program.name);
-            let help = "name it in a CONFIGURATION, call it, or remove it";
-            self.warn("U1055", message, program.name.span(), help);
-            let kept = (self.program.clone(), self.names.clone(), self.calls.clone());
-            let at = (std::mem::take(&mut self.addresses), std::mem::take(&mut self.extents));
-            self.check(unit, None, Some(unit), program);
-            self.bodies();
-            self.recursion();
-            (self.program, self.names, self.calls) = kept;
-            (self.addresses, self.extents) = at;
-            self.elements = Default::default();
-        }
-    }
-
     /// Whether a name that is called is that of a program which runs by itself.
     pub(super) fn runs_by_itself(&self, name: &Name) -> bool {
         let unit = self.unit_names.get(&name.key());

@@ -150,9 +150,7 @@ impl<'a> Lowering<'a> {
         }
         self.bodies();
         self.copy_elements();
-        if options.program.is_none() {
-            self.check_idle(&programs);
-        }
+        self.check_idle(&programs, options.program.is_some());
         self.recursion();
         self.program.initial.sort_by_key(|initial| initial.slot);
         Vec::new()
