@@ -241,17 +241,6 @@ pub(crate) fn program(
 ) -> Result<(Source, ProgramFile, Duration), Answer> {
     let file = ProgramText::expected(path)?;
     let period = |found: Option<Duration>| wanted.period.or(found).unwrap_or(USUAL_PERIOD);
-    // A Boolean program has stronger proofs than the same program with numbers. It runs in every scan.
-    if wanted.program.is_none() {
-        let read = read_ladder(&file.name, &file.text, None);
-        let is_every_scan = read.period.is_none_or(|interval| interval == period(read.period));
-        if let Some(ladder) = read.program.filter(|_| is_every_scan)
-            && !has_errors(&read.diagnostics)
-        {
-            let file = file.found(read.diagnostics);
-            return Ok((Source::Ladder(ladder), file, period(read.period)));
-        }
-    }
     let read = read_source(&file.name, &file.text, wanted);
     let file = file.found(read.diagnostics);
     match read.source {

@@ -13,11 +13,16 @@ use crate::console::Console;
 /// Interval of the progress messages.
 const BETWEEN: Duration = Duration::from_secs(3);
 
+/// Age of a command without a time limit at which its progress names the option.
+const LONG: Duration = Duration::from_secs(20);
+
 /// Time limit of a command.
 pub(crate) struct Patience<'c> {
     begin: Instant,
     told: Cell<Instant>,
     budget: Option<Duration>,
+    /// Whether the progress has named the option, or there is none.
+    named: Cell<bool>,
     about: RefCell<String>,
     console: RefCell<&'c mut Console>,
     most: Cell<Most>,
@@ -76,10 +81,17 @@ impl<'c> Patience<'c> {
             begin: now,
             told: Cell::new(now),
             budget,
+            named: Cell::new(true),
             about: RefCell::default(),
             console: RefCell::new(console),
             most: Cell::default(),
         }
+    }
+
+    /// The same, of a command that has the option `--budget`: the progress names it once.
+    pub(crate) fn naming_budget(self) -> Self {
+        self.named.set(false);
+        self
     }
 
     /// Sets the subject of the progress messages.
@@ -104,7 +116,11 @@ impl<'c> Patience<'c> {
         let now = Instant::now();
         if now - self.told.get() >= BETWEEN {
             self.told.set(now);
-            let line = format!("{} s: {progress}", self.seconds());
+            let is_long = self.budget.is_none() && now - self.begin >= LONG;
+            let line = match is_long && !self.named.replace(true) {
+                true => format!("{} s: {progress}; --budget 5min would end it", self.seconds()),
+                false => format!("{} s: {progress}", self.seconds()),
+            };
             self.console.borrow_mut().note(&line);
         }
         self.budget.is_none_or(|budget| now - self.begin < budget)

@@ -3,6 +3,7 @@
 mod answer;
 mod numbers;
 
+use std::borrow::Cow;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -13,19 +14,19 @@ use understudy_cluster::{Cluster, Overrides};
 use understudy_interchange::{Source, Wanted};
 use understudy_ladder::Program;
 use understudy_logic::Circuit;
-use understudy_parity::ParityController;
+use understudy_parity::generate;
 use understudy_text::duration::parse_positive;
-use understudy_text::{Diagnostic, Report, has_errors};
+use understudy_text::{Diagnostic, Report, Severity, has_errors};
 use understudy_verification::program::{Bounds, Remarks, Subject};
 use understudy_verification::property::{Properties, Property, not_of_one_scan, read, read_one};
 use understudy_verification::symbolic::Resolved;
-use understudy_verification::{GoOn, draw_runs, prove_parity_while, smv};
+use understudy_verification::{GoOn, Refutation, draw_runs, prove_parity_while, smv};
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::files;
 use crate::patience::{Patience, Resources};
-use answer::{Finding, ProgramAnswer};
+use answer::{Finding, ProgramAnswer, UnderstudyProof};
 
 /// Prove properties of programs or show counterexamples
 #[derive(Debug, Args)]
@@ -100,12 +101,20 @@ enum Smv {
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let is_cluster = arguments.file.extension().is_some_and(|extension| extension == "toml");
-    let patience = Patience::new(arguments.budget, console);
+    let patience = Patience::new(arguments.budget, console).naming_budget();
     if is_cluster {
         return cluster(arguments, &patience);
     }
     let wanted = Wanted { period: arguments.period, program: arguments.program.as_deref() };
-    let (program, mut file, period) = match files::program(&arguments.file, wanted)? {
+    let (source, mut file, period) = files::program(&arguments.file, wanted)?;
+    // What a program misses of one that is not executed: a proof would be about initial values.
+    for found in file.report.diagnostics.iter_mut().filter(|found| found.code == "U1085") {
+        found.severity = Severity::Error;
+    }
+    if file.report.has_errors() {
+        return Err(Answer::bad_files(file.reports()));
+    }
+    let (program, mut file, period) = match (source, file, period) {
         (Source::Typed(program), file, _) => {
             return numbers::of_program(arguments, &program, file, &patience);
         }
@@ -293,9 +302,9 @@ fn cluster(arguments: &Arguments, patience: &Patience<'_>) -> Result<Answer, Ans
             (None, None) => {}
         }
     }
-    let parity = cluster.parity();
-    let parity = parity.map(|understudy| parity_proof(&cluster, understudy, bounds));
-    Ok(answer::of_programs(programs, parity, None, used(arguments, patience))
+    patience.turn_to("the understudy".to_owned());
+    let understudy = parity_proof(&cluster, bounds);
+    Ok(answer::of_programs(programs, Some(understudy), None, used(arguments, patience))
         .with_used(reports)
         .and_next(&[&"simulate", &arguments.file]))
 }
@@ -305,20 +314,36 @@ fn used(arguments: &Arguments, patience: &Patience<'_>) -> Option<Resources> {
     arguments.resources.then(|| patience.resources())
 }
 
-/// Result of the proof of the understudy.
-fn parity_proof(
-    cluster: &Cluster,
-    understudy: &ParityController,
-    bounds: Bounds<'_>,
-) -> Result<String, String> {
-    let controllers = cluster.controllers().iter();
-    let members: Vec<Circuit> =
-        controllers.filter_map(|controller| controller.circuit().cloned()).collect();
-    match prove_parity_while(&members, understudy.circuit(), bounds.nodes, bounds.go_on) {
-        Ok(proof) => Ok(format!(
+/// Whether the generated understudy is the sum of its members. With programs that are no circuits stations execute all programs and add their
+/// outputs; then the parity controller is generated and compared that `understudy parity` prints.
+fn parity_proof(cluster: &Cluster, bounds: Bounds<'_>) -> UnderstudyProof {
+    let mut members: Vec<Circuit> = Vec::new();
+    for controller in cluster.controllers() {
+        match controller.code.exact_circuit() {
+            Ok(circuit) => members.push(circuit.into_owned()),
+            Err(inexact) => {
+                return UnderstudyProof::LeftOut(format!(
+                    "no parity controller is generated and compared, since the program of `{}` has no circuit: {inexact}; the understudy executes the programs themselves and adds their outputs",
+                    controller.name
+                ));
+            }
+        }
+    }
+    let generated = match cluster.parity() {
+        Some(parity) => Cow::Borrowed(parity),
+        None => match generate(&members) {
+            Ok(parity) => Cow::Owned(parity),
+            Err(error) => return UnderstudyProof::LeftOut(error.to_string()),
+        },
+    };
+    match prove_parity_while(&members, generated.circuit(), bounds.nodes, bounds.go_on) {
+        Ok(proof) => UnderstudyProof::Proved(format!(
             "the understudy equals the sum of its members: {} registers and {} outputs compared",
             proof.registers, proof.outputs
         )),
-        Err(refutation) => Err(refutation.to_string()),
+        Err(undecided @ Refutation::Undecided { .. }) => {
+            UnderstudyProof::Undecided(undecided.to_string())
+        }
+        Err(refutation) => UnderstudyProof::Fails(refutation.to_string()),
     }
 }

@@ -192,3 +192,90 @@ END_PROGRAM
     let shown = answer.shown();
     assert_snapshot!(shown.replace(&folder.display().to_string(), "FOLDER"));
 }
+
+/// Writes files into a folder and answers with the path of the first one.
+fn written(folder: &str, files: &[(&str, &str)]) -> String {
+    let folder = empty_folder(folder);
+    for (name, text) in files {
+        fs::write(folder.join(name), text).expect("written");
+    }
+    folder.join(files[0].0).display().to_string()
+}
+
+const RANGED: &str = "PROGRAM tank
+  VAR_INPUT x : INT (10..100); END_VAR
+  VAR_OUTPUT high : BOOL; half : BOOL; END_VAR
+  high := x > 100 OR x < 10;
+  half := x > 50;
+END_PROGRAM
+";
+
+/// A proof is of the program that stations execute, whose inputs are numbers of their declarations: alone, in a cluster and together.
+#[test]
+fn inputs_are_values_of_their_declarations() {
+    let cluster =
+        "[cluster]\nname = \"cell\"\n[[controller]]\nname = \"tank\"\nladder = \"tank.st\"\n";
+    let file = written("verify_ranges", &[("tank.st", RANGED), ("cluster.toml", cluster)]);
+    let cluster = file.replace("tank.st", "cluster.toml");
+    for (file, name) in [(&file, ""), (&cluster, "tank.")] {
+        let properties = [format!("never {name}high"), format!("never {name}half")];
+        let answer = understudy(&[
+            "verify",
+            file,
+            "--json",
+            "--property",
+            &properties[0],
+            "--property",
+            &properties[1],
+        ]);
+        let found = &answer.json()["result"]["programs"][0]["properties"];
+        assert_eq!(found[0]["verdict"], json!("holds"), "{found}");
+        assert_eq!(found[1]["verdict"], json!("fails"), "{found}");
+        let x = found[1]["scans"]["numbers"][format!("{name}x")][0].as_str();
+        let x: i64 = x.expect("it is shown").parse().expect("a number");
+        assert!((51..=100).contains(&x), "{found}");
+    }
+    // Beyond its subrange an input is the end of it, in `scan` as in a station; a file of inputs is refused.
+    let undriven = understudy(&["check", &cluster]);
+    assert!(undriven.errors.contains("it keeps its initial value 10"), "{}", undriven.shown());
+}
+
+#[test]
+fn the_understudy_of_programs_with_numbers_is_proved_or_left_out() {
+    let cluster = "[cluster]\nname = \"cell\"\n[[controller]]\nname = \"tank\"\nladder = \"tank.st\"\n[[controller]]\nname = \"other\"\nladder = \"other.st\"\n";
+    let other = "PROGRAM other VAR_INPUT go : BOOL; END_VAR VAR_OUTPUT n : INT (0..9); END_VAR IF go AND n < 9 THEN n := n + 1; END_IF; END_PROGRAM";
+    let real = "PROGRAM other VAR_INPUT t : REAL; END_VAR VAR_OUTPUT hot : BOOL; END_VAR hot := t > 90.0; END_PROGRAM";
+    for (other, verdict, line) in [
+        (other, "proved", "\nproved: the understudy equals the sum of its members: "),
+        (real, "left-out", "\nLEFT OUT: no parity controller is generated and compared"),
+    ] {
+        let files = [("cluster.toml", cluster), ("tank.st", RANGED), ("other.st", other)];
+        let file = written(&format!("verify_understudy_{verdict}"), &files);
+        let answer = understudy(&["verify", &file]);
+        assert_eq!(answer.status, 0, "{}", answer.shown());
+        assert!(answer.output.contains(line), "{}", answer.shown());
+        let result = &understudy(&["verify", &file, "--json"]).json()["result"];
+        assert_eq!(result["understudy_verdict"], json!(verdict), "{result}");
+    }
+}
+
+/// What a chosen program reads of another one keeps its initial value: nothing is proved of it, and `scan` warns.
+#[test]
+fn a_program_that_misses_another_one_is_not_proved() {
+    let text =
+        "PROGRAM a VAR_INPUT go : BOOL; END_VAR VAR_OUTPUT x : BOOL; END_VAR x := go; END_PROGRAM
+PROGRAM b VAR_INPUT i : BOOL; END_VAR VAR_OUTPUT y : BOOL; END_VAR y := a.x; END_PROGRAM
+";
+    let file = written("verify_missing", &[("two.st", text), ("inputs.txt", "0\n1\n")]);
+    let answer = understudy(&["verify", &file, "--program", "b", "--property", "never y"]);
+    assert_eq!(answer.status, 2, "{}", answer.shown());
+    assert!(answer.errors.contains("error[U1085]: `a.x` is read here"), "{}", answer.shown());
+    let together = understudy(&["verify", &file, "--property", "never b.y"]);
+    assert_eq!(together.status, 1, "{}", together.shown());
+    let inputs = file.replace("two.st", "inputs.txt");
+    let answer = understudy(&["scan", &file, "--program", "b", "--inputs", &inputs]);
+    assert_eq!(answer.status, 0, "{}", answer.shown());
+    assert!(answer.errors.contains("warning[U1085]"), "{}", answer.shown());
+    let answer = understudy(&["convert", &file, "--unit", "b", "--to", "ladder"]);
+    assert!(answer.errors.contains("U1085"), "{}", answer.shown());
+}

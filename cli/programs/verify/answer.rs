@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_logic::Circuit;
-use understudy_verification::numbers::{Answer as NumbersProof, Run};
+use understudy_verification::numbers::{Answer as NumbersProof, Model, Run};
 use understudy_verification::program::{
     Answer as Proof, Bounds, Lamp, OutputFinding, Remarks, Subject,
 };
@@ -24,6 +24,8 @@ pub(crate) struct Verification {
     programs: Vec<ProgramAnswer>,
     /// Result of the proof of a cluster's understudy.
     understudy: Option<String>,
+    /// `proved`, `fails`, `undecided`, or `left-out` where no parity controller is generated, so that there is nothing to compare.
+    understudy_verdict: Option<&'static str>,
     /// Whether everything was proved.
     proved: bool,
     /// Page of runs.
@@ -32,12 +34,35 @@ pub(crate) struct Verification {
     resources: Option<Resources>,
 }
 
+/// Whether the understudy of a cluster is the sum of its members, and what was compared or was in the way.
+pub(super) enum UnderstudyProof {
+    Proved(String),
+    Fails(String),
+    Undecided(String),
+    /// There is no generated controller.
+    LeftOut(String),
+}
+
+impl UnderstudyProof {
+    /// The verdict in JSON, the word in the text, and what was found.
+    fn told(self) -> (&'static str, &'static str, String) {
+        match self {
+            Self::Proved(message) => ("proved", "proved", message),
+            Self::Fails(message) => ("fails", "FAILS", message),
+            Self::Undecided(message) => ("undecided", "undecided", message),
+            Self::LeftOut(message) => ("left-out", "LEFT OUT", message),
+        }
+    }
+}
+
 /// Results for one program.
 #[derive(Debug, Serialize, JsonSchema)]
 pub(crate) struct ProgramAnswer {
     name: String,
     /// Number of state bits.
     registers: usize,
+    /// Inputs that are assumed to be finite numbers.
+    finite_inputs: Vec<String>,
     /// For each output of a ladder program, whether it can always be switched on and off again.
     switches: Vec<Switch>,
     /// Remarks on the order and the effect of its rungs; they do not affect the verdict.
@@ -144,10 +169,11 @@ fn values(values: &[String]) -> String {
 
 impl ProgramAnswer {
     /// A program with numbers, or several together, without results.
-    pub(super) fn of_numbers(name: &str, circuit: &Circuit) -> Self {
+    pub(super) fn of_numbers(name: &str, model: &Model) -> Self {
         Self {
             name: name.to_owned(),
-            registers: circuit.registers().len(),
+            registers: model.circuit().registers().len(),
+            finite_inputs: model.finite_inputs().map(str::to_owned).collect(),
             switches: Vec::new(),
             remarks: Vec::new(),
             undecided_remarks: 0,
@@ -167,6 +193,7 @@ impl ProgramAnswer {
         Self {
             name: circuit.name().to_owned(),
             registers: circuit.registers().len(),
+            finite_inputs: Vec::new(),
             switches: switches.map(|(signal, finding)| switch(circuit, signal, &finding)).collect(),
             remarks: remarked.collect(),
             undecided_remarks: remarks.undecided,
@@ -213,6 +240,10 @@ impl ProgramAnswer {
                 "undecided", self.undecided_remarks
             );
         }
+        if !self.finite_inputs.is_empty() {
+            let names = listed(&self.finite_inputs);
+            let _ = writeln!(text, "  {:<9} finite: {names}", "assumed");
+        }
         for finding in &self.properties {
             let name = finding.name.as_ref().map(|name| format!("{name}: "));
             let name = name.unwrap_or_default();
@@ -227,6 +258,16 @@ impl ProgramAnswer {
             push_table(&mut text, finding.scans.as_ref());
         }
         text
+    }
+}
+
+/// The first of some names and how many more there are.
+fn listed(names: &[String]) -> String {
+    const SHOWN: usize = 5;
+    let shown: Vec<String> = names.iter().take(SHOWN).map(|name| format!("`{name}`")).collect();
+    match names.len().saturating_sub(SHOWN) {
+        0 => shown.join(", "),
+        more => format!("{} and {more} more", shown.join(", ")),
     }
 }
 
@@ -327,19 +368,17 @@ fn switch(circuit: &Circuit, signal: Signal, finding: &OutputFinding) -> Switch 
 
 pub(super) fn of_programs(
     programs: Vec<ProgramAnswer>,
-    understudy: Option<Result<String, String>>,
+    understudy: Option<UnderstudyProof>,
     page: Option<String>,
     resources: Option<Resources>,
 ) -> Answer {
-    let right =
-        programs.iter().all(ProgramAnswer::proved) && understudy.as_ref().is_none_or(Result::is_ok);
+    let understudy = understudy.map(UnderstudyProof::told);
+    let understudy_verdict = understudy.as_ref().map(|(verdict, ..)| *verdict);
+    let right = programs.iter().all(ProgramAnswer::proved)
+        && !matches!(understudy_verdict, Some("fails" | "undecided"));
     let texts: Vec<String> = programs.iter().map(ProgramAnswer::text).collect();
     let mut text = texts.join("\n");
-    if let Some(understudy) = &understudy {
-        let (word, message) = match understudy {
-            Ok(message) => ("proved", message),
-            Err(message) => ("FAILS", message),
-        };
+    if let Some((_, word, message)) = &understudy {
         let _ = writeln!(text, "\n{word}: {message}");
     }
     if let Some(page) = &page {
@@ -351,7 +390,8 @@ pub(super) fn of_programs(
     let status = if right { Status::Done } else { Status::Failed };
     let result = Verification {
         programs,
-        understudy: understudy.map(|proof| proof.unwrap_or_else(|message| message)),
+        understudy: understudy.map(|(.., message)| message),
+        understudy_verdict,
         proved: right,
         page,
         resources,

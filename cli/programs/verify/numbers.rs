@@ -65,7 +65,7 @@ pub(super) fn of_program(
 /// Proves the standard property of a program of a cluster.
 pub(super) fn standard(program: &Program, bounds: Bounds<'_>) -> Result<ProgramAnswer, Answer> {
     let model = Model::of_program(program).map_err(|error| unsupported(&error))?;
-    let mut proved = ProgramAnswer::of_numbers(&program.name, model.circuit());
+    let mut proved = ProgramAnswer::of_numbers(&program.name, &model);
     if let Some((property, formula)) = standard_property(&model, STANDARD) {
         let answers = model.check(std::slice::from_ref(&formula), &[], bounds, &mut || {});
         let findings = answers
@@ -98,7 +98,7 @@ fn prove(
     bounds: Bounds<'_>,
     patience: &Patience<'_>,
 ) -> ProgramAnswer {
-    let mut proved = ProgramAnswer::of_numbers(name, model.circuit());
+    let mut proved = ProgramAnswer::of_numbers(name, model);
     let (properties, formulas): (Vec<Property>, Vec<Resolved>) =
         asked.properties.into_iter().unzip();
     let mut answered = 0;
@@ -136,9 +136,10 @@ fn members(cluster: &Cluster) -> Vec<Member<'_>> {
         let sources = points.map(|point| {
             let source = remote_io.inputs.iter().find(|input| input.name == point.name);
             match source.map(|input| &input.kind) {
-                Some(InputSourceKind::Operator(declaration)) => {
-                    Source::Any(declaration.limits().map(|(low, high)| low..=high))
-                }
+                Some(InputSourceKind::Operator(declaration)) => match declaration.limits() {
+                    Some((low, high)) => Source::Any(Some(low..=high)),
+                    None => Source::declared(point),
+                },
                 Some(InputSourceKind::Signal(declaration)) => Source::Signal {
                     program: declaration.input.from.index(),
                     output: declaration.output.clone(),
@@ -147,7 +148,7 @@ fn members(cluster: &Cluster) -> Vec<Member<'_>> {
                 },
                 None => match signal_of_valid(remote_io, point) {
                     Some(of) => Source::Valid { of },
-                    None => Source::Any(None),
+                    None => Source::declared(point),
                 },
             }
         });
