@@ -1,8 +1,8 @@
 //! Properties of a program by several methods, the cheap ones first:
 //!
 //! ```text
-//! runs of a few scans            invariants of large programs that break soon
 //! diagrams of few nodes          most properties of most ladders, with runs that show why
+//! runs of a few scans            invariants of large programs that break soon
 //! induction over few scans       invariants, however large the program is
 //! few states listed one by one   programs in steps: few of many states can be reached
 //! diagrams of more nodes, more states, diagrams of as many nodes as allowed
@@ -26,7 +26,7 @@ use understudy_logic::Variable;
 const NODES: [usize; 2] = [1 << 17, 1 << 20];
 /// Parts of a program that may be too large before diagrams of that many nodes are given up.
 const REFUSED: u32 = 3;
-/// The search before all others: registers from which on a property needs it, the scans of its runs, operations of all scans together, and steps.
+/// The search of short runs: registers from which on a property needs it, the scans of its runs, operations of all scans together, and steps for all properties.
 const LARGE: usize = 30;
 const SOON: u32 = 40;
 const OPERATIONS: usize = 2_000_000;
@@ -101,8 +101,8 @@ impl<'s, 'b> Stages<'s, 'b> {
     pub(super) fn run(mut self) -> Vec<Answer> {
         let [few, more] = NODES;
         let all = self.bounds.nodes;
-        self.search();
         self.diagrams(few.min(all));
+        self.search();
         self.induction(FEW_SCANS.min(self.bounds.scans), FEW_STEPS);
         let few_states = Explicit::few(&self.subject.circuit).min(self.bounds.states);
         let listed = self.list(few_states);
@@ -160,13 +160,15 @@ impl<'s, 'b> Stages<'s, 'b> {
         }
     }
 
-    /// Invariants that break within a few scans: diagrams of large programs take long to find what a run of few scans shows.
+    /// Invariants that break within a few scans: large diagrams and lists take long to find what a run of few scans shows.
     fn search(&mut self) {
         if !self.fair.is_empty() {
             return;
         }
         let circuit = &self.subject.circuit;
-        for place in self.left() {
+        let left = self.left();
+        let steps = SOON_STEPS / left.len().max(1) as u64;
+        for place in left {
             let Some(kept) = invariant(&self.properties[place]) else {
                 continue;
             };
@@ -184,7 +186,7 @@ impl<'s, 'b> Stages<'s, 'b> {
             let next: Vec<_> = registers.iter().map(|register| register.next).collect();
             let operations = circuit.graph().reached(&next).into_iter().filter(|is| *is).count();
             let scans = (OPERATIONS / operations.max(1)).min(SOON as usize) as u32;
-            let depth = Depth { scans, steps: SOON_STEPS, go_on: self.bounds.go_on };
+            let depth = Depth { scans, steps, go_on: self.bounds.go_on };
             match search(circuit, kept, depth) {
                 Some(Induction::Fails(trace)) => self.answer(place, Answer::Fails(Some(trace))),
                 Some(Induction::Undecided(scans)) if scans > 0 => {
