@@ -81,7 +81,7 @@ pub fn prove_always(
 
 /// Searches a run of at most `depth.scans` scans that ends with a scan without `invariant`, the shortest one.
 ///
-/// Nothing for a formula that speaks of more than one scan.
+/// Nothing for a formula over more than one scan.
 pub fn search(circuit: &Circuit, invariant: &Resolved, depth: Depth<'_>) -> Option<Induction> {
     if !invariant.is_of_one_scan() {
         return None;

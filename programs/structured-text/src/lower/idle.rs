@@ -17,8 +17,8 @@ use super::names::Symbol;
 const NAMED: usize = 8;
 
 impl<'a> Lowering<'a> {
-    /// Checks the programs that nothing runs and nothing calls, and looks for what the others read of them. Nothing of them is kept. Where one program
-    /// was chosen, the others are not looked at for errors.
+    /// Checks the programs that nothing runs and nothing calls, and searches what the others read of them. Nothing of them
+    /// is kept. Where one program was chosen, errors of the others are not reported.
     pub(super) fn check_idle(&mut self, programs: &[&'a Unit], is_chosen: bool) {
         let has_body = self.routines.keys().filter(|key| key.owner.method.is_none());
         let executed: HashSet<usize> = has_body.map(|key| key.owner.unit).collect();
