@@ -287,8 +287,9 @@ impl RemoteIo {
 
     fn begin_cycle(&mut self, now: Time, moment: Moment, anchor: Time) {
         if self.member.clock.moment().is_some() {
-            if self.deadline == Deadline::Ahead {
-                self.decide(now);
+            match self.deadline {
+                Deadline::Ahead => self.decide(now),
+                Deadline::Passed { .. } => self.note_lateness(now),
             }
             self.close_cycle();
         }
@@ -325,12 +326,11 @@ impl RemoteIo {
             return self.decide(now);
         };
         self.miss_signals();
+        self.note_lateness(now);
         self.apply(Selection::Missing(Missing::NoCycle), None);
         self.note_idle();
         // One that was stopped for long does not make up for every deadline that it slept through.
-        let period = self.settings.agreement.schedule.period();
-        let passed = now.since(self.decides_at()).as_nanos() / period.as_nanos();
-        let passed = u32::try_from(passed).unwrap_or(u32::MAX);
+        let passed = self.periods_late(now);
         self.deadline = Deadline::Passed { idle: idle.saturating_add(1).saturating_add(passed) };
         self.count_votes(now, self.own_stations());
     }

@@ -20,6 +20,7 @@ mod set_inputs;
 #[path = "../shared/mod.rs"]
 mod shared;
 mod standing_still;
+mod suspended;
 mod tennessee_eastman;
 mod writes;
 

@@ -8,7 +8,7 @@ use understudy_cycle::Mode;
 use understudy_node::Event;
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_simulator::{Action, Fault, Network, Record, Simulation, Tally};
-use understudy_wire::{ConfigurationHash, Member, ProgramId, StationId};
+use understudy_wire::{ConfigurationHash, Member, ProgramId, Source, StationId};
 
 const ROBOT: Member = Member::Station(StationId(0));
 const UNDERSTUDY: Member = Member::Station(StationId(2));
@@ -226,6 +226,48 @@ fn a_station_that_stood_still_does_not_report_samples_as_missing() {
                 })
                 .expect("the cluster gets ready");
             assert_eq!(missing, [], "{station:?} stood still for {cycles} cycles at {phase}");
+        }
+    }
+}
+
+/// A remote I/O that goes on after it was suspended for longer than it holds outputs has proved nothing since: it drives the fail-safe values and
+/// then new outputs, whether the frames of the time between have waited for it or are lost.
+#[test]
+fn a_remote_io_that_stood_still_holds_no_output_of_before() {
+    let stations = [0, 1, 2].map(|rank| Member::Station(StationId(rank)));
+    let hold = u64::from(press_cell::HOLD_CYCLES);
+    for (cycles, phase) in [hold + 2, 30, 300]
+        .into_iter()
+        .flat_map(|cycles| [0.0, 0.3, 0.6, 0.9].map(|phase| (cycles, phase)))
+    {
+        for is_cut in [false, true] {
+            let mut simulation =
+                Simulation::new(press_cell::parts(Mode::Full, 1), Network::default(), 1);
+            let goes_on = 50 + cycles;
+            let mut schedule = |at_cycle, member, action| {
+                simulation.schedule(Fault { at_cycle, phase, member, action });
+            };
+            schedule(50, ROBOT_IO, Action::Stop);
+            schedule(goes_on, ROBOT_IO, Action::Continue);
+            for station in stations.into_iter().filter(|_| is_cut) {
+                schedule(50, station, Action::Cut { to: ROBOT_IO });
+                schedule(goes_on + 1, station, Action::Heal { to: ROBOT_IO });
+            }
+            let mut sources = Vec::new();
+            let mut observe = |_, cycle: Option<u64>, member, record: Record<'_>| {
+                if let Record::RemoteIo(RemoteIoEvent::Applied { source, .. }) = record
+                    && member == ROBOT_IO
+                    && cycle.is_some_and(|cycle| (goes_on..goes_on + 20).contains(&cycle))
+                {
+                    sources.push(*source);
+                }
+            };
+            simulation.run(400, 100, &mut observe).expect("the cluster gets ready");
+            let what = format!("{cycles} cycles at {phase}, cut: {is_cut}: {sources:?}");
+            assert!(sources.contains(&Source::FailSafe), "{what}");
+            assert!(!sources.contains(&Source::Held), "{what}");
+            assert_eq!(sources.last(), Some(&Source::Direct), "{what}");
+            assert_eq!(simulation.violations().first(), None, "{what}");
         }
     }
 }

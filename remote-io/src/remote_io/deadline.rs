@@ -16,6 +16,7 @@ impl RemoteIo {
     /// The deadline of a cycle that was started. Turns that were received are discarded if it comes a period late.
     pub(super) fn decide(&mut self, now: Time) {
         let late = now.since(self.decides_at()) > self.settings.agreement.schedule.period();
+        self.note_lateness(now);
         self.deadline = Deadline::Passed { idle: 0 };
         let received = Received {
             turns: &self.turns,
@@ -71,6 +72,22 @@ impl RemoteIo {
         }
         self.apply(selection, sampled);
         self.watch_protection();
+    }
+
+    /// Periods that have passed since the deadline which is decided now.
+    pub(super) fn periods_late(&self, now: Time) -> u32 {
+        let period = self.settings.agreement.schedule.period();
+        let passed = now.since(self.decides_at()).as_nanos() / period.as_nanos();
+        u32::try_from(passed).unwrap_or(u32::MAX)
+    }
+
+    /// A remote I/O that was suspended for longer than outputs are held has missed these deadlines: what it proved before is not held any more.
+    /// Fewer missed deadlines are counted by the frames of their cycles, which have waited meanwhile.
+    pub(super) fn note_lateness(&mut self, now: Time) {
+        let passed = self.periods_late(now);
+        if passed >= self.settings.hold_cycles {
+            self.missed = self.missed.max(passed);
+        }
     }
 
     /// Outputs that the stations have proved and that a stopped program gives: they are those before its fault, and only held as such.

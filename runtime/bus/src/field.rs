@@ -10,8 +10,9 @@ use understudy_wire::{Actuation, Body, Frame, Header, Image, Member, Moment, Pro
 
 /// Drives and senses the field of one member; never blocks.
 pub trait FieldDriver: Send {
-    /// Drives y(i) in the cycle `moment`; answers with a frame where the field is reached over the link.
-    fn drive(&mut self, moment: Moment, outputs: &Image) -> Option<Frame>;
+    /// Drives y(i) in the cycle `moment`, which was decided `age` ago: a member may be suspended in between. Answers with a frame where the
+    /// field is reached over the link.
+    fn drive(&mut self, moment: Moment, outputs: &Image, age: Duration) -> Option<Frame>;
 
     /// u(i), where `frame` comes from this field.
     fn sense<'frame>(&mut self, frame: &'frame Frame) -> Option<&'frame Image>;
@@ -46,7 +47,7 @@ pub enum Look {
 pub struct NoField;
 
 impl FieldDriver for NoField {
-    fn drive(&mut self, _moment: Moment, _outputs: &Image) -> Option<Frame> {
+    fn drive(&mut self, _moment: Moment, _outputs: &Image, _age: Duration) -> Option<Frame> {
         None
     }
 
@@ -80,7 +81,7 @@ impl SimulatedField {
 }
 
 impl FieldDriver for SimulatedField {
-    fn drive(&mut self, moment: Moment, outputs: &Image) -> Option<Frame> {
+    fn drive(&mut self, moment: Moment, outputs: &Image, _age: Duration) -> Option<Frame> {
         Some(Frame {
             header: Header {
                 cluster: self.agreement.cluster,

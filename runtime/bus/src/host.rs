@@ -322,7 +322,8 @@ impl<M: Machine> Host<'_, M> {
                     self.say(&frame, round);
                 }
                 Output::Drive(outputs) => {
-                    if let Some(frame) = self.field.drive(round.moment, &outputs) {
+                    let age = self.clock.now().since(now);
+                    if let Some(frame) = self.field.drive(round.moment, &outputs, age) {
                         self.say(&frame, round);
                     }
                 }

@@ -9,6 +9,10 @@
 //!
 //! A device that ends its connection after some answers is served over a new one at once.
 //!
+//! Outputs are driven at each deadline. Where none come for two periods, the cycle does not run, or this process was suspended: then nothing is
+//! exchanged, so that the device's own watchdog finds it and no old outputs are written. An exchange that has taken longer than it may is void,
+//! also where all of it was answered while this process was suspended.
+//!
 //! When the remote I/O ends in order, the device is driven to the fail-safe values; when it dies, that is for the device's own
 //! watchdog to do.
 
@@ -39,6 +43,9 @@ const FIRST_PAUSE: Duration = Duration::from_millis(50);
 
 /// At most; the outputs wait for it when the device is there again.
 const LONGEST_PAUSE: Duration = Duration::from_millis(400);
+
+/// Periods after which outputs that were driven are not written any more.
+const OUTPUTS_LAST: u32 = 2;
 
 /// A device that breaks off so often in a row, or does not answer, when its outputs are read is not asked for them any more.
 const UNREAD: u8 = 2;
@@ -78,7 +85,8 @@ struct State {
     number: u64,
     seen: Look,
     seen_at: Instant,
-    outputs: Option<Image>,
+    /// With the time at which they were decided.
+    outputs: Option<(Image, Instant)>,
     /// Another master writes its outputs too.
     contested: bool,
     ending: bool,
@@ -135,28 +143,30 @@ impl Device {
         })
     }
 
-    /// Drives y(i) as soon as the device takes it; never waits for that.
-    pub fn drive(&self, outputs: &Image) {
-        self.shared.lock().outputs = Some(outputs.clone());
+    /// Drives y(i), which was decided `age` ago, as soon as the device takes it; never waits for that.
+    pub fn drive(&self, outputs: &Image, age: Duration) {
+        let now = Instant::now();
+        let decided_at = now.checked_sub(age).unwrap_or(now);
+        self.shared.lock().outputs = Some((outputs.clone(), decided_at));
         self.shared.changed.notify_one();
     }
 
     /// What is new since the last look; never waits for the device.
     pub fn look(&mut self) -> Option<Look> {
         let state = self.shared.lock();
-        if state.number == self.looked_at {
-            let age = state.seen_at.elapsed();
-            let fresh = age <= self.stale_after || matches!(state.seen, Look::Lost(_));
-            if fresh || self.stale {
-                return None;
-            }
-            self.stale = true;
+        let is_new = state.number != std::mem::replace(&mut self.looked_at, state.number);
+        let age = state.seen_at.elapsed();
+        // An answer that nobody has looked at gets old too, where this process was suspended.
+        if age > self.stale_after && matches!(state.seen, Look::Sensors(_)) {
+            let was_stale = std::mem::replace(&mut self.stale, true);
             let age_ms = age.as_millis();
-            return Some(Look::Lost(format!("the last answer is {age_ms} ms old")));
+            let lost = || Look::Lost(format!("the last answer is {age_ms} ms old"));
+            return (is_new || !was_stale).then(lost);
         }
-        self.looked_at = state.number;
-        self.stale = false;
-        Some(state.seen.clone())
+        if is_new {
+            self.stale = false;
+        }
+        is_new.then(|| state.seen.clone())
     }
 
     /// Whether another master writes the outputs too, where that is new.
@@ -253,19 +263,11 @@ impl Worker {
         let mut contest = Contest::default();
         let mut read_at = Instant::now();
         loop {
-            let (outputs, ending) = {
-                let state = self.shared.lock();
-                if state.ending {
-                    (Some(self.fail_safe.clone()), true)
-                } else {
-                    (state.outputs.clone(), false)
-                }
-            };
-            let driven = outputs.as_ref().map(|outputs| (&self.outputs, outputs));
             let patience = self.settings.timeout;
+            device.ends_at(Instant::now() + patience);
             if let Some(written) = &written
                 && self.unread.get() < UNREAD
-                && !ending
+                && !self.shared.lock().ending
                 && read_at.elapsed() >= READ_BACK_EVERY
             {
                 read_at = Instant::now();
@@ -286,11 +288,35 @@ impl Worker {
                     }
                 }
             }
+            // Before the outputs are taken: a suspension from here on is found by the requests.
+            let begun = Instant::now();
+            let (outputs, ending) = {
+                let state = self.shared.lock();
+                if state.ending {
+                    (Some((self.fail_safe.clone(), Instant::now())), true)
+                } else {
+                    (state.outputs.clone(), false)
+                }
+            };
+            if let Some((_, decided_at)) = &outputs
+                && decided_at.elapsed() > self.period * OUTPUTS_LAST
+            {
+                self.shared.changed.notified().await;
+                continue;
+            }
+            let outputs = outputs.map(|(outputs, _)| outputs);
+            let driven = outputs.as_ref().map(|outputs| (&self.outputs, outputs));
+            device.ends_at(begun + patience);
             let exchanged = timeout(patience, exchange(&mut device, driven, &self.inputs)).await;
             if ending {
                 return was_of_use;
             }
             match exchanged {
+                // What was answered in time and is read late is as old as the time since.
+                Ok(Ok(_)) if begun.elapsed() > patience => {
+                    self.lose_unanswered();
+                    return was_of_use;
+                }
                 Ok(Ok(sensors)) => {
                     was_of_use = true;
                     written = outputs;
@@ -307,14 +333,18 @@ impl Worker {
                     }
                 }
                 Err(_) => {
-                    let address = &self.settings.connection;
-                    self.lose(format!("{address} does not answer within {patience:?}"));
+                    self.lose_unanswered();
                     return was_of_use;
                 }
             }
             // Woken early by new outputs and by the end.
             let _ = timeout(self.period, self.shared.changed.notified()).await;
         }
+    }
+
+    fn lose_unanswered(&self) {
+        let (address, patience) = (&self.settings.connection, self.settings.timeout);
+        self.lose(format!("{address} does not answer within {patience:?}"));
     }
 
     fn said(&self, trouble: &Trouble) -> String {

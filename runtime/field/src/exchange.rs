@@ -1,6 +1,7 @@
 //! One exchange with the device: all outputs go out, all inputs come in.
 
 use std::io;
+use std::time::Instant;
 
 use tokio::net::TcpStream;
 use tokio::time::sleep;
@@ -47,6 +48,8 @@ pub(crate) struct Link<'a> {
     device: Context,
     /// Whether a request was answered over this connection.
     has_answered: bool,
+    /// After this time nothing is requested: outputs would be old.
+    until: Option<Instant>,
 }
 
 /// An answer of the device, or its exception.
@@ -68,7 +71,22 @@ impl<'a> Link<'a> {
     pub(crate) async fn connect(connection: &'a Connection, unit: u8) -> io::Result<Self> {
         let unit = Slave(unit);
         let device = open(connection, unit).await?;
-        Ok(Self { connection, unit, device, has_answered: false })
+        Ok(Self { connection, unit, device, has_answered: false, until: None })
+    }
+
+    /// Requests nothing after this time. A suspended process does not see that its time is over before it goes on.
+    pub(crate) fn ends_at(&mut self, time: Instant) {
+        self.until = Some(time);
+    }
+
+    fn in_time(&self) -> Result<(), Error> {
+        match self.until {
+            Some(until) if Instant::now() > until => {
+                let reason = "the exchange has taken longer than its `timeout`";
+                Err(io::Error::new(io::ErrorKind::TimedOut, reason).into())
+            }
+            _ => Ok(()),
+        }
     }
 
     /// The answer to a request.
@@ -77,6 +95,7 @@ impl<'a> Link<'a> {
         request: impl AsyncFn(&mut Context) -> Result<Answered<T>, Error>,
     ) -> Result<Answered<T>, Error> {
         self.await_silence().await;
+        self.in_time()?;
         let answer = request(&mut self.device).await;
         let answer = match answer {
             Err(Error::Transport(_)) if self.has_answered => {
@@ -85,6 +104,7 @@ impl<'a> Link<'a> {
                 self.has_answered = false;
                 self.device = open(self.connection, self.unit).await?;
                 self.await_silence().await;
+                self.in_time()?;
                 request(&mut self.device).await
             }
             answer => answer,

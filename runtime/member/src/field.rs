@@ -22,8 +22,8 @@ impl Equipment {
 }
 
 impl FieldDriver for Equipment {
-    fn drive(&mut self, _moment: Moment, outputs: &Image) -> Option<Frame> {
-        self.0.drive(outputs);
+    fn drive(&mut self, _moment: Moment, outputs: &Image, age: Duration) -> Option<Frame> {
+        self.0.drive(outputs, age);
         None
     }
 

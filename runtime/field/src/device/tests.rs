@@ -126,13 +126,18 @@ fn started(ends: Ends, period: Duration) -> (Device, Arc<Held>) {
     (device, held)
 }
 
-/// The states that the cycle sees until `enough` good ones were seen.
-fn looks(device: &mut Device, enough: usize) -> Vec<Look> {
+/// The states that the cycle sees until `enough` good ones were seen; both outputs are driven in each period.
+fn looks(device: &mut Device, period: Duration, enough: usize) -> Vec<Look> {
     let started = Instant::now();
+    let mut driven: Option<Instant> = None;
     let mut seen = Vec::new();
     let is_good = |look: &&Look| matches!(look, Look::Sensors(_));
     while seen.iter().filter(is_good).count() < enough {
         assert!(started.elapsed() < DEADLINE, "{seen:?}");
+        if driven.is_none_or(|at| at.elapsed() >= period) {
+            device.drive(&Image::from_bits([true, true]), Duration::ZERO);
+            driven = Some(Instant::now());
+        }
         seen.extend(device.look());
         std::thread::yield_now();
     }
@@ -152,8 +157,7 @@ fn a_device_that_ends_its_connections_is_served_without_a_gap() {
     ];
     for (ends, period) in cases {
         let (mut device, held) = started(ends, period);
-        device.drive(&Image::from_bits([true, true]));
-        let seen = looks(&mut device, 40);
+        let seen = looks(&mut device, period, 40);
         let lost: Vec<&Look> = seen.iter().filter(|look| matches!(look, Look::Lost(_))).collect();
         let first = Look::Lost("no answer yet".into());
         assert!(lost.iter().all(|look| **look == first), "{ends:?}: {lost:?}");
@@ -166,6 +170,29 @@ fn a_device_that_ends_its_connections_is_served_without_a_gap() {
         let coils = held.coils.lock().expect("no panic").clone();
         assert_eq!(coils, BTreeMap::from([(3, false), (800, false)]), "{ends:?}");
     }
+}
+
+/// The device's own watchdog sets its outputs where the cycle drives them no more: what was driven last is not written again.
+#[test]
+fn outputs_that_are_not_driven_any_more_are_not_written_again() {
+    let period = Duration::from_millis(2);
+    let (mut device, held) = started(Ends::After(u64::MAX), period);
+    looks(&mut device, period, 5);
+    // The exchange that has begun by now ends, and the next one would be a period later.
+    let (mut requests, mut since) = (0, Instant::now());
+    while since.elapsed() < 20 * period {
+        let now = held.requests.load(Ordering::SeqCst);
+        if now != std::mem::replace(&mut requests, now) {
+            since = Instant::now();
+            held.coils.lock().expect("no panic").clear();
+        }
+        assert!(requests < 2_000, "it is exchanged with although nothing is driven");
+        std::thread::yield_now();
+    }
+    assert_eq!(*held.coils.lock().expect("no panic"), BTreeMap::new());
+    looks(&mut device, period, 5);
+    let coils = held.coils.lock().expect("no panic").clone();
+    assert_eq!(coils, BTreeMap::from([(3, true), (800, true)]), "driven again");
 }
 
 #[test]
