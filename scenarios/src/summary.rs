@@ -122,6 +122,9 @@ pub struct RemoteIoSummary {
 pub struct PlantSummary {
     /// Its name.
     pub name: String,
+    /// Name of the remote I/O that drives it.
+    #[serde(skip)]
+    pub remote_io: String,
     /// Whether it was served by true or held outputs throughout, and nothing happened to it that must not.
     pub functional: bool,
     /// Parts that it finished.
@@ -267,6 +270,7 @@ impl Summary {
             let (_, name) = members.iter().find(|(member, _)| *member == plant)?;
             Some(PlantSummary {
                 name: name.to_owned(),
+                remote_io: members.name(Member::RemoteIo(ProgramId(program as u8))).to_owned(),
                 functional: service.functional(),
                 finished: service.finished(),
                 plant_faults: service.plant_faults(),

@@ -7,13 +7,23 @@ impl Summary {
     pub fn verdict(&self) -> String {
         let (run, asked) = (self.cycles_run, self.cycles_asked);
         match (&self.inconclusive, self.passed, self.interrupted) {
-            (_, true, _) => "passed: all expectations were met".to_owned(),
+            (_, true, _) => format!("passed: all expectations were met{}", self.not_functional()),
             (Some(why), false, _) => format!("INCONCLUSIVE: {why}; neither passed nor failed"),
             (None, false, true) => format!("interrupted after {run} of {asked} cycles"),
             (None, false, false) if run < asked => {
                 format!("FAILED: only {run} of {asked} cycles were completed")
             }
             (None, false, false) => "FAILED".to_owned(),
+        }
+    }
+
+    /// Names the plants that were not functional, of which nothing was expected.
+    fn not_functional(&self) -> String {
+        let plants = self.plants.iter().filter(|plant| !plant.functional);
+        let names: Vec<&str> = plants.map(|plant| plant.name.as_str()).collect();
+        match names.as_slice() {
+            [] => String::new(),
+            names => format!("; not functional: {}", names.join(", ")),
         }
     }
 

@@ -21,6 +21,7 @@ mod model_check;
 mod named_files;
 mod next;
 mod others;
+mod outcomes;
 mod papers;
 mod pasted;
 mod petri;

@@ -68,6 +68,9 @@ pub(super) fn expectations(
             needs_time: true,
         });
     }
+    if scenario.asks_for_nothing() {
+        list.extend(undisturbed(summary));
+    }
     let plant_name = |program| account.terms.members.name(Member::Plant(program));
     let plant = |program| {
         let name = plant_name(program);
@@ -97,6 +100,32 @@ pub(super) fn expectations(
         range(remote_io, during, *finding)
     }));
     list
+}
+
+/// What a cluster that merely runs must do: every plant stays functional, and so does equipment behind a remote I/O. Cycles that a stall of the
+/// host explains do not count.
+fn undisturbed(summary: &Summary) -> impl Iterator<Item = ExpectationSummary> {
+    summary.remote_ios.iter().map(|remote_io| {
+        let plant = summary.plants.iter().find(|plant| plant.remote_io == remote_io.name);
+        let lacking = [
+            (remote_io.counts.wrong, "wrong"),
+            (remote_io.counts.fail_safe, "fail-safe"),
+            (remote_io.counts.missed, "missed"),
+            (plant.map_or(0, |plant| plant.plant_faults), "plant faults"),
+        ];
+        let lacking = lacking.into_iter().filter(|(number, _)| *number > 0);
+        let lacking: Vec<String> =
+            lacking.map(|(number, what)| format!("{number} {what}")).collect();
+        ExpectationSummary {
+            expected: match plant {
+                Some(plant) => format!("{} functional", plant.name),
+                None => format!("{} applies proven or held outputs", remote_io.name),
+            },
+            found: if lacking.is_empty() { "as expected".to_owned() } else { lacking.join(", ") },
+            met: lacking.is_empty(),
+            needs_time: true,
+        }
+    })
 }
 
 fn at_most(what: &str, allowed: u64, found: u64, by_stall: u64) -> ExpectationSummary {
