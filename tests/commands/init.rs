@@ -110,6 +110,71 @@ CONFIGURATION plant
 END_CONFIGURATION
 ";
 
+/// A program that nothing runs is no part of the cluster, and the draft says so, whatever number of others the file has.
+#[test]
+fn a_program_that_no_task_runs_is_named() {
+    for (number, text) in [
+        TWO_PROGRAMS.to_owned(),
+        // One of the two runs.
+        TWO_PROGRAMS
+            .lines()
+            .filter(|line| !line.contains(": drain;"))
+            .collect::<Vec<_>>()
+            .join("\n"),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let folder = empty_folder(&format!("init_from_idle_{number}"));
+        let idle = "PROGRAM spare VAR_INPUT a : BOOL; END_VAR VAR_OUTPUT b : BOOL; END_VAR b := a; END_PROGRAM\n";
+        fs::write(folder.join("plant.st"), format!("{idle}{text}\n")).expect("written");
+        let answer = init(&folder, &["plant.st"]);
+        assert_eq!(answer.status, 0, "{}", answer.shown());
+        let named = answer.output.matches("U1055: nothing runs the PROGRAM `spare`").count();
+        assert_eq!(named, 1, "{}", answer.shown());
+        assert!(!folder.join("cell/spare.st").exists());
+        let drains = answer.output.contains("nothing runs the PROGRAM `drain`");
+        assert_eq!(drains, number == 1, "{}", answer.shown());
+    }
+}
+
+/// Programs that share a part of the memory by addresses of different sizes do something else apart.
+#[test]
+fn programs_that_share_bits_at_addresses_stay_together() {
+    let two = |one: &str, other: &str| {
+        format!(
+            "PROGRAM fill VAR_INPUT a : BOOL; END_VAR VAR_OUTPUT q : BOOL; END_VAR VAR w AT {one}; END_VAR q := a; w := w; END_PROGRAM
+             PROGRAM drain VAR_INPUT b : BOOL; END_VAR VAR_OUTPUT r : BOOL; END_VAR VAR v AT {other}; END_VAR r := b; v := v; END_PROGRAM
+             CONFIGURATION c RESOURCE r ON plc TASK t(INTERVAL := T#20ms, PRIORITY := 1);
+             PROGRAM f WITH t : fill; PROGRAM d WITH t : drain; END_RESOURCE END_CONFIGURATION\n"
+        )
+    };
+    for (number, (one, other, status, together)) in [
+        ("%MW0 : WORD", "%MX0.3 : BOOL", 2, false),
+        ("%MW0 : ARRAY[0..3] OF INT", "%MD1 : DINT", 2, false),
+        ("%QW0 : WORD", "%QX0.3 : BOOL", 0, true),
+        ("%QX0.3 : BOOL", "%QW0 : WORD", 0, true),
+        ("%QW1 : WORD", "%QX0.3 : BOOL", 0, false),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let folder = empty_folder(&format!("init_from_overlap_{number}"));
+        fs::write(folder.join("plant.st"), two(one, other)).expect("written");
+        let answer = init(&folder, &["plant.st"]);
+        assert_eq!(answer.status, status, "{one} and {other}: {}", answer.shown());
+        assert_eq!(answer.errors.contains("U1083"), status == 2, "{}", answer.shown());
+        let cluster = fs::read_to_string(folder.join("cell/cluster.toml")).unwrap_or_default();
+        let controllers = cluster.matches("[[controller]]").count();
+        let wanted = match (status, together) {
+            (2, _) => 0,
+            (_, true) => 1,
+            _ => 2,
+        };
+        assert_eq!(controllers, wanted, "{one} and {other}: {cluster}");
+    }
+}
+
 #[test]
 fn each_program_of_a_file_gets_a_controller() {
     let folder = empty_folder("init_from_two_in_one");

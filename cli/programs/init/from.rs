@@ -10,7 +10,9 @@ use std::time::Duration;
 use understudy_cluster::{
     Draft, DraftProgram, MAXIMUM_PROGRAM_NAME, is_name, read as read_cluster,
 };
-use understudy_interchange::{Apart, Copies, Format, Source, USUAL_PERIOD, read_apart};
+use understudy_interchange::{
+    Apart, Copies, Format, IDLE_PROGRAM, Source, USUAL_PERIOD, read_apart,
+};
 use understudy_text::{Report, Severity, decode, duration};
 use understudy_wire::MAXIMUM_PROGRAMS;
 
@@ -29,9 +31,14 @@ pub(super) fn run(folder: &Path, arguments: &[PathBuf]) -> Result<Answer, Answer
     });
     let all: Vec<NewFile> = texts.chain(copies.map(|copy| copy.file)).collect();
     let paths = files::write_new(folder, &all)?;
-    let marks =
-        "\ncomplete the entries marked FILL IN in cluster.toml: fail-safe outputs and plants\n";
-    Ok(written(folder, &paths, marks).with_used(found.reports))
+    let findings = found.reports.iter().flat_map(|report| &report.diagnostics);
+    let idle = findings.filter(|finding| finding.code == IDLE_PROGRAM);
+    let idle: String =
+        idle.map(|finding| format!("\n{}: {}\n", finding.code, finding.message)).collect();
+    let marks = format!(
+        "{idle}\ncomplete the entries marked FILL IN in cluster.toml: fail-safe outputs and plants\n"
+    );
+    Ok(written(folder, &paths, &marks).with_used(found.reports))
 }
 
 /// A file of one program or several that has been read.

@@ -5,10 +5,10 @@
 use std::collections::{HashMap, HashSet};
 use std::time::Duration;
 
-use understudy_structured_text::lower::{event, has_event, roots};
+use understudy_structured_text::lower::{event, has_event, roots, share_bits};
 use understudy_structured_text::print;
 use understudy_structured_text::syntax::{Declaration, File, Name, Unit, UnitKind};
-use understudy_text::{Diagnostic, has_errors};
+use understudy_text::{Diagnostic, Severity, has_errors};
 
 use crate::format::Format;
 use crate::plcopen;
@@ -16,6 +16,12 @@ use crate::source::{Source, SourceFile, Wanted, no_program, read_source};
 use crate::twincat;
 use crate::typed_text::{Bodies, parsed, typed_text_with};
 use crate::written::{WriteError, Written, write};
+
+/// Code of the warning on a program that nothing runs: it is not kept.
+pub const IDLE_PROGRAM: &str = "U1055";
+
+/// Code of an address that cannot be used.
+const ADDRESS: &str = "U1083";
 
 /// A program for a controller of its own.
 #[derive(Debug)]
@@ -51,11 +57,16 @@ pub fn read_apart(name: &str, text: &str, copies: Copies) -> (Vec<Apart>, Vec<Di
     let parsed = file.parsed.as_ref();
     let units = parsed.map_or_else(Vec::new, |parsed| programs(name, text, parsed));
     let belong_together = parsed.is_some_and(|parsed| belong_together(parsed, &units));
-    if units.len() < 2 || whole.source.is_some() && belong_together {
+    // Alone, each program has the memory to itself in which another one has a part.
+    let is_wrong = |found: &Diagnostic| found.code == ADDRESS && found.severity == Severity::Error;
+    let share_memory = whole.diagnostics.iter().any(is_wrong);
+    if units.len() < 2 || share_memory || whole.source.is_some() && belong_together {
         return file.together(whole, copies);
     }
     let mut apart = Vec::new();
-    let mut diagnostics = Vec::new();
+    // Of what is read program by program, the whole alone tells which programs nothing runs.
+    let idle = whole.diagnostics.iter().filter(|found| found.code == IDLE_PROGRAM);
+    let mut diagnostics: Vec<Diagnostic> = idle.cloned().collect();
     if belong_together {
         let message =
             "the programs of the file share variables, and nothing says which of them run";
@@ -205,7 +216,7 @@ fn belong_together(file: &File, programs: &[String]) -> bool {
     let globals: HashMap<String, String> = globals
         .map(|global| (global.name.key(), place(global).unwrap_or_else(|| global.name.key())))
         .collect();
-    let mut users: HashMap<String, usize> = HashMap::new();
+    let mut users: Vec<(String, &str)> = Vec::new();
     for program in programs {
         let mut own = main.get(&program.to_ascii_uppercase()).cloned().unwrap_or_default();
         own.insert(memory_of(&program.to_ascii_uppercase()));
@@ -221,11 +232,12 @@ fn belong_together(file: &File, programs: &[String]) -> bool {
                 None => (word.starts_with('%') || word.starts_with(MEMORY)).then_some(word),
             });
         let shared: HashSet<&str> = shared.filter(|word| !is_input(word)).collect();
-        for word in shared {
-            *users.entry(word.to_owned()).or_default() += 1;
-        }
+        users.extend(shared.into_iter().map(|word| (word.to_owned(), program.as_str())));
     }
-    is_more || users.values().any(|users| *users > 1)
+    let meet = |(one, by): &(String, &str), (other, to): &(String, &str)| {
+        by != to && (one == other || share_bits(one, other))
+    };
+    is_more || users.iter().any(|user| users.iter().any(|other| meet(user, other)))
 }
 
 /// In front of the name of a program, the word for its memory. No name has a space.

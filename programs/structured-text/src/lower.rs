@@ -37,6 +37,7 @@ mod tasks;
 mod times;
 mod types;
 
+pub use addresses::share_bits;
 pub use called::roots;
 pub use standard::input_names;
 pub use tasks::{another_interval, event, has_event, intervals, period};

@@ -179,6 +179,78 @@ fn memory_at_addresses_that_overlap_is_refused() {
     );
 }
 
+/// Inputs and outputs of every pair of sizes at every small address: those that share bits of the process image, by the count of the standard or by
+/// that of bytes, have a warning with both places, or an error where they have one size. So does nobody else.
+#[test]
+fn inputs_and_outputs_that_share_bits_are_named() {
+    const SIZES: [(char, &str, u64); 5] = [
+        ('X', "BOOL", 1),
+        ('B', "BYTE", 8),
+        ('W', "WORD", 16),
+        ('D', "DWORD", 32),
+        ('L', "LWORD", 64),
+    ];
+    // The address, its bits by size and by bytes.
+    let places = |(letter, _, bits): (char, &str, u64)| {
+        (0..5_u64).map(move |at| match letter {
+            'X' => (format!("X{}.{}", at / 2, 3 * (at % 2)), [at / 2 * 8 + 3 * (at % 2); 2]),
+            _ => (format!("{letter}{at}"), [at * bits, at * 8]),
+        })
+    };
+    for area in ['I', 'Q', 'M'] {
+        for (first, second) in SIZES.iter().flat_map(|a| SIZES.iter().map(move |b| (*a, *b))) {
+            for ((one, begins), (other, starts)) in
+                places(first).flat_map(|a| places(second).map(move |b| (a.clone(), b)))
+            {
+                let meet = |by: usize| {
+                    begins[by] < starts[by] + second.2 && starts[by] < begins[by] + first.2
+                };
+                let same_size = first.0 == second.0;
+                let shares = one != other && (meet(0) || !same_size && meet(1));
+                let text = format!(
+                    "PROGRAM main VAR a AT %{area}{one} : {}; END_VAR END_PROGRAM
+                     PROGRAM more VAR b AT %{area}{other} : {}; END_VAR END_PROGRAM",
+                    first.1, second.1
+                );
+                let (_, found) = read(&text, None);
+                let found: Vec<_> = found.iter().filter(|found| found.code == "U1083").collect();
+                assert_eq!(found.len(), usize::from(shares), "{text}: {found:?}");
+                for found in found {
+                    let is_error = found.severity == Severity::Error;
+                    assert_eq!(is_error, area == 'M' || same_size, "{text}");
+                    assert!(found.message.contains(&format!("%{area}{one}")), "{}", found.message);
+                    assert!(
+                        found.message.contains(&format!("%{area}{other}")),
+                        "{}",
+                        found.message
+                    );
+                    assert_eq!(found.related.len(), 1, "both places");
+                }
+            }
+        }
+    }
+    // One warning for a word, whichever is declared first.
+    for variables in [
+        "w AT %QW0 : WORD; a AT %QX0.0 : BOOL; b AT %QX0.1 : BOOL; c AT %QX1.7 : BOOL;",
+        "a AT %QX0.0 : BOOL; b AT %QX0.1 : BOOL; c AT %QX1.7 : BOOL; w AT %QW0 : WORD;",
+        "w AT %QW0 : WORD; a AT %QX0.0 : ARRAY[0..9] OF BOOL;",
+    ] {
+        let text = format!("PROGRAM main VAR {variables} END_VAR END_PROGRAM");
+        let (lowered, found) = read(&text, None);
+        assert!(lowered.program.is_some());
+        assert_eq!(
+            shown(&text, &found, Severity::Warning).matches("share bits").count(),
+            1,
+            "{text}"
+        );
+    }
+    refused(
+        "TYPE pair : STRUCT one : INT; two : INT; END_STRUCT; END_TYPE
+         PROGRAM main VAR p AT %QW0 : pair; x AT %QW1 : INT; END_VAR END_PROGRAM",
+        &["U1083", "share a part of the memory"],
+    );
+}
+
 #[test]
 fn a_structure_at_an_address_has_a_point_for_each_part() {
     check(

@@ -14,35 +14,28 @@ use super::types::Resolved;
 /// Points that one variable may have.
 const MAXIMUM_POINTS: usize = 1_000;
 
-/// The part of the memory that a variable at an address takes, counted in two ways: by the size in the address, as
-/// CODESYS counts, and by bytes, as Siemens counts.
+/// A part of the inputs, the outputs or the memory, counted in two ways: by the size in the address, as CODESYS counts, and by bytes, as Siemens
+/// counts.
 #[derive(Clone)]
-pub(super) struct Extent {
-    name: String,
-    span: Span,
+struct Part {
+    /// I, Q or M.
+    area: char,
     /// The levels in front of the last one, which tell modules apart.
     levels: Vec<u64>,
     bits: u64,
     ranges: [(u64, u64); 2],
 }
 
-impl Extent {
-    /// The bytes of a variable of `bytes` bytes at an address such as `%MW3`; nothing for an address outside of the memory or
-    /// an incomplete one.
-    fn of(name: &Name, address: &Name, bytes: Option<u64>) -> Option<Self> {
-        let key = normal(address.as_str());
-        let numbers = key.strip_prefix("%M")?.get(1..)?;
-        let numbers: Result<Vec<u64>, _> = numbers.split('.').map(str::parse).collect();
+impl Part {
+    /// The part of so many bits at an address such as `%MW3`, or of the size in the address; nothing for an incomplete address.
+    fn of(address: &str, size: Option<u64>) -> Option<Self> {
+        let key = normal(address);
+        let area = key.chars().nth(1).filter(|area| matches!(area, 'I' | 'Q' | 'M'))?;
+        let numbers: Result<Vec<u64>, _> = key.get(3..)?.split('.').map(str::parse).collect();
         let mut levels = numbers.ok()?;
         let last = levels.pop()?;
-        let bits = match key.chars().nth(2)? {
-            'B' => 8,
-            'W' => 16,
-            'D' => 32,
-            'L' => 64,
-            _ => 1,
-        };
-        let length = bytes.map_or(bits, |bytes| bits.max(bytes.saturating_mul(8)));
+        let bits = bits_of(&key).map_or(1, u64::from);
+        let length = size.map_or(bits, |size| bits.max(size));
         let starts = match bits {
             // A bit has its byte in front.
             1 => {
@@ -51,13 +44,8 @@ impl Extent {
             }
             _ => [last.saturating_mul(bits), last.saturating_mul(8)],
         };
-        Some(Self {
-            name: name.as_str().to_owned(),
-            span: address.span(),
-            levels,
-            bits,
-            ranges: starts.map(|start| (start, start.saturating_add(length))),
-        })
+        let ranges = starts.map(|start| (start, start.saturating_add(length)));
+        Some(Self { area, levels, bits, ranges })
     }
 
     fn overlaps(&self, other: &Self) -> bool {
@@ -66,8 +54,26 @@ impl Extent {
             start < to && from < end
         };
         // Addresses of one size are counted in that size.
-        self.levels == other.levels && (meet(0) || self.bits != other.bits && meet(1))
+        (self.area, &self.levels) == (other.area, &other.levels)
+            && (meet(0) || self.bits != other.bits && meet(1))
     }
+}
+
+/// Whether two addresses such as `%MW0` and `%MX0.3` can be one memory.
+pub fn share_bits(one: &str, other: &str) -> bool {
+    let parts = Part::of(one, None).zip(Part::of(other, None));
+    parts.is_some_and(|(one, other)| one.overlaps(&other))
+}
+
+/// A variable at an address, and its part of the memory.
+#[derive(Clone)]
+pub(super) struct Extent {
+    name: String,
+    address: String,
+    span: Span,
+    /// A warning about it is reported already.
+    is_told: bool,
+    part: Part,
 }
 
 impl Lowering<'_> {
@@ -206,23 +212,44 @@ impl Lowering<'_> {
         }
     }
 
-    /// Refuses a memory that shares a part of another one: no two compilers agree on which.
-    fn overlap(&mut self, name: &Name, address: &Name, resolved: &Resolved) -> Option<()> {
-        let bytes = match resolved.of.elementary() {
-            Some(Elementary::Bool) => None,
-            _ => Some(self.bytes(&resolved.of)),
+    /// Refuses a memory that shares a part of another one: no two compilers agree on which. So does a point of the size of another one.
+    pub(super) fn overlap(
+        &mut self,
+        name: &Name,
+        address: &Name,
+        resolved: &Resolved,
+    ) -> Option<()> {
+        let is_memory = normal(address.as_str()).starts_with("%M");
+        let size = match (resolved.of.elementary(), element(&resolved.of)) {
+            (Some(Elementary::Bool), _) => None,
+            // Points of bits follow one another.
+            (_, Some(Elementary::Bool)) if !is_memory => Some(self.bytes(&resolved.of)),
+            _ => Some(self.bytes(&resolved.of).saturating_mul(8)),
         };
-        let Some(extent) = Extent::of(name, address, bytes) else {
+        let Some(part) = Part::of(address.as_str(), size) else {
             return Some(());
         };
-        let other = self.extents.iter().find(|other| other.overlaps(&extent));
-        let Some(other) = other.cloned() else {
+        let extent = Extent {
+            name: name.as_str().to_owned(),
+            address: address.as_str().to_owned(),
+            span: address.span(),
+            is_told: false,
+            part,
+        };
+        let other = self.extents.iter().position(|other| other.part.overlaps(&extent.part));
+        let Some(other) = other else {
             self.extents.push(extent);
             return Some(());
         };
+        // Points of one size are counted in that size everywhere.
+        if extent.part.area != 'M' && extent.part.bits != self.extents[other].part.bits {
+            self.warn_of_shared_bits(extent, other);
+            return Some(());
+        }
+        let other = self.extents[other].clone();
         let message = format!(
-            "`{name}` at {address} and `{}` share a part of the memory, and are of different sizes",
-            other.name
+            "`{name}` at {address} and `{}` at {} share a part of the memory",
+            other.name, other.address
         );
         let found = understudy_text::Diagnostic::error("U1083", message, address.span());
         let found = found.with_related(other.span, "the other one");
@@ -230,6 +257,30 @@ impl Lowering<'_> {
             "give them addresses apart, or read a part of one variable, such as `word.3` or `word.%B1`",
         ));
         None
+    }
+
+    /// Warns of inputs or outputs of different sizes that are one in the memory of some controllers, and are points of their own in others and here.
+    /// Once for each variable, so that a word has no warning for each of its bits.
+    fn warn_of_shared_bits(&mut self, mut extent: Extent, other: usize) {
+        let wider = if self.extents[other].part.bits > extent.part.bits {
+            &mut self.extents[other]
+        } else {
+            &mut extent
+        };
+        if !std::mem::replace(&mut wider.is_told, true) {
+            let points = if extent.part.area == 'I' { "inputs" } else { "outputs" };
+            let other = &self.extents[other];
+            let message = format!(
+                "`{}` at {} and `{}` at {} share bits of the process image in the standard and in CODESYS; here they are two {points}, as in OpenPLC",
+                extent.name, extent.address, other.name, other.address
+            );
+            let found = understudy_text::Diagnostic::warning("U1083", message, extent.span.clone());
+            let found = found.with_related(other.span.clone(), "the other one");
+            self.report(found.with_help(
+                "where the program relies on shared bits, declare the wider variable alone and read or write its parts, such as `word.3`",
+            ));
+        }
+        self.extents.push(extent);
     }
 
     /// Warns where the size in an address is not that of the variable.

@@ -90,6 +90,7 @@ impl Lowering<'_> {
             };
             list.push(Statement { line, kind: StatementKind::Assign(to, load(from)) });
         }
+        self.overlap(name, address, resolved)?;
         Some(at_slot(name, slot, resolved, is_input))
     }
 
