@@ -8,6 +8,24 @@ const MODE: &str = "<?xml version=\"1.0\"?>\n<TcPlcObject><DUT Name=\"E_Mode\"><
 const MAIN: &str = "<?xml version=\"1.0\"?>\n<TcPlcObject><POU Name=\"MAIN\"><Declaration><![CDATA[PROGRAM MAIN\nVAR_INPUT a : BOOL; END_VAR\nVAR_OUTPUT q : BOOL; END_VAR\nVAR m : E_Mode; END_VAR]]></Declaration>\n<Implementation><ST><![CDATA[IF a THEN m := E_Mode.on; ELSE m := E_Mode.off; END_IF\nq := m = E_Mode.on;]]></ST></Implementation></POU></TcPlcObject>\n";
 const PROJECT: &str = r#"<Project xmlns="http://schemas.microsoft.com/developer/msbuild/2003"><ItemGroup><Compile Include="DUTs\E_Mode.TcDUT"/><Compile Include="MAIN.TcPOU"/></ItemGroup></Project>"#;
 
+/// Comments of a body are kept, wherever in it they are.
+#[test]
+fn comments_of_a_body_are_kept_to_the_last() {
+    let folder = empty_folder("twincat_comments");
+    let body = "// above\nq := a; // beside\n(* below *)";
+    let text = MAIN.replace("VAR m : E_Mode; END_VAR", "").replace(
+        "IF a THEN m := E_Mode.on; ELSE m := E_Mode.off; END_IF\nq := m = E_Mode.on;",
+        body,
+    );
+    assert!(text.contains(body));
+    fs::write(folder.join("MAIN.TcPOU"), text).expect("written");
+    let written = understudy_in(&folder, &["convert", "MAIN.TcPOU", "--to", "st"]);
+    assert_eq!(written.status, 0, "{}", written.shown());
+    let places: Vec<Option<usize>> =
+        ["above", "beside", "below"].iter().map(|word| written.output.find(word)).collect();
+    assert!(places.iter().all(Option::is_some) && places.is_sorted(), "{}", written.output);
+}
+
 #[test]
 fn the_files_of_a_project_are_one_program() {
     let folder = empty_folder("twincat");

@@ -93,9 +93,9 @@ impl Parser<'_> {
                 kind => statements.push(Statement { kind, span: self.since(start), comments }),
             }
         }
-        // What is written below the last statement stands at one that does nothing.
+        // What is written below the last statement stands at one that does nothing. A body may be a text of its own.
         let comments = self.comments();
-        if !comments.is_empty() && self.at_word("END_PROGRAM") {
+        if !comments.is_empty() && (self.at_word("END_PROGRAM") || self.at_end()) {
             statements.push(Statement {
                 kind: StatementKind::Nothing,
                 span: self.span(),
