@@ -8,7 +8,7 @@ use std::time::{Duration, SystemTime};
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
-use understudy_bus::{BusError, Call, DONE, Request, Told};
+use understudy_bus::{BusError, Call, DONE, RefusedOrder, Request, Told};
 use understudy_cluster::{Cluster, Overrides};
 use understudy_executable::Interface;
 use understudy_journal::{
@@ -22,7 +22,7 @@ use understudy_typed::Elementary;
 use understudy_view::{Run, find_running_of};
 use understudy_wire::{Cycle, Force, Member, Role, SignalPlace, StateChoice, Write, WriteAnswer};
 
-use crate::answer::{Answer, Status};
+use crate::answer::{Answer, Failure, Status};
 use crate::files;
 
 /// Command or query a member
@@ -80,6 +80,11 @@ impl What {
     fn is_of_alarm(self) -> bool {
         matches!(self, Self::AcknowledgeAlarm | Self::ShelveAlarm | Self::UnshelveAlarm)
     }
+
+    /// Whether it changes something, and does not only ask.
+    fn is_order(self) -> bool {
+        !matches!(self, Self::Status | Self::Configuration | Self::Journal)
+    }
 }
 
 impl Arguments {
@@ -87,6 +92,19 @@ impl Arguments {
     fn word(&self) -> String {
         let word = self.what.to_possible_value();
         word.map_or_else(String::new, |value| value.get_name().to_owned())
+    }
+
+    /// The record of an order that this answer refuses.
+    fn refused(&self, answer: &Answer) -> RefusedOrder {
+        let why = answer.failures.first().map_or_else(String::new, |failure| {
+            let Failure { code, message } = failure;
+            // Some messages begin with their code.
+            let words = message.strip_prefix(&format!("{code}: ")).unwrap_or(message);
+            format!("{code}: {words}")
+        });
+        let owner = crate::inspect::top::owner();
+        let signal = self.signal.as_deref().unwrap_or_default();
+        RefusedOrder::new(&self.word(), &self.name, &owner, why).with(signal, &self.reason)
     }
 
     /// Reply to `cold-start` or `accept-state`.
@@ -143,10 +161,44 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     }
 }
 
-/// Sends the command to the laboratory that writes the run.
+/// Sends the command to the laboratory that writes the run. The laboratory records one that is refused here, too.
 fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
     let word = arguments.word();
-    let command = match arguments.what {
+    let ordered = command(arguments).and_then(|command| {
+        let run = written(arguments)?;
+        let member = crate::member::find(run.cluster(), &arguments.name)?;
+        Ok((run, member, command))
+    });
+    let (run, member, command) = ordered.inspect_err(|answer| {
+        if arguments.what.is_order()
+            && let Ok(run) = written(arguments)
+        {
+            run.commander().refused_and_wait(arguments.refused(answer));
+        }
+    })?;
+    let done = match command {
+        Command::Write(write) => run.commander().write_and_wait(member, &write),
+        command => run.commander().act_and_wait(&OperatorAction::Command {
+            member,
+            command,
+            owner: crate::inspect::top::owner(),
+            reason: arguments.reason.clone(),
+        }),
+    };
+    let done = done.map_err(|refusal| refused(&refusal))?;
+    let mut text = format!("{word} {}: done", arguments.name);
+    let mut result = json!({ "run": run.path(), "name": arguments.name, "done": word });
+    if let Some(cycle) = done.cycle {
+        text = format!("{word} {}: in effect since cycle {cycle} of the cluster", arguments.name);
+        result["cycle"] = json!(cycle);
+    }
+    Ok(Answer::done(text, result).and_next(&[&"top", &run.path()]))
+}
+
+/// The command to a member of a laboratory.
+fn command(arguments: &Arguments) -> Result<Command, Answer> {
+    let word = arguments.word();
+    Ok(match arguments.what {
         What::Force => Command::Force(force(arguments, written(arguments)?.cluster())?),
         What::Unforce => {
             Command::Unforce { signal: place(arguments, written(arguments)?.cluster())?.0 }
@@ -171,26 +223,7 @@ fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
             );
             return Err(Answer::failed(Status::BadInput, "U0621", message));
         }
-    };
-    let run = written(arguments)?;
-    let member = crate::member::find(run.cluster(), &arguments.name)?;
-    let done = match command {
-        Command::Write(write) => run.commander().write_and_wait(member, &write),
-        command => run.commander().act_and_wait(&OperatorAction::Command {
-            member,
-            command,
-            owner: crate::inspect::top::owner(),
-            reason: arguments.reason.clone(),
-        }),
-    };
-    let done = done.map_err(|refusal| refused(&refusal))?;
-    let mut text = format!("{word} {}: done", arguments.name);
-    let mut result = json!({ "run": run.path(), "name": arguments.name, "done": word });
-    if let Some(cycle) = done.cycle {
-        text = format!("{word} {}: in effect since cycle {cycle} of the cluster", arguments.name);
-        result["cycle"] = json!(cycle);
-    }
-    Ok(Answer::done(text, result).and_next(&[&"top", &run.path()]))
+    })
 }
 
 /// Whether the cluster of the run, or of the cluster file, has the member.
@@ -313,20 +346,51 @@ fn write_elsewhere(
     Ok(Answer::done(text, result))
 }
 
-/// Sends the command to a remote member.
+/// Sends the command to a remote member. The member records one that is refused here, or to which this certificate is not admitted, too.
 fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
     let (cluster, _) = files::cluster(&arguments.target, Overrides::default())?;
     let keys = OperatorKeys::load(keys, &cluster, Date::of(SystemTime::now()));
     let keys = keys.map_err(|errors| crate::deployment::keys::failed(&errors))?;
     let member = crate::member::find(&cluster, &arguments.name)?;
-    let request = match arguments.what {
+    let address = cluster.address(member).ok_or_else(|| {
+        let message = format!("no address for {}", arguments.name);
+        Answer::failed(Status::BadInput, "U0608", message)
+    })?;
+    let hash = cluster.agreement().cluster;
+    let tls = tls_keys(&keys.tls);
+    let call = || Call::to(address, hash, &arguments.name, &tls);
+    let record = |answer: &Answer| {
+        if arguments.what.is_order()
+            && let Ok(call) = call()
+        {
+            // A member of another version does not know the question.
+            let _ = call.ask(&Request::Refused(arguments.refused(answer)));
+        }
+    };
+    let request = request(arguments, &cluster, keys.role).inspect_err(record)?;
+    ask_elsewhere(arguments, request, &call).inspect_err(|answer| {
+        // What the member decides itself has a record already.
+        let code = answer.failures.first().map(|failure| failure.code.as_str());
+        if matches!(code, Some("U0510" | "U0556")) {
+            record(answer);
+        }
+    })
+}
+
+/// What a remote member is asked; nothing for its journal, which is followed.
+fn request(
+    arguments: &Arguments,
+    cluster: &Cluster,
+    role: Role,
+) -> Result<Option<Request>, Answer> {
+    Ok(match arguments.what {
         What::Status => Some(Request::Status),
         What::Configuration => Some(Request::Configuration),
         What::Release => Some(Request::Release),
         What::ColdStart | What::AcceptState => Some(Request::Choose(arguments.choice())),
-        What::Force => Some(Request::Force(force(arguments, &cluster)?)),
-        What::Unforce => Some(Request::Unforce(place(arguments, &cluster)?.0)),
-        What::Write => Some(Request::Write(write(arguments, &cluster, keys.role)?)),
+        What::Force => Some(Request::Force(force(arguments, cluster)?)),
+        What::Unforce => Some(Request::Unforce(place(arguments, cluster)?.0)),
+        What::Write => Some(Request::Write(write(arguments, cluster, role)?)),
         What::Stop => Some(Request::Stop),
         What::Journal => None,
         What::Kill
@@ -339,14 +403,14 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
                 reason: "its process runs on another machine: stop or start it there".to_owned(),
             }));
         }
-    };
-    let address = cluster.address(member).ok_or_else(|| {
-        let message = format!("no address for {}", arguments.name);
-        Answer::failed(Status::BadInput, "U0608", message)
-    })?;
-    let hash = cluster.agreement().cluster;
-    let tls = tls_keys(&keys.tls);
-    let call = || Call::to(address, hash, &arguments.name, &tls);
+    })
+}
+
+fn ask_elsewhere(
+    arguments: &Arguments,
+    request: Option<Request>,
+    call: &impl Fn() -> Result<Call, BusError>,
+) -> Result<Answer, Answer> {
     if let Some(request @ Request::Write(_)) = &request {
         return write_elsewhere(arguments, request, call);
     }

@@ -6,8 +6,9 @@ use std::path::Path;
 use std::time::Instant;
 
 use nix::sys::signal::Signal;
-use serde_json::Value;
+use serde_json::{Value, json};
 
+use super::deaths::{Records, is};
 use super::shared::{DEADLINE, answer, empty_folder, some_at_a_time};
 use super::{no_orphan, running_with, signal};
 
@@ -90,6 +91,34 @@ fn an_alarm_is_acknowledged_and_shelved_from_another_process() {
     assert_eq!(code(operate(&run, "runnin", &["shelve-alarm"])), refused("U0660"));
     let endless = ["shelve-alarm", "--seconds", "86401"];
     assert_eq!(code(operate(&run, "running", &endless)), refused("U0661"));
+    // Each refused order has a record, with the name that does not exist.
+    let mut records = Records::of(&run);
+    let mut recorded = |to: &str, order: &str, signal: &str, code: &str| {
+        let found = records
+            .wait_for("a refused order", |record| is(record, "laboratory", "command-refused"));
+        let event = &found["event"];
+        let why = event["why"].as_str().unwrap_or_default();
+        assert_eq!((&event["to"], &event["order"]), (&json!(to), &json!(order)), "{event}");
+        assert_eq!(event["signal"], signal, "{event}");
+        assert!(why.starts_with(code) && event["owner"] != "", "{event}");
+    };
+    recorded("running", "acknowledge-alarm", "", "U0662");
+    recorded("runnin", "shelve-alarm", "", "U0660");
+    recorded("running", "shelve-alarm", "", "U0661");
+    let long = "x".repeat(1000);
+    let nothing = format!("{long}=1");
+    for (to, order, signal, code) in [
+        ("pump-io", "write", "nothing=1", "U0640"),
+        ("pump-io", "force", "nothing=1", "U0556"),
+        ("pump-io", "unforce", "nothing", "U0556"),
+        ("nobody", "write", "start=true", "U0605"),
+        ("pump-io", "write", nothing.as_str(), "U0640"),
+    ] {
+        let (status, document) = operate(&run, to, &[order, signal]);
+        assert_ne!(status, 0, "{document:#}");
+        let signal: String = signal.chars().take(60).collect();
+        recorded(to, order, &signal, code);
+    }
 
     done(&run, "pump-io", &["write", "start=true"]);
     let raised = wait_for(&run, "unacknowledged");

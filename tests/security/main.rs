@@ -5,6 +5,7 @@
     reason = "what is waited for has a deadline on the real clock"
 )]
 
+mod clocks;
 mod crowd;
 mod deployment;
 mod duplicates;

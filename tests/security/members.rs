@@ -36,7 +36,9 @@ fn an_operator_is_answered_until_revoked_and_nobody_else_is() {
     let common = ["--link", "udp", "--no-real-time"];
     let robot_io = of("robot-io");
     let start = ["remote-io", cluster, "--name", "robot-io", "--keys", &robot_io];
-    let mut running = Running::start(&[&start[..], &common].concat());
+    let journal = folder.join("robot-io.jsonl");
+    let to_file = ["--journal", text(&journal)];
+    let mut running = Running::start(&[&start[..], &common, &to_file].concat());
     let operate = |keys: &str, what: &[&str]| {
         let call = ["operate", cluster, "--name", "robot-io", "--keys", keys];
         answer(&[&call[..], what].concat())
@@ -65,6 +67,31 @@ fn an_operator_is_answered_until_revoked_and_nobody_else_is() {
     assert!(lines.status.success());
     assert_eq!(String::from_utf8_lossy(&lines.stdout).lines().count(), 3);
 
+    // An order with an unknown name, and one without the right to it, have records in the member's journal.
+    let guest = of("guest");
+    for (keys, what, code, status) in [
+        (&operator, &["force", "nothing=1"][..], "U0556", 2),
+        (&operator, &["write", "nothing=1"], "U0640", 2),
+        (&guest, &["force", "grip=true"], "U0510", 1),
+    ] {
+        let refused = operate(keys, what);
+        assert_eq!((refused.0, codes(&refused.1)), (status, vec![code]), "{what:?}");
+        let is_it = |line: &str| {
+            let record: serde_json::Value = serde_json::from_str(line).unwrap_or_default();
+            let event = &record["event"];
+            let why = event["why"].as_str().unwrap_or_default();
+            event["event"] == "order-refused"
+                && (&event["to"], &event["order"]) == (&"robot-io".into(), &what[0].into())
+                && event["signal"] == what[1]
+                && why.starts_with(code)
+        };
+        let started = Instant::now();
+        while !fs::read_to_string(&journal).unwrap_or_default().lines().any(is_it) {
+            assert!(started.elapsed() < DEADLINE, "{what:?} has no record");
+            std::thread::yield_now();
+        }
+    }
+
     // Keys of a member are no operator's, and keys of another cluster of the same name are nobody's.
     let refused = operate(&of("robot"), &["stop"]);
     assert_eq!((refused.0, codes(&refused.1)), (2, vec!["U0910"]));
@@ -75,7 +102,6 @@ fn an_operator_is_answered_until_revoked_and_nobody_else_is() {
     assert_eq!((refused.0, codes(&refused.1)), (1, vec!["U0509"]));
 
     // A member that runs learns who is revoked; the revoked one does not.
-    let guest = of("guest");
     let kept = folder.join("kept");
     copy(Path::new(&guest), &kept);
     assert_eq!(operate(text(&kept), &["status"]).0, 0);

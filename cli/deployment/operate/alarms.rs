@@ -3,6 +3,7 @@
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde_json::json;
+use understudy_bus::RefusedOrder;
 use understudy_journal::{AlarmRefusal, OperatorAction, Refusal, Shelving, Unshelving, find_alarm};
 use understudy_view::{Alarm, Bounds, Run};
 
@@ -30,7 +31,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     };
     for action in &actions {
         let checked = action.alarm_event(run.cluster().alarms());
-        checked.map_err(|refusal| refused(&refusal))?;
+        checked.map_err(|refusal| {
+            let order = action.refused(&refusal);
+            order.into_iter().for_each(|order| run.commander().refused_and_wait(order));
+            refused(&refusal)
+        })?;
         let done = run.commander().act_and_wait(action);
         done.map_err(|refusal| refused(&refusal))?;
     }
@@ -60,6 +65,8 @@ fn acknowledgements(arguments: &Arguments, run: &Run) -> Result<Vec<OperatorActi
             Err(unknown) if !is_member => unknown,
             _ => AlarmRefusal::NotOpen(name.clone()),
         };
+        let order = RefusedOrder::new(&arguments.word(), name, &owner, &refusal);
+        run.commander().refused_and_wait(order);
         return Err(refused(&Refusal::Alarm(refusal)));
     }
     Ok(actions)

@@ -23,7 +23,7 @@ use std::time::{Duration, Instant};
 
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::mpsc::{Receiver, Sender, channel};
-use understudy_bus::{Cuts, LinkKind, WRITES_PER_SECOND, WriteLimiter};
+use understudy_bus::{Cuts, LinkKind, RefusedOrders, WRITES_PER_SECOND, WriteLimiter};
 use understudy_cluster::Cluster;
 use understudy_journal::{
     Commands, Journal, JournalState, KEYS, PendingWrites, Record, RunDirectory, RunEvent,
@@ -216,6 +216,7 @@ fn run(
         writes: PendingWrites::default(),
         // Less than a member takes, so that each caller gets an answer.
         write_limiter: WriteLimiter::new(WRITES_PER_SECOND / 2),
+        refused_orders: RefusedOrders::default(),
         directory: directory.path().to_owned(),
         sender,
         watch,
@@ -276,6 +277,7 @@ struct Laboratory<'w> {
     commanded: bool,
     writes: PendingWrites,
     write_limiter: WriteLimiter,
+    refused_orders: RefusedOrders,
     directory: PathBuf,
     sender: Sender<Said>,
     watch: &'w mut dyn FnMut(Progress),

@@ -11,12 +11,12 @@ impl Laboratory<'_> {
     pub(super) async fn obey(&mut self, commanded: Commanded) {
         let OperatorAction::Command { member, command, owner, reason } = commanded.action.clone()
         else {
-            let event = commanded.action.alarm_event(&self.account.terms.alarms);
-            let done = event.map(|event| {
+            let alarms = &self.account.terms.alarms;
+            let (event, done) = commanded.action.recorded(alarms, &self.refused_orders);
+            if let Some(event) = event {
                 self.note(event);
                 self.show_journal();
-                Done::default()
-            });
+            }
             return commanded.answer(done);
         };
         let write = match &command {

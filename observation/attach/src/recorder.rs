@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::mpsc::{Receiver, channel};
 use tokio::sync::oneshot;
-use understudy_bus::{DONE, HostEvent, Request};
+use understudy_bus::{DONE, HostEvent, RefusedOrders, Request};
 use understudy_cluster::AlarmDeclaration;
 use understudy_journal::{
     Command, Commanded, Commander, Commands, Done, Happening, Journal, OperatorAction, Record,
@@ -121,6 +121,7 @@ impl Found {
             names,
             signals: self.signals,
             alarms: self.alarms,
+            refused_orders: RefusedOrders::default(),
             has_origin: false,
             published: None,
             in_effect: InEffect::default(),
@@ -146,6 +147,7 @@ struct Recorder {
     names: BTreeMap<Member, String>,
     /// Inputs and outputs of each program.
     signals: Vec<(usize, usize)>,
+    refused_orders: RefusedOrders,
     alarms: Arc<[AlarmDeclaration]>,
     has_origin: bool,
     /// The first turn that was reported, and when.
@@ -287,12 +289,11 @@ impl Recorder {
         }
         let OperatorAction::Command { member, command, owner, reason } = commanded.action.clone()
         else {
-            let event = commanded.action.alarm_event(&self.alarms);
-            let done = event.map(|event| {
+            let (event, done) = commanded.action.recorded(&self.alarms, &self.refused_orders);
+            if let Some(event) = event {
                 self.own(event);
                 self.journal.flush();
-                Done::default()
-            });
+            }
             commanded.answer(done);
             return;
         };

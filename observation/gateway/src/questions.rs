@@ -47,7 +47,9 @@ async fn done(gate: &WriteGate, text: &str) -> Result<u64, Refusal> {
     let member = gate.cluster().member(&asked.name);
     let member = member.ok_or_else(|| {
         let name: String = asked.name.chars().take(60).collect();
-        Refusal::Said(format!("U0640: the cluster has no remote I/O `{name}`"))
+        let refusal = Refusal::Said(format!("U0640: the cluster has no remote I/O `{name}`"));
+        gate.refuse(&asked.name, &asked.input, &asked.owner, &asked.reason, &refusal);
+        refusal
     })?;
     let value = match &asked.value {
         Value::String(text) => text.clone(),

@@ -12,11 +12,14 @@ use std::io::Write as _;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use tokio::runtime::Handle;
 use tokio::sync::Semaphore;
 use tokio::time::Instant;
-use understudy_bus::WriteLimiter;
+use understudy_bus::{RefusedOrder, RefusedOrders, WriteLimiter};
 use understudy_cluster::Cluster;
-use understudy_journal::{Commander, Done, Refusal, WriteRequest, WriteSessions, new_write};
+use understudy_journal::{
+    Commander, Done, OperatorAction, Refusal, WriteRequest, WriteSessions, new_write,
+};
 use understudy_text::visible;
 use understudy_view::Run;
 use understudy_wire::{Member, Write, WriteId, WriteRefusal};
@@ -34,6 +37,7 @@ pub struct WriteGate {
     commander: Commander,
     sessions: WriteSessions,
     limiter: WriteLimiter,
+    refused: RefusedOrders,
     places: Semaphore,
     numbered: Mutex<Numbered>,
 }
@@ -56,6 +60,7 @@ impl WriteGate {
             sessions: WriteSessions::new(commander.clone()),
             commander,
             limiter: WriteLimiter::new(WRITES_PER_SECOND),
+            refused: RefusedOrders::default(),
             places: Semaphore::new(MAXIMUM_WRITES),
             numbered: Mutex::default(),
         }
@@ -72,7 +77,27 @@ impl WriteGate {
     /// The refusal that the remote I/O would give for any of its inputs.
     pub fn check(&self, member: Member, request: &WriteRequest<'_>) -> Result<Write, Refusal> {
         let write = new_write(&self.cluster, member, request).map_err(Refusal::from);
-        write.inspect_err(|refusal| self.log(member, request.owner, refusal))
+        write.inspect_err(|refusal| {
+            self.log(member, request.owner, refusal);
+            let name = self.cluster.member_name(member).unwrap_or_default();
+            self.refuse(name, request.input, request.owner, request.reason, refusal);
+        })
+    }
+
+    /// Has a write recorded in the journal of the run that was refused before it was sent.
+    pub fn refuse(&self, name: &str, input: &str, owner: &str, reason: &str, refusal: &Refusal) {
+        let order = RefusedOrder::new("write", name, owner, refusal).with(input, reason);
+        let Some(order) = self.refused.admit(order) else {
+            return;
+        };
+        let commander = self.commander.clone();
+        match Handle::try_current() {
+            // The caller has its answer without it.
+            Ok(runtime) => drop(runtime.spawn(async move {
+                let _ = commander.act(OperatorAction::Refused(order)).await;
+            })),
+            Err(_) => commander.refused_and_wait(order),
+        }
     }
 
     /// Sends a write and waits for its outcome: the cycle of the cluster from which it is in effect. Its identifier is that of the
@@ -98,11 +123,13 @@ impl WriteGate {
         }
         // One that was sent before may be in effect, so it is not refused.
         let busy = if known.is_some() { Err(Refusal::Undecided) } else { busy };
-        let Ok(_place) = self.places.try_acquire() else {
-            return busy;
-        };
-        if !self.limiter.admits(&write.owner) {
-            return busy;
+        let place = self.places.try_acquire();
+        if place.is_err() || !self.limiter.admits(&write.owner) {
+            let name = self.cluster.member_name(member).unwrap_or_default();
+            let input = self.input_name(member, write.input);
+            return busy.inspect_err(|busy| {
+                self.refuse(name, input, &write.owner, &write.reason, busy);
+            });
         }
         let owner = write.owner.clone();
         let done = match id {
@@ -140,6 +167,18 @@ impl WriteGate {
         done
     }
 
+    fn input_name(&self, member: Member, input: u16) -> &str {
+        let Member::RemoteIo(program) = member else {
+            return "";
+        };
+        let remote_io = self.cluster.remote_ios().get(program.index());
+        let mut sources = remote_io.iter().flat_map(|remote_io| &remote_io.inputs);
+        let found = sources.find(|source| {
+            source.operator().is_some_and(|operator| operator.input.place.bit == input)
+        });
+        found.map_or("", |source| source.name.as_str())
+    }
+
     fn numbered(&self) -> MutexGuard<'_, Numbered> {
         self.numbered.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -173,6 +212,40 @@ mod tests {
             reason: "a test".to_owned(),
         };
         (write, Some(id))
+    }
+
+    /// Each refused write has a record on its way to the journal, with the name that does not exist, and a flood of them has a few.
+    #[test]
+    fn refused_writes_are_recorded_at_a_bounded_rate() {
+        let (commander, mut commands) = commands();
+        let cluster = understudy_testing::press_cell(Mode::Full);
+        let gate = WriteGate::of(Arc::new(cluster), commander);
+        let request = WriteRequest {
+            input: "nothing",
+            value: understudy_journal::RequestedValue::Stored(1),
+            role: Role::Operator,
+            owner: "anna",
+            reason: "a test",
+        };
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+        runtime.expect("a runtime").block_on(async {
+            for _ in 0..1000 {
+                gate.check(MEMBER, &request).expect_err("no such input");
+            }
+            let mut recorded = 0;
+            while let Ok(commanded) =
+                tokio::time::timeout(Duration::from_millis(100), commands.next()).await
+            {
+                let OperatorAction::Refused(order) = commanded.action.clone() else {
+                    panic!("{commanded:?}");
+                };
+                assert_eq!((order.to.as_str(), order.signal.as_str()), ("robot-io", "nothing"));
+                assert!(order.owner == "anna" && order.why.starts_with("U0640"), "{order:?}");
+                commanded.answer(Ok(Done::default()));
+                recorded += 1;
+            }
+            assert!((1..=20).contains(&recorded), "{recorded}");
+        });
     }
 
     #[test]

@@ -24,6 +24,7 @@ use understudy_wire::{
     WriteRefusal,
 };
 
+use understudy_bus::{RefusedOrder, RefusedOrders};
 use understudy_cluster::AlarmDeclaration;
 use understudy_remote_io::Event as RemoteIoEvent;
 
@@ -181,6 +182,8 @@ pub enum OperatorAction {
     Shelve(Shelving),
     /// It is shelved no more.
     Unshelve(Unshelving),
+    /// An order was refused before it was one of the above; only its record is wanted.
+    Refused(RefusedOrder),
 }
 
 impl OperatorAction {
@@ -190,7 +193,7 @@ impl OperatorAction {
     /// [`Refusal::Alarm`], and [`Refusal::Busy`] for a command to a member.
     pub fn alarm_event(&self, alarms: &[AlarmDeclaration]) -> Result<RunEvent, Refusal> {
         let event = match self {
-            Self::Command { .. } => return Err(Refusal::Busy),
+            Self::Command { .. } | Self::Refused(_) => return Err(Refusal::Busy),
             Self::Acknowledge(seen) => Ok(RunEvent::Acknowledged(seen.clone())),
             Self::Shelve(shelving) => {
                 let checked = shelving.check(alarms);
@@ -202,6 +205,40 @@ impl OperatorAction {
             }
         };
         event.map_err(Refusal::Alarm)
+    }
+
+    /// The record of an action that is no command to a member, and what it came to. A refused one has a record too, within `refused`.
+    pub fn recorded(
+        &self,
+        alarms: &[AlarmDeclaration],
+        refused: &RefusedOrders,
+    ) -> (Option<RunEvent>, Result<Done, Refusal>) {
+        if let Self::Refused(order) = self {
+            let order = refused.admit(order.clone());
+            return (order.map(RunEvent::CommandRefused), Ok(Done::default()));
+        }
+        match self.alarm_event(alarms) {
+            Ok(event) => (Some(event), Ok(Done::default())),
+            Err(refusal) => {
+                let order = self.refused(&refusal).and_then(|order| refused.admit(order));
+                (order.map(RunEvent::CommandRefused), Err(refusal))
+            }
+        }
+    }
+
+    /// An action on an alarm as a refused order.
+    pub fn refused(&self, refusal: &Refusal) -> Option<RefusedOrder> {
+        let (order, name, owner, reason) = match self {
+            Self::Command { .. } | Self::Refused(_) => return None,
+            Self::Acknowledge(seen) => ("acknowledge-alarm", &seen.name, &seen.owner, ""),
+            Self::Shelve(shelving) => {
+                ("shelve-alarm", &shelving.name, &shelving.owner, shelving.reason.as_str())
+            }
+            Self::Unshelve(unshelving) => {
+                ("unshelve-alarm", &unshelving.name, &unshelving.owner, unshelving.reason.as_str())
+            }
+        };
+        Some(RefusedOrder::new(order, name, owner, refusal).with("", reason))
     }
 }
 
@@ -355,6 +392,11 @@ impl Commander {
     /// [`Refusal`].
     pub fn acknowledge_and_wait(&self, acknowledgement: Acknowledgement) -> Result<Done, Refusal> {
         self.act_and_wait(&OperatorAction::Acknowledge(acknowledgement))
+    }
+
+    /// Has an order recorded that was refused. Where no process writes the run there is no journal that could have it.
+    pub fn refused_and_wait(&self, order: RefusedOrder) {
+        let _ = self.act_and_wait(&OperatorAction::Refused(order));
     }
 
     /// Does what an operator wants, from a thread that has nothing else to do.

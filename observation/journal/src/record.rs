@@ -6,7 +6,7 @@ use serde::de::{self, DeserializeOwned};
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 use serde_json::value::RawValue;
-use understudy_bus::HostEvent;
+use understudy_bus::{HostEvent, RefusedOrder};
 use understudy_simulator::Action;
 use understudy_wire::{Member, Moment};
 
@@ -99,6 +99,8 @@ pub enum RunEvent {
         /// Why it was not done, where it was not.
         refused: Option<String>,
     },
+    /// An order of a person was refused before it was a command to a member: it names something that does not exist, or the person has no right to it.
+    CommandRefused(RefusedOrder),
     /// Somebody has seen an alarm.
     Acknowledged(Acknowledgement),
     /// An alarm on a signal was shelved.

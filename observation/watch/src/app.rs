@@ -4,7 +4,8 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError, RwLock, RwLockReadGuard};
 
 use tokio::sync::{Semaphore, watch};
-use understudy_journal::{Commander, WriteSessions};
+use understudy_bus::RefusedOrder;
+use understudy_journal::{Commander, OperatorAction, WriteSessions};
 use understudy_view::{Alarm, Reading, Run};
 
 use crate::api::not_remembered;
@@ -27,6 +28,15 @@ pub struct Commanding {
     pub forbidden: Option<String>,
     /// Commands that are impossible in this run, each with the reason.
     pub impossible: Vec<(&'static str, String)>,
+}
+
+impl Commanding {
+    /// Has an order recorded that was refused here. Where no process writes the run there is no journal that could have it.
+    pub(crate) async fn record_refused(&self, order: Option<RefusedOrder>) {
+        if let Some(order) = order {
+            let _ = self.commander.act(OperatorAction::Refused(order)).await;
+        }
+    }
 }
 
 #[derive(Debug)]

@@ -85,6 +85,11 @@ impl Problem {
         Self::new(StatusCode::BAD_REQUEST, code, message)
     }
 
+    /// Code and message, as records have them.
+    pub(crate) fn words(&self) -> String {
+        format!("{}: {}", self.code, self.message)
+    }
+
     /// The laboratory refused a command; its text begins with the code.
     pub(crate) fn refused(words: &str) -> Self {
         let (code, message) = words.split_once(": ").unwrap_or(("U0682", words));

@@ -62,13 +62,15 @@ pub enum KeysError {
     },
     /// Too late.
     #[error(
-        "U0908: the certificate of {name} expired on {expires}; `understudy keys issue` makes a new one"
+        "U0908: the certificate of {name} expired on {expires}, and the clock of this machine is at {now}; `understudy keys issue` makes a new one; where the clock is wrong, set it"
     )]
     Expired {
         /// Whose.
         name: String,
         /// When.
         expires: Date,
+        /// What the clock says.
+        now: Date,
     },
     /// Too early, by the clock of the machine.
     #[error(

@@ -73,6 +73,8 @@ pub struct TlsFiles {
     pub certificate: PathBuf,
     /// Its own private key.
     pub private_key: PathBuf,
+    /// When its own certificate is valid.
+    pub validity: Validity,
     /// Common names of the members whose certificates hold.
     pub members: Vec<String>,
     /// Common names of the viewers whose certificates hold.
@@ -318,13 +320,7 @@ fn read(
             let wanted = member.unwrap_or("a person").to_owned();
             errors.push(others(file.name.clone(), wanted));
         }
-        let begins = file.issued.map(certificate::begins);
-        if let Some(begins) = begins.filter(|begins| now < *begins) {
-            errors.push(KeysError::NotYetValid { name: file.name.clone(), begins, now });
-        }
-        if now >= file.expires {
-            errors.push(KeysError::Expired { name: file.name.clone(), expires: file.expires });
-        }
+        errors.extend(Validity::of(file).outside(now));
         let is_revoked = |list: &RevokedFile| list.holds(&file.name, file.generation);
         if revoked.as_ref().is_some_and(is_revoked) {
             errors
@@ -337,11 +333,39 @@ fn read(
     }
 }
 
+/// When the certificate of a holder is valid.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Validity {
+    name: String,
+    begins: Option<Date>,
+    expires: Date,
+}
+
+impl Validity {
+    fn of(file: &KeysFile) -> Self {
+        Self {
+            name: file.name.clone(),
+            begins: file.issued.map(certificate::begins),
+            expires: file.expires,
+        }
+    }
+
+    /// Why the certificate does not count at a time; nothing where it does.
+    pub fn outside(&self, now: Date) -> Option<KeysError> {
+        let Self { name, begins, expires } = self.clone();
+        if let Some(begins) = begins.filter(|begins| now < *begins) {
+            return Some(KeysError::NotYetValid { name, begins, now });
+        }
+        (now >= expires).then_some(KeysError::Expired { name, expires, now })
+    }
+}
+
 fn tls(folder: &Path, file: &KeysFile, revoked: &RevokedFile) -> TlsFiles {
     TlsFiles {
         authority: folder.join("authority.pem"),
         certificate: folder.join("certificate.pem"),
         private_key: folder.join("private-key.pem"),
+        validity: Validity::of(file),
         members: revoked.without(&file.members),
         viewers: revoked.without(&file.viewers),
         operators: revoked.without(&file.operators),

@@ -10,6 +10,7 @@
 //! | `command/release`, `command/stop` | asked: done | engineers | no |
 //! | `write/operator`, `write/engineer` | asked with a write as JSON: its outcome | operators; engineers | no |
 //! | `command/force`, `command/unforce` | asked with a force or a signal as JSON: done, or why not | engineers | no |
+//! | `refused` | asked with a refused order of a person as JSON: it is recorded | all | no |
 //! | `journal` | told: the lines of its journal, those of a moment at once; twice a second those in effect again | all | no |
 //!
 //! and under `understudy/cluster/<member>`, for callers whose cluster file may be another one: asked, the hash of the configuration.
@@ -18,6 +19,7 @@
 //! opened is tried again, and the member runs without it; who is revoked is cut off as soon as the list of the admitted changes.
 
 mod followed;
+mod refused;
 mod tls;
 
 use std::net::{SocketAddr, TcpListener};
@@ -46,10 +48,11 @@ use crate::rights::run_in_background;
 use crate::writes::{self, Callers};
 
 pub(crate) use followed::{Batch, Gaps, Telemetry, followed};
-pub use tls::{Admitted, TlsKeys};
-pub(crate) use tls::{WRITE_KEYS, endpoint, hash_key, insert, prefix, tls_config};
+pub use tls::{Admitted, TlsKeys, Validity};
+pub(crate) use tls::{REFUSED_KEY, WRITE_KEYS, endpoint, hash_key, insert, prefix, tls_config};
 
 use followed::Line;
+use refused::RefusedReports;
 use tls::access_control;
 
 /// How often it is looked who is admitted.
@@ -141,6 +144,7 @@ pub(crate) struct Channel<E> {
     sink: JournalSender<E>,
     clock: Clock,
     connections: Connections,
+    refused: RefusedReports,
     stop: Arc<AtomicBool>,
     /// An operator wants the member to end.
     stop_wanted: Arc<AtomicBool>,
@@ -196,6 +200,7 @@ impl<E: Send + 'static> Channel<E> {
             sink,
             clock,
             connections: Connections::new(MOST_CONNECTIONS, 3),
+            refused: RefusedReports::default(),
             stop: Arc::clone(&stop),
             stop_wanted: Arc::default(),
         };
@@ -216,7 +221,7 @@ impl<E: Send + 'static> Channel<E> {
         let mut next_try = Time::default();
         let mut looked = self.clock.now();
         let mut reported = looked;
-        let mut stopping = false;
+        let (mut stopping, mut is_valid) = (false, true);
         loop {
             let now = self.clock.now();
             if opened.is_none() && now >= next_try {
@@ -273,6 +278,7 @@ impl<E: Send + 'static> Channel<E> {
                 };
                 self.sink.record(now, Noted::Host(event));
             }
+            self.note_refused(now, &mut is_valid);
         }
         // The journal ends when nobody reports any more.
         drop(self.sink);
@@ -356,6 +362,7 @@ impl<E: Send + 'static> Channel<E> {
         for (role, key) in WRITE_KEYS {
             answers.push(self.answer_writes(&session, role, key)?);
         }
+        answers.push(self.answer_refused(&session)?);
         let relay = Relay::start(listener, self.connections.clone(), PATIENCE, inner)?;
         Ok(Opened { session, relay, journal, _answers: answers })
     }

@@ -33,6 +33,9 @@ impl Documents {
     /// # Errors
     /// Nobody listens there, or one side does not accept the other's certificate.
     pub fn open(address: SocketAddr, keys: Option<&TlsKeys>) -> Result<Self, BusError> {
+        if let Some(reason) = keys.and_then(|keys| keys.validity.reason()) {
+            return Err(BusError::ClockOutside { address, reason });
+        }
         let config = || -> zenoh::Result<zenoh::Config> {
             let (mut config, endpoint) = match keys {
                 Some(keys) => (tls_config("client", keys)?, endpoint(address)),

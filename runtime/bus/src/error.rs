@@ -83,6 +83,14 @@ pub enum BusError {
         /// What Zenoh said.
         reason: String,
     },
+    /// A certificate does not count by the clock of this machine, so no member accepts it and none is called.
+    #[error("U0582: cannot call {address}: {reason}")]
+    ClockOutside {
+        /// Who was to be called.
+        address: SocketAddr,
+        /// Whose certificate, its validity, and what the clock says.
+        reason: String,
+    },
     /// A call was taken, and its answer was lost on the way.
     #[error(
         "U0581: the answer of {name} at {address} to `{request}` is lost: what was asked may be done; ask for the state of the member"
@@ -142,6 +150,7 @@ impl BusError {
             Self::Unanswered { .. } => "U0510",
             Self::Outvoted(_) => "U0598",
             Self::AnswerLost { .. } => "U0581",
+            Self::ClockOutside { .. } => "U0582",
         }
     }
 

@@ -21,6 +21,7 @@ use crate::error::BusError;
 use crate::host::Summary;
 use crate::link::LinkKind;
 use crate::refused_as::RefusedAs;
+use crate::refused_orders::RefusedOrder;
 use crate::rights::Rights;
 use crate::tally::Tally;
 
@@ -136,11 +137,20 @@ pub enum HostEvent {
         /// Where the last one came from.
         address: IpAddr,
     },
+    /// The TLS listener refused certificates of callers, since the last such record.
+    RefusedCertificates {
+        /// How many.
+        connections: u64,
+        /// Why the last one; with the time of this machine and the end of the validity, where that is the reason.
+        reason: String,
+    },
     /// Writes of operators were refused at once since the last such record: more came in a second than this member takes.
     RefusedWrites {
         /// Their number.
         writes: u64,
     },
+    /// An order of a person to this member was refused before it was sent: it names something that does not exist, or the person has no right to it.
+    OrderRefused(RefusedOrder),
     /// The member said frames that break a bound of the wire, since the last such record: a mistake in this program.
     UnsendableFrames {
         /// How many.

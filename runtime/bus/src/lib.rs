@@ -28,6 +28,8 @@ mod operator;
 mod orders;
 mod ports;
 mod refused_as;
+mod refused_certificates;
+mod refused_orders;
 mod rights;
 mod tally;
 mod trouble;
@@ -39,7 +41,7 @@ mod writes;
 mod zenoh_link;
 
 pub use announcer::{Announcer, Question};
-pub use channel::{Admitted, ChannelSettings, DONE, LinesInEffect, TlsKeys};
+pub use channel::{Admitted, ChannelSettings, DONE, LinesInEffect, TlsKeys, Validity};
 pub use clock::Clock;
 pub use connections::{
     Connection, Connections, Listener, RESERVED_DESCRIPTORS, RefusedConnections, RelayedCallers,
@@ -64,6 +66,7 @@ pub use operator::{Call, Request, Told};
 pub use orders::{Control, Cuts, Order, Orders, orders};
 pub use ports::free_addresses;
 pub use refused_as::RefusedAs;
+pub use refused_orders::{RefusedOrder, RefusedOrders};
 pub use rights::{Rights, keep_times};
 pub use wakefulness::Wakefulness;
 pub use watchdog::Watchdog;

@@ -18,6 +18,8 @@ use tracing_subscriber::fmt::{MakeWriter, layer};
 use tracing_subscriber::layer::{Layer, SubscriberExt};
 use tracing_subscriber::util::SubscriberInitExt;
 
+use crate::refused_certificates;
+
 /// Environment variable of the filter, as other programs with `tracing` have it.
 const FILTER_VARIABLE: &str = "RUST_LOG";
 
@@ -153,7 +155,8 @@ impl LogSettings {
                 json.log_internal_errors(false).with_writer(made).boxed()
             }
         };
-        let installed = tracing_subscriber::registry().with(layer.with_filter(targets)).try_init();
+        let lines = tracing_subscriber::registry().with(layer.with_filter(targets));
+        let installed = lines.with(refused_certificates::layer()).try_init();
         for message in wrong {
             tracing::error!("{message}");
         }

@@ -9,9 +9,10 @@ use understudy_wire::{ClusterHash, Force, Role, SignalPlace, StateChoice, Write}
 use zenoh::Wait;
 
 use crate::channel::{
-    Batch, Gaps, TlsKeys, WRITE_KEYS, endpoint, hash_key, insert, prefix, tls_config,
+    Batch, Gaps, REFUSED_KEY, TlsKeys, WRITE_KEYS, endpoint, hash_key, insert, prefix, tls_config,
 };
 use crate::error::{BusError, reason};
+use crate::refused_orders::RefusedOrder;
 
 /// Longer than it takes a member on a network that works.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -41,6 +42,8 @@ pub enum Request {
     Unforce(SignalPlace),
     /// To write a value; the caller asks under its own role.
     Write(Write),
+    /// To record an order that was refused before it was sent.
+    Refused(RefusedOrder),
     /// To end.
     Stop,
 }
@@ -57,6 +60,7 @@ impl Request {
             Self::Unforce(_) => "command/unforce",
             Self::Write(write) if write.role >= Role::Engineer => WRITE_KEYS[1].1,
             Self::Write(_) => WRITE_KEYS[0].1,
+            Self::Refused(_) => REFUSED_KEY,
             Self::Stop => "command/stop",
         }
     }
@@ -73,6 +77,7 @@ impl Request {
             Self::Force(force) => serde_json::to_string(force),
             Self::Unforce(signal) => serde_json::to_string(signal),
             Self::Write(write) => serde_json::to_string(write),
+            Self::Refused(order) => serde_json::to_string(&order.clone().bounded()),
             _ => return String::new(),
         };
         text.unwrap_or_default()
@@ -100,7 +105,7 @@ impl Call {
     /// Calls the member `name` of a cluster, which listens at `address`.
     ///
     /// # Errors
-    /// [`BusError::Uncalled`] where nobody is there, or one side does not believe the other's certificate.
+    /// [`BusError::ClockOutside`] where its own certificate does not count now, [`BusError::Uncalled`] where nobody is there, or one side does not believe the other's certificate.
     pub fn to(
         address: SocketAddr,
         cluster: ClusterHash,
@@ -112,6 +117,9 @@ impl Call {
             address,
             reason: reason(&error),
         };
+        if let Some(reason) = keys.validity.reason() {
+            return Err(BusError::ClockOutside { address, reason });
+        }
         let config = || -> zenoh::Result<zenoh::Config> {
             let mut config = tls_config("client", keys)?;
             insert(&mut config, "connect/endpoints", &json!([endpoint(address)]))?;

@@ -18,8 +18,9 @@ use std::time::{Duration, Instant, SystemTime};
 use members::{Chatter, endpoints, peers, station};
 use serde_json::json;
 use understudy_bus::{
-    Admitted, BusError, Call, ChannelSettings, Commands, DONE, Endpoints, Guard, LinesInEffect,
-    LinkKind, MemberSettings, NoField, Peer, Request, Summary, TlsKeys, run_member,
+    Admitted, BusError, Call, ChannelSettings, Commands, DONE, Documents, Endpoints, Guard,
+    LinesInEffect, LinkKind, MemberSettings, NoField, Peer, Request, Summary, TlsKeys, Validity,
+    run_member,
 };
 use understudy_cycle::Mode;
 use understudy_keys::{Authority, Date, People};
@@ -65,6 +66,7 @@ fn issued() -> PathBuf {
 fn keys(folder: &Path, name: &str) -> TlsKeys {
     let folder = folder.join(name);
     TlsKeys {
+        validity: Default::default(),
         authority: folder.join("authority.pem"),
         certificate: folder.join("certificate.pem"),
         private_key: folder.join("private-key.pem"),
@@ -253,4 +255,26 @@ fn an_operator_reaches_a_member_with_an_ipv6_address() {
         assert!(started.elapsed() < DEADLINE, "the leader is not obeyed");
     }
     running.join().expect("no panic").expect("it ends as it is told to");
+}
+
+/// No call is made with a certificate that does not count by the clock of this machine: the answer is at once, and says so.
+#[test]
+fn a_caller_whose_clock_is_outside_its_certificate_is_told_both_times() {
+    const REASON: &str =
+        "valid from 2026-11-26T17:00:00Z, and the clock of this machine is at 2020-01-01T00:00:00Z";
+    let keys = TlsKeys {
+        authority: "authority.pem".into(),
+        certificate: "certificate.pem".into(),
+        private_key: "private-key.pem".into(),
+        validity: Validity::by(|| Some(REASON.to_owned())),
+    };
+    let address = SocketAddr::from(([127, 0, 0, 1], 7450));
+    let cluster = press_cell(Mode::Full).agreement().cluster;
+    let call = Call::to(address, cluster, "robot", &keys).map(|_| ());
+    let documents = Documents::open(address, Some(&keys)).map(|_| ());
+    for refused in [call, documents] {
+        let error = refused.expect_err("no call is made");
+        assert_eq!(error.code(), "U0582");
+        assert!(error.to_string().contains(REASON), "{error}");
+    }
 }

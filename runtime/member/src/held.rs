@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::SystemTime;
 
 use understudy_bus::{
-    Admitted, ChannelSettings, Guard, LinesInEffect, NewLife, TlsKeys, hold_back_signals,
+    Admitted, ChannelSettings, Guard, LinesInEffect, NewLife, TlsKeys, Validity, hold_back_signals,
 };
 use understudy_cluster::{Cluster, Security};
 use understudy_journal::RecordsInEffect;
@@ -104,5 +104,17 @@ pub fn tls_keys(tls: &TlsFiles) -> TlsKeys {
         authority: tls.authority.clone(),
         certificate: tls.certificate.clone(),
         private_key: tls.private_key.clone(),
+        validity: {
+            let validity = tls.validity.clone();
+            Validity::by(move || {
+                let outside = validity.outside(Date::of(SystemTime::now()));
+                // The error of a call has a code of its own.
+                outside.map(|error| {
+                    let text = error.to_string();
+                    let words = text.strip_prefix(&format!("{}: ", error.code()));
+                    words.unwrap_or(&text).to_owned()
+                })
+            })
+        },
     }
 }

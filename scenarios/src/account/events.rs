@@ -168,7 +168,7 @@ impl Account {
                     referee.asked(write.input, write.value);
                 }
             }
-            RunEvent::Commanded { .. } => {}
+            RunEvent::Commanded { .. } | RunEvent::CommandRefused(_) => {}
             RunEvent::Interrupted => {
                 self.interrupted = true;
                 // The newest cycle may be cut off for some: it is none of the run any more.

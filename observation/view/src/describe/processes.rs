@@ -2,7 +2,7 @@
 
 use std::time::{Duration, UNIX_EPOCH};
 
-use understudy_bus::HostEvent;
+use understudy_bus::{HostEvent, RefusedOrder};
 use understudy_journal::{Action, Command, Members, RunEvent, time_text};
 use understudy_wire::{Member, SignalPlace, StateChoice};
 
@@ -30,6 +30,9 @@ descriptions! { host: HostEvent, members: Members;
     RefusedConnections { connections, address } => "refused-connections" Warning format!(
         "{connections} connections to the operators' port were refused because of the limit, the last from {address}"
     );
+    RefusedCertificates { connections, reason } => "refused-certificates" Warning
+        format!("{connections} certificates of callers were refused, the last because of: {reason}");
+    OrderRefused(order) => "order-refused" Warning refused_text(order);
     UnsendableFrames { frames, reason } => "unsendable-frames" Warning
         format!("{frames} frames could not be sent: {reason}");
     LinkReopened { silence_ms, peer } => "link-reopened" Warning
@@ -47,6 +50,18 @@ descriptions! { host: HostEvent, members: Members;
     JournalLost { records } => "journal-lost" Warning format!("{records} records are lost");
     UnknownCommand { line } => "unknown-command" Warning format!("received an unknown command: {line}");
     Stopped(_) => "stopped" Info "ended as requested";
+}
+
+/// An order that was refused, with the person and the names in it.
+fn refused_text(order: &RefusedOrder) -> String {
+    let RefusedOrder { to, order, signal, owner, reason, why, more } = order;
+    let signal = if signal.is_empty() { String::new() } else { format!(" of {signal}") };
+    let reason = if reason.is_empty() { String::new() } else { format!(" ({reason})") };
+    let more = match more {
+        0 => String::new(),
+        more => format!("; {more} more were refused before it"),
+    };
+    format!("{owner} orders {order}{signal} at {to}{reason}; refused: {why}{more}")
 }
 
 /// What a link did not receive: no member, or one that it is connected to.
@@ -78,6 +93,7 @@ descriptions! { run: RunEvent, members: Members;
         let refused = refused.as_ref().map_or_else(String::new, |why| format!("; refused: {why}"));
         format!("{owner} commands {what} of {}: {reason}{refused}", members.name(*member))
     };
+    CommandRefused(order) => "command-refused" Warning refused_text(order);
     Acknowledged(seen) => "acknowledged" Notice format!(
         "{} has acknowledged the alarm {} of {} of cycle {}",
         seen.owner, seen.alarm, seen.name, seen.cycle

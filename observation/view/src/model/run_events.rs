@@ -71,6 +71,7 @@ impl Model {
                 }
             }
             RunEvent::Commanded { .. }
+            | RunEvent::CommandRefused(_)
             | RunEvent::Journal { .. }
             | RunEvent::Checkpoint { .. }
             | RunEvent::Continues(_)

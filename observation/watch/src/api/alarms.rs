@@ -8,7 +8,8 @@ use axum::extract::rejection::{JsonRejection, PathRejection};
 use axum::extract::{Extension, Path, State};
 use serde::Deserialize;
 use serde_json::{Value, json};
-use understudy_journal::{OperatorAction, Shelving, Unshelving};
+use understudy_bus::RefusedOrder;
+use understudy_journal::{OperatorAction, Refusal, Shelving, Unshelving};
 
 use super::{Answered, command::named};
 use crate::app::App;
@@ -30,7 +31,10 @@ pub(super) async fn acknowledge(
     let Path(number) = number?;
     let Json(Acknowledged { owner }) = body?;
     let owner = named(&person, owner)?;
+    let refused =
+        |why: &str| RefusedOrder::new("acknowledge-alarm", &format!("alarm {number}"), &owner, why);
     if let Some(why) = App::why_not_act(&person) {
+        app.commanding.record_refused(Some(refused(why))).await;
         return Err(Problem::forbidden(why));
     }
     if let Some((from, percent)) = app.model().known().and_then(Known::past) {
@@ -38,9 +42,11 @@ pub(super) async fn acknowledge(
             "the alarms before cycle {from} are being read ({percent} %): try again in some seconds"
         )));
     }
-    let alarm = app
-        .alarm(number)?
-        .ok_or_else(|| Problem::unknown(format!("the run has no alarm {number}")))?;
+    let Some(alarm) = app.alarm(number)? else {
+        let problem = Problem::unknown(format!("the run has no alarm {number}"));
+        app.commanding.record_refused(Some(refused(&problem.words()))).await;
+        return Err(problem);
+    };
     let seen = alarm.acknowledgement(owner, unix_seconds());
     // It is shown as acknowledged once the journal contains it.
     let done = app.commanding.commander.acknowledge(seen).await;
@@ -103,6 +109,8 @@ pub(super) async fn unshelve(
 /// Does what a person wants with an alarm; it is shown once the journal contains it.
 async fn act(app: &App, person: &Person, action: OperatorAction) -> Answered<Json<Value>> {
     if let Some(why) = App::why_not_act(person) {
+        let refusal = Refusal::Said(why.to_owned());
+        app.commanding.record_refused(action.refused(&refusal)).await;
         return Err(Problem::forbidden(why));
     }
     let alarms = {
@@ -111,8 +119,10 @@ async fn act(app: &App, person: &Person, action: OperatorAction) -> Answered<Jso
         let unknown = || Problem::unknown("the run has not started".to_owned());
         Arc::clone(cluster.ok_or_else(unknown)?.alarms())
     };
-    let checked = action.alarm_event(&alarms);
-    checked.map_err(|refusal| Problem::bad(refusal.to_string()))?;
+    if let Err(refusal) = action.alarm_event(&alarms) {
+        app.commanding.record_refused(action.refused(&refusal)).await;
+        return Err(Problem::bad(refusal.to_string()));
+    }
     let done = app.commanding.commander.act(action).await;
     done.map_err(|refusal| Problem::refused(&refusal.to_string()))?;
     Ok(Json(json!({})))

@@ -7,6 +7,7 @@ use axum::extract::rejection::JsonRejection;
 use axum::extract::{Extension, State};
 use serde::Deserialize;
 use serde_json::{Value, json};
+use understudy_bus::RefusedOrder;
 use understudy_cluster::Cluster;
 use understudy_journal::{
     Command, Done, Refusal, RequestedValue, WriteRequest, force_value, new_write,
@@ -106,23 +107,14 @@ pub(super) async fn command(
     body: Result<Json<Asked>, JsonRejection>,
 ) -> Answered<Json<Value>> {
     let Json(asked) = body?;
-    let is_write = matches!(asked.command, AskedCommand::Write { .. });
-    let why = if is_write { app.why_not_write(&person) } else { app.why_not(&person) };
-    if let Some(why) = why {
-        return Err(Problem::forbidden(why));
-    }
-    let owner = named(&person, asked.owner)?;
-    let reason = readable(asked.reason, MAXIMUM_REASON_LENGTH, "the reason")?;
-    let (member, command) = {
-        let model = app.model();
-        let member = model.member(&asked.member);
-        let member = member.ok_or_else(|| {
-            Problem::unknown(format!("the cluster has no member {:.60}", asked.member))
-        })?;
-        let started = || Problem::unknown("the run has not started");
-        let cluster = model.cluster().ok_or_else(started)?;
-        let by = By { role: person.role, owner: &owner, reason: &reason };
-        (member, asked.command.given(cluster, member, by)?)
+    let order = asked.order(&person);
+    let Ordered { member, command, owner, reason } = match ordered(&app, &person, asked) {
+        Ok(ordered) => ordered,
+        Err(problem) => {
+            let order = RefusedOrder { why: problem.words(), ..order };
+            app.commanding.record_refused(Some(order)).await;
+            return Err(problem);
+        }
     };
     let done: Result<Done, Refusal> = match command {
         Command::Write(write) => app.writes.write(member, write).await,
@@ -141,6 +133,44 @@ pub(super) async fn command(
     Ok(Json(json!({ "cycle": cycle, "run_cycle": run_cycle })))
 }
 
+/// A command that may be given.
+struct Ordered {
+    member: Member,
+    command: Command,
+    owner: String,
+    reason: String,
+}
+
+/// Whether a person may give a command, and what it is.
+fn ordered(app: &App, person: &Person, asked: Asked) -> Answered<Ordered> {
+    let is_write = matches!(asked.command, AskedCommand::Write { .. });
+    let why = if is_write { app.why_not_write(person) } else { app.why_not(person) };
+    if let Some(why) = why {
+        return Err(Problem::forbidden(why));
+    }
+    let owner = named(person, asked.owner)?;
+    let reason = readable(asked.reason, MAXIMUM_REASON_LENGTH, "the reason")?;
+    let model = app.model();
+    let member = model.member(&asked.member);
+    let member = member.ok_or_else(|| {
+        Problem::unknown(format!("the cluster has no member {:.60}", asked.member))
+    })?;
+    let started = || Problem::unknown("the run has not started");
+    let cluster = model.cluster().ok_or_else(started)?;
+    let by = By { role: person.role, owner: &owner, reason: &reason };
+    let command = asked.command.given(cluster, member, by)?;
+    Ok(Ordered { member, command, owner, reason })
+}
+
+impl Asked {
+    /// As an order that is refused; only why is not known yet.
+    fn order(&self, person: &Person) -> RefusedOrder {
+        let (order, signal) = self.command.words();
+        let owner = if person.name.is_empty() { &self.owner } else { &person.name };
+        RefusedOrder::new(order, &self.member, owner, "").with(&signal, &self.reason)
+    }
+}
+
 /// Person who gives a command.
 struct By<'a> {
     role: Role,
@@ -149,6 +179,27 @@ struct By<'a> {
 }
 
 impl AskedCommand {
+    /// Its word, and its signal where it has one.
+    fn words(&self) -> (&'static str, String) {
+        let place = |signal: &SignalPlace| match signal {
+            SignalPlace::Input(place) => format!("input {place}"),
+            SignalPlace::Output(place) => format!("output {place}"),
+        };
+        match self {
+            Self::Kill => ("kill", String::new()),
+            Self::Restart => ("restart", String::new()),
+            Self::Stop => ("stop", String::new()),
+            Self::Continue => ("continue", String::new()),
+            Self::Release => ("release", String::new()),
+            Self::Choose { .. } => ("choose", String::new()),
+            Self::Isolate => ("isolate", String::new()),
+            Self::Rejoin => ("rejoin", String::new()),
+            Self::Force { signal, .. } => ("force", place(signal)),
+            Self::Unforce { signal } => ("unforce", place(signal)),
+            Self::Write { input, .. } => ("write", input.clone()),
+        }
+    }
+
     /// The command to a member of the cluster.
     fn given(self, cluster: &Cluster, member: Member, by: By<'_>) -> Answered<Command> {
         let (owner, reason) = (by.owner.to_owned(), by.reason.to_owned());

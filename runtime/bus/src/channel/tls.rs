@@ -1,13 +1,15 @@
 //! Mutual TLS, and who may do what over it: the settings that both ends of the channel share.
 
+use std::fmt;
 use std::net::SocketAddr;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use serde_json::json;
 use understudy_wire::{ClusterHash, Role};
 
 /// Where a holder's TLS files lie.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub struct TlsKeys {
     /// The certificate of the authority, whom alone a listener trusts.
     pub authority: PathBuf,
@@ -15,6 +17,32 @@ pub struct TlsKeys {
     pub certificate: PathBuf,
     /// Its own private key.
     pub private_key: PathBuf,
+    /// Whether its own certificate counts now.
+    pub validity: Validity,
+}
+
+/// Says why a certificate does not count by the clock of this machine, with both times.
+#[derive(Clone, Default)]
+pub struct Validity(Option<Arc<Check>>);
+
+type Check = dyn Fn() -> Option<String> + Send + Sync;
+
+impl Validity {
+    /// By a function that is asked whenever it matters, since clocks are set and time passes.
+    pub fn by(check: impl Fn() -> Option<String> + Send + Sync + 'static) -> Self {
+        Self(Some(Arc::new(check)))
+    }
+
+    /// Why the certificate does not count now; nothing where it does, or where that is not known.
+    pub fn reason(&self) -> Option<String> {
+        self.0.as_ref().and_then(|check| check())
+    }
+}
+
+impl fmt::Debug for Validity {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_tuple("Validity").field(&self.reason()).finish()
+    }
 }
 
 /// Whose calls are answered, by the common names of their certificates.
@@ -24,7 +52,7 @@ pub struct Admitted {
     pub engineers: Vec<String>,
     /// May also write operator inputs.
     pub operators: Vec<String>,
-    /// May also follow the journal.
+    /// May also follow the journal, and report an order that was refused.
     pub viewers: Vec<String>,
     /// May ask.
     pub members: Vec<String>,
@@ -41,6 +69,9 @@ impl Admitted {
 /// Where a member takes writes, by the role that may ask there.
 pub(crate) const WRITE_KEYS: [(Role, &str); 2] =
     [(Role::Operator, "write/operator"), (Role::Engineer, "write/engineer")];
+
+/// Where a member is told of orders that were refused before they were sent.
+pub(crate) const REFUSED_KEY: &str = "refused";
 
 /// Where a member's keys begin.
 pub(crate) fn prefix(cluster: ClusterHash, name: &str) -> String {
@@ -100,6 +131,7 @@ pub(super) fn access_control(prefix: &str, hash: &str, admitted: &Admitted) -> s
     let commands = vec![format!("{prefix}/command/*")];
     let writes = WRITE_KEYS.map(|(_, key)| vec![format!("{prefix}/{key}")]);
     let journal = vec![format!("{prefix}/journal")];
+    let refused = vec![format!("{prefix}/{REFUSED_KEY}")];
     let rule = |id: &str, messages: &[&str], flow: &str, keys: &[String]| {
         json!({
             "id": id,
@@ -115,6 +147,8 @@ pub(super) fn access_control(prefix: &str, hash: &str, admitted: &Admitted) -> s
         rule("ask-answer", &answers, "egress", &asked),
         rule("follow", &["declare_subscriber"], "ingress", &journal),
         rule("follow-lines", &["put"], "egress", &journal),
+        rule("refused", &["query"], "ingress", &refused),
+        rule("refused-answer", &answers, "egress", &refused),
         rule("write", &["query"], "ingress", &writes[0]),
         rule("write-answer", &answers, "egress", &writes[0]),
         rule("engineer-write", &["query"], "ingress", &writes[1]),
@@ -126,8 +160,8 @@ pub(super) fn access_control(prefix: &str, hash: &str, admitted: &Admitted) -> s
     // Each may do what the one before it may.
     let groups = [
         ("members", &admitted.members, &all[..2]),
-        ("viewers", &admitted.viewers, &all[..4]),
-        ("operators", &admitted.operators, &all[..6]),
+        ("viewers", &admitted.viewers, &all[..6]),
+        ("operators", &admitted.operators, &all[..8]),
         ("engineers", &admitted.engineers, &all[..]),
     ];
     // A group of nobody would be one of everybody: Zenoh takes a missing list for a wildcard, and refuses an empty one.
