@@ -248,8 +248,8 @@ impl Lowering<'_> {
         }
         let other = self.extents[other].clone();
         let message = format!(
-            "`{name}` at {address} and `{}` at {} share a part of the memory",
-            other.name, other.address
+            "`{name}` at {address} and, at {}, `{}` share a part of the memory",
+            other.address, other.name
         );
         let found = understudy_text::Diagnostic::error("U1083", message, address.span());
         let found = found.with_related(other.span, "the other one");
