@@ -247,7 +247,8 @@ fn translate(text: &str, project: &Project, pou: &Pou, reading: &mut Reading) {
     {
         let mut found = Vec::new();
         let period = reading.period.unwrap_or(USUAL_PERIOD);
-        let plan = plan::plan(graph, &|name| units::is_block(project, name), &mut found);
+        let is_block = |name: &str| units::is_block(project, name);
+        let plan = plan::plan(graph, &is_block, &units::places(project, pou), &mut found);
         let drawn = ladder::draw(project, pou, &plan, period);
         let is_wrong = has_errors(&found) || has_errors(&drawn.diagnostics);
         if drawn.general.is_empty() || is_wrong {
@@ -269,7 +270,9 @@ fn translate(text: &str, project: &Project, pou: &Pou, reading: &mut Reading) {
     }
     let used = units::used(project, pou);
     let used = used.iter().map(|unit| unit.name.to_uppercase()).collect();
-    let (mut file, found) = typed::read_typed_of(text, Some(&used));
+    let typed::ReadFile { mut file, diagnostics: found, notes } =
+        typed::read_typed_of(text, Some(&used));
+    reading.fidelity.plan(notes);
     // The period is that of the task that was found.
     file.instances.retain(|instance| has_event && instance.of.is(&pou.name));
     file.tasks.retain(|_| has_event);

@@ -71,11 +71,12 @@ pub(crate) fn draw(project: &Project, pou: &Pou, plan: &Plan, period: Duration) 
                 drawing.write(targets, power, &step.span);
             }
             Action::Call(call) => drawing.call(call, &step.span),
-            Action::Keep { object, power, guard } => {
+            Action::Keep { object, power, edge, guard } => {
                 if guard.is_some() {
                     drawing.general("a function with EN", step.span.clone());
                 }
-                let contact = drawing.kept_in(power, &format!("power_{object}"), &step.span);
+                let contact =
+                    drawing.kept_edge(power, *edge, &format!("power_{object}"), &step.span);
                 drawing.kept.insert(*object, contact);
             }
             Action::Jump { .. } | Action::Label(_) => {
@@ -132,8 +133,24 @@ impl Drawing<'_> {
 
     /// A new memory bit that takes a power in a rung of its own.
     fn kept_in(&mut self, power: &Power, wanted: &str, span: &Range<usize>) -> Name {
+        self.kept_edge(power, None, wanted, span)
+    }
+
+    /// A new memory bit for a power or its edge.
+    fn kept_edge(
+        &mut self,
+        power: &Power,
+        edge: Option<Edge>,
+        wanted: &str,
+        span: &Range<usize>,
+    ) -> Name {
         let network = self.series(power);
-        self.bit_of(network, CoilKind::Plain, wanted, span)
+        let kind = match edge {
+            None => CoilKind::Plain,
+            Some(Edge::Rising) => CoilKind::Rising,
+            Some(Edge::Falling) => CoilKind::Falling,
+        };
+        self.bit_of(network, kind, wanted, span)
     }
 
     fn bit_of(

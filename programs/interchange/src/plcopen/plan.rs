@@ -7,6 +7,9 @@
 
 mod jumps;
 mod links;
+mod places;
+mod rings;
+mod stale;
 mod walk;
 
 use std::collections::{HashMap, HashSet};
@@ -15,11 +18,13 @@ use std::ops::Range;
 use understudy_ladder::Name;
 use understudy_text::Diagnostic;
 
-use self::links::{Links, Source};
-use self::walk::{Trace, Walk};
-use super::document::{Graph, Kind, Language, Modifier};
+use self::links::Links;
+use self::stale::stale;
+use self::walk::Walk;
+use super::document::{Edge, Graph, Kind, Language, Modifier};
 use super::power::Power;
-use super::standard::StandardBlock;
+
+pub(crate) use self::places::Places;
 
 /// Distances between comments and rungs that are measured; with more, comments stand at the end.
 const MAXIMUM_DISTANCES: usize = 10_000_000;
@@ -53,10 +58,12 @@ pub(crate) enum Action {
     },
     /// A function block's turn.
     Call(Call),
-    /// The power of an object is kept for later steps of this scan; with a guard, for later scans too.
+    /// The power of an object, or its edge, is kept for later steps of this scan; with a guard, for later scans too. The
+    /// pins of blocks have numbers of their own behind those of the objects.
     Keep {
         object: usize,
         power: Power,
+        edge: Option<Edge>,
         guard: Option<Power>,
     },
     /// With power, what comes before the label is not done; without a name, what comes before the end.
@@ -105,13 +112,14 @@ impl Action {
     }
 }
 
-/// Plans a graph of LD or FBD; `is_block` tells instances' types from functions.
+/// Plans a graph of LD or FBD; `is_block` tells instances' types from functions, `places` has the addresses of variables.
 pub(crate) fn plan(
     graph: &Graph,
     is_block: &dyn Fn(&str) -> bool,
+    places: &Places,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Plan {
-    let plan = walked(graph, is_block, Rules::Bits, diagnostics);
+    let plan = walked(graph, is_block, places, Rules::Bits, diagnostics);
     jumps::check(graph, &plan, diagnostics);
     plan
 }
@@ -121,9 +129,10 @@ pub(crate) fn plan(
 pub(crate) fn plan_numbers(
     graph: &Graph,
     is_block: &dyn Fn(&str) -> bool,
+    places: &Places,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Plan {
-    walked(graph, is_block, Rules::Numbers, diagnostics)
+    walked(graph, is_block, places, Rules::Numbers, diagnostics)
 }
 
 /// What a graph may hold.
@@ -136,110 +145,39 @@ enum Rules {
 fn walked(
     graph: &Graph,
     is_block: &dyn Fn(&str) -> bool,
+    places: &Places,
     rules: Rules,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Plan {
     let links = Links::new(graph, is_block, diagnostics);
-    let mut found = Vec::new();
-    let (mut plan, trace) = Walk::new(graph, &links, &HashSet::new(), rules).run(&mut found);
-    let mut stale = stale(graph, &links, &plan, &trace);
-    stale.extend(&trace.fed_back);
-    if !stale.is_empty() {
-        found.clear();
-        plan = Walk::new(graph, &links, &stale, rules).run(&mut found).0;
-        stale.retain(|object| !trace.fed_back.contains(object));
-    }
-    diagnostics.append(&mut found);
-    for object in stale {
+    let mut keep = HashSet::new();
+    let mut reread = HashSet::new();
+    let mut plan = loop {
+        let mut found = Vec::new();
+        let (plan, trace) = Walk::new(graph, &links, &keep, rules).run(&mut found);
+        let stale = stale(graph, &links, (&plan, &trace), places);
+        let known = keep.len();
+        keep.extend(&trace.fed_back);
+        reread.extend(stale.iter().filter(|object| !keep.contains(*object)));
+        keep.extend(stale);
+        if keep.len() == known {
+            diagnostics.append(&mut found);
+            break plan;
+        }
+    };
+    for object in reread {
+        let Some(object) = graph.objects.get(object).or_else(|| links.enabled(graph, object))
+        else {
+            continue;
+        };
         let message = "it is asked for again after its variable has been written: it keeps what it let through first, where tools that \
                        write Structured Text read the variable again";
-        let span = graph.objects[object].span.clone();
-        plan.notes.push((message.to_owned(), span));
+        plan.notes.push((message.to_owned(), object.span.clone()));
     }
     plan.notes.sort_by_key(|(_, span)| span.start);
+    plan.notes.dedup();
     comments(graph, &mut plan);
     plan
-}
-
-/// The objects whose reading would differ between the first and the last step that asks for them.
-fn stale(graph: &Graph, links: &Links, plan: &Plan, trace: &Trace) -> HashSet<usize> {
-    // Who asks later has finished later, so the last step that asks is known when its sources are looked at.
-    let mut last = vec![0; graph.objects.len()];
-    for &place in trace.finished.iter().rev() {
-        let asks = trace.step[place].unwrap_or(last[place]);
-        last[place] = asks;
-        for source in links.sources[place].iter().flatten() {
-            if let Source::Output(from, _) = source {
-                last[*from] = last[*from].max(asks);
-            }
-        }
-    }
-    let mut writes: HashMap<String, Vec<usize>> = HashMap::new();
-    let mut calls = Vec::new();
-    for (place, step) in plan.steps.iter().enumerate() {
-        match &step.action {
-            Action::Write { targets, .. } => {
-                for (target, _) in targets {
-                    writes.entry(target.to_uppercase()).or_default().push(place);
-                }
-            }
-            Action::Call(call) => {
-                let key = format!("{}.", call.instance.to_uppercase());
-                writes.entry(key).or_default().push(place);
-                // A unit of the file may write global variables, and those at its in-out pins.
-                if StandardBlock::of(&call.type_name).is_none() {
-                    calls.push(place);
-                }
-            }
-            Action::Keep { .. } | Action::Jump { .. } | Action::Label(_) => {}
-        }
-    }
-    let is_between = |places: &[usize], first: usize, last: usize| {
-        let next = places.partition_point(|&place| place < first);
-        places.get(next).is_some_and(|&place| place < last)
-    };
-    let changed = |text: &str, first: usize, last: usize| {
-        writes.get(text).is_some_and(|places| is_between(places, first, last))
-    };
-    let mut stale = HashSet::new();
-    for &place in &trace.finished {
-        let text = match &graph.objects[place].kind {
-            Kind::Contact(text, _) | Kind::InVariable(text, _) => text.to_uppercase(),
-            Kind::InOutVariable(text, ..) => text.to_uppercase(),
-            _ => continue,
-        };
-        let instance = text.split_once('.').map(|(instance, _)| format!("{instance}."));
-        let asked = (trace.first[place], last[place]);
-        let is_named = text.starts_with(|first: char| first.is_alphabetic() || first == '_');
-        if changed(&text, asked.0, asked.1)
-            || is_named && !text.contains('#') && is_between(&calls, asked.0, asked.1)
-            || instance.is_some_and(|instance| changed(&instance, asked.0, asked.1))
-        {
-            stale.insert(place);
-        }
-    }
-    answers(graph, links, &mut stale);
-    stale
-}
-
-/// A number is kept as what a function makes of it: a comparison is one bit.
-fn answers(graph: &Graph, links: &Links, stale: &mut HashSet<usize>) {
-    let mut asked: HashMap<usize, usize> = HashMap::new();
-    for (place, object) in graph.objects.iter().enumerate() {
-        if matches!(object.kind, Kind::Block(_)) && !links.is_block[place] {
-            for source in links.sources[place].iter().flatten() {
-                if let Source::Output(from, _) = source
-                    && matches!(graph.objects[*from].kind, Kind::InVariable(..))
-                    && stale.contains(from)
-                {
-                    stale.insert(place);
-                    *asked.entry(*from).or_default() += 1;
-                }
-            }
-        }
-    }
-    // What only functions ask for needs no bit itself.
-    stale.retain(|place| asked.get(place) != Some(&links.fan_out[*place]));
 }
 
 /// Gives each comment to the nearest step below it; there may be several columns of rungs on a sheet.

@@ -33,21 +33,29 @@ const FIRST_EDITION: &str = "http://www.plcopen.org/xml/tc6.xsd";
 struct Typed {
     file: File,
     diagnostics: Vec<Diagnostic>,
+    notes: Vec<(String, Range<usize>)>,
+}
+
+/// A document as syntax.
+#[derive(Default)]
+pub(super) struct ReadFile {
+    pub(super) file: File,
+    pub(super) diagnostics: Vec<Diagnostic>,
+    /// What is worth knowing of its networks and changes nothing.
+    pub(super) notes: Vec<(String, Range<usize>)>,
 }
 
 /// Reads a document, with everything that is wrong with it. Places are those of the document.
 pub fn read_typed(text: &str) -> (File, Vec<Diagnostic>) {
-    read_typed_of(text, None)
+    let read = read_typed_of(text, None);
+    (read.file, read.diagnostics)
 }
 
 /// Reads of a document the units of these names, in capitals; all of them where none are given.
-pub(super) fn read_typed_of(
-    text: &str,
-    units: Option<&HashSet<String>>,
-) -> (File, Vec<Diagnostic>) {
+pub(super) fn read_typed_of(text: &str, units: Option<&HashSet<String>>) -> ReadFile {
     let document = match xml::parse(text) {
         Ok(document) => document,
-        Err(error) => return (File::default(), vec![error]),
+        Err(error) => return ReadFile { diagnostics: vec![error], ..ReadFile::default() },
     };
     let root = document.root_element();
     let namespace = root.tag_name().namespace().unwrap_or_default();
@@ -59,9 +67,9 @@ pub(super) fn read_typed_of(
         );
         let error = Diagnostic::error("U1001", message, xml::start_tag(root));
         let help = format!("it should be `project` in the namespace {:?}", NAMESPACES[0]);
-        return (File::default(), vec![error.with_help(help)]);
+        return ReadFile { diagnostics: vec![error.with_help(help)], ..ReadFile::default() };
     }
-    let mut typed = Typed { file: File::default(), diagnostics: Vec::new() };
+    let mut typed = Typed { file: File::default(), diagnostics: Vec::new(), notes: Vec::new() };
     account::check(root, &mut typed.diagnostics);
     typed.project(root, units);
     let mut diagnostics = typed.diagnostics;
@@ -73,7 +81,11 @@ pub(super) fn read_typed_of(
     }
     diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
     diagnostics.dedup();
-    (typed.file, diagnostics)
+    let mut notes = typed.notes;
+    for (_, span) in &mut notes {
+        within(text, span);
+    }
+    ReadFile { file: typed.file, diagnostics, notes }
 }
 
 /// The units of a document whose bodies are ladders or function blocks, in capitals.
@@ -220,6 +232,7 @@ impl Typed {
             }
         };
         let made = std::mem::take(&mut network.made);
+        self.notes.append(&mut network.notes);
         if !is_chart {
             for part in pou.actions.iter().chain(&pou.transitions) {
                 found.push(foreign(part, pou));

@@ -3,7 +3,8 @@
 use understudy_ladder::Name;
 use understudy_text::Diagnostic;
 
-use super::document::{Body, Ignored, Pou, PouKind, Project, VariableType};
+use super::document::{Body, Ignored, Pou, PouKind, Project, Section, VariableType};
+use super::plan::Places;
 use super::standard::StandardBlock;
 
 /// The unit and all units that it uses, itself first.
@@ -39,6 +40,21 @@ fn mentions(pou: &Pou, name: &str) -> bool {
 
 fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split(|letter: char| !letter.is_alphanumeric() && letter != '_')
+}
+
+/// Where the variables of a unit are.
+pub(crate) fn places(project: &Project, pou: &Pou) -> Places {
+    let mut places = Places::default();
+    let has_in_out = pou.variables.iter().any(|known| known.section == Section::InOut);
+    for known in pou.variables.iter().chain(&project.globals) {
+        if let Some(address) = &known.address {
+            places.located(&known.name, address);
+        }
+        if has_in_out && matches!(known.section, Section::InOut | Section::External) {
+            places.of_caller(&known.name);
+        }
+    }
+    places
 }
 
 /// Whether a block of that type keeps something from scan to scan.

@@ -6,6 +6,7 @@ use std::fmt::Write;
 use understudy_interchange::plcopen::read;
 use understudy_ladder::print;
 
+use crate::numbers::{Scans, typed};
 use crate::support::{PERIOD, data, findings, program};
 use understudy_logic::Running;
 use understudy_testing::random::Dice;
@@ -17,6 +18,8 @@ pub(crate) struct Cell {
     is_coil: bool,
     negated: bool,
     edge: Option<bool>,
+    /// A coil that sets or resets.
+    sets: Option<bool>,
     place: (usize, usize),
     /// 0 is the rail.
     sources: Vec<usize>,
@@ -65,7 +68,17 @@ impl Naive<'_> {
         for &id in order {
             let power = self.power(id);
             let cell = &self.cells[id - 1];
-            self.values.insert(cell.variable.clone(), power != cell.negated);
+            let value = match (cell.sets, cell.edge) {
+                (Some(sets), _) if power => sets,
+                (Some(_), _) => continue,
+                (None, None) => power != cell.negated,
+                (None, Some(rising)) => {
+                    let input = power == rising;
+                    let last = self.last.insert(id, input).unwrap_or(false);
+                    input && !last
+                }
+            };
+            self.values.insert(cell.variable.clone(), value);
         }
     }
 }
@@ -106,8 +119,13 @@ pub(crate) fn element(cell: &Cell) -> String {
         Some(true) => " edge=\"rising\"",
         Some(false) => " edge=\"falling\"",
     };
+    let storage = match cell.sets {
+        None => "",
+        Some(true) => " storage=\"set\"",
+        Some(false) => " storage=\"reset\"",
+    };
     format!(
-        "<{name} localId=\"{}\" negated=\"{}\"{edge}><position x=\"{}\" y=\"{}\"/><connectionPointIn>{}</connectionPointIn><connectionPointOut/><variable>{}</variable></{name}>\n",
+        "<{name} localId=\"{}\" negated=\"{}\"{edge}{storage}><position x=\"{}\" y=\"{}\"/><connectionPointIn>{}</connectionPointIn><connectionPointOut/><variable>{}</variable></{name}>\n",
         cell.id,
         cell.negated,
         cell.place.0,
@@ -131,13 +149,15 @@ fn random_cells(dice: &mut Dice) -> Vec<Cell> {
         let names = ["i0", "i1", "i2", "q0", "q1", "m0"];
         let first = if is_coil { 3 } else { 0 };
         let variable = names[first + dice.below(names.len() - first)].to_owned();
-        let edge = (!is_coil && dice.rarely(4)).then(|| dice.rarely(2));
+        let sets = (is_coil && dice.rarely(2)).then(|| dice.rarely(2));
+        let edge = (sets.is_none() && dice.rarely(4)).then(|| dice.rarely(2));
         cells.push(Cell {
             id,
             variable,
             is_coil,
-            negated: edge.is_none() && dice.rarely(3),
+            negated: edge.is_none() && sets.is_none() && dice.rarely(3),
             edge,
+            sets,
             place: (id * 10, dice.below(5) * 10),
             sources,
         });
@@ -162,6 +182,10 @@ fn random_graphs_mean_what_a_naive_walk_finds() {
         let program = program(&file(&declared, &format!("{RAIL}{objects}")));
         let circuit = program.lower(PERIOD).expect("it was checked");
         let mut run = Running::new(&circuit);
+        // With a number among its points the file is a program with numbers.
+        let numbers = declared.clone() + &variables(&[("output", "n", "<INT/>")]);
+        let numbers = typed(&file(&numbers, &format!("{RAIL}{objects}")), PERIOD);
+        let mut scans = Scans::new(numbers.expect("it has no errors as a ladder"));
         let mut order: Vec<usize> =
             cells.iter().filter(|cell| cell.is_coil).map(|cell| cell.id).collect();
         order.sort_by_key(|id| (cells[id - 1].place.1, cells[id - 1].place.0));
@@ -187,6 +211,11 @@ fn random_graphs_mean_what_a_naive_walk_finds() {
                 "seed {seed}, scan {scan}\n{objects}\n{}",
                 print(&program)
             );
+            let given: Vec<u64> = inputs.iter().map(|bit| u64::from(*bit)).collect();
+            let mut shown = scans.scan(&given);
+            assert_eq!(shown.pop(), Some(0));
+            let shown: Vec<bool> = shown.iter().map(|bit| *bit != 0).collect();
+            assert_eq!(shown, expected, "with numbers: seed {seed}, scan {scan}\n{objects}");
         }
     }
 }
@@ -227,7 +256,7 @@ fn shown(variables: &str, objects: &str) -> String {
     format!("{}\n{program}", lines.join("\n"))
 }
 
-const BITS: [(&str, &str, &str); 4] = [
+pub(crate) const BITS: [(&str, &str, &str); 4] = [
     ("input", "a", "<BOOL/>"),
     ("input", "b", "<BOOL/>"),
     ("output", "y", "<BOOL/>"),
@@ -241,6 +270,7 @@ pub(crate) fn contact(id: usize, variable: &str, sources: &[usize]) -> String {
         is_coil: false,
         negated: false,
         edge: None,
+        sets: None,
         place: (id * 10, id * 10),
         sources: sources.to_vec(),
     })
@@ -330,6 +360,7 @@ fn cell(id: usize, variable: &str, sources: &[usize]) -> Cell {
         is_coil: false,
         negated: false,
         edge: None,
+        sets: None,
         place: (id * 10, id * 10),
         sources: sources.to_vec(),
     }

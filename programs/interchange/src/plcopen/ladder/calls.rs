@@ -4,13 +4,13 @@ use std::ops::Range;
 use std::time::Duration;
 
 use understudy_ladder::{
-    Block, BlockKind, CoilKind, Contact, ContactKind, Element, Feed, MAXIMUM_PRESET_TIME,
+    Block, BlockKind, Contact, ContactKind, Element, Feed, MAXIMUM_PRESET_TIME,
     MAXIMUM_PRESET_VALUE, Name, Series,
 };
 
 use super::Drawing;
 use super::scope::Binding;
-use crate::plcopen::document::{Edge, Ignored};
+use crate::plcopen::document::Ignored;
 use crate::plcopen::literal::{integer, time};
 use crate::plcopen::plan::{Action, Call, Input};
 use crate::plcopen::power::Power;
@@ -165,13 +165,10 @@ impl Drawing<'_> {
     fn input(&mut self, input: &Input, span: &Range<usize>) -> Series {
         let power =
             if input.modifier.negated { input.power.clone().not() } else { input.power.clone() };
-        let network = self.series(&power);
-        let kind = match input.modifier.edge {
-            None => return network,
-            Some(Edge::Rising) => CoilKind::Rising,
-            Some(Edge::Falling) => CoilKind::Falling,
+        let Some(edge) = input.modifier.edge else {
+            return self.series(&power);
         };
-        let operand = self.bit_of(network, kind, &format!("{}_edge", input.pin), span);
+        let operand = self.kept_edge(&power, Some(edge), &format!("{}_edge", input.pin), span);
         vec![Element::Contact(Contact { kind: ContactKind::NormallyOpen, operand })]
     }
 

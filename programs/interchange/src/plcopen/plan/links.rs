@@ -7,6 +7,7 @@ use understudy_ladder::Name;
 use understudy_text::Diagnostic;
 
 use super::is_ladder;
+use super::rings::rings;
 use crate::plcopen::document::{CONDITION, Graph, Kind, Object, Pin, Wire};
 use crate::plcopen::standard::StandardBlock;
 
@@ -32,6 +33,12 @@ pub(super) struct Links {
     pub(super) fan_out: Vec<usize>,
     /// Calls of function blocks, as opposed to functions.
     pub(super) is_block: Vec<bool>,
+    /// By object: whether something asks for its ENO.
+    pub(super) takes_eno: Vec<bool>,
+    /// The numbers of rings.
+    pub(super) ring: Vec<usize>,
+    /// By object: the number of its first pin.
+    first_pin: Vec<usize>,
 }
 
 struct Resolver<'a> {
@@ -73,7 +80,12 @@ impl Links {
             Resolver { graph, places, connectors, is_block: &blocks, looks: Cell::new(0) };
         let mut sources = Vec::with_capacity(graph.objects.len());
         let mut fan_out = vec![0; graph.objects.len()];
+        let mut takes_eno = vec![false; graph.objects.len()];
+        let mut first_pin = Vec::with_capacity(graph.objects.len());
+        let mut pins = 2 * graph.objects.len();
         for object in &graph.objects {
+            first_pin.push(pins);
+            pins += object.inputs.len();
             let mut inputs = Vec::new();
             for pin in &object.inputs {
                 if pin.wires.len() > MAXIMUM_WIRES {
@@ -92,8 +104,9 @@ impl Links {
                 };
                 if counts(object) {
                     for source in &found {
-                        if let Source::Output(from, _) = source {
+                        if let Source::Output(from, pin) = source {
                             fan_out[*from] += 1;
+                            takes_eno[*from] |= is_eno(pin.as_ref());
                         }
                     }
                 }
@@ -114,7 +127,23 @@ impl Links {
             let span = graph.objects.first().map_or(0..0, |object| object.span.clone());
             diagnostics.push(Diagnostic::error("U1001", message, span));
         }
-        Self { sources, fan_out, is_block: blocks }
+        let ring = rings(&sources);
+        Self { sources, fan_out, is_block: blocks, takes_eno, ring, first_pin }
+    }
+
+    /// The number of what an object has at EN.
+    pub(super) fn enable(&self, place: usize) -> usize {
+        self.sources.len() + place
+    }
+
+    /// The object of the number of what is at an EN.
+    pub(super) fn enabled<'a>(&self, graph: &'a Graph, number: usize) -> Option<&'a Object> {
+        graph.objects.get(number.checked_sub(self.sources.len())?)
+    }
+
+    /// The number of an input of an object.
+    pub(super) fn pin(&self, place: usize, input: usize) -> usize {
+        self.first_pin[place] + input
     }
 
     /// How many connections name an object, whatever becomes of them.
@@ -123,6 +152,11 @@ impl Links {
         let wires = pins.flat_map(|pin| &pin.wires);
         wires.filter(|wire| wire.from == object.id).count()
     }
+}
+
+/// Whether an output of a block says that the block was enabled.
+pub(super) fn is_eno(pin: Option<&Name>) -> bool {
+    pin.is_some_and(|pin| pin.eq_ignore_ascii_case("ENO"))
 }
 
 fn is_sequence(object: &Object) -> bool {

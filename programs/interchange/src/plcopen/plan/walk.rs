@@ -7,11 +7,11 @@ use std::collections::{HashMap, HashSet};
 use understudy_ladder::Name;
 use understudy_text::Diagnostic;
 
-use super::links::{Links, Source};
+use super::links::{Links, Source, is_eno};
 use super::{Plan, Rules};
 use finish::read;
 
-use crate::plcopen::document::{Condition, Graph, Kind, Language, Object};
+use crate::plcopen::document::{Condition, Graph, Kind, Language, Object, Pin};
 use crate::plcopen::power::Power;
 use crate::plcopen::standard::StandardBlock;
 
@@ -30,8 +30,16 @@ pub(super) struct Trace {
     pub(super) first: Vec<usize>,
     /// By object: its own step, where it has one.
     pub(super) step: Vec<Option<usize>>,
-    /// Objects that feed themselves, which are what they were in the last scan.
+    /// Objects that feed themselves, and EN of blocks that do, which are what they were in the last scan.
     pub(super) fed_back: HashSet<usize>,
+}
+
+/// An object whose sources are looked for.
+struct Open {
+    place: usize,
+    /// The object that acts and for which the source is looked for.
+    asker: usize,
+    waiting: Vec<usize>,
 }
 
 pub(super) struct Walk<'a> {
@@ -43,8 +51,10 @@ pub(super) struct Walk<'a> {
     states: Vec<State>,
     /// What each object lets through; for a block, of which there are several outputs, unused.
     powers: Vec<Option<Power>>,
-    /// The guard of a function with EN.
-    guards: HashMap<usize, Power>,
+    /// What is at the EN of blocks that have acted.
+    enables: HashMap<usize, Power>,
+    /// The place of each object in the order of all that act.
+    rank: Vec<Option<usize>>,
     plan: Plan,
     trace: Trace,
     /// The sources of the last step, if it is one of coils.
@@ -65,7 +75,8 @@ impl<'a> Walk<'a> {
             rules,
             states: vec![State::New; graph.objects.len()],
             powers: vec![None; graph.objects.len()],
-            guards: HashMap::new(),
+            enables: HashMap::new(),
+            rank: vec![None; graph.objects.len()],
             plan: Plan::default(),
             trace: Trace {
                 finished: Vec::new(),
@@ -85,6 +96,9 @@ impl<'a> Walk<'a> {
             let object = &objects[place];
             (self.order(object), object.position.1, object.position.0)
         });
+        for (rank, &place) in acting.iter().enumerate() {
+            self.rank[place] = Some(rank);
+        }
         for place in acting {
             self.visit(place, diagnostics);
         }
@@ -197,9 +211,9 @@ impl<'a> Walk<'a> {
         if self.states[root] == State::Done {
             return;
         }
-        let mut open: Vec<(usize, Vec<usize>)> = vec![self.enter(root)];
-        while let Some((place, waiting)) = open.last_mut() {
-            let place = *place;
+        let mut open: Vec<Open> = vec![self.enter(root, root)];
+        while let Some(Open { place, asker, waiting }) = open.last_mut() {
+            let (place, asker) = (*place, *asker);
             let Some(next) = waiting.pop() else {
                 open.pop();
                 self.trace.first[place] = self.plan.steps.len();
@@ -208,24 +222,72 @@ impl<'a> Walk<'a> {
                 self.states[place] = State::Done;
                 continue;
             };
+            let is_later = self.acts_later(next, asker);
             match self.states[next] {
                 State::Done => {}
+                State::New if is_later && self.links.ring[next] == self.links.ring[asker] => {
+                    self.goes_back(next, place, &open, diagnostics);
+                }
                 State::New => {
-                    let entered = self.enter(next);
+                    if is_later {
+                        diagnostics.push(self.out_of_order(next, asker));
+                    }
+                    let entered = self.enter(next, asker);
                     open.push(entered);
                 }
-                State::Open if self.links.is_block[next] => {
-                    let message = "its output goes back to its own inputs: they see what it was in the last scan";
-                    let span = self.graph.objects[next].span.clone();
-                    self.plan.notes.push((message.to_owned(), span));
-                }
-                State::Open if self.rules == Rules::Numbers => self.feed_back(next),
-                State::Open => {
-                    let ring: Vec<usize> = open.iter().map(|(place, _)| *place).collect();
-                    diagnostics.push(self.cycle(next, place, &ring));
-                    self.powers[next].get_or_insert(Power::Constant(false));
-                }
+                State::Open => self.goes_back(next, place, &open, diagnostics),
             }
+        }
+    }
+
+    /// Whether an object comes behind another one by its executionOrderId.
+    fn acts_later(&self, place: usize, asker: usize) -> bool {
+        self.object(asker).order != 0
+            && self.rank[place].zip(self.rank[asker]).is_some_and(|(place, asker)| place > asker)
+    }
+
+    /// The finding on an object that acts before its place, since another one needs its result.
+    fn out_of_order(&self, place: usize, asker: usize) -> Diagnostic {
+        let (object, asker) = (self.object(place), self.object(asker));
+        let order = |object: &Object| match object.order {
+            0 => "no executionOrderId".to_owned(),
+            order => format!("the executionOrderId {order}"),
+        };
+        let message = format!(
+            "object {} has {}, and feeds object {}, which has {}: it acts before that object here, \
+             and other tools use its result of the last scan",
+            object.id,
+            order(object),
+            asker.id,
+            order(asker)
+        );
+        Diagnostic::warning("U1024", message, object.span.clone())
+            .with_related(asker.span.clone(), "it feeds this object")
+            .with_help("number what feeds an object before the object; a value of the last scan goes through a variable")
+    }
+
+    /// An object feeds itself: what is asked of it is what it was in the last scan.
+    fn goes_back(
+        &mut self,
+        next: usize,
+        place: usize,
+        open: &[Open],
+        diagnostics: &mut Vec<Diagnostic>,
+    ) {
+        if self.links.takes_eno[next] && self.enable_input(next).is_some() {
+            self.trace.fed_back.insert(self.links.enable(next));
+        }
+        if self.links.is_block[next] {
+            let message =
+                "its output goes back to its own inputs: they see what it was in the last scan";
+            let span = self.graph.objects[next].span.clone();
+            self.plan.notes.push((message.to_owned(), span));
+        } else if self.rules == Rules::Numbers {
+            self.feed_back(next);
+        } else {
+            let ring: Vec<usize> = open.iter().map(|open| open.place).collect();
+            diagnostics.push(self.cycle(next, place, &ring));
+            self.powers[next].get_or_insert(Power::Constant(false));
         }
     }
 
@@ -242,17 +304,18 @@ impl<'a> Walk<'a> {
         self.powers[place].get_or_insert(last);
     }
 
-    fn enter(&mut self, place: usize) -> (usize, Vec<usize>) {
+    fn enter(&mut self, place: usize, asker: usize) -> Open {
         self.states[place] = State::Open;
-        let mut feeding: Vec<usize> = Vec::new();
+        let mut waiting: Vec<usize> = Vec::new();
         for source in self.links.sources[place].iter().flatten() {
             if let Source::Output(from, _) = source {
-                feeding.push(*from);
+                waiting.push(*from);
             }
         }
         // They are taken from the end.
-        feeding.reverse();
-        (place, feeding)
+        waiting.reverse();
+        let asker = if self.rank[place].is_some() { place } else { asker };
+        Open { place, asker, waiting }
     }
 
     fn cycle(&self, first: usize, last: usize, open: &[usize]) -> Diagnostic {
@@ -304,8 +367,8 @@ impl<'a> Walk<'a> {
             .iter()
             .find(|output| pin.as_ref().is_some_and(|pin| output.name.eq_ignore_ascii_case(pin)));
         let modifier = declared.map(|output| output.modifier).unwrap_or_default();
-        let power = if pin.as_ref().is_some_and(|pin| pin.eq_ignore_ascii_case("ENO")) {
-            self.enable(place).unwrap_or(Power::Constant(true))
+        let power = if is_eno(pin.as_ref()) {
+            self.enabled(place)
         } else if self.links.is_block[place] {
             let instance = self.instance(object);
             let standard = StandardBlock::of(&block.type_name);
@@ -340,15 +403,19 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// The power at EN, where it is connected.
-    fn enable(&self, place: usize) -> Option<Power> {
-        let object = self.object(place);
-        let input = object
-            .inputs
-            .iter()
-            .position(|pin| pin.name.eq_ignore_ascii_case("EN") && !pin.wires.is_empty())?;
-        let power = self.power(place, input);
-        let power = if object.inputs[input].modifier.negated { power.not() } else { power };
-        (power != Power::Constant(true)).then_some(power)
+    /// The power at ENO: that at EN, where it is connected.
+    fn enabled(&self, place: usize) -> Power {
+        let fed_back = || match self.enable_input(place) {
+            // It is asked for before it is known.
+            Some(_) if self.states[place] != State::Done => Power::Kept(self.links.enable(place)),
+            _ => Power::Constant(true),
+        };
+        self.enables.get(&place).cloned().unwrap_or_else(fed_back)
+    }
+
+    /// The input EN, where it is connected.
+    fn enable_input(&self, place: usize) -> Option<usize> {
+        let is_enable = |pin: &Pin| pin.name.eq_ignore_ascii_case("EN") && !pin.wires.is_empty();
+        self.object(place).inputs.iter().position(is_enable)
     }
 }

@@ -18,7 +18,7 @@ use super::network::Network;
 use crate::plcopen::document::{
     self, ActionContent, Body as Drawn, CONDITION, Condition, Graph, Kind, Part, Pou,
 };
-use crate::plcopen::plan::{self, Plan, plan_numbers};
+use crate::plcopen::plan::{self, Plan};
 use crate::plcopen::power::Power;
 use crate::plcopen::structure::wired;
 use crate::plcopen::structure::{Structure, structure};
@@ -58,9 +58,7 @@ impl Reader<'_, '_> {
 
     /// What the network of the chart itself gives to its transitions, by their variables.
     fn wired(&mut self) -> HashMap<String, Expression> {
-        let file = self.network.file;
-        let is_call = |name: &str| super::network::is_call(file, name);
-        let mut plan = plan_numbers(self.graph, &is_call, self.network.diagnostics);
+        let mut plan = self.network.plan(self.graph);
         let mut conditions = HashMap::new();
         // A condition of contacts alone is a value; what has steps before it is a method that takes them.
         let is_plain = plan.steps.iter().all(|step| match &step.action {

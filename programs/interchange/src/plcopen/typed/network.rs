@@ -18,7 +18,7 @@ use understudy_typed::Comparison;
 use super::make;
 use super::values::{Values, unit};
 use crate::plcopen::document::{Edge, Graph};
-use crate::plcopen::plan::{Action, Plan, plan_numbers};
+use crate::plcopen::plan::{Action, Places, Plan, plan_numbers};
 use crate::plcopen::power::{Power, Read};
 use crate::plcopen::standard::StandardBlock;
 
@@ -44,6 +44,10 @@ pub(super) struct Network<'a> {
     /// Instances that nobody named, as they are called here.
     instances: HashMap<String, String>,
     parts: Vec<Vec<Statement>>,
+    /// The addresses of the variables of the unit.
+    pub(super) places: Places,
+    /// What is worth knowing of the networks and changes nothing.
+    pub(super) notes: Vec<(String, Range<usize>)>,
 }
 
 /// Which part of a network with jumps is next.
@@ -69,15 +73,23 @@ impl<'a> Network<'a> {
             renamed: HashMap::new(),
             instances: HashMap::new(),
             parts: Vec::new(),
+            places: places(file, declarations),
+            notes: Vec::new(),
         }
     }
 
     /// The statements of a graph of LD or FBD.
     pub(super) fn statements(&mut self, graph: &Graph) -> Vec<Statement> {
+        let plan = self.plan(graph);
+        self.planned(&plan)
+    }
+
+    pub(super) fn plan(&mut self, graph: &Graph) -> Plan {
         let file = self.file;
         let is_call = |name: &str| is_call(file, name);
-        let plan = plan_numbers(graph, &is_call, self.diagnostics);
-        self.planned(&plan)
+        let mut plan = plan_numbers(graph, &is_call, &self.places, self.diagnostics);
+        self.notes.append(&mut plan.notes);
+        plan
     }
 
     pub(super) fn planned(&mut self, plan: &Plan) -> Vec<Statement> {
@@ -94,9 +106,7 @@ impl<'a> Network<'a> {
                 self.declared(call, &step.span);
             }
         }
-        for step in &plan.steps {
-            self.keep_early(step, plan);
-        }
+        self.keep_early(plan);
         for step in &plan.steps {
             self.step(step, labels.as_ref());
         }
@@ -345,6 +355,22 @@ impl<'a> Network<'a> {
         self.prepare(power, span);
         self.value(power, span)
     }
+}
+
+/// Where the variables of a unit are.
+fn places(file: &File, declarations: &[Declaration]) -> Places {
+    let mut places = Places::default();
+    let has_in_out = declarations.iter().any(|known| known.class == Class::InOut);
+    for known in declarations.iter().chain(&file.globals) {
+        if let Some(address) = &known.address {
+            places.located(known.name.as_str(), address.as_str());
+        }
+        let is_of_caller = matches!(known.class, Class::InOut | Class::External);
+        if has_in_out && is_of_caller {
+            places.of_caller(known.name.as_str());
+        }
+    }
+    places
 }
 
 /// Whether a block acts of itself: one that keeps something, or a function that does more than answer.

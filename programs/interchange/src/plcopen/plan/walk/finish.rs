@@ -4,8 +4,8 @@ use understudy_ladder::Name;
 use understudy_text::Diagnostic;
 
 use super::Walk;
-use crate::plcopen::document::{CONDITION, Kind, Modifier, Object, Pin};
-use crate::plcopen::plan::links::Source;
+use crate::plcopen::document::{CONDITION, Edge, Kind, Modifier, Object, Pin};
+use crate::plcopen::plan::links::{Source, is_eno};
 use crate::plcopen::plan::{Action, Call, Input, Step};
 use crate::plcopen::power::{Power, Read};
 use crate::plcopen::structure::wired;
@@ -83,13 +83,35 @@ impl Walk<'_> {
         let (size, depth) = power.measure();
         let shared = self.links.fan_out[place] > 1 && size > MAXIMUM_SHARED;
         let large = size > MAXIMUM_SIZE || depth > MAXIMUM_DEPTH;
-        let guard = self.guards.get(&place).cloned();
+        let guard = self.guard(place);
         if guard.is_none() && !shared && !large && !self.keep.contains(&place) {
             self.powers[place] = Some(power);
             return;
         }
         self.powers[place] = Some(Power::Kept(place));
-        self.step(place, Action::Keep { object: place, power, guard });
+        self.step(place, Action::Keep { object: place, power, edge: None, guard });
+    }
+
+    /// The power without which a function does not act.
+    fn guard(&self, place: usize) -> Option<Power> {
+        self.enables.get(&place).filter(|_| !self.links.is_block[place]).cloned()
+    }
+
+    /// Keeps what is at an input of an object.
+    fn keep_input(
+        &mut self,
+        place: usize,
+        number: usize,
+        power: Power,
+        edge: Option<Edge>,
+    ) -> Power {
+        self.last_coils = None;
+        self.plan.steps.push(Step {
+            comments: Vec::new(),
+            span: self.object(place).span.clone(),
+            action: Action::Keep { object: number, power, edge, guard: None },
+        });
+        Power::Kept(number)
     }
 
     fn step(&mut self, place: usize, action: Action) {
@@ -133,7 +155,8 @@ impl Walk<'_> {
         }
         let sources = self.links.sources[place].first().cloned().unwrap_or_default();
         let guard = match sources.as_slice() {
-            [Source::Output(from, _)] => self.guards.get(from).cloned(),
+            // ENO is known also while the function does not act.
+            [Source::Output(from, pin)] if !is_eno(pin.as_ref()) => self.guard(*from),
             _ => None,
         };
         let power = self.power(place, 0);
@@ -151,17 +174,35 @@ impl Walk<'_> {
         self.step(place, Action::Jump { label, power });
     }
 
-    fn inputs(&self, place: usize) -> Vec<Input> {
+    /// What is connected to the inputs but EN, with their numbers.
+    fn inputs(&self, place: usize) -> Vec<(usize, Input)> {
         let object = self.object(place);
         let connected = |pin: &Pin| !pin.wires.is_empty() && !pin.name.eq_ignore_ascii_case("EN");
         let pins = object.inputs.iter().enumerate();
         pins.filter(|(_, pin)| connected(pin))
-            .map(|(input, pin)| Input {
-                pin: pin.name.clone(),
-                modifier: pin.modifier,
-                power: self.power(place, input),
+            .map(|(input, pin)| {
+                let power = self.power(place, input);
+                let number = self.links.pin(place, input);
+                (number, Input { pin: pin.name.clone(), modifier: pin.modifier, power })
             })
             .collect()
+    }
+
+    /// The power at EN, where it is connected.
+    fn enable(&mut self, place: usize) -> Option<Power> {
+        let input = self.enable_input(place)?;
+        let modifier = self.object(place).inputs[input].modifier;
+        let power = self.power(place, input);
+        let mut power = if modifier.negated { power.not() } else { power };
+        let number = self.links.enable(place);
+        if modifier.edge.is_some() || self.keep.contains(&number) {
+            power = self.keep_input(place, number, power, modifier.edge);
+        }
+        if power == Power::Constant(true) {
+            return None;
+        }
+        self.enables.insert(place, power.clone());
+        Some(power)
     }
 
     fn call(&mut self, place: usize) {
@@ -169,12 +210,13 @@ impl Walk<'_> {
         let Kind::Block(block) = &object.kind else {
             return;
         };
+        let enable = self.enable(place);
         let call = Call {
             type_name: block.type_name.clone(),
             instance: self.instance(object),
             is_named: block.instance.is_some(),
-            inputs: self.inputs(place),
-            enable: self.enable(place),
+            inputs: self.inputs(place).into_iter().map(|(_, input)| input).collect(),
+            enable,
             in_wire: self.links.fan_out[place] == 1,
         };
         self.step(place, Action::Call(call));
@@ -185,16 +227,15 @@ impl Walk<'_> {
         let Kind::Block(block) = &object.kind else {
             return;
         };
-        let inputs: Vec<(Name, Power)> = self
-            .inputs(place)
-            .into_iter()
-            .map(|input| {
-                let power = if input.modifier.negated { input.power.not() } else { input.power };
-                (input.pin, power)
-            })
-            .collect();
-        if let Some(enable) = self.enable(place) {
-            self.guards.insert(place, enable);
+        self.enable(place);
+        let mut inputs: Vec<(Name, Power)> = Vec::new();
+        for (number, input) in self.inputs(place) {
+            let power = if input.modifier.negated { input.power.not() } else { input.power };
+            let power = match input.modifier.edge {
+                None => power,
+                edge => self.keep_input(place, number, power, edge),
+            };
+            inputs.push((input.pin, power));
         }
         self.pass(place, function(&block.type_name, inputs));
     }

@@ -5,8 +5,8 @@ use std::ops::Range;
 
 use understudy_ladder::Name as Written;
 use understudy_structured_text::syntax::{
-    Argument, Class, Declaration, Expression, Name, Statement, StatementKind, TypeName, Unit,
-    UnitKind,
+    Argument, Class, Declaration, Expression, Name, Statement, StatementKind, TypeKind, TypeName,
+    Unit, UnitKind,
 };
 use understudy_text::Diagnostic;
 
@@ -17,6 +17,9 @@ use crate::plcopen::power::Power;
 use crate::plcopen::standard::StandardBlock;
 use crate::plcopen::typed::make;
 use crate::plcopen::typed::values::unit;
+
+/// How often the types of values that go round in a ring are made wider: as often as there are wider ones.
+const MAXIMUM_WIDENINGS: usize = 16;
 
 impl Network<'_> {
     /// The parts of a plan by their labels; none where nothing jumps to one.
@@ -52,33 +55,79 @@ impl Network<'_> {
         jumps.then_some(labels)
     }
 
-    /// Names a value that is asked for before its step.
-    pub(super) fn keep_early(&mut self, step: &Step, plan: &Plan) {
-        if let Action::Keep { object, power, .. } = &step.action {
-            let name = format!("kept.{}", self.made.len());
-            self.kept.insert(*object, name.clone());
-            // Its type is found when everything that it is made of has a name.
-            let mut silent = Vec::new();
-            std::mem::swap(self.diagnostics, &mut silent);
-            let value = self.value(power, &step.span);
-            let mut of = self.certain_type_of(&value);
-            let mut taken = plan.steps.iter().filter_map(|other| match &other.action {
-                Action::Write { targets, power, .. } if *power == Power::Kept(*object) => {
-                    targets.first()
-                }
-                _ => None,
-            });
-            // A number without a type has that of the variable which it goes to.
-            if of.is_none()
-                && let Some((target, _)) = taken.next()
-                && let Some(target) = self.target(target)
-            {
-                of = self.certain_type_of(&make::read(target));
+    /// Names the values that are kept, since they are asked for before their steps, and finds their types.
+    pub(super) fn keep_early(&mut self, plan: &Plan) {
+        let mut kept = Vec::new();
+        for step in &plan.steps {
+            if let Action::Keep { object, power, .. } = &step.action {
+                let name = format!("kept.{}", self.made.len() + kept.len());
+                self.kept.insert(*object, name.clone());
+                kept.push((*object, name, power, &step.span));
             }
-            std::mem::swap(self.diagnostics, &mut silent);
-            let of = of.unwrap_or_else(|| self.type_of(&value));
-            self.declare_named(&name, of);
         }
+        // What is wrong with them is found where they are written.
+        let found = self.diagnostics.len();
+        let mut types: HashMap<&str, usize> = HashMap::new();
+        loop {
+            self.keep_types(&kept, &mut types);
+            let mut untyped =
+                kept.iter().filter(|(_, name, ..)| !types.contains_key(name.as_str()));
+            let Some((_, first, power, span)) = untyped.clone().next() else {
+                break;
+            };
+            // A number without a type has that of the variable which it goes to.
+            let of_target = untyped
+                .find_map(|(object, name, ..)| Some((name, self.type_of_target(plan, *object)?)));
+            let (name, of) = of_target.unwrap_or_else(|| {
+                let value = self.value(power, span);
+                (first, self.type_of(&value))
+            });
+            types.insert(name, self.made.len());
+            self.declare_named(name, of);
+        }
+        self.diagnostics.truncate(found);
+    }
+
+    /// Types what is kept by what it is made of, and makes the types in rings as wide as what comes in there.
+    fn keep_types<'k>(
+        &mut self,
+        kept: &'k [(usize, String, &Power, &Range<usize>)],
+        types: &mut HashMap<&'k str, usize>,
+    ) {
+        for _ in 0..=MAXIMUM_WIDENINGS {
+            let mut is_changed = false;
+            for (_, name, power, span) in kept {
+                let value = self.value(power, span);
+                let Some(of) = self.certain_type_of(&value) else {
+                    continue;
+                };
+                match types.get(name.as_str()) {
+                    Some(&at) if is_same(&of, &self.made[at].of) => continue,
+                    Some(&at) => self.made[at].of = of,
+                    None => {
+                        types.insert(name, self.made.len());
+                        self.declare_named(name, of);
+                    }
+                }
+                is_changed = true;
+            }
+            if !is_changed {
+                return;
+            }
+        }
+    }
+
+    /// The type of the first variable that takes what an object has kept.
+    fn type_of_target(&mut self, plan: &Plan, object: usize) -> Option<TypeName> {
+        let mut taken = plan.steps.iter().filter_map(|other| match &other.action {
+            Action::Write { targets, power, .. } if *power == Power::Kept(object) => {
+                targets.first()
+            }
+            _ => None,
+        });
+        let (target, _) = taken.next()?;
+        let target = self.target(target)?;
+        self.certain_type_of(&make::read(target))
     }
 
     fn declare_named(&mut self, name: &str, of: TypeName) {
@@ -117,8 +166,9 @@ impl Network<'_> {
             Action::Write { targets, power, guard } => {
                 self.write(targets, power, guard.as_ref(), span)
             }
-            Action::Keep { object, power, guard } => {
+            Action::Keep { object, power, edge, guard } => {
                 let value = self.prepared(power, span);
+                let value = self.changed(value, false, *edge, span);
                 let name = self.kept.get(object).cloned().unwrap_or_default();
                 let kept = make::assign(make::path(&name, None, span), value, span);
                 self.guarded(guard.as_ref(), vec![kept], span);
@@ -149,7 +199,13 @@ impl Network<'_> {
         span: &Range<usize>,
     ) {
         let mut value = self.prepared(power, span);
-        if targets.len() > 1 && power.measure().0 > 1 {
+        // All coils take the power from before the first of them.
+        let is_changed = |(target, _): &(Written, Modifier)| match power {
+            Power::Read(read) => read.edge.is_none() && self.places.overlap(&read.text, target),
+            _ => false,
+        };
+        let is_shared = power.measure().0 > 1 || targets.iter().rev().skip(1).any(is_changed);
+        if targets.len() > 1 && is_shared {
             let shared = self.declare("power", make::named("BOOL", span));
             self.push(make::assign(make::path(&shared, None, span), value, span));
             value = make::variable(&shared, span);
@@ -282,6 +338,15 @@ impl Network<'_> {
         };
         self.diagnostics.push(found.with_help(help));
         self.declare_named(&call.instance, of);
+    }
+}
+
+/// Whether two types are the same; types without names are compared where they are used.
+fn is_same(left: &TypeName, right: &TypeName) -> bool {
+    match (&left.kind, &right.kind) {
+        (TypeKind::Named(left), TypeKind::Named(right)) => left.key() == right.key(),
+        (TypeKind::Named(_), _) | (_, TypeKind::Named(_)) => false,
+        _ => true,
     }
 }
 
