@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
-use understudy_interchange::plcopen::Fidelity;
+use understudy_interchange::plcopen::{Fidelity, fidelity_with_numbers};
 use understudy_interchange::{
     Bodies, Compared, Format, Reading, Source, Wanted, WriteError, Written, read, read_source,
     typed_text, unknown_form, write,
@@ -91,8 +91,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         None => Reading { diagnostics: vec![unknown_form(&source)], ..Reading::default() },
     };
     let mut report = Report { name, text: source, diagnostics: reading.diagnostics };
-    let mut kept =
-        if arguments.fidelity { fidelity_text(&reading.fidelity, &report) } else { String::new() };
+    let mut fidelity = reading.fidelity;
     let wanted = Wanted { program: arguments.unit.as_deref(), period: arguments.period };
     let form = form_of_output(arguments);
     let failed = |error: WriteError| (code(&error), error.to_string());
@@ -112,6 +111,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
                 Ok((None, _)) => None,
                 Ok((Some(written), diagnostics)) => {
                     report.diagnostics = diagnostics;
+                    // That of the ladder is of another reading.
+                    fidelity = fidelity_with_numbers(&report.text, wanted.program);
                     Some(Ok(written))
                 }
                 Err(error) => Some(Err(failed(error))),
@@ -127,8 +128,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         }
         (None, _) => None,
     };
+    let mut kept =
+        if arguments.fidelity { fidelity_text(&fidelity, &report) } else { String::new() };
     let Some(written) = written else {
-        let fidelity = fidelity_value(&reading.fidelity, &report, None);
+        let fidelity = fidelity_value(&fidelity, &report, None);
         let mut answer = Answer::bad_files(joined.reports(report.diagnostics));
         answer.text = kept;
         answer.result = json!({ "file": null, "text": null, "fidelity": fidelity });
@@ -144,7 +147,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     if arguments.fidelity {
         kept.push_str(&written_text(&written));
     }
-    let fidelity = fidelity_value(&reading.fidelity, &report, Some(&written));
+    let fidelity = fidelity_value(&fidelity, &report, Some(&written));
     report.diagnostics.extend(written.losses);
     let text = written.text;
     let answer = match &arguments.to_file {

@@ -89,9 +89,7 @@ pub fn read(text: &str, unit: Option<&str>) -> Reading {
         within(text, &mut found.span);
         found.related.iter_mut().for_each(|related| within(text, &mut related.span));
     }
-    for note in &mut reading.fidelity.notes {
-        within(text, &mut note.span);
-    }
+    reading.fidelity.finish(text);
     for (_, span) in &mut reading.runs {
         within(text, span);
     }
@@ -100,6 +98,24 @@ pub fn read(text: &str, unit: Option<&str>) -> Reading {
         reading.program = None;
     }
     reading
+}
+
+/// What of a file a program with numbers, which has all of its units or what `unit` uses, does not keep. It has no counts: a
+/// program with numbers consists of statements.
+pub fn fidelity_with_numbers(text: &str, unit: Option<&str>) -> Fidelity {
+    let mut fidelity = Fidelity::default();
+    let Ok(document) = xml::parse(text) else {
+        return fidelity;
+    };
+    let (project, _) = document::read_bodies(document.root_element());
+    let is_unit = |pou: &&Pou| unit.is_some_and(|unit| pou.name.eq_ignore_ascii_case(unit));
+    if let Some(pou) = project.pous.iter().find(is_unit) {
+        fidelity.unused(&project, pou);
+    }
+    fidelity.plan(typed::read_typed_of(text, None).notes);
+    fidelity.ignored(project.ignored);
+    fidelity.finish(text);
+    fidelity
 }
 
 /// Names of the programs that the tasks of a file run, or, where it has no tasks, of all its programs; each once.

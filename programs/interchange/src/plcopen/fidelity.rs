@@ -6,6 +6,7 @@ use understudy_ladder::{Element, Program, visit};
 
 use super::document::{ActionContent, Body, Condition, Ignored, Kind, Pou, Project, Section};
 use super::units::used;
+use super::within;
 
 /// What was kept, and what was not.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -98,13 +99,8 @@ impl Fidelity {
                 comments,
             ),
         ];
+        self.unused(project, pou);
         let used = used(project, pou);
-        for other in &project.pous {
-            if !used.iter().any(|known| known.name == other.name) {
-                let message = format!("the unit `{}` is not used by `{}`", other.name, pou.name);
-                self.notes.push(Note { message, span: other.name.span() });
-            }
-        }
         for global in &project.globals {
             let is_used = used.iter().flat_map(|pou| &pou.variables).any(|variable| {
                 variable.section == Section::External
@@ -117,6 +113,24 @@ impl Fidelity {
                 );
                 self.notes.push(Note { message, span: global.name.span() });
             }
+        }
+    }
+
+    /// Notes the units that a unit does not use.
+    pub(super) fn unused(&mut self, project: &Project, pou: &Pou) {
+        let used = used(project, pou);
+        for other in &project.pous {
+            if !used.iter().any(|known| known.name == other.name) {
+                let message = format!("the unit `{}` is not used by `{}`", other.name, pou.name);
+                self.notes.push(Note { message, span: other.name.span() });
+            }
+        }
+    }
+
+    /// Brings the places of notes to letters of the file, and the notes into its order.
+    pub(super) fn finish(&mut self, text: &str) {
+        for note in &mut self.notes {
+            within(text, &mut note.span);
         }
         self.notes.sort_by_key(|note| note.span.start);
         self.notes.dedup();

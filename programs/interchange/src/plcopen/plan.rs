@@ -151,11 +151,11 @@ fn walked(
 ) -> Plan {
     let links = Links::new(graph, is_block, diagnostics);
     let mut keep = HashSet::new();
-    let mut reread = HashSet::new();
+    let mut reread: HashSet<usize> = HashSet::new();
     let mut plan = loop {
         let mut found = Vec::new();
         let (plan, trace) = Walk::new(graph, &links, &keep, rules).run(&mut found);
-        let stale = stale(graph, &links, (&plan, &trace), places);
+        let stale = stale(graph, &links, (&plan, &trace), places, &keep);
         let known = keep.len();
         keep.extend(&trace.fed_back);
         reread.extend(stale.iter().filter(|object| !keep.contains(*object)));
@@ -165,9 +165,10 @@ fn walked(
             break plan;
         }
     };
-    for object in reread {
-        let Some(object) = graph.objects.get(object).or_else(|| links.enabled(graph, object))
-        else {
+    for place in reread {
+        // Other tools evaluate a function once too.
+        let object = graph.objects.get(place);
+        let Some(object) = object.filter(|object| !matches!(object.kind, Kind::Block(_))) else {
             continue;
         };
         let message = "it is asked for again after its variable has been written: it keeps what it let through first, where tools that \

@@ -213,7 +213,7 @@ fn every_element_of_each_language_counts() {
     }
 }
 
-fn codes(text: &str) -> Vec<&'static str> {
+pub(crate) fn codes(text: &str) -> Vec<&'static str> {
     let reading = read(text, None);
     let errors = reading.diagnostics.iter().filter(|found| found.severity == Severity::Error);
     let codes: Vec<&str> = errors.map(|found| found.code).collect();
@@ -238,7 +238,7 @@ fn what_has_no_meaning_here_is_refused_and_not_dropped() {
             "U1010",
         ),
         (
-            r#"<LD><step localId="1" name="s" initialStep="true"><position x="0" y="0"/></step></LD>"#,
+            r#"<LD><step localId="1" name="idle" initialStep="true"><position x="0" y="0"/></step></LD>"#,
             "U1010",
         ),
         ("<ST><xhtml:p>y := a;</xhtml:p></ST><IL><xhtml:p>LD b</xhtml:p></IL>", "U1010"),

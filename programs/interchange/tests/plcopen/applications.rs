@@ -143,3 +143,43 @@ fn what_of_an_application_is_not_read_is_refused_by_its_name() {
     let found = typed(&text, PERIOD).expect_err("a refusal");
     assert!(found.iter().any(|found| found.code == "U1010"), "{found:#?}");
 }
+
+/// A program of one network with an element of a vendor in front of it.
+fn network(element: &str) -> String {
+    let variables = |name: &str| variable(name, "<BOOL/>");
+    format!(
+        r#"<project xmlns="http://www.plcopen.org/xml/tc6_0200"><types><dataTypes/><pous><pou name="MAIN" pouType="program"><interface><inputVars>{}</inputVars><outputVars>{}</outputVars></interface><body><FBD>{element}<inVariable localId="1"><position x="0" y="0"/><connectionPointOut/><expression>a</expression></inVariable><outVariable localId="2"><position x="0" y="0"/><connectionPointIn><connection refLocalId="1"/></connectionPointIn><expression>q</expression></outVariable></FBD></body></pou></pous></types><instances><configurations/></instances></project>"#,
+        variables("a"),
+        variables("q")
+    )
+}
+
+#[test]
+fn the_title_of_a_network_is_a_comment() {
+    let element = |kind: &str, title: &str, more: &str| {
+        let kind =
+            data("fbdelementtype", &format!(r#"<ElementType xmlns="">{kind}</ElementType>"#));
+        format!(
+            r#"<vendorElement localId="9"><position x="0" y="0"/><alternativeText><xhtml xmlns="http://www.w3.org/1999/xhtml">{title}</xhtml></alternativeText>{more}<addData>{kind}</addData></vendorElement>"#
+        )
+    };
+    for title in ["", "the lamp"] {
+        let text = network(&element("networktitle", title, ""));
+        let reading = read(&text, None);
+        assert!(reading.diagnostics.is_empty(), "{:?}", reading.diagnostics);
+        assert!(reading.fidelity.notes.is_empty(), "{:?}", reading.fidelity.notes);
+        let program = reading.program.expect("a program");
+        let comments: Vec<&str> = title.split_terminator('\n').collect();
+        assert_eq!(program.rungs[0].comments, comments);
+        assert!(typed(&text, PERIOD).is_ok());
+    }
+    let pins = r#"<inputVariables><variable formalParameter="x"><connectionPointIn><connection refLocalId="1"/></connectionPointIn></variable></inputVariables>"#;
+    for (kind, more) in [("call", ""), ("networktitle", pins)] {
+        let text = network(&element(kind, "", more));
+        let found = read(&text, None).diagnostics;
+        let codes: Vec<&str> = found.iter().map(|found| found.code).collect();
+        assert_eq!(codes, ["U1010"], "{found:?}");
+        let found = typed(&text, PERIOD).expect_err("an unknown element");
+        assert_eq!(found.len(), 1, "{found:?}");
+    }
+}

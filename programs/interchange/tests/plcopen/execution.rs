@@ -96,3 +96,87 @@ fn a_contact_keeps_its_power_while_its_bit_is_written_by_another_name() {
         }
     }
 }
+
+#[test]
+fn what_a_program_with_numbers_does_not_keep_is_what_is_not_written() {
+    // The ladder of this file has neither the ring nor the numbers; the program has both.
+    let text = pair([2, 1], true);
+    let kept = understudy_interchange::plcopen::fidelity_with_numbers(&text, None);
+    assert_eq!(kept, Default::default());
+    // `m` is read again after it has been written, which other tools do and this one does not.
+    let given = |id: u32, name: &str| {
+        format!(
+            r#"<inVariable localId="{id}"><connectionPointOut/><expression>{name}</expression></inVariable>"#
+        )
+    };
+    let taken = |id: u32, source: u32, name: &str| {
+        format!(
+            r#"<outVariable localId="{id}" executionOrderId="{id}"><connectionPointIn><connection refLocalId="{source}"/></connectionPointIn><expression>{name}</expression></outVariable>"#
+        )
+    };
+    let add = r#"<block localId="3" typeName="ADD" executionOrderId="3"><inputVariables><variable formalParameter="IN1"><connectionPointIn><connection refLocalId="1"/></connectionPointIn></variable><variable formalParameter="IN2"><connectionPointIn><connection refLocalId="2"/></connectionPointIn></variable></inputVariables><inOutVariables/><outputVariables><variable formalParameter="OUT"><connectionPointOut/></variable></outputVariables></block>"#;
+    for of in ["INT", "REAL"] {
+        let body = given(1, "m") + &given(2, "a") + add + &taken(4, 3, "m") + &taken(5, 1, "y");
+        let text = text.replace("<INT/>", &format!("<{of}/>"));
+        let (start, _) = text.split_once("<FBD>").expect("a diagram");
+        let (_, end) = text.split_once("</FBD>").expect("a diagram");
+        let local = format!(
+            r#"<localVars><variable name="m"><type><{of}/></type></variable></localVars></interface>"#
+        );
+        let start = start.replace("</interface>", &local);
+        let text = format!("{start}<FBD>{body}</FBD>{end}");
+        let kept = understudy_interchange::plcopen::fidelity_with_numbers(&text, None);
+        assert_eq!(kept.notes.len(), 1, "{of}: {kept:?}");
+        assert!(kept.notes[0].message.contains("asked for again"), "{kept:?}");
+    }
+}
+
+#[test]
+fn a_variable_that_is_wired_twice_is_what_it_was_first() {
+    let given = |id: u32, name: &str| {
+        format!(
+            r#"<inVariable localId="{id}"><connectionPointOut/><expression>{name}</expression></inVariable>"#
+        )
+    };
+    let from = |id: u32| {
+        format!(r#"<connectionPointIn><connection refLocalId="{id}"/></connectionPointIn>"#)
+    };
+    let taken = |id: u32, source: u32, name: &str| {
+        let from = from(source);
+        format!(
+            r#"<outVariable localId="{id}" executionOrderId="{id}">{from}<expression>{name}</expression></outVariable>"#
+        )
+    };
+    // Both functions read `m`, and `m` is written between them.
+    for of in ["BOOL", "INT"] {
+        let function = |id: u32| {
+            let word = if of == "BOOL" { "XOR" } else { "ADD" };
+            let pins = [(1, 1), (2, 2)].map(|(pin, source)| {
+                format!(r#"<variable formalParameter="IN{pin}">{}</variable>"#, from(source))
+            });
+            format!(
+                r#"<block localId="{id}" typeName="{word}" executionOrderId="{id}"><inputVariables>{}</inputVariables><inOutVariables/><outputVariables><variable formalParameter="OUT"><connectionPointOut/></variable></outputVariables></block>"#,
+                pins.concat()
+            )
+        };
+        let written = [taken(4, 2, "m"), taken(6, 3, "x"), taken(7, 5, "y")];
+        let body = given(1, "m") + &given(2, "a") + &function(3) + &function(5) + &written.concat();
+        let named =
+            |name: &str| format!(r#"<variable name="{name}"><type><{of}/></type></variable>"#);
+        let text = format!(
+            r#"<project xmlns="http://www.plcopen.org/xml/tc6_0201"><types><dataTypes/><pous><pou name="main" pouType="program"><interface><inputVars>{}</inputVars><outputVars>{}{}</outputVars><localVars>{}</localVars></interface><body><FBD>{body}</FBD></body></pou></pous></types><instances><configurations/></instances></project>"#,
+            named("a"),
+            named("x"),
+            named("y"),
+            named("m")
+        );
+        let mut scans = Scans::new(typed(&text, PERIOD).expect("no errors"));
+        let given = [1, 1, 0, 0, 1];
+        let shown = given.map(|given| scans.scan(&[given]));
+        let expected = match of {
+            "BOOL" => [[1, 1], [0, 0], [1, 1], [0, 0], [1, 1]],
+            _ => [[1, 1], [2, 2], [1, 1], [0, 0], [1, 1]],
+        };
+        assert_eq!(shown, expected.map(Vec::from), "{of}");
+    }
+}

@@ -8,6 +8,7 @@ mod execution;
 mod instruction_lists;
 mod jumps;
 mod meaning;
+mod modifiers;
 mod networks;
 mod numbers;
 mod order;

@@ -13,7 +13,7 @@ use super::{
     Action, ActionContent, Block, Condition, Edge, Graph, Kind, Language, Modifier, Object, Pin,
     Storage, Transition, Wire,
 };
-use crate::plcopen::xml::{attribute, child, children, elements, start_tag, text, word};
+use crate::plcopen::xml::{attribute, child, children, elements, held, start_tag, text, word};
 
 /// The input of a transition whose condition is wired to it.
 pub(crate) const CONDITION: &str = "condition";
@@ -94,8 +94,13 @@ fn object(reader: &mut Reader, node: Node<'_, '_>) -> Option<Object> {
                 }));
             }
             "inOutVariables" => {
-                let both = pins(reader, part).into_iter();
-                let both: Vec<Pin> = both.map(|(pin, _)| pin).collect();
+                let mut both = Vec::new();
+                for (pin, node) in pins(reader, part) {
+                    if pin.modifier != Modifier::default() {
+                        changed(reader, "an in-out variable that is changed on its way", node);
+                    }
+                    both.push(pin);
+                }
                 outputs.extend(both.iter().map(|pin| Pin { wires: Vec::new(), ..pin.clone() }));
                 inputs.extend(both);
             }
@@ -108,6 +113,7 @@ fn object(reader: &mut Reader, node: Node<'_, '_>) -> Option<Object> {
                     pin
                 }));
             }
+            "addData" if is_title(node) => {}
             "addData" => reader.ignore("additional data of a tool", part),
             "documentation" => reader.ignore("the documentation of an object", part),
             _ => {}
@@ -118,21 +124,21 @@ fn object(reader: &mut Reader, node: Node<'_, '_>) -> Option<Object> {
     let kind = match name {
         "leftPowerRail" => Kind::LeftRail,
         "rightPowerRail" => Kind::RightRail,
-        "contact" => {
-            if modifier(node, "").storage.is_some() {
-                changed(reader, "a contact that sets or resets", node);
-            }
-            Kind::Contact(variable(), modifier(node, ""))
-        }
-        "coil" => Kind::Coil(variable(), modifier(node, "")),
+        "contact" => Kind::Contact(variable(), read_modifier(reader, node, "", "a contact")),
+        "coil" => Kind::Coil(variable(), modifier(reader, node, "")),
         "block" => Kind::Block(Block {
             type_name: reader.needed(node, "typeName")?,
             instance: attribute(node, "instanceName").filter(|name| !name.is_empty()),
         }),
-        "inVariable" => Kind::InVariable(expression(), modifier(node, "")),
-        "outVariable" => Kind::OutVariable(expression(), modifier(node, "")),
+        "inVariable" => Kind::InVariable(
+            expression(),
+            read_modifier(reader, node, "", "a variable that is read"),
+        ),
+        "outVariable" => Kind::OutVariable(expression(), modifier(reader, node, "")),
         "inOutVariable" => {
-            Kind::InOutVariable(expression(), modifier(node, "In"), modifier(node, "Out"))
+            let to = modifier(reader, node, "In");
+            let from = read_modifier(reader, node, "Out", "a variable that is read");
+            Kind::InOutVariable(expression(), to, from)
         }
         "connector" => Kind::Connector(reader.needed(node, "name")?),
         "continuation" => Kind::Continuation(reader.needed(node, "name")?),
@@ -140,20 +146,32 @@ fn object(reader: &mut Reader, node: Node<'_, '_>) -> Option<Object> {
             child(node, "content").map(text).unwrap_or_default().as_str().trim().to_owned(),
         ),
         "step" | "macroStep" => {
+            not_negated(reader, node, "step");
             let initial = attribute(node, "initialStep")
                 .is_some_and(|value| matches!(value.as_str(), "true" | "1"));
             Kind::Step(reader.needed(node, "name")?, initial)
         }
-        "transition" => Kind::Transition(transition(reader, node, &mut inputs)),
+        "transition" => {
+            not_negated(reader, node, "transition");
+            Kind::Transition(transition(reader, node, &mut inputs))
+        }
         "selectionDivergence" => Kind::SelectionDivergence,
         "selectionConvergence" => Kind::SelectionConvergence,
         "simultaneousDivergence" => Kind::SimultaneousDivergence,
         "simultaneousConvergence" => Kind::SimultaneousConvergence,
         "jumpStep" => Kind::JumpStep(reader.needed(node, "targetName")?),
-        "actionBlock" => Kind::Actions(actions(reader, node)),
+        "actionBlock" => {
+            not_negated(reader, node, "action block");
+            Kind::Actions(actions(reader, node))
+        }
         "label" => Kind::Label(reader.needed(node, "label")?),
         "jump" => Kind::Jump(reader.needed(node, "label")?),
         "return" => Kind::Return,
+        // The title of a network of CODESYS; what other elements of vendors do is unknown.
+        "vendorElement" if is_title(node) => {
+            let title = child(node, "alternativeText").map(text).unwrap_or_default();
+            Kind::Comment(title.as_str().trim().to_owned())
+        }
         "vendorElement" => Kind::Other("a vendor's element"),
         "error" => Kind::Other("an error mark"),
         _ => {
@@ -174,13 +192,26 @@ fn object(reader: &mut Reader, node: Node<'_, '_>) -> Option<Object> {
     })
 }
 
+/// Whether an element of a vendor is the title of a network, which does nothing.
+fn is_title(node: Node<'_, '_>) -> bool {
+    let has_pins = elements(node).any(|part| part.tag_name().name().ends_with("Variables"));
+    node.tag_name().name() == "vendorElement"
+        && !has_pins
+        && child(node, "addData").is_some_and(|data| {
+            elements(data).any(|data| {
+                let is_kind = held(data).to_ascii_lowercase().ends_with("elementtype");
+                is_kind && word(data).eq_ignore_ascii_case("networktitle")
+            })
+        })
+}
+
 /// The pins of a list with their elements.
 fn pins<'a, 'i>(reader: &mut Reader, list: Node<'a, 'i>) -> Vec<(Pin, Node<'a, 'i>)> {
     let mut pins = Vec::new();
     for node in children(list, "variable") {
         let name =
             attribute(node, "formalParameter").unwrap_or_else(|| Name::at("", start_tag(node)));
-        let modifier = modifier(node, "");
+        let modifier = modifier(reader, node, "");
         if let Some(point) = child(node, "connectionPointOut") {
             unread_expression(reader, point);
         }
@@ -230,22 +261,53 @@ fn input(reader: &mut Reader, point: Node<'_, '_>, name: Name, modifier: Modifie
 }
 
 /// `negated`, `edge` and `storage`, with a suffix for objects that have two of each.
-pub(super) fn modifier(node: Node<'_, '_>, suffix: &str) -> Modifier {
-    let value = |name: &str| attribute(node, &format!("{name}{suffix}"));
-    let is = |name: &str, word: &str| value(name).is_some_and(|value| value.as_str() == word);
+pub(super) fn modifier(reader: &mut Reader, node: Node<'_, '_>, suffix: &str) -> Modifier {
+    let mut one_of = |name: &str, known: &[&[&str]]| {
+        let name = format!("{name}{suffix}");
+        let value = attribute(node, &name).filter(|value| !value.is_empty());
+        let found = value
+            .as_ref()
+            .and_then(|value| known.iter().position(|words| words.contains(&value.as_str())));
+        if let Some(value) = value.filter(|_| found.is_none()) {
+            let words: Vec<&str> =
+                known.iter().filter_map(|words| words.first().copied()).collect();
+            let message =
+                format!("invalid value `{value}` of `{name}`: expected {}", words.join(", "));
+            reader.diagnostics.push(Diagnostic::error("U1010", message, value.span()));
+        }
+        found.unwrap_or(0)
+    };
+    // "negated" is what one tool writes for "true".
+    let negated = one_of("negated", &[&["false", "0"], &["true", "1", "negated"]]);
+    let edge = one_of("edge", &[&["none"], &["rising"], &["falling"]]);
+    let stored = [&["none"][..], &["set"], &["reset"]];
+    let storage = one_of("storage", &stored);
+    let kind = one_of("kind", &stored);
     Modifier {
-        // "negated" is what one tool writes for "true".
-        negated: is("negated", "true") || is("negated", "1") || is("negated", "negated"),
-        edge: match () {
-            () if is("edge", "rising") => Some(Edge::Rising),
-            () if is("edge", "falling") => Some(Edge::Falling),
-            () => None,
-        },
-        storage: match () {
-            () if is("storage", "set") || is("kind", "set") => Some(Storage::Set),
-            () if is("storage", "reset") || is("kind", "reset") => Some(Storage::Reset),
-            () => None,
-        },
+        negated: negated == 1,
+        edge: [None, Some(Edge::Rising), Some(Edge::Falling)][edge],
+        storage: [None, Some(Storage::Set), Some(Storage::Reset)][storage.max(kind)],
+    }
+}
+
+/// A modifier of what is only read.
+pub(super) fn read_modifier(
+    reader: &mut Reader,
+    node: Node<'_, '_>,
+    suffix: &str,
+    what: &str,
+) -> Modifier {
+    let modifier = modifier(reader, node, suffix);
+    if modifier.storage.is_some() {
+        changed(reader, &format!("{what} that sets or resets"), node);
+    }
+    modifier
+}
+
+/// Refuses the negation of what has none here.
+fn not_negated(reader: &mut Reader, node: Node<'_, '_>, what: &str) {
+    if modifier(reader, node, "").negated {
+        changed(reader, &format!("a negated {what}"), node);
     }
 }
 
@@ -259,7 +321,7 @@ fn transition(reader: &mut Reader, node: Node<'_, '_>, inputs: &mut Vec<Pin>) ->
     let Some(condition) = child(node, "condition") else {
         return found;
     };
-    found.negated = modifier(condition, "").negated;
+    found.negated = modifier(reader, condition, "").negated;
     for part in elements(condition) {
         match part.tag_name().name() {
             "reference" => {

@@ -40,7 +40,8 @@ fn read_parts(root: Node<'_, '_>, has_variables: bool) -> (Project, Vec<Diagnost
                 for list in elements(part) {
                     match list.tag_name().name() {
                         "pous" => reader.pous(list),
-                        "dataTypes" => {
+                        // They are read elsewhere for programs with numbers.
+                        "dataTypes" if has_variables => {
                             for data_type in children(list, "dataType") {
                                 reader.ignore("a data type of the file", data_type);
                             }

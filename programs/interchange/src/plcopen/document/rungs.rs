@@ -4,7 +4,7 @@
 use roxmltree::Node;
 use understudy_ladder::Name;
 
-use super::objects::modifier;
+use super::objects::{modifier, read_modifier};
 use super::read::Reader;
 use super::{Block, Kind, Modifier, Object, Pin, Wire};
 use crate::plcopen::standard::StandardBlock;
@@ -46,12 +46,12 @@ pub(super) fn rung(
         }
         match part.tag_name().name() {
             "contact" => {
-                let kind = Kind::Contact(variable, modifier(part, ""));
+                let kind = Kind::Contact(variable, read_modifier(reader, part, "", "a contact"));
                 power.from = rung.add(part, kind, vec![input]);
                 power.pin = None;
             }
             "coil" => {
-                rung.add(part, Kind::Coil(variable, modifier(part, "")), vec![input]);
+                rung.add(part, Kind::Coil(variable, modifier(reader, part, "")), vec![input]);
             }
             "block" => {
                 let Some(type_name) = reader.needed(part, "typeName") else {

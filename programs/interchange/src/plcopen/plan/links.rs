@@ -136,11 +136,6 @@ impl Links {
         self.sources.len() + place
     }
 
-    /// The object of the number of what is at an EN.
-    pub(super) fn enabled<'a>(&self, graph: &'a Graph, number: usize) -> Option<&'a Object> {
-        graph.objects.get(number.checked_sub(self.sources.len())?)
-    }
-
     /// The number of an input of an object.
     pub(super) fn pin(&self, place: usize, input: usize) -> usize {
         self.first_pin[place] + input

@@ -118,15 +118,17 @@ pub(super) fn stale(
     links: &Links,
     (plan, trace): (&Plan, &Trace),
     places: &Places,
+    kept: &HashSet<usize>,
 ) -> HashSet<usize> {
     let asked = asked(graph, links, trace);
     let writes = Writes::of(plan, places);
     let of_result = |source: &Source, from: usize, last: usize| match source {
         Source::Rail => false,
         Source::Output(at, _) => {
-            let step =
-                trace.step[*at].filter(|_| links.is_block[*at] || trace.fed_back.contains(at));
-            step.is_some_and(|step| from <= step && step < last)
+            // What is at its pins is kept in front of its own step.
+            let is_changed =
+                trace.step[*at].is_some() && (links.is_block[*at] || trace.fed_back.contains(at));
+            is_changed && (from..last).contains(&trace.first[*at])
                 || instance(&graph.objects[*at])
                     .filter(|_| links.is_block[*at])
                     .is_some_and(|name| writes.change(&name, (from, last), places))
@@ -157,7 +159,7 @@ pub(super) fn stale(
             stale.insert(place);
         }
     }
-    answers(graph, links, &mut stale);
+    answers(graph, links, kept, &mut stale);
     stale
 }
 
@@ -169,9 +171,10 @@ fn instance(object: &Object) -> Option<String> {
     }
 }
 
-/// A number is kept as what a function makes of it: a comparison is one bit.
-fn answers(graph: &Graph, links: &Links, stale: &mut HashSet<usize>) {
-    let mut asked: HashMap<usize, usize> = HashMap::new();
+/// A number is kept as what a function makes of it: a comparison is one bit. Where that was not enough, it is kept itself.
+fn answers(graph: &Graph, links: &Links, kept: &HashSet<usize>, stale: &mut HashSet<usize>) {
+    // By variable: how many pins of functions ask for it, and whether one of these functions is not kept yet.
+    let mut asked: HashMap<usize, (usize, bool)> = HashMap::new();
     for (place, object) in graph.objects.iter().enumerate() {
         if !matches!(object.kind, Kind::Block(_)) || links.is_block[place] {
             continue;
@@ -186,13 +189,15 @@ fn answers(graph: &Graph, links: &Links, stale: &mut HashSet<usize>) {
                     && stale.contains(from)
                 {
                     stale.insert(place);
-                    *asked.entry(*from).or_default() += 1;
+                    let (pins, is_new) = asked.entry(*from).or_default();
+                    *pins += 1;
+                    *is_new |= !kept.contains(&place);
                 }
             }
         }
     }
-    // What only functions ask for needs no bit itself.
     stale.retain(|place| {
-        links.fan_out.get(*place).is_none() || asked.get(place) != Some(&links.fan_out[*place])
+        let fan_out = links.fan_out.get(*place);
+        !asked.get(place).is_some_and(|(pins, is_new)| *is_new && Some(pins) == fan_out)
     });
 }

@@ -6,7 +6,7 @@ use understudy_text::{Diagnostic, MAXIMUM_FINDINGS};
 use crate::plcopen::xml::{held, start_tag};
 
 /// Elements with the attributes that they may have. Those in front of `|` are understood; behind it, they change nothing.
-const KNOWN: [(&str, &str); 97] = [
+const KNOWN: [(&str, &str); 98] = [
     ("project", "|xmlns schemaLocation"),
     ("types", ""),
     ("dataTypes", ""),
@@ -105,6 +105,7 @@ const KNOWN: [(&str, &str); 97] = [
     ("macroStep", "localId name|height width globalId executionOrderId"),
     // Refused where objects are read.
     ("vendorElement", "localId|height width globalId executionOrderId"),
+    ("alternativeText", "*"),
     ("error", "localId|height width globalId executionOrderId"),
     ("qualifier", ""),
     // Places on the sheet.
@@ -153,8 +154,16 @@ const ELEMENTARY: [&str; 27] = [
 ];
 
 /// Elements whose contents are texts, headers or pictures: what stands in them is read as a whole, or changes nothing.
-const WHOLE: [&str; 7] =
-    ["fileHeader", "contentHeader", "documentation", "content", "ST", "IL", "expression"];
+const WHOLE: [&str; 8] = [
+    "fileHeader",
+    "contentHeader",
+    "documentation",
+    "content",
+    "ST",
+    "IL",
+    "expression",
+    "alternativeText",
+];
 
 /// Additional data of tools that holds parts of the program.
 const PROGRAM_DATA: [&str; 11] = [
