@@ -31,8 +31,8 @@ fn document(file: &str, name: &str, text: &str, bodies: Bodies) -> Written {
 const LEVEL: &str = "
 (* Level control with an alarm. *)
 PROGRAM level
-  VAR_INPUT raw AT %IW0 : INT; auto AT %IX0.0 : BOOL; setpoint AT %ID1 : REAL; END_VAR
-  VAR_OUTPUT valve AT %QD1 : REAL; alarm AT %QX0.0 : BOOL; late AT %QX0.1 : BOOL; n AT %QW0 : INT; END_VAR
+  VAR_INPUT raw AT %IW20 : INT; auto AT %IX0.0 : BOOL; setpoint AT %ID12 : REAL; END_VAR
+  VAR_OUTPUT valve AT %QD8 : REAL; alarm AT %QX0.0 : BOOL; late AT %QX0.1 : BOOL; n AT %QW20 : INT; END_VAR
   VAR scaled : REAL; error : REAL; t : TON; c : CTU; latch : SR; last : BOOL; END_VAR
   (* scale to percent *)
   scaled := INT_TO_REAL(raw) * 100.0 / 27648.0;
