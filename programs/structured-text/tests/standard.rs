@@ -215,6 +215,49 @@ fn texts_are_selected() {
 }
 
 #[test]
+fn bits_and_reals_are_transferred_and_numbers_converted() {
+    check(
+        "PROGRAM main
+         VAR_INPUT d : DWORD; END_VAR
+         VAR_OUTPUT a : BOOL; b : DWORD; c : DWORD; e : BOOL; f : LWORD; g : BOOL; h : DWORD; i : BOOL; END_VAR
+           a := DWORD_TO_REAL(d) = 1.0; b := REAL_TO_DWORD(-2.0); c := REAL_TO_DWORD(DWORD_TO_REAL(d));
+           e := LWORD_TO_LREAL(16#3FF8_0000_0000_0000) = 1.5; f := LREAL_TO_LWORD(1.0);
+           g := TO_REAL(d) = 1.0; h := TO_DWORD(REAL#1.0); i := UDINT_TO_REAL(TO_UDINT(d)) > 1.0E9;
+         END_PROGRAM",
+        &[
+            (&[0x3F80_0000], "1 3221225472 1065353216 1 4607182418800017408 1 1065353216 1"),
+            (&[1], "0 3221225472 1 1 4607182418800017408 0 1065353216 0"),
+        ],
+    );
+}
+
+#[test]
+fn a_text_beyond_its_type_is_the_nearest_number() {
+    for (text, int, uint, dint, lint, byte) in [
+        ("40000", 32767, 40000, 40000, "40000", 255),
+        ("-40000", -32768, 0, -40000, "-40000", 0),
+        ("99999999999999999999", 32767, 65535, i32::MAX, "9223372036854775807", 255),
+        ("-99999999999999999999", -32768, 0, i32::MIN, "-9223372036854775808", 0),
+        ("16#fF", 255, 255, 255, "255", 255),
+        ("2#101", 5, 5, 5, "5", 5),
+        ("-8#17", -15, 0, -15, "-15", 0),
+        ("42 m", 42, 42, 42, "42", 42),
+        ("m", 0, 0, 0, "0", 0),
+        ("", 0, 0, 0, "0", 0),
+    ] {
+        let program = format!(
+            "PROGRAM main
+             VAR_OUTPUT a : INT; b : UINT; c : DINT; d : LINT; e : BYTE; END_VAR
+             VAR t : STRING; END_VAR
+               t := '{text}';
+               a := STRING_TO_INT(t); b := STRING_TO_UINT(t); c := STRING_TO_DINT(t); d := STRING_TO_LINT(t); e := STRING_TO_BYTE(t);
+             END_PROGRAM"
+        );
+        check(&program, &[(&[], &format!("{int} {uint} {dint} {lint} {byte}"))]);
+    }
+}
+
+#[test]
 fn conversions_have_the_values_of_the_standard() {
     check(
         "PROGRAM main

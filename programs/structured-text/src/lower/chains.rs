@@ -5,7 +5,9 @@ use understudy_typed::{Comparison, Elementary, Expression, Operation, TextOperat
 use crate::syntax::{self, Operator, Span};
 
 use super::Lowering;
-use super::convert::{as_bits, as_integer, common, comparable, is_number, is_whole, limits};
+use super::convert::{
+    as_bits, as_integer, common, comparable, conversion, is_number, is_whole, limits,
+};
 use super::fold::{apply, boolean, choose, convert, reinterpret, text};
 use super::names::number;
 use super::numbers::{Number, Operand};
@@ -288,7 +290,7 @@ impl Lowering<'_> {
         let message = format!("{left} and {right} cannot be {what}");
         let is_elementary = |name: &str| Elementary::ALL.iter().any(|of| of.name() == name);
         let help = if is_elementary(&left) && is_elementary(&right) {
-            format!("convert one of them, such as with {right}_TO_{left}(…)")
+            format!("convert one of them, such as with {}(…)", conversion(&right, &left))
         } else {
             "use values of one type".to_owned()
         };

@@ -72,6 +72,27 @@ pub(super) fn as_integer(of: Elementary) -> Elementary {
     }
 }
 
+/// Whether a conversion takes the bits and not the number: table 25 of the standard's third edition.
+pub(super) fn takes_bits(from: Elementary, to: Elementary) -> bool {
+    use Elementary::{Dword, Lreal, Lword, Real};
+    matches!((from, to), (Dword, Real) | (Real, Dword) | (Lword, Lreal) | (Lreal, Lword))
+}
+
+/// The name of the function that converts numbers of one type to another one.
+pub(super) fn conversion(from: &str, to: &str) -> String {
+    let number = |name: &str| {
+        let mut types = Elementary::ALL.iter();
+        types.find(|of| of.name() == name).map_or(name.to_owned(), |of| as_integer(*of).to_string())
+    };
+    let is_real = |name: &str| matches!(name, "REAL" | "LREAL");
+    match (is_real(from), is_real(to)) {
+        // The function of these names may take the bits.
+        (true, false) => format!("{from}_TO_{}", number(to)),
+        (false, true) => format!("{}_TO_{to}", number(from)),
+        _ => format!("{from}_TO_{to}"),
+    }
+}
+
 /// The bit string of a type's width.
 pub(super) fn as_bits(of: Elementary) -> Elementary {
     match of.bits() {
@@ -296,14 +317,14 @@ impl Lowering<'_> {
             Fit::Whole | Fit::Rounded => return,
         };
         let message = format!("{found} becomes {to}{what}");
-        let help = format!("write {from}_TO_{to}(…) if that is meant");
+        let help = format!("write {}(…) if that is meant", conversion(from.name(), to.name()));
         self.warn("U1080", message, span.clone(), help);
     }
 
     /// Warns where digits may be lost.
     fn rounded_to(&mut self, (found, from): (&str, Elementary), to: Elementary, span: &Span) {
         let message = format!("{found} becomes {to}, which has fewer digits");
-        let help = format!("write {from}_TO_{to}(…) if that is meant");
+        let help = format!("write {}(…) if that is meant", conversion(from.name(), to.name()));
         self.warn("U1080", message, span.clone(), help);
     }
 
@@ -319,7 +340,7 @@ impl Lowering<'_> {
                     "BOOL" => {
                         format!("compare it, such as `… > 0`, or write {found}_TO_BOOL(…)")
                     }
-                    _ => format!("write {found}_TO_{wanted}(…)"),
+                    _ => format!("write {}(…)", conversion(found, wanted)),
                 }
             }
             Type::Elementary(of) if of.is_time() => "write a unit, such as T#500ms".to_owned(),

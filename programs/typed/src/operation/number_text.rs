@@ -103,7 +103,8 @@ fn write_time_of_day(nanoseconds: i64) -> String {
     text
 }
 
-/// A stored value as it is read from the start of a text, blanks before it left out; 0 where there is none.
+/// A stored value as it is read from the start of a text, blanks before it left out; 0 where there is none. A whole number
+/// beyond its type is the nearest one of the type.
 pub(crate) fn read(of: Elementary, text: &[u8]) -> u64 {
     let text = text.trim_ascii_start();
     // What stands behind the first byte that is no ASCII is not of a number.
@@ -122,7 +123,10 @@ pub(crate) fn read(of: Elementary, text: &[u8]) -> u64 {
             let time = read_time_of_day(rest.strip_prefix('-').unwrap_or(""));
             date.wrapping_add(time) as u64
         }
-        _ => read_integer(&text) & of.mask(),
+        _ => {
+            let (least, most) = of.limits();
+            read_integer(&text).clamp(least, most) as u64 & of.mask()
+        }
     }
 }
 
@@ -141,10 +145,20 @@ fn read_digits(text: &str) -> (u64, usize, &str) {
     (number, digits.len(), rest)
 }
 
-fn read_integer(text: &str) -> u64 {
+/// A whole number at the start of a text, as a literal has it: decimal, or behind `2#`, `8#` or `16#`. More than 64 bits are
+/// the largest number.
+fn read_integer(text: &str) -> i128 {
     let (is_negative, rest) = read_sign(text);
-    let (number, _, _) = read_digits(rest);
-    if is_negative { number.wrapping_neg() } else { number }
+    let based = [("2#", 2), ("8#", 8), ("16#", 16)];
+    let based =
+        based.into_iter().find_map(|(prefix, base)| Some((rest.strip_prefix(prefix)?, base)));
+    let (digits, base) = based.unwrap_or((rest, 10));
+    let mut number = 0_i128;
+    let digits = digits.chars().map_while(|digit| digit.to_digit(base));
+    for digit in digits {
+        number = (number * i128::from(base) + i128::from(digit)).min(i128::from(u64::MAX));
+    }
+    if is_negative { -number } else { number }
 }
 
 fn read_sign(text: &str) -> (bool, &str) {

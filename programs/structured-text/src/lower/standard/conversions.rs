@@ -1,14 +1,15 @@
 //! Conversions: `X_TO_Y`, `TO_Y`, `TRUNC`, binary coded decimals.
 //!
 //! A TIME or TIME_OF_DAY as a number is one of milliseconds, a DATE or DATE_AND_TIME one of seconds, as in CODESYS, TwinCAT and
-//! Siemens controllers; the long types (LTIME, …) are numbers of nanoseconds.
+//! Siemens controllers; the long types (LTIME, …) are numbers of nanoseconds. Between DWORD and REAL, and LWORD and LREAL, the
+//! bits are taken, as the third edition of the standard has it.
 
 use understudy_typed::{Elementary, Expression, Operation, TextOperation, Type};
 
 use crate::syntax;
 
 use super::{Lowering, lint};
-use crate::lower::convert::{as_bits, as_integer, is_whole};
+use crate::lower::convert::{as_bits, as_integer, is_whole, takes_bits};
 use crate::lower::fold::{apply, convert, reinterpret, text};
 use crate::lower::types::{DEFAULT_CAPACITY, elementary};
 
@@ -229,6 +230,7 @@ impl Lowering<'_> {
             (true, true) => time_to_time(value, from, to),
             (true, false) => from_time(value, unit, to),
             (false, true) => to_time(value, from, to, to_unit),
+            (false, false) if takes_bits(from, to) => reinterpret(value, to),
             (false, false) => convert(value, to),
         })
     }
