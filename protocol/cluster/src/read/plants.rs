@@ -1,6 +1,6 @@
 //! Plants: models bound to their controllers, and who feeds whom.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::time::Duration;
 
@@ -143,13 +143,20 @@ fn bound(
     let signals = signals(section);
     let (plant, mut problems) =
         Plant::following(kind, interface, &signals, &terminals, fed_by.is_some());
+    let undriven: BTreeSet<String> = problems
+        .iter()
+        .filter_map(|problem| match problem {
+            BindingProblem::InputNotDriven { input } => Some(input.clone()),
+            _ => None,
+        })
+        .collect();
     // What an error left out could be the source of an input.
     if diagnostics.iter().any(super::is_error) {
         problems.retain(|problem| !matches!(problem, BindingProblem::InputNotDriven { .. }));
     }
     let not_driven = |problem: &BindingProblem, name: &str| matches!(problem, BindingProblem::InputNotDriven { input } if input == name);
     for source in &remote_io.inputs {
-        let is_driven = !problems.iter().any(|problem| not_driven(problem, &source.name));
+        let is_driven = !undriven.contains(&source.name);
         if is_driven && plant.is_some() {
             let message = format!(
                 "the plant `{}` drives the input `{}`, which has another source",
