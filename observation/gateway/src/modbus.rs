@@ -19,7 +19,7 @@ use understudy_wire::{MAXIMUM_OWNER_LENGTH, Role};
 use crate::error::GatewayError;
 use crate::feed::Feed;
 use crate::followed::Followed;
-use crate::register_map::{ProcessImage, RegisterMap, Target};
+use crate::register_map::{Area, ProcessImage, RegisterMap, Target};
 use crate::requests::Checked;
 use crate::serve_until_asked;
 use crate::writing::WriteGate;
@@ -227,22 +227,27 @@ fn is_of_run(request: &Request<'_>) -> bool {
 }
 
 fn answer(image: &ProcessImage, request: &Request<'_>) -> Result<Response, ExceptionCode> {
-    match *request {
-        Request::ReadCoils(address, count) => {
-            part(&image.coils, address, count, MOST_BITS).map(Response::ReadCoils)
+    let (area, address, count) = match *request {
+        Request::ReadCoils(address, count) => (Area::Coil, address, count),
+        Request::ReadDiscreteInputs(address, count) => (Area::DiscreteInput, address, count),
+        Request::ReadInputRegisters(address, count)
+        | Request::ReadHoldingRegisters(address, count) => (Area::Register, address, count),
+        _ => return Err(ExceptionCode::IllegalFunction),
+    };
+    let registers = || part(&image.registers, address, count, MOST_REGISTERS);
+    let response = match *request {
+        Request::ReadCoils(..) => {
+            Response::ReadCoils(part(&image.coils, address, count, MOST_BITS)?)
         }
-        Request::ReadDiscreteInputs(address, count) => {
-            part(&image.inputs, address, count, MOST_BITS).map(Response::ReadDiscreteInputs)
+        Request::ReadDiscreteInputs(..) => {
+            Response::ReadDiscreteInputs(part(&image.inputs, address, count, MOST_BITS)?)
         }
-        Request::ReadInputRegisters(address, count) => {
-            part(&image.registers, address, count, MOST_REGISTERS).map(Response::ReadInputRegisters)
-        }
-        Request::ReadHoldingRegisters(address, count) => {
-            part(&image.registers, address, count, MOST_REGISTERS)
-                .map(Response::ReadHoldingRegisters)
-        }
-        _ => Err(ExceptionCode::IllegalFunction),
-    }
+        Request::ReadHoldingRegisters(..) => Response::ReadHoldingRegisters(registers()?),
+        _ => Response::ReadInputRegisters(registers()?),
+    };
+    let first = usize::from(address);
+    let is_known = image.is_known(area, &(first..first + usize::from(count)));
+    is_known.then_some(response).ok_or(ExceptionCode::GatewayTargetDevice)
 }
 
 /// Consecutive values of a table.
@@ -269,8 +274,32 @@ mod tests {
             inputs: vec![true, false, true],
             coils: vec![false, true],
             registers: vec![1, 2, 3],
+            unknown: Vec::new(),
         };
         assert_eq!(answer(&image, request), expected, "{request:?}");
+    }
+
+    /// Every range of a table of six, of which two have no value.
+    #[test]
+    fn a_value_that_is_not_known_is_an_exception() {
+        let image = ProcessImage {
+            inputs: vec![true; 6],
+            coils: vec![true; 6],
+            registers: vec![7; 6],
+            unknown: vec![(Area::Register, 2..4)],
+        };
+        for (address, count) in
+            (0..6).flat_map(|from| (1..=6 - from).map(move |count| (from, count)))
+        {
+            let is_known = !(address..address + count).any(|place| (2..4).contains(&place));
+            let expected = match is_known {
+                true => Ok(Response::ReadInputRegisters(vec![7; usize::from(count)])),
+                false => Err(ExceptionCode::GatewayTargetDevice),
+            };
+            let request = Request::ReadInputRegisters(address, count);
+            assert_eq!(answer(&image, &request), expected, "{request:?}");
+            assert!(answer(&image, &Request::ReadCoils(address, count)).is_ok());
+        }
     }
 
     #[test]

@@ -1,10 +1,12 @@
 //! The values of the registers.
 
+use std::ops::Range;
+
 use understudy_typed::{Elementary, Points};
 use understudy_view::{RunState, Snapshot, StationState, stored};
 use understudy_wire::Member;
 
-use super::{NUMBERS, OF_PROGRAM, PROGRAMS, RegisterMap, STATIONS, VERSION, registers_of};
+use super::{Area, NUMBERS, OF_PROGRAM, PROGRAMS, RegisterMap, STATIONS, VERSION, registers_of};
 use crate::feed::Feed;
 use crate::followed::Observation;
 
@@ -17,6 +19,32 @@ pub struct ProcessImage {
     pub coils: Vec<bool>,
     /// Input and holding registers.
     pub registers: Vec<u16>,
+    /// Places without a value, by table: the remote I/O of their program does not report. They hold 0, and no client gets it.
+    pub unknown: Vec<(Area, Range<usize>)>,
+}
+
+impl ProcessImage {
+    /// Whether all values of a range are known.
+    pub fn is_known(&self, area: Area, range: &Range<usize>) -> bool {
+        let meets = |other: &Range<usize>| range.start < other.end && other.start < range.end;
+        !self.unknown.iter().any(|(of, other)| *of == area && meets(other))
+    }
+
+    /// Bits and registers of each table so far.
+    fn lengths(&self) -> [(Area, usize); 3] {
+        [
+            (Area::DiscreteInput, self.inputs.len()),
+            (Area::Coil, self.coils.len()),
+            (Area::Register, self.registers.len()),
+        ]
+    }
+
+    /// What was added since then has no value.
+    fn unknown_since(&mut self, before: [(Area, usize); 3]) {
+        let added = before.into_iter().zip(self.lengths());
+        let added = added.map(|((area, from), (_, to))| (area, from..to));
+        self.unknown.extend(added.filter(|(_, range)| !range.is_empty()));
+    }
 }
 
 /// The register of the number of open alarms.
@@ -90,9 +118,18 @@ impl RegisterMap {
             image.registers.resize(NUMBERS, 0);
         }
         for (interface, program) in self.interfaces.iter().zip(&snapshot.programs) {
-            let (inputs, outputs) = (program.inputs.as_deref(), program.outputs.as_deref());
+            let before = image.lengths();
+            let inputs = program.inputs.as_deref();
             add_points(&interface.inputs, inputs, &mut image.inputs, &mut image.registers);
+            if inputs.is_none() {
+                image.unknown_since(before);
+            }
+            let before = image.lengths();
+            let outputs = program.outputs.as_deref();
             add_points(&interface.outputs, outputs, &mut image.coils, &mut image.registers);
+            if outputs.is_none() {
+                image.unknown_since(before);
+            }
         }
         for target in &self.coils {
             let Member::RemoteIo(program) = target.member else {
@@ -101,7 +138,11 @@ impl RegisterMap {
             let program = snapshot.programs.get(program.index());
             let inputs = program.and_then(|program| program.inputs.as_deref());
             let value = inputs.and_then(|inputs| stored(&target.point, inputs));
+            let before = image.lengths();
             image.coils.push(value == Some(1));
+            if value.is_none() {
+                image.unknown_since(before);
+            }
         }
         image
     }
