@@ -1,6 +1,7 @@
 //! `understudy operate`: operator commands, by the socket of a laboratory or by mutual TLS.
 
 mod alarms;
+mod status;
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -118,7 +119,7 @@ impl Arguments {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum What {
-    /// Print the status of the member
+    /// Print the state of the member: the records that are in effect, and its newest turn or deadline
     Status,
     /// Print the canonical configuration of the member
     Configuration,
@@ -219,7 +220,7 @@ fn command(arguments: &Arguments) -> Result<Command, Answer> {
         | What::UnshelveAlarm => {
             named(arguments)?;
             let message = format!(
-                "`{word}` requires a remote member: give the folder of the operator's keys by --keys; a laboratory accepts kill, restart, release, cold-start, accept-state, force, unforce and write"
+                "`{word}` requires a remote member: give the folder of the operator's keys by --keys; a laboratory accepts kill, restart, release, cold-start, accept-state, force, unforce, write, acknowledge-alarm, shelve-alarm and unshelve-alarm"
             );
             return Err(Answer::failed(Status::BadInput, "U0621", message));
         }
@@ -368,7 +369,7 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
         }
     };
     let request = request(arguments, &cluster, keys.role).inspect_err(record)?;
-    ask_elsewhere(arguments, request, &call).inspect_err(|answer| {
+    ask_elsewhere(arguments, &cluster, request, &call).inspect_err(|answer| {
         // What the member decides itself has a record already.
         let code = answer.failures.first().map(|failure| failure.code.as_str());
         if matches!(code, Some("U0510" | "U0556")) {
@@ -408,6 +409,7 @@ fn request(
 
 fn ask_elsewhere(
     arguments: &Arguments,
+    cluster: &Cluster,
     request: Option<Request>,
     call: &impl Fn() -> Result<Call, BusError>,
 ) -> Result<Answer, Answer> {
@@ -436,9 +438,12 @@ fn ask_elsewhere(
         call.follow(SILENCE, take)?;
         return Ok(Answer::done("", json!(null)));
     };
+    if request == Request::Status {
+        return Ok(status::ask(&call, cluster, &arguments.name)?);
+    }
     let text = call.ask(&request)?;
     if request.is_command() && text != DONE {
-        return Err(refused(&Refusal::Force(text)));
+        return Err(refused(&Refusal::of_answer(text)));
     }
     let result = serde_json::from_str(&text).unwrap_or_else(|_| json!({ "text": text }));
     Ok(Answer::done(text, result))

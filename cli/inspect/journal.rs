@@ -51,6 +51,12 @@ pub(crate) struct Arguments {
 const LOOK: Duration = Duration::from_millis(100);
 
 pub(crate) fn run(arguments: &Arguments, json: bool) -> Result<Answer, Answer> {
+    if let (Some(from), Some(to)) = (arguments.from, arguments.to)
+        && from > to
+    {
+        let message = format!("--from {from} is after --to {to}: no cycle is between them");
+        return Err(Answer::failed(Status::BadInput, "U0600", message));
+    }
     let run = arguments.run.open()?;
     let filter = Filter {
         members: arguments.member.clone(),
@@ -78,7 +84,12 @@ pub(crate) fn run(arguments: &Arguments, json: bool) -> Result<Answer, Answer> {
     }
     let mut text: String = lines.iter().map(|line| line.to_text() + "\n").collect();
     if lines.is_empty() {
-        text += "Only periodic records of every cycle; show them with --all.\n";
+        text += match arguments.all {
+            true => "No records.\n",
+            false => {
+                "No records but those of every cycle, if there are any; show them with --all.\n"
+            }
+        };
     }
     for trouble in &troubles {
         text += &format!("       -  {trouble}\n");

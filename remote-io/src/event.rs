@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 use understudy_cycle::{Notice, Outvoted, Refusal};
 use understudy_wire::{
-    ConfigurationHash, Force, Image, Lineage, Member, Moment, ProgramId, SignalPlace, Source,
-    StationId, StationSet, Write, WriteId, WriteRefusal,
+    ConfigurationHash, Force, Image, Lineage, Member, Moment, OrderRefusal, ProgramId, SignalPlace,
+    Source, StationId, StationSet, Write, WriteId, WriteRefusal,
 };
 
 use crate::settings::ValueFault;
@@ -34,8 +34,11 @@ pub enum Event {
         moment: Moment,
         /// u(i); `None` where no cycle was started or the history is not known yet.
         sampled: Option<Image>,
-        /// y(i).
+        /// y(i): direct, reconstructed, held or fail-safe, before forces.
         outputs: Image,
+        /// What the device gets, where that differs from these outputs: a signal is forced, or the program is stopped.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        driven: Option<Image>,
         /// Source of the outputs.
         source: Source,
         /// Understudy whose word the output was reconstructed from.
@@ -144,6 +147,24 @@ pub enum Event {
         moment: Moment,
         /// Signal, value, duration, operator and reason.
         force: Force,
+    },
+    /// A force was refused and has no effect.
+    ForceRefused {
+        /// Current cycle.
+        moment: Moment,
+        /// The force.
+        force: Force,
+        /// Reason.
+        refusal: OrderRefusal,
+    },
+    /// The end of a force was refused: the signal is not forced.
+    UnforceRefused {
+        /// Current cycle.
+        moment: Moment,
+        /// The signal.
+        signal: SignalPlace,
+        /// Reason.
+        refusal: OrderRefusal,
     },
     /// A force has ended.
     Unforced {
@@ -283,6 +304,17 @@ pub enum Event {
         /// Delay behind the time that it had asked for.
         late: Duration,
     },
+}
+
+impl Event {
+    /// The outputs that the device gets from a deadline on: those of the program, or held or fail-safe ones, and in their place the forced values.
+    /// Everything that states a driven value reads it here.
+    pub fn driven(&self) -> Option<&Image> {
+        match self {
+            Self::Applied { outputs, driven, .. } => Some(driven.as_ref().unwrap_or(outputs)),
+            _ => None,
+        }
+    }
 }
 
 /// A station that cannot prove the output of a program, from the view of its remote I/O.

@@ -38,8 +38,8 @@ use std::time::Duration;
 
 use understudy_cycle::{Arrival, Input, Machine, Output, Outvoted, Participant, RemoteIoInput};
 use understudy_wire::{
-    Body, ConfigurationHash, Frame, Holding, Image, Member, Moment, ProgramId, Recalled, Source,
-    StateChoice, StationId, StationSet, Time,
+    Body, ConfigurationHash, Frame, Holding, Image, Member, Moment, OrderRefusal, ProgramId,
+    Recalled, Source, StateChoice, StationId, StationSet, Time,
 };
 
 use crate::diagnosis::Diagnosing;
@@ -76,6 +76,8 @@ pub struct RemoteIo {
     /// When a cycle was counted last in which the history was looked for.
     looked: Time,
     protection: Protection,
+    /// When the host woke it last too late to keep its times.
+    resumed: Option<Time>,
     forcing: Forcing,
     writing: Writing,
     signals: Signals,
@@ -142,6 +144,23 @@ enum Question {
 struct Applied {
     source: Source,
     outputs: Image,
+    missing: Option<Missing>,
+}
+
+impl Applied {
+    /// Whether no station computes the program: its outputs are fail-safe, because none was received that could prove them.
+    fn is_of_no_station(&self) -> bool {
+        let unproved = matches!(
+            self.missing,
+            Some(
+                Missing::NoCycle
+                    | Missing::NotSynchronised
+                    | Missing::TwoErasures
+                    | Missing::SecondFailure
+            )
+        );
+        self.source == Source::FailSafe && unproved
+    }
 }
 
 impl RemoteIo {
@@ -163,6 +182,7 @@ impl RemoteIo {
             diagnosed: Image::zero(settings.undriven.width()),
             looked: now,
             protection: Protection::default(),
+            resumed: None,
             forcing: Forcing::default(),
             writing: Writing::new(&settings.operator_inputs),
             signals: Signals::new(&settings),
@@ -197,6 +217,11 @@ impl RemoteIo {
 
     fn report(&mut self, event: Event) {
         self.member.report(event);
+    }
+
+    /// Says what became of an order.
+    fn obeyed(&mut self, outcome: Result<(), OrderRefusal>) {
+        self.member.put(Output::Obeyed(outcome));
     }
 
     fn receive(&mut self, now: Time, frame: &Arc<Frame>) {
@@ -269,6 +294,7 @@ impl RemoteIo {
             self.trust.release();
             self.report(Event::Released { moment });
         }
+        self.obeyed(Ok(()));
     }
 
     fn note(&mut self, station: StationId, holdings: &[Holding], recalled: &[Recalled]) {
@@ -288,6 +314,10 @@ impl RemoteIo {
     fn begin_cycle(&mut self, now: Time, moment: Moment, anchor: Time) {
         if self.member.clock.moment().is_some() {
             match self.deadline {
+                Deadline::Ahead if self.slept_through(now, anchor) => {
+                    self.miss_signals();
+                    self.missed = self.missed.saturating_add(1);
+                }
                 Deadline::Ahead => self.decide(now),
                 Deadline::Passed { .. } => self.note_lateness(now),
             }
@@ -300,6 +330,21 @@ impl RemoteIo {
         // A station has started this cycle, whether its turn is received or not.
         self.count_votes(now, self.own_stations().max(1));
         self.sample(now);
+    }
+
+    /// Whether the current cycle took no time, and is one of those that this remote I/O finds in its buffers after it was suspended: its deadline is
+    /// over, the device kept its last values, and it is not driven or recorded now as if it had been driven then.
+    fn slept_through(&self, now: Time, next: Time) -> bool {
+        let period = self.settings.agreement.schedule.period();
+        let took_time = next.since(self.member.clock.anchor()) >= period / 2;
+        !took_time && self.resumed.is_some_and(|resumed| now.since(resumed) < period)
+    }
+
+    /// Notes that the host has woken this remote I/O too late to keep its times.
+    fn note_sleep(&mut self, now: Time) {
+        if now.since(self.member.wakeup()) > self.settings.agreement.schedule.stall() {
+            self.resumed = Some(now);
+        }
     }
 
     fn close_cycle(&mut self) {
@@ -367,6 +412,7 @@ impl Hash for RemoteIo {
             diagnosed,
             looked,
             protection,
+            resumed,
             forcing,
             writing,
             signals,
@@ -383,7 +429,7 @@ impl Hash for RemoteIo {
         (member, holders, knowledge, question, authority).hash(hasher);
         (sensors, field, diagnosing, diagnosed, forcing).hash(hasher);
         (writing, signals).hash(hasher);
-        (looked, protection, turns, deadline, missed, applied).hash(hasher);
+        (looked, resumed, protection, turns, deadline, missed, applied).hash(hasher);
         (last_true, descent, program, trust, differed).hash(hasher);
     }
 }
@@ -392,6 +438,7 @@ impl Machine for RemoteIo {
     type Event = Event;
 
     fn handle_input(&mut self, now: Time, input: Input<'_>) {
+        self.note_sleep(now);
         self.member.note_time(now);
         self.end_forces(now);
         match input {

@@ -9,7 +9,7 @@ use understudy_wire::{Image, ProgramHash, ProgramId};
 use crate::channel::Channel;
 use crate::diagnosis::Diagnosis;
 use crate::ramp::Ramp;
-use crate::source::{OperatorInput, SignalInput, SignalSource};
+use crate::source::{OperatorInput, PointPlace, SignalInput, SignalSource};
 
 /// Configuration of one remote I/O.
 #[derive(Debug, Clone)]
@@ -22,6 +22,10 @@ pub struct Settings {
     pub hash: ProgramHash,
     /// u(i) where nothing drives it: the initial values of its variables.
     pub undriven: Image,
+    /// Signals of u(i), in the order of their bits.
+    pub input_points: Vec<PointPlace>,
+    /// Signals of y(i), in the order of their bits.
+    pub output_points: Vec<PointPlace>,
     /// Inputs that operators write; no two share a bit with each other or with a signal.
     pub operator_inputs: Vec<OperatorInput>,
     /// Inputs that are outputs of other programs.

@@ -1,6 +1,6 @@
 //! Inputs of a program that do not come from its field: operators write them, or another program computes them.
 
-use understudy_typed::Elementary;
+use understudy_typed::{Elementary, Point};
 use understudy_wire::{Image, PointValue, ProgramId, Role};
 
 /// Place of a value in a process image.
@@ -13,6 +13,22 @@ pub struct PointPlace {
 }
 
 impl PointPlace {
+    /// Place of a point.
+    pub fn of(point: &Point) -> Self {
+        // Images are at most 64 Kbit wide, which is checked elsewhere.
+        Self { bit: u16::try_from(point.bit).unwrap_or(u16::MAX), of: point.of }
+    }
+
+    /// BOOLs, one for each bit of an image.
+    pub fn booleans(width: u16) -> Vec<Self> {
+        (0..width).map(|bit| Self { bit, of: Elementary::Bool }).collect()
+    }
+
+    /// Whether the signal can have a value: one of its width, and a finite number where it is a REAL or an LREAL.
+    pub fn takes(self, value: PointValue) -> bool {
+        u32::from(value.width()) == self.of.bits() && is_number(self.of, value.stored())
+    }
+
     /// Stores a value.
     pub(crate) fn set(self, image: &mut Image, stored: u64) {
         for bit in 0..self.of.bits() {
@@ -84,19 +100,14 @@ impl OperatorInput {
     /// # Errors
     /// [`ValueMismatch`].
     pub fn check(&self, value: PointValue) -> Result<(), ValueMismatch> {
-        let of = self.place.of;
-        if u32::from(value.width()) != of.bits() {
+        if !self.place.takes(value) {
             return Err(ValueMismatch::Type);
         }
-        let stored = value.stored();
+        let (of, stored) = (self.place.of, value.stored());
         match self.kind {
-            OperatorInputKind::Level | OperatorInputKind::Pulse(_) => Ok(()),
-            OperatorInputKind::Setpoint { .. } | OperatorInputKind::Group { .. }
-                if !is_number(of, stored) =>
-            {
-                Err(ValueMismatch::Type)
-            }
-            OperatorInputKind::Group { .. } => Ok(()),
+            OperatorInputKind::Level
+            | OperatorInputKind::Pulse(_)
+            | OperatorInputKind::Group { .. } => Ok(()),
             OperatorInputKind::Setpoint { low, high } => {
                 let is_inside = in_order(of, low, stored) && in_order(of, stored, high);
                 is_inside.then_some(()).ok_or(ValueMismatch::Limits)

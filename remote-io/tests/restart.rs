@@ -4,7 +4,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_cycle::{Agreement, Input, Machine, Mode, Output, RemoteIoInput, Schedule};
-use understudy_remote_io::{Event, Release, RemoteIo, Settings, StaleState, ValueFault};
+use understudy_remote_io::{
+    Event, PointPlace, Release, RemoteIo, Settings, StaleState, ValueFault,
+};
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
     Join, Lineage, Member, Moment, ProgramHash, ProgramId, ProgramSet, Recalled, SamplesReceived,
@@ -41,6 +43,8 @@ fn run(held: [Held; 3], release: Release, released_at: u64, cycles: u64) -> Vec<
             agreement,
             hash: ProgramHash(1),
             undriven: Image::zero(1),
+            input_points: PointPlace::booleans(1),
+            output_points: PointPlace::booleans(1),
             operator_inputs: Vec::new(),
             signals: Vec::new(),
             signal_sources: Vec::new(),

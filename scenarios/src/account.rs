@@ -24,7 +24,9 @@ use understudy_journal::{AlarmChange, Happening, Members, Numbering, Record, mom
 use understudy_node::Event as StationEvent;
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_simulator::{Action, Referee, Violation};
-use understudy_wire::{Member, Moment, ProgramId, ProgramSet, Source, StationId, StationSet};
+use understudy_wire::{
+    Force, Member, Moment, OrderRefusal, ProgramId, ProgramSet, Source, StationId, StationSet,
+};
 
 use crate::figure::Signals;
 use crate::scenario::{During, Scenario};
@@ -86,7 +88,24 @@ pub(crate) struct DoneStep {
     pub(crate) asked: u64,
     /// The first cycle whose deadline came after it.
     pub(crate) measured: u64,
+    /// Why the member refused it; it has no effect then.
+    pub(crate) refused: Option<OrderRefusal>,
 }
+
+/// A force of a signal, or one that was refused.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct DoneForce {
+    pub(crate) program: ProgramId,
+    pub(crate) force: Force,
+    /// The first cycle with it; nothing before the origin.
+    pub(crate) from: Option<u64>,
+    /// The first cycle without it; nothing where it lasts.
+    pub(crate) to: Option<u64>,
+    pub(crate) refused: Option<OrderRefusal>,
+}
+
+/// Forces that are listed, at most; all are counted.
+const MAXIMUM_FORCES: usize = 100;
 
 /// An unexpected end of a member.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -142,6 +161,8 @@ pub struct Account {
     alarms: Alarms,
     pub(crate) traces: Traces,
     pub(crate) steps: Vec<DoneStep>,
+    pub(crate) forces: Vec<DoneForce>,
+    pub(crate) force_count: u64,
     pub(crate) deaths: Vec<Death>,
     pub(crate) death_count: u64,
     pub(crate) violations: Vec<(u64, ProgramId, Violation)>,
@@ -180,6 +201,8 @@ impl Account {
                 stations: vec![Trace::default(); stations],
             },
             steps: Vec::new(),
+            forces: Vec::new(),
+            force_count: 0,
             deaths: Vec::new(),
             death_count: 0,
             violations: Vec::new(),

@@ -99,8 +99,8 @@ pub fn simulate(
 
 fn applied(happening: &Happening) -> Option<(Moment, Image)> {
     match happening {
-        Happening::RemoteIo(RemoteIoEvent::Applied { moment, outputs, .. }) => {
-            Some((*moment, outputs.clone()))
+        Happening::RemoteIo(event @ RemoteIoEvent::Applied { moment, .. }) => {
+            Some((*moment, event.driven()?.clone()))
         }
         _ => None,
     }

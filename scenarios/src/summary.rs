@@ -6,11 +6,11 @@ use std::fmt;
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use understudy_cluster::Priority;
-use understudy_journal::JournalState;
+use understudy_cluster::{Priority, value_text};
+use understudy_journal::{JournalState, Members};
 use understudy_wire::{Member, ProgramId};
 
-use crate::account::{Account, Counts, Interval, Presence, Service, Stall};
+use crate::account::{Account, Counts, DoneForce, Interval, Presence, Service, Stall};
 use crate::scenario::{Scenario, action_text};
 
 /// The whole of `summary.json`.
@@ -42,6 +42,10 @@ pub struct Summary {
     pub plants: Vec<PlantSummary>,
     /// What was done to whom, in order.
     pub steps: Vec<StepSummary>,
+    /// Forces of signals and refused ones, in order, at most 100 of them.
+    pub forces: Vec<ForceSummary>,
+    /// How many there were.
+    pub force_count: u64,
     /// Members that ended unexpectedly, at most 100 of them.
     pub deaths: Vec<DeathSummary>,
     /// How many there were.
@@ -146,6 +150,51 @@ pub struct StepSummary {
     pub asked: u64,
     /// The first cycle whose deadline came after it.
     pub measured: u64,
+    /// Why the member refused it, where it did: it has no effect then.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub refused: Option<String>,
+}
+
+/// A force of a signal: an output was driven with its value, an input was sampled with it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct ForceSummary {
+    /// The remote I/O.
+    pub name: String,
+    /// The signal.
+    pub signal: String,
+    /// The value.
+    pub value: String,
+    /// The first cycle with it; nothing where it was forced before cycle 0.
+    pub from: Option<u64>,
+    /// The first cycle without it; nothing where it lasts until the end.
+    pub to: Option<u64>,
+    /// Person who forced it.
+    pub owner: String,
+    /// Reason.
+    pub reason: String,
+    /// Why the remote I/O refused it, where it did: it has no effect then.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub refused: Option<String>,
+}
+
+impl ForceSummary {
+    fn new(done: &DoneForce, members: &Members) -> Self {
+        let DoneForce { program, force, from, to, refused } = done;
+        let known = members.signal(*program, force.signal);
+        let known = known.filter(|known| known.of.bits() == u32::from(force.value.width()));
+        let stored = force.value.stored();
+        Self {
+            name: members.name(Member::RemoteIo(*program)).to_owned(),
+            signal: known.map_or_else(|| format!("{:?}", force.signal), |known| known.name.clone()),
+            value: known
+                .map_or_else(|| format!("16#{stored:X}"), |known| value_text(known.of, stored)),
+            from: *from,
+            to: *to,
+            owner: force.owner.clone(),
+            reason: force.reason.clone(),
+            refused: refused.map(|refusal| refusal.to_string()),
+        }
+    }
 }
 
 /// A member that ended unexpectedly.
@@ -282,6 +331,7 @@ impl Summary {
             name: name(step.member),
             asked: step.asked,
             measured: step.measured,
+            refused: step.refused.map(|refusal| refusal.to_string()),
         });
         let alarms = account.alarm_findings();
         let alarms = alarms.filter(|(_, finding, _)| finding.raised > 0);
@@ -308,6 +358,8 @@ impl Summary {
             remote_ios: remote_ios.collect(),
             plants: plants.collect(),
             steps: steps.collect(),
+            forces: account.forces.iter().map(|done| ForceSummary::new(done, members)).collect(),
+            force_count: account.force_count,
             deaths: account
                 .deaths
                 .iter()

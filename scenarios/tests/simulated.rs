@@ -252,6 +252,34 @@ source = "reconstructed"
     assert_eq!(found.last().copied(), Some("as expected, but for 10 while the host stood still"));
 }
 
+/// The device of a suspended remote I/O keeps its last values: no deadline of that time was held or fail-safe, whatever it finds in its buffers
+/// afterwards.
+#[test]
+fn the_deadlines_of_a_suspended_remote_io_are_missed() {
+    let text = "title = \"Suspended\"\ncycles = 120\n\n[[step]]\nat = 30\naction = \"stop\"\nstation = \"robot-io\"\n\n[[step]]\nat = 80\naction = \"continue\"\nstation = \"robot-io\"\n";
+    for seed in 0..20 {
+        let (bytes, summary, _) = run(Mode::Full, text, seed);
+        let mut at = std::collections::BTreeMap::<u64, usize>::new();
+        for record in records(&bytes[..]) {
+            let record = record.expect("a record");
+            if record.name == "robot-io"
+                && matches!(
+                    record.event,
+                    Happening::RemoteIo(understudy_remote_io::Event::Applied { .. })
+                )
+            {
+                *at.entry(record.at_ns / 10_000_000).or_default() += 1;
+            }
+        }
+        // At most one for the cycle in which it was suspended, and the one of the period in which it continues.
+        assert!(at.values().all(|&count| count <= 2), "{seed}: {at:?}");
+        let counts = summary.remote_ios[0].counts;
+        assert!((48..=50).contains(&counts.missed), "{seed}: {counts:?}");
+        assert!(counts.fail_safe + counts.held <= 4, "{seed}: {counts:?}");
+        assert_eq!(counts.wrong, 0);
+    }
+}
+
 /// A host that woke a member late once may have cost more than the cycle in which that was seen: neither passed nor failed.
 #[test]
 fn a_run_on_a_late_host_is_inconclusive() {

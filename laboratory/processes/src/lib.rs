@@ -26,7 +26,7 @@ use tokio::sync::mpsc::{Receiver, Sender, channel};
 use understudy_bus::{Cuts, LinkKind, RefusedOrders, WRITES_PER_SECOND, WriteLimiter};
 use understudy_cluster::Cluster;
 use understudy_journal::{
-    Commands, Journal, JournalState, KEYS, PendingWrites, Record, RunDirectory, RunEvent,
+    Commands, Journal, JournalState, KEYS, PendingOrders, Record, RunDirectory, RunEvent,
     RunSocket, commands as queue_of_commands, keep_cluster, monotonic_ns,
 };
 use understudy_simulator::Action;
@@ -213,7 +213,7 @@ fn run(
         afterwards,
         judged: None,
         commanded: commands.is_some(),
-        writes: PendingWrites::default(),
+        orders: PendingOrders::default(),
         // Less than a member takes, so that each caller gets an answer.
         write_limiter: WriteLimiter::new(WRITES_PER_SECOND / 2),
         refused_orders: RefusedOrders::default(),
@@ -275,7 +275,7 @@ struct Laboratory<'w> {
     judged: Option<Account>,
     /// Whether somebody gives commands, or said that he might.
     commanded: bool,
-    writes: PendingWrites,
+    orders: PendingOrders,
     write_limiter: WriteLimiter,
     refused_orders: RefusedOrders,
     directory: PathBuf,
@@ -377,7 +377,7 @@ impl Laboratory<'_> {
             journal.write(record);
         }
         self.account.observe(record);
-        self.writes.observe(record);
+        self.orders.observe(record);
         self.conductor.hear(record, Instant::now());
         if let Some(moment) = self.account.origin().filter(|_| !had_origin) {
             self.note(RunEvent::Origin { moment, cycle: 0 });

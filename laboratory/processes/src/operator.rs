@@ -2,7 +2,7 @@
 
 use understudy_journal::{Command, Commanded, Done, OperatorAction, Refusal, RunEvent};
 use understudy_simulator::{Action, Fault};
-use understudy_wire::{Force, Member, ProgramId, WriteRefusal};
+use understudy_wire::{Member, WriteRefusal};
 
 use super::Laboratory;
 use crate::process::Process;
@@ -19,14 +19,17 @@ impl Laboratory<'_> {
             }
             return commanded.answer(done);
         };
-        let write = match &command {
-            Command::Write(write) => Some(write.id),
-            _ => None,
-        };
+        let is_decided_there = matches!(
+            command,
+            Command::Write(_)
+                | Command::Force(_)
+                | Command::Unforce { .. }
+                | Command::Choose { .. }
+        );
         let done = self.obey_command(member, command, owner, reason).await;
-        // Its outcome comes with the journal of the remote I/O.
-        if let (Some(id), Ok(_)) = (write, &done) {
-            return self.writes.add(id, commanded);
+        // The outcome comes with the journal of the remote I/O.
+        if is_decided_there && done.is_ok() {
+            return self.orders.add(commanded);
         }
         commanded.answer(done);
     }
@@ -90,18 +93,14 @@ impl Laboratory<'_> {
             _ if !running => Some(Refusal::Down(name())),
             Command::Stop if still => Some(already("stands still")),
             Command::Continue if !still => Some(already("runs")),
-            Command::Force(force) => self.force_refusal(member, force),
+            Command::Kill | Command::Continue => None,
+            _ if still => Some(Refusal::Suspended(name())),
+            // The rest is checked by the remote I/O.
+            Command::Force(force) => {
+                force.check().err().map(|error| Refusal::Force(error.to_string()))
+            }
             _ => None,
         }
-    }
-
-    fn force_refusal(&self, member: Member, force: &Force) -> Option<Refusal> {
-        let Member::RemoteIo(ProgramId(program)) = member else {
-            return None;
-        };
-        let signals = self.account.terms.signals.get(usize::from(program))?;
-        let (inputs, outputs) = (signals.inputs.len(), signals.outputs.len());
-        Refusal::of_force(&self.name(member), force, inputs, outputs)
     }
 
     async fn command(&mut self, member: Member, command: &Command) -> Result<Done, Refusal> {

@@ -412,7 +412,7 @@ impl Simulation {
                 Output::Report(event) => {
                     observe(self.now, self.pace.cycle(), member, Record::Station(&event));
                 }
-                Output::Drive(_) | Output::Answer(_) => {}
+                Output::Drive(_) | Output::Answer(_) | Output::Obeyed(_) => {}
             }
         }
     }
@@ -439,7 +439,7 @@ impl Simulation {
                     observe(self.now, self.pace.cycle(), member, Record::RemoteIo(&event));
                 }
                 // The event says the same.
-                Output::Answer(_) => {}
+                Output::Answer(_) | Output::Obeyed(_) => {}
             }
         }
     }

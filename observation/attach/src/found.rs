@@ -21,8 +21,6 @@ const AT_ONCE: usize = 16;
 pub struct Found {
     pub(crate) line: Line,
     pub(crate) members: Vec<(Peer, Result<Call, String>)>,
-    /// Inputs and outputs of each program.
-    pub(crate) signals: Vec<(usize, usize)>,
     /// Alarms on signals.
     pub(crate) alarms: Arc<[AlarmDeclaration]>,
 }
@@ -89,13 +87,9 @@ pub fn find(cluster: &Cluster, keys: TlsKeys, peers: Vec<Peer>) -> Result<Found,
         return Err(why_nobody(called, line.configuration));
     }
     let members = called.into_iter();
-    let controllers = cluster.controllers().iter();
     Ok(Found {
         line,
         alarms: Arc::clone(cluster.alarms()),
-        signals: controllers
-            .map(|own| (own.interface.inputs.width(), own.interface.outputs.width()))
-            .collect(),
         members: members.map(|(peer, call)| (peer, call.map_err(Vain::words))).collect(),
     })
 }

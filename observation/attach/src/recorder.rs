@@ -119,7 +119,6 @@ impl Found {
             journal,
             calls,
             names,
-            signals: self.signals,
             alarms: self.alarms,
             refused_orders: RefusedOrders::default(),
             has_origin: false,
@@ -145,8 +144,6 @@ struct Recorder {
     journal: Journal,
     calls: Calls,
     names: BTreeMap<Member, String>,
-    /// Inputs and outputs of each program.
-    signals: Vec<(usize, usize)>,
     refused_orders: RefusedOrders,
     alarms: Arc<[AlarmDeclaration]>,
     has_origin: bool,
@@ -325,15 +322,9 @@ impl Recorder {
                 return Err(elsewhere(PROCESS));
             }
         };
-        let Member::RemoteIo(program) = member else {
+        let Member::RemoteIo(_) = member else {
             return Err(Refusal::WrongMember { name, needs: "it is for remote I/Os" });
         };
-        if let (Command::Force(force), Some((inputs, outputs))) =
-            (command, self.signals.get(program.index()))
-            && let Some(refusal) = Refusal::of_force(&name, force, *inputs, *outputs)
-        {
-            return Err(refusal);
-        }
         let Some(call) = self.calls.to(member) else {
             return Err(elsewhere("it takes no call now"));
         };
@@ -347,7 +338,7 @@ impl Recorder {
         asking.map_err(|error| system(error.to_string()))?;
         match told.await {
             Ok(Ok(answer)) if answer == DONE => Ok(Done::default()),
-            Ok(Ok(why)) => Err(Refusal::Force(why)),
+            Ok(Ok(why)) => Err(Refusal::of_answer(why)),
             Ok(Err(error)) => Err(system(error.to_string())),
             Err(_) => Err(Refusal::Busy),
         }

@@ -158,8 +158,8 @@ impl AlarmFold {
         let Some(track) = self.tracks.get_mut(program.index()) else {
             return Vec::new();
         };
-        let (sampled, outputs, missing) = match event {
-            RemoteIoEvent::Applied { sampled, outputs, missing, .. } => (sampled, outputs, missing),
+        let (sampled, missing) = match event {
+            RemoteIoEvent::Applied { sampled, missing, .. } => (sampled, missing),
             RemoteIoEvent::StartedCold { .. } if !track.begun => {
                 track.begun = true;
                 return self.set(program, Condition::OVER);
@@ -178,7 +178,7 @@ impl AlarmFold {
         }
         let inputs = track.inputs.clone();
         let value = |alarm: &AlarmDeclaration| {
-            let image = if alarm.is_output { Some(outputs) } else { inputs.as_ref() };
+            let image = if alarm.is_output { event.driven() } else { inputs.as_ref() };
             let image = image?;
             let ends = alarm.point.bit as usize + alarm.point.of.bits() as usize;
             (ends <= image.width()).then(|| alarm.point.get(image.words()))

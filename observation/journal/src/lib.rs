@@ -39,7 +39,7 @@ pub use named_files::{ALLOWED_FOLDERS, named_file};
 pub use numbering::Numbering;
 pub use operator::{
     Acknowledgement, AlarmRefusal, Command, Commanded, Commander, Commands, DECIDED_WITHIN, Done,
-    MAXIMUM_SHELVING_SECONDS, OperatorAction, PendingWrites, Refusal, RequestedValue, RunSocket,
+    MAXIMUM_SHELVING_SECONDS, OperatorAction, PendingOrders, Refusal, RequestedValue, RunSocket,
     Shelving, Unshelving, WriteProblem, WriteRequest, WriteSessions, attempt_until_decided,
     commands, find_alarm, force_value, new_write, write_answer,
 };

@@ -10,6 +10,7 @@
 
 mod acknowledgement;
 mod new_write;
+mod pending;
 mod sessions;
 mod shelving;
 mod socket;
@@ -20,18 +21,16 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use tokio::sync::{mpsc, oneshot};
 use understudy_wire::{
-    Force, Member, SignalPlace, StateChoice, Write, WriteAnswer, WriteId, WriteOutcome,
-    WriteRefusal,
+    Force, Member, OrderRefusal, SignalPlace, StateChoice, Write, WriteOutcome, WriteRefusal,
 };
 
+use crate::record::RunEvent;
 use understudy_bus::{RefusedOrder, RefusedOrders};
 use understudy_cluster::AlarmDeclaration;
-use understudy_remote_io::Event as RemoteIoEvent;
-
-use crate::record::{Happening, Record, RunEvent};
 
 pub use acknowledgement::Acknowledgement;
 pub use new_write::{RequestedValue, WriteProblem, WriteRequest, force_value, new_write};
+pub use pending::{PendingOrders, write_answer};
 pub use sessions::{DECIDED_WITHIN, WriteSessions, attempt_until_decided};
 pub use shelving::{AlarmRefusal, MAXIMUM_SHELVING_SECONDS, Shelving, Unshelving, find_alarm};
 pub use socket::RunSocket;
@@ -124,6 +123,12 @@ pub enum Refusal {
         /// What can be done there in its place.
         reason: String,
     },
+    /// It is suspended, and would do later what is asked now.
+    #[error("U0551: {0} is suspended: let it continue first")]
+    Suspended(String),
+    /// The remote I/O refuses a choice, a force or the end of a force.
+    #[error("{code}: {0}", code = .0.code())]
+    Order(OrderRefusal),
     /// The remote I/O refuses a write.
     #[error("{code}: {refusal}", code = .refusal.code())]
     Write {
@@ -147,17 +152,10 @@ pub enum Refusal {
 }
 
 impl Refusal {
-    /// Why a force is none for a remote I/O with so many inputs and outputs, where it is none.
-    pub fn of_force(name: &str, force: &Force, inputs: usize, outputs: usize) -> Option<Self> {
-        if let Err(error) = force.check() {
-            return Some(Self::Force(error.to_string()));
-        }
-        let (place, count, kind) = match force.signal {
-            SignalPlace::Input(place) => (place, inputs, "inputs"),
-            SignalPlace::Output(place) => (place, outputs, "outputs"),
-        };
-        (!force.fits(count))
-            .then(|| Self::Force(format!("{name} has {count} {kind}, and no number {place}")))
+    /// What a member answers in place of being done; with its code, where the member says one.
+    pub fn of_answer(answer: String) -> Self {
+        let said = Self::Said(answer);
+        if said.own_code().is_some() { said } else { Self::Force(said.to_string()) }
     }
 }
 
@@ -260,50 +258,6 @@ impl Done {
             WriteOutcome::Refused { refusal } => Err(Refusal::Write { refusal }),
         }
     }
-}
-
-/// Writes that were sent to their remote I/Os, until their outcomes are in the journal.
-#[derive(Debug, Default)]
-pub struct PendingWrites(Vec<(WriteId, Commanded)>);
-
-impl PendingWrites {
-    /// Waits for the outcome of a write.
-    pub fn add(&mut self, id: WriteId, commanded: Commanded) {
-        // Callers that have given up do not come back.
-        self.0.retain(|(_, waiting)| !waiting.answer.is_closed());
-        self.0.push((id, commanded));
-    }
-
-    /// Answers the callers whose writes are decided by a record.
-    pub fn observe(&mut self, record: &Record) {
-        let Some(answer) = write_answer(record).filter(|_| !self.0.is_empty()) else {
-            return;
-        };
-        for (id, commanded) in std::mem::take(&mut self.0) {
-            if id == answer.id {
-                commanded.answer(Done::of_write(answer.outcome));
-            } else {
-                self.0.push((id, commanded));
-            }
-        }
-    }
-}
-
-/// The outcome of a write that a record tells.
-pub fn write_answer(record: &Record) -> Option<WriteAnswer> {
-    let Happening::RemoteIo(event) = &record.event else {
-        return None;
-    };
-    let refused = |refusal: WriteRefusal| WriteOutcome::Refused { refusal };
-    let (id, outcome) = match event {
-        RemoteIoEvent::WriteInEffect { id, since, .. } => {
-            (*id, WriteOutcome::InEffect { since: *since })
-        }
-        RemoteIoEvent::WriteRefused { write, refusal, .. } => (write.id, refused(*refusal)),
-        RemoteIoEvent::WriteVoid { id, .. } => (*id, refused(WriteRefusal::Void)),
-        _ => return None,
-    };
-    Some(WriteAnswer { id, outcome })
 }
 
 /// An action that waits for its answer.

@@ -201,6 +201,8 @@ pub fn moment(event: &Happening) -> Option<Moment> {
             | RemoteIo::Released { moment }
             | RemoteIo::Forced { moment, .. }
             | RemoteIo::Unforced { moment, .. }
+            | RemoteIo::ForceRefused { moment, .. }
+            | RemoteIo::UnforceRefused { moment, .. }
             | RemoteIo::Written { moment, .. }
             | RemoteIo::WriteInEffect { moment, .. }
             | RemoteIo::WriteRefused { moment, .. }

@@ -116,6 +116,7 @@ mod tests {
             moment,
             sampled: None,
             outputs: Image::zero(2),
+            driven: None,
             source: Source::Direct,
             word_of: None,
             missing: None,

@@ -216,6 +216,26 @@ impl Alarms {
         self.lasting.insert(subject, self.count);
     }
 
+    /// Puts an alarm in the place of one that lasts: what it is about has changed. The newer one counts; it is acknowledged if the one before it was
+    /// and `asks_again` is false.
+    pub(crate) fn replace(&mut self, subject: Subject, cycle: i64, text: String, asks_again: bool) {
+        let lasting = self.lasting.get(&subject).copied();
+        let before = lasting.and_then(|lasting| self.alarms.get_mut(&lasting)).map(|before| {
+            if before.acknowledged_by.is_none() {
+                before.repeated_in = Some(cycle);
+            }
+            before.clone()
+        });
+        self.over(&subject, cycle);
+        self.raise_alarm(subject, cycle, text, |alarm| {
+            if let Some(before) = before.filter(|_| !asks_again) {
+                alarm.raised_ns = before.raised_ns;
+                alarm.acknowledged_by = before.acknowledged_by;
+                alarm.acknowledged_in = before.acknowledged_in;
+            }
+        });
+    }
+
     /// What it was about is over.
     pub(crate) fn over(&mut self, subject: &Subject, cycle: i64) {
         if let Some(lasting) = self.lasting.remove(subject)
@@ -292,6 +312,27 @@ mod tests {
         assert!(!alarms.iter().any(Alarm::is_open));
         alarms.raise(subject(), 12, "again".to_owned());
         assert_eq!(alarms.iter().filter(|alarm| alarm.is_open()).count(), 1);
+    }
+
+    #[test]
+    fn an_alarm_that_is_replaced_asks_again_where_something_is_added() {
+        for (is_acknowledged, asks_again) in
+            [(false, false), (false, true), (true, false), (true, true)]
+        {
+            let mut alarms = Alarms::default();
+            let subject = || ("press-io".to_owned(), "forced");
+            alarms.replace(subject(), 3, "one".to_owned(), true);
+            if is_acknowledged {
+                let seen = alarms.iter().next().expect("one").acknowledgement("anna".to_owned(), 0);
+                alarms.acknowledged(&seen, 4);
+            }
+            alarms.replace(subject(), 5, "other".to_owned(), asks_again);
+            let open: Vec<&Alarm> = alarms.iter().filter(|alarm| alarm.is_open()).collect();
+            let [open] = open[..] else { panic!("{open:?}") };
+            assert_eq!((open.text.as_str(), open.over), ("other", None));
+            let acknowledged = is_acknowledged && !asks_again;
+            assert_eq!(open.acknowledged_by.is_some(), acknowledged);
+        }
     }
 
     #[test]

@@ -51,14 +51,14 @@ pub enum ViewError {
         programs: Vec<String>,
     },
     /// The cycle is not in what is left of the journal.
-    #[error("U0575: cycle {cycle} is not in the journal of {program}, which has {known}")]
+    #[error("U0575: cycle {cycle} is not in the journal of {program}, which has {}", cycles_text(*.cycle, *.known))]
     NoCycle {
         /// As it was asked for.
         cycle: i64,
         /// Whose program.
         program: String,
-        /// The cycles that it has, in words.
-        known: String,
+        /// The first and the last cycle that it has.
+        known: Option<(i64, i64)>,
     },
     /// The state of the program is not known in this cycle.
     #[error("U0576: the state of {program} is not known in cycle {cycle}: {reason}")]
@@ -83,6 +83,17 @@ pub enum ViewError {
     /// The part of the run to be shown is not given.
     #[error("U0579: no part of the run to show: {0}")]
     NoScene(String),
+}
+
+/// The cycles of a journal that has no record of `cycle`.
+fn cycles_text(cycle: i64, known: Option<(i64, i64)>) -> String {
+    match known {
+        None => "none".to_owned(),
+        Some((from, to)) if (from..=to).contains(&cycle) => {
+            format!("{from} to {to} without it: its remote I/O reported nothing in it")
+        }
+        Some((from, to)) => format!("{from} to {to}"),
+    }
 }
 
 impl ViewError {

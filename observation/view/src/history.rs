@@ -38,9 +38,11 @@ pub struct Sampled {
 /// The outputs at a deadline.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Driven {
-    /// y(i).
+    /// y(i) as the device gets it, with the forced values.
     pub outputs: Image,
-    /// Their source.
+    /// y(i) before forces.
+    pub unforced: Image,
+    /// Source of the unforced outputs.
     pub source: Source,
     /// The station whose parity word they were reconstructed from.
     pub word_of: Option<StationId>,
@@ -315,7 +317,8 @@ impl History {
             }
             Event::Applied { moment, outputs, source, word_of, missing, heard, .. } => {
                 let driven = Driven {
-                    outputs: outputs.clone(),
+                    outputs: event.driven().unwrap_or(outputs).clone(),
+                    unforced: outputs.clone(),
                     source: *source,
                     word_of: *word_of,
                     missing: *missing,

@@ -39,7 +39,7 @@ pub use counters::{Counters, MemberCounters, ProgramCounters};
 use cycle::{LastMargin, Received};
 use programs::ProgramTrack;
 use reports::Reports;
-pub(crate) use standing::Standing;
+pub(crate) use standing::{ForcedSignal, Standing};
 pub use turns::SentTurn;
 use turns::Turns;
 

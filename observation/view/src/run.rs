@@ -243,7 +243,21 @@ impl Run {
             }
         }
         let model = self.read_from(bounds, None, until)?;
-        model.why(signal, cycle)
+        match model.why(signal, cycle) {
+            // It was read up to this cycle only.
+            Err(ViewError::NoCycle { cycle: absent, program, known }) => {
+                let whole = self.read_from(bounds, None, i64::MAX)?;
+                let why = whole.why(signal, cycle);
+                match (why, known) {
+                    (Err(ViewError::NoCycle { known: Some((_, to)), .. }), Some((from, _))) => {
+                        let known = Some((from, to));
+                        Err(ViewError::NoCycle { cycle: absent, program, known })
+                    }
+                    (why, _) => why,
+                }
+            }
+            why => why,
+        }
     }
 
     /// Cycles at the beginning of a reading in which the states of the programs may not be known yet.

@@ -29,7 +29,7 @@ impl Series {
         self.inputs.get(program.index())
     }
 
-    /// y(i) as it was applied.
+    /// y(i) as driven.
     pub fn outputs(&self, program: ProgramId) -> Option<&Timeline<Image>> {
         self.outputs.get(program.index())
     }

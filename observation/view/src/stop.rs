@@ -135,10 +135,11 @@ pub(crate) fn fits(cluster: &Cluster, program: ProgramId, event: &RemoteIoEvent)
     let are_inputs = |width| width == interface.inputs.width();
     match event {
         RemoteIoEvent::Sampled { inputs, .. } => are_inputs(inputs.width()),
-        RemoteIoEvent::Applied { sampled, outputs, .. } => {
+        RemoteIoEvent::Applied { sampled, outputs, driven, .. } => {
             let sampled = sampled.as_ref();
+            let mut outputs = std::iter::once(outputs).chain(driven);
             sampled.is_none_or(|sampled| are_inputs(sampled.width()))
-                && outputs.width() == interface.outputs.width()
+                && outputs.all(|outputs| outputs.width() == interface.outputs.width())
         }
         _ => true,
     }

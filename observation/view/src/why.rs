@@ -24,7 +24,7 @@ use crate::describe::missing_text;
 use crate::error::ViewError;
 use crate::history::{Driven, History, Sampled, Step};
 use crate::model::Model;
-use crate::value::{named, named_text, value_in};
+use crate::value::{forced_point, forced_value, named, named_text, value_in};
 use explain::Explainer;
 
 /// Why an output or a variable of a program has its value.
@@ -34,7 +34,7 @@ pub struct Why {
     pub signal: String,
     /// Its program.
     pub program: String,
-    /// The remote I/O that drives it.
+    /// The remote I/O of its program; an output is driven by it.
     pub remote_io: String,
     /// From the origin of the run.
     pub cycle: i64,
@@ -44,7 +44,14 @@ pub struct Why {
     /// Its value as driven, of a variable after the scan: a BOOL as true or false, a number as a number, null where it is not finite, a time in
     /// nanoseconds.
     pub value: Value,
-    /// `direct`, `reconstructed`, `held` or `fail-safe`; nothing for a cycle whose deadline is not in the journal.
+    /// Where a force is in effect: its value is the one of the operator, whatever the program computes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub forced: Option<WhyForced>,
+    /// The cycle whose value the device kept, where the deadline of this one is not in the journal.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kept_since: Option<i64>,
+    /// `direct`, `reconstructed`, `held` or `fail-safe`, of an output, before forces; nothing for a cycle whose deadline is not in the journal, and
+    /// for other signals.
     pub source: Option<&'static str>,
     /// Why there was no provable output, in a missed cycle.
     pub missing: Option<&'static str>,
@@ -70,6 +77,21 @@ pub struct Why {
     pub ramp_to: Option<Value>,
     /// The chain of contacts or statements; nothing for a fail-safe value, unless a program fault led to it.
     pub because: Option<Reason>,
+}
+
+/// A force of a signal.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct WhyForced {
+    /// Person who forced it.
+    pub owner: String,
+    /// Reason.
+    pub reason: String,
+    /// Duration in seconds.
+    pub seconds: u32,
+    /// The cycle in which it was forced.
+    pub since: i64,
+    /// The value of an output without the force.
+    pub unforced: Option<Value>,
 }
 
 fn type_name<S: Serializer>(of: &Option<Elementary>, serializer: S) -> Result<S::Ok, S::Error> {
@@ -183,8 +205,14 @@ impl Model {
         let step = &history.steps()[place];
         let controller = &self.cluster.controllers()[program.index()];
         let output = controller.interface.outputs.find(name);
-        let source = step.driven.as_ref().map(|driven| driven.source);
-        let missing = step.driven.as_ref().and_then(|driven| driven.missing);
+        let decided = step.driven.as_ref().filter(|_| output.is_some());
+        let source = decided.map(|driven| driven.source);
+        let missing = decided.and_then(|driven| driven.missing);
+        // A deadline that was missed: the device kept the values of the one before it.
+        let steps = || history.steps().iter();
+        let is_missed = step.driven.is_none() && steps().skip(place).any(|it| it.driven.is_some());
+        let kept = steps().take(place).rfind(|it| it.driven.is_some());
+        let kept = kept.filter(|_| is_missed && output.is_some());
         // What is held was true in an earlier cycle; the fail-safe values were never computed.
         let explained = match source {
             Some(Source::Held) if output.is_some() => last_true(history, place),
@@ -195,16 +223,17 @@ impl Model {
             (Some(output), Some(sampled)) => Some(value_in(output, &sampled.outputs)),
             _ => None,
         };
-        let driven =
-            step.driven.as_ref().and_then(|driven| Some(value_in(output?, &driven.outputs)));
+        let drives = decided.or(kept.and_then(|kept| kept.driven.as_ref()));
+        let driven = drives.and_then(|driven| Some(value_in(output?, &driven.outputs)));
+        let unforced = drives.and_then(|driven| Some(value_in(output?, &driven.unforced)));
         let because = match &controller.code {
             Code::Ladder(ladder, _) => explained
                 .map(|explained| Explainer::new(self, history, ladder).root(name, explained))
                 .transpose()?,
             Code::Typed(typed, text) => {
                 let mut explainer = statements::Explainer::new(self, history, typed, text);
-                let stopped = missing == Some(Missing::ProgramFault) && output.is_some();
-                let value = driven.clone().unwrap_or_default();
+                let stopped = missing == Some(Missing::ProgramFault);
+                let value = unforced.clone().unwrap_or_default();
                 let fault = stopped.then(|| explainer.fault(name, value, place)).flatten();
                 match (fault, explained, typed.part(name)) {
                     (Some(fault), ..) => Some(fault),
@@ -215,7 +244,7 @@ impl Model {
         };
         let fail_safe = &self.cluster.remote_ios()[program.index()].fail_safe;
         let configured = output.map(|output| value_in(output, fail_safe));
-        let on_ramp = source == Some(Source::FailSafe) && configured != driven;
+        let on_ramp = source == Some(Source::FailSafe) && configured != unforced;
         let value =
             driven.or(because.as_ref().map(|reason| reason.value.clone())).unwrap_or_default();
         let sampled = step.sampled.as_ref().into_iter();
@@ -229,6 +258,8 @@ impl Model {
             remote_io: self.members.name(Member::RemoteIo(program)).to_owned(),
             cycle: step.cycle,
             age_cycles: None,
+            forced: self.why_forced(program, name, step.cycle, &value, unforced.as_ref()),
+            kept_since: kept.map(|kept| kept.cycle),
             source: source.map(source_word),
             missing: missing.map(missing_text),
             scanned: scanned.filter(|scanned| *scanned != value),
@@ -239,11 +270,34 @@ impl Model {
             of: typed.and_then(|typed| typed.part(name)?.of.elementary()),
             ramp_to: configured.filter(|_| on_ramp),
             value,
-            reconstructed: step
-                .driven
-                .as_ref()
-                .and_then(|driven| self.reconstructed(program, step, driven)),
+            reconstructed: decided.and_then(|driven| self.reconstructed(program, step, driven)),
             because,
+        })
+    }
+
+    /// The force that a value comes from; nothing where the signal is not forced, or was forced after this cycle.
+    fn why_forced(
+        &self,
+        program: ProgramId,
+        name: &str,
+        cycle: i64,
+        value: &Value,
+        unforced: Option<&Value>,
+    ) -> Option<WhyForced> {
+        let controller = &self.cluster.controllers()[program.index()];
+        let standing = self.standing(cycle);
+        let forced = standing.program(program)?.forced.iter().find(|forced| {
+            let point = forced_point(controller, &forced.force);
+            point.is_some_and(|point| {
+                point.name == name && forced_value(point, &forced.force) == *value
+            })
+        })?;
+        Some(WhyForced {
+            owner: forced.force.owner.clone(),
+            reason: forced.force.reason.clone(),
+            seconds: forced.force.seconds,
+            since: forced.since,
+            unforced: unforced.cloned(),
         })
     }
 

@@ -62,7 +62,9 @@ async function explain(program, output, cycle, takesFocus) {
     el("div", { class: "drawer-head" }, el("h2", {}, `Why is ${answer.signal} ${valueText(answer.value, answer.type)}?`), close),
     el("p", { class: "soft" }, `${answer.program}, cycle ${answer.cycle}; remote I/O ${answer.remote_io}`),
     ...source(answer).map((line) => el("p", {}, line)),
-    answer.because ? el("ul", { class: "cause" }, tree(answer.because)) : el("p", {}, "It is the configured fail-safe value: the program did not cause it."),
+    ...(answer.because ? [el("ul", { class: "cause" }, tree(answer.because))] : []),
+    ...(answer.source === "fail-safe" && answer.ramp_to === undefined
+      ? [el("p", {}, `${answer.forced ? "That" : "It"} is the configured fail-safe value: the program did not cause it.`)] : []),
     el("p", {}, el("a", { href: addressOf("ladder", { program, find: answer.signal }), click: hide }, "Show it in the program")),
   );
   drawer.hidden = false;
@@ -73,7 +75,17 @@ async function explain(program, output, cycle, takesFocus) {
 
 // Source of the value and its proof: equation (12) with its numbers.
 function source(answer) {
-  const lines = [`It is ${SOURCES[answer.source]?.words ?? "not known yet"}${answer.missing ? `: ${answer.missing}` : ""}.`];
+  const lines = [];
+  const { forced, kept_since: kept } = answer;
+  if (forced) {
+    lines.push(`Forced by ${forced.owner} since cycle ${forced.since}, for ${forced.seconds} s: ${forced.reason}.`);
+  }
+  if (kept !== undefined) {
+    lines.push(`The remote I/O missed this deadline: the device kept the value of cycle ${kept}.`);
+  } else {
+    const it = forced ? `Without the force it would be ${valueText(forced.unforced, answer.type)},` : "It is";
+    lines.push(`${it} ${SOURCES[answer.source]?.words ?? "not known yet"}${answer.missing ? `: ${answer.missing}` : ""}.`);
+  }
   if (answer.scanned !== null && answer.scanned !== answer.value) {
     lines.push(`The scan of the program yields ${valueText(answer.scanned, answer.type)}.`);
   }

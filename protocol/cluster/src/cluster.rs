@@ -18,7 +18,7 @@ use understudy_node::Program;
 use understudy_parity::ParityController;
 use understudy_plant::{Followed, Plant};
 use understudy_remote_io::{
-    Diagnosis, Ramp, Release, SignalSource, StaleState, StopPoints, ValueFault,
+    Diagnosis, PointPlace, Ramp, Release, SignalSource, StaleState, StopPoints, ValueFault,
 };
 use understudy_typed::Program as TypedProgram;
 use understudy_wire::{Epoch, Image, Member, ProgramHash, ProgramId, Roster, StationId};
@@ -372,6 +372,8 @@ impl Cluster {
             agreement: Arc::clone(&self.agreement),
             hash: controller.hash,
             undriven: initial_image(&controller.interface.inputs),
+            input_points: controller.interface.inputs.iter().map(PointPlace::of).collect(),
+            output_points: controller.interface.outputs.iter().map(PointPlace::of).collect(),
             operator_inputs: remote_io.operator_inputs().map(|it| it.input).collect(),
             signals: remote_io.signals().map(|signal| signal.input).collect(),
             signal_sources: self.signal_sources(remote_io),

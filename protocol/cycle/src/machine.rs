@@ -8,7 +8,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_wire::{
-    ConfigurationHash, Force, Frame, Image, SignalPlace, StateChoice, Time, Write, WriteAnswer,
+    ConfigurationHash, Force, Frame, Image, OrderRefusal, SignalPlace, StateChoice, Time, Write,
+    WriteAnswer,
 };
 
 /// An input of a member.
@@ -52,6 +53,8 @@ pub enum Output<Event> {
     Report(Event),
     /// The answer to a write.
     Answer(WriteAnswer),
+    /// What became of the release, the choice, the force or the end of a force that was given last; once for each.
+    Obeyed(Result<(), OrderRefusal>),
 }
 
 /// A majority of stations with another configuration, against a member that does not take part yet.

@@ -7,6 +7,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::identifier::Moment;
+
 /// Maximum duration of one force, in seconds.
 pub const MAXIMUM_FORCE_SECONDS: u32 = 3600;
 
@@ -129,6 +131,55 @@ pub enum ForceError {
     /// Its reason is missing, too long or not readable.
     #[error("the reason has 1 to {MAXIMUM_REASON_LENGTH} readable characters")]
     Reason,
+}
+
+/// Reason why a remote I/O refuses an order of an operator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, thiserror::Error)]
+#[serde(tag = "reason", rename_all = "kebab-case")]
+pub enum OrderRefusal {
+    /// No signal of the program begins at this bit.
+    #[error("no signal of the program begins at this bit; a number is forced as a whole")]
+    NoSignal,
+    /// The value has another width than the signal, or is not a finite number.
+    #[error("the value does not suit the signal: {width} bits are needed{}", if *.real { ", and a finite number" } else { "" })]
+    Value {
+        /// Width of the signal in bits.
+        width: u16,
+        /// Whether the signal is a REAL or an LREAL.
+        real: bool,
+    },
+    /// The force lacks its duration, its operator or its reason.
+    #[error(
+        "the force needs a duration of 1 to {MAXIMUM_FORCE_SECONDS} seconds, an operator and a reason"
+    )]
+    Incomplete,
+    /// The signal is not forced.
+    #[error("the signal is not forced")]
+    NotForced,
+    /// The program continues, and no choice of a state is asked for.
+    #[error("no choice of a state is asked for: the state of the program is not lost")]
+    NoChoice,
+    /// The chosen state is not available, or is not the newest.
+    #[error("the newest available state is of cycle {} of the cluster", .newest.cycle.0)]
+    OtherState {
+        /// Cycle of the newest available state.
+        newest: Moment,
+    },
+}
+
+impl OrderRefusal {
+    /// Why a choice is refused: the newest available state, where a choice is asked for, is of another cycle.
+    pub fn of_choice(newest: Option<Moment>) -> Self {
+        newest.map_or(Self::NoChoice, |newest| Self::OtherState { newest })
+    }
+
+    /// Its code in the documentation of errors.
+    pub fn code(self) -> &'static str {
+        match self {
+            Self::NoSignal | Self::Value { .. } | Self::Incomplete | Self::NotForced => "U0556",
+            Self::NoChoice | Self::OtherState { .. } => "U0583",
+        }
+    }
 }
 
 impl Force {

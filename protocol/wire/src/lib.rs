@@ -20,7 +20,7 @@ pub use audience::{Audience, Roster, Topic, ZENOH_PORT_OFFSET};
 pub use codec::{FrameError, MAXIMUM_FRAME_BYTES, decode, encode};
 pub use force::{
     Force, ForceError, MAXIMUM_FORCE_SECONDS, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH,
-    PointValue, SignalPlace, check_owner_and_reason,
+    OrderRefusal, PointValue, SignalPlace, check_owner_and_reason,
 };
 pub use frame::{
     Actuation, Body, Field, Frame, Header, Holding, Join, MAXIMUM_HISTORY, Partial, Recalled,

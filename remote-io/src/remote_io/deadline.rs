@@ -171,15 +171,16 @@ impl RemoteIo {
             self.knowledge.applied(moment);
             self.report_in_effect(moment);
         }
-        self.applied = Some(Applied { source, outputs: outputs.clone() });
+        self.applied = Some(Applied { source, outputs: outputs.clone(), missing });
         let mut driven = self.forcing.outputs(&outputs);
         if let Some(stop) = self.settings.stop {
             driven.set(stop.stopped, self.program != Execution::Running);
         }
-        self.member.put(Output::Drive(driven));
+        self.member.put(Output::Drive(driven.clone()));
         self.report(Event::Applied {
             moment,
             sampled,
+            driven: Some(driven).filter(|driven| *driven != outputs),
             outputs,
             source,
             word_of,

@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use understudy_wire::{Force, Image, PointValue, SignalPlace, Time};
+use understudy_wire::{Force, Image, OrderRefusal, PointValue, SignalPlace, Time};
 
 use super::RemoteIo;
 use crate::event::Event;
@@ -80,14 +80,28 @@ impl Forcing {
 }
 
 impl RemoteIo {
-    /// A force of a signal that the program does not have, or without an end, is refused.
-    pub(super) fn force(&mut self, now: Time, force: &Force) {
-        let width = match force.signal {
-            SignalPlace::Input(_) => self.settings.undriven.width(),
-            SignalPlace::Output(_) => self.settings.fail_safe.width(),
+    /// Why a force cannot be done: whoever gives it, it is of a signal as a whole, and of a value that the signal can have.
+    fn force_refusal(&self, force: &Force) -> Option<OrderRefusal> {
+        if force.check().is_err() {
+            return Some(OrderRefusal::Incomplete);
+        }
+        let points = match force.signal {
+            SignalPlace::Input(_) => &self.settings.input_points,
+            SignalPlace::Output(_) => &self.settings.output_points,
         };
-        if !force.fits(width) || force.check().is_err() {
-            return;
+        let Some(point) = points.iter().find(|point| point.bit == force.signal.first_bit()) else {
+            return Some(OrderRefusal::NoSignal);
+        };
+        let (width, real) = (point.of.bits() as u16, point.of.is_real());
+        (!point.takes(force.value)).then_some(OrderRefusal::Value { width, real })
+    }
+
+    /// Forces a signal, or refuses that.
+    pub(super) fn force(&mut self, now: Time, force: &Force) {
+        if let Some(refusal) = self.force_refusal(force) {
+            let moment = self.moment();
+            self.report(Event::ForceRefused { moment, force: force.clone(), refusal });
+            return self.obeyed(Err(refusal));
         }
         // The operator sees one force for each bit.
         while let Some(signal) = self.forcing.remove_overlapping(force) {
@@ -96,12 +110,17 @@ impl RemoteIo {
         let until = now + Duration::from_secs(u64::from(force.seconds));
         self.forcing.put(force.signal, force.value, until);
         self.report(Event::Forced { moment: self.moment(), force: force.clone() });
+        self.obeyed(Ok(()));
     }
 
     pub(super) fn unforce(&mut self, signal: SignalPlace) {
         if self.forcing.remove(signal) {
             self.report_unforced(signal, false);
+            return self.obeyed(Ok(()));
         }
+        let refusal = OrderRefusal::NotForced;
+        self.report(Event::UnforceRefused { moment: self.moment(), signal, refusal });
+        self.obeyed(Err(refusal));
     }
 
     pub(super) fn end_forces(&mut self, now: Time) {

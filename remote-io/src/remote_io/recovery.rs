@@ -12,7 +12,7 @@
 //!   covers it after a restart ──────────────────────────── the state is lost: see `StaleState`
 //! ```
 
-use understudy_wire::{Holding, Moment, StateChoice, StationId, StationSet, Time};
+use understudy_wire::{Holding, Moment, OrderRefusal, StateChoice, StationId, StationSet, Time};
 
 use super::knowledge::{Floor, Knowledge, Run};
 use super::{Authority, Question, RemoteIo};
@@ -183,8 +183,11 @@ impl RemoteIo {
                 let newest = newest.filter(|_| question.is_some());
                 let newest = newest.map(|(_, newest)| newest.stepped);
                 self.report(Event::ChoiceRefused { moment, newest });
+                let refusal = OrderRefusal::of_choice(newest);
+                return self.obeyed(Err(refusal));
             }
         }
+        self.obeyed(Ok(()));
     }
 
     /// Starts to sample: from the state of a station, or cold.

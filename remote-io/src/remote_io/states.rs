@@ -87,6 +87,8 @@ impl Bench {
             agreement: Arc::new(agreement),
             hash: ProgramHash(1),
             undriven: Image::zero(1),
+            input_points: crate::source::PointPlace::booleans(1),
+            output_points: crate::source::PointPlace::booleans(1),
             operator_inputs: Vec::new(),
             signals: Vec::new(),
             signal_sources: Vec::new(),

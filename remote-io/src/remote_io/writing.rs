@@ -21,7 +21,7 @@ use understudy_wire::{
 };
 
 use self::sessions::{Progress, Session, Sessions};
-use super::RemoteIo;
+use super::{Applied, RemoteIo};
 use crate::event::Event;
 use crate::history::History;
 use crate::source::{OperatorInput, OperatorInputKind, ValueMismatch};
@@ -245,7 +245,10 @@ impl Writing {
                 && first <= moment
             {
                 session.progress = Progress::InEffect { since: first };
-                effective.push((session.id, first));
+                // What stations recall was in effect before the restart, unless its caller still asks.
+                if session.has_caller() {
+                    effective.push((session.id, first));
+                }
             }
         }
         effective
@@ -323,8 +326,10 @@ impl RemoteIo {
         let period = self.settings.agreement.schedule.period().as_nanos().max(1);
         let memory = u32::try_from(REMEMBERED_FOR.as_nanos().div_ceil(period));
         self.writing.sessions.forget(memory.unwrap_or(u32::MAX));
-        let runs =
-            self.knowledge.run().is_some() && self.sensors.is_some() && self.question.is_none();
+        let runs = self.knowledge.run().is_some()
+            && self.sensors.is_some()
+            && self.question.is_none()
+            && !self.applied.as_ref().is_some_and(Applied::is_of_no_station);
         let inputs = &self.settings.operator_inputs;
         let taken = match self.writing.known(inputs, write) {
             Some(known) => known,
@@ -333,7 +338,7 @@ impl RemoteIo {
         };
         match taken {
             Ok(Taking::New) => self.report(Event::Written { moment, write: write.clone() }),
-            Ok(Taking::Pending) => {}
+            Ok(Taking::Pending) => self.writing.sessions.asked_again(write),
             Ok(Taking::InEffect(since)) => {
                 let id = write.id;
                 self.report(Event::WriteInEffect { moment, id, since });

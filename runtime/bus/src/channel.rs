@@ -43,7 +43,7 @@ use crate::control::{LINE_BYTES, order};
 use crate::endpoints::Endpoints;
 use crate::error::{BusError, reason};
 use crate::journal::{EventSink, HostEvent, JournalSender, Noted};
-use crate::orders::{Control, Order};
+use crate::orders::{Control, Order, Unknown};
 use crate::rights::run_in_background;
 use crate::writes::{self, Callers};
 
@@ -72,6 +72,9 @@ const HANDSHAKE_TIMEOUT_MS: u32 = 3_000;
 
 /// An open session gives signs of life more often.
 const PATIENCE: Duration = Duration::from_secs(30);
+
+/// Time limit for the answer of the member to a command; less than a caller waits.
+const ORDER_PATIENCE: Duration = Duration::from_secs(4);
 
 /// Refused connections are reported together, so often at most.
 const REFUSALS_EVERY: Duration = Duration::from_secs(1);
@@ -409,10 +412,18 @@ impl<E> Channel<E> {
 
 /// The answer to a command.
 fn given(control: &Control, order: Order) -> String {
-    if control.give(order) {
-        return DONE.to_owned();
+    match control.ask(order, ORDER_PATIENCE) {
+        Ok(Some(Ok(()))) => DONE.to_owned(),
+        Ok(Some(Err(refusal))) => format!("{}: {refusal}", refusal.code()),
+        Ok(None) => "U0554: this member cannot do that: it is for remote I/Os".to_owned(),
+        Err(Unknown::Full) => {
+            "U0557: too many commands wait at this member; repeat the command".to_owned()
+        }
+        Err(Unknown::Late) => {
+            "U0581: the member does not answer: the command may be done; ask for its state"
+                .to_owned()
+        }
     }
-    "too many commands wait at this member; repeat the command".to_owned()
 }
 
 /// A command that comes with a value.

@@ -22,7 +22,7 @@ use crate::field::{FieldDriver, Look};
 use crate::guard::Guard;
 use crate::journal::{EventSink, HostEvent, Noted};
 use crate::link::{Link, LinkCounters, Reopening};
-use crate::orders::{Order, Orders};
+use crate::orders::{Obeyed, Order, Orders};
 use crate::trouble::{Duplicates, Refusals};
 use crate::unreceived::Unreceived;
 use crate::watchdog::Watchdog;
@@ -107,6 +107,8 @@ struct Round {
     duplicates: Duplicates,
     unreceived: Option<Unreceived>,
     unsendable: Unsendable,
+    /// What the member says of the order that it was given last.
+    obeyed: Obeyed,
     reported: Time,
     summary: Summary,
 }
@@ -204,8 +206,8 @@ impl<M: Machine> Host<'_, M> {
 
     /// True where it is to stop.
     fn obey(&mut self, round: &mut Round) -> bool {
-        while let Some(order) = self.orders.take() {
-            let input = match &order {
+        while let Some(given) = self.orders.take() {
+            let input = match &given.order {
                 Order::Stop => return true,
                 // Holds already: it is asked of the orders for each frame.
                 Order::Cut(_) => continue,
@@ -215,10 +217,11 @@ impl<M: Machine> Host<'_, M> {
                 Order::Unforce(signal) => Input::RemoteIo(RemoteIoInput::Unforce(*signal)),
                 Order::Write(write) => Input::RemoteIo(RemoteIoInput::Write(write)),
             };
-            debug!(?order, "an order");
+            debug!(order = ?given.order, "an order");
             let now = self.clock.now();
             self.machine.handle_input(now, input);
             self.drain(now, round);
+            given.answer(round.obeyed.take());
         }
         false
     }
@@ -329,6 +332,7 @@ impl<M: Machine> Host<'_, M> {
                 }
                 Output::Report(event) => self.sink.record(now, Noted::Member(event)),
                 Output::Answer(answer) => self.orders.answer(answer),
+                Output::Obeyed(obeyed) => round.obeyed = Some(obeyed),
             }
         }
     }

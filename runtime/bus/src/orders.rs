@@ -2,12 +2,14 @@
 
 use std::os::fd::BorrowedFd;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::Receiver;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use understudy_wire::{
-    Force, Member, ProgramSet, SignalPlace, StateChoice, StationSet, Write, WriteAnswer,
+    Force, Member, OrderRefusal, ProgramSet, SignalPlace, StateChoice, StationSet, Write,
+    WriteAnswer,
 };
 
 use crate::doorbell::{Inbox, Outbox, doorbell};
@@ -34,6 +36,35 @@ pub enum Order {
     Write(Write),
     /// The laboratory cuts the links from these members, and heals those from all others.
     Cut(Cuts),
+}
+
+/// An order with the caller who waits for its outcome.
+#[derive(Debug)]
+pub(crate) struct Given {
+    pub(crate) order: Order,
+    caller: Option<SyncSender<Obeyed>>,
+}
+
+impl Given {
+    /// Tells the caller what became of the order; never blocks.
+    pub(crate) fn answer(self, obeyed: Obeyed) {
+        if let Some(caller) = self.caller {
+            // A caller who does not wait any more needs no answer.
+            let _ = caller.try_send(obeyed);
+        }
+    }
+}
+
+/// What became of an order of an operator; nothing where the member does not take such orders.
+pub(crate) type Obeyed = Option<Result<(), OrderRefusal>>;
+
+/// Why the outcome of an order is not known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Unknown {
+    /// It was not taken: too many wait.
+    Full,
+    /// It was taken, and the member has not answered in time.
+    Late,
 }
 
 /// Members whose frames a member of a laboratory drops, as if the links from them were cut.
@@ -80,7 +111,7 @@ impl Standing {
 /// The member's end.
 #[derive(Debug)]
 pub struct Orders {
-    inbox: Inbox<Order>,
+    inbox: Inbox<Given>,
     standing: Arc<Standing>,
     limiter: Arc<WriteLimiter>,
     answers: Answers,
@@ -89,7 +120,7 @@ pub struct Orders {
 /// The end of whoever gives orders; may be cloned, and used from any thread.
 #[derive(Debug, Clone)]
 pub struct Control {
-    outbox: Outbox<Order>,
+    outbox: Outbox<Given>,
     standing: Arc<Standing>,
     limiter: Arc<WriteLimiter>,
     answers: Arc<Mutex<Option<Receiver<WriteAnswer>>>>,
@@ -126,7 +157,16 @@ impl Control {
             }
             _ => {}
         }
-        self.outbox.put(order)
+        self.outbox.put(Given { order, caller: None })
+    }
+
+    /// Gives an order of an operator, and waits until the member has obeyed or refused it.
+    pub(crate) fn ask(&self, order: Order, patience: Duration) -> Result<Obeyed, Unknown> {
+        let (caller, answered) = sync_channel(1);
+        if !self.outbox.put(Given { order, caller: Some(caller) }) {
+            return Err(Unknown::Full);
+        }
+        answered.recv_timeout(patience).map_err(|_| Unknown::Late)
     }
 
     /// The answers to writes; once.
@@ -137,9 +177,9 @@ impl Control {
 }
 
 impl Orders {
-    pub(crate) fn take(&self) -> Option<Order> {
+    pub(crate) fn take(&self) -> Option<Given> {
         if self.standing.stopping.load(Ordering::SeqCst) {
-            return Some(Order::Stop);
+            return Some(Given { order: Order::Stop, caller: None });
         }
         self.inbox.take()
     }

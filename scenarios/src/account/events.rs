@@ -5,11 +5,12 @@ use understudy_node::Event as StationEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_simulator::Action;
 use understudy_wire::{
-    Image, Member, Moment, ProgramId, ProgramSet, Source, StationId, StationSet,
+    Force, Image, Member, Moment, OrderRefusal, ProgramId, ProgramSet, Source, StationId,
+    StationSet,
 };
 
 use super::service::Outcome;
-use super::{Account, Death, DoneStep, LAG_CYCLES, MAXIMUM_DEATHS};
+use super::{Account, Death, DoneForce, DoneStep, LAG_CYCLES, MAXIMUM_DEATHS, MAXIMUM_FORCES};
 
 impl Account {
     pub(super) fn station(&mut self, station: StationId, event: &StationEvent) {
@@ -60,6 +61,7 @@ impl Account {
         let RemoteIoEvent::Applied { moment, source, missing, heard, .. } = event else {
             let changes = self.alarms.fold.remote_io(program, 0, event);
             self.alarms_changed(&changes, None);
+            self.order_decided(program, event);
             if let RemoteIoEvent::Refused { member, theirs, ours } = event {
                 self.refuse(*member, theirs.to_string(), ours.to_string());
             }
@@ -90,6 +92,63 @@ impl Account {
         self.look_for_origin(number, *moment);
         while self.open.len() > LAG_CYCLES && self.oldest_is_told() {
             self.close_oldest();
+        }
+    }
+
+    /// Forces, and orders that were refused.
+    fn order_decided(&mut self, program: ProgramId, event: &RemoteIoEvent) {
+        let next = self.numbering.latest().and_then(|newest| self.since_origin(newest + 1));
+        match event {
+            RemoteIoEvent::ChoiceRefused { newest, .. } => {
+                let member = Member::RemoteIo(program);
+                let asked = self.steps.iter_mut().rev().find(|step| {
+                    step.member == member && matches!(step.action, Action::Choose { .. })
+                });
+                if let Some(step) = asked {
+                    step.refused = Some(OrderRefusal::of_choice(*newest));
+                }
+            }
+            RemoteIoEvent::Forced { force, .. } => self.forced(program, force, next, None),
+            RemoteIoEvent::ForceRefused { force, refusal, .. } => {
+                self.forced(program, force, next, Some(*refusal));
+            }
+            RemoteIoEvent::Unforced { signal, .. } => {
+                self.end_forces(next, |of| of.program == program && of.force.signal == *signal);
+            }
+            _ => {}
+        }
+    }
+
+    fn forced(
+        &mut self,
+        program: ProgramId,
+        force: &Force,
+        from: Option<u64>,
+        refused: Option<OrderRefusal>,
+    ) {
+        if refused.is_none() {
+            // A new one of the same signal takes its place.
+            self.end_forces(from, |of| of.program == program && of.force.signal == force.signal);
+        }
+        self.force_count += 1;
+        if self.forces.len() < MAXIMUM_FORCES {
+            let (force, to) = (force.clone(), None);
+            self.forces.push(DoneForce { program, force, from, to, refused });
+        }
+    }
+
+    /// Forces end with the process of their remote I/O.
+    fn forces_of_ended(&mut self, member: Member, action: Action, cycle: u64) {
+        if let (Member::RemoteIo(program), Action::Crash) = (member, action) {
+            self.end_forces(Some(cycle), |of| of.program == program);
+        }
+    }
+
+    fn end_forces(&mut self, to: Option<u64>, is_over: impl Fn(&DoneForce) -> bool) {
+        let lasting = |of: &&mut DoneForce| of.to.is_none() && of.refused.is_none();
+        for force in self.forces.iter_mut().filter(lasting).filter(|of| is_over(of)) {
+            // One that was over before the origin lasted no cycle.
+            force.to = Some(to.unwrap_or(0));
         }
     }
 
@@ -145,10 +204,13 @@ impl Account {
                     member: *member,
                     asked: *asked,
                     measured,
+                    refused: None,
                 });
+                self.forces_of_ended(*member, *action, measured);
             }
             RunEvent::Ended { member, how, said } => {
                 let cycle = self.disturb(*member, Action::Crash);
+                self.forces_of_ended(*member, Action::Crash, cycle.unwrap_or(0));
                 self.death_count += 1;
                 if self.deaths.len() < MAXIMUM_DEATHS {
                     self.deaths.push(Death {

@@ -38,6 +38,7 @@ fn applied(ms: u64, program: u8, source: Source) -> Record {
         moment: Moment::default(),
         sampled: None,
         outputs: Image::zero(1),
+        driven: None,
         source,
         word_of: None,
         missing: None,

@@ -73,6 +73,8 @@ pub(crate) fn parts(understudies: usize) -> Parts {
         agreement: Arc::clone(&agreement),
         hash: program.hash,
         undriven: Image::zero(1),
+        input_points: understudy_remote_io::PointPlace::booleans(1),
+        output_points: understudy_remote_io::PointPlace::booleans(1),
         operator_inputs: Vec::new(),
         signals: Vec::new(),
         signal_sources: Vec::new(),

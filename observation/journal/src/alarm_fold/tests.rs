@@ -153,6 +153,7 @@ fn journal(cluster: &Cluster, steps: &[Step]) -> Vec<(i64, Record)> {
                     moment: moment(cycle),
                     sampled: missing.is_none().then_some(inputs),
                     outputs,
+                    driven: None,
                     source: Source::Direct,
                     word_of: None,
                     missing: *missing,

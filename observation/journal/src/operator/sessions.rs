@@ -29,10 +29,15 @@ const FINAL: [&str; 6] = ["U0556", "U0640", "U0641", "U0642", "U0643", "U0647"];
 impl Refusal {
     /// Its code in the documentation of errors.
     pub fn code(&self) -> String {
+        self.own_code().unwrap_or_else(|| "U0557".to_owned())
+    }
+
+    /// The code that its message begins with.
+    pub(super) fn own_code(&self) -> Option<String> {
         let message = self.to_string();
         let code = message.split(':').next().unwrap_or_default();
         let is_code = code.len() == 5 && code.starts_with('U');
-        if is_code { code } else { "U0557" }.to_owned()
+        is_code.then(|| code.to_owned())
     }
 
     /// Whether a write may be in effect although it was not confirmed.

@@ -219,10 +219,17 @@ impl Dice<'_> {
             (Some(_), false) => Source::FailSafe,
         };
         let is_sampled = missing != Some(Missing::NoCycle) && !self.one_in(5);
+        let sampled = is_sampled.then(|| self.image(inputs));
+        let proved = self.image(outputs);
+        // In some cycles the first output is forced to the other value.
+        let is_forced = self.moment.cycle.0.is_multiple_of(3);
+        let mut driven = proved.clone();
+        driven.set(0, !proved.get(0));
         Happening::RemoteIo(RemoteIoEvent::Applied {
             moment: self.moment,
-            sampled: is_sampled.then(|| self.image(inputs)),
-            outputs: self.image(outputs),
+            sampled,
+            outputs: proved,
+            driven: Some(driven).filter(|_| is_forced),
             source,
             word_of: (source == Source::Reconstructed).then(|| self.station()),
             missing,

@@ -313,7 +313,14 @@ fn reports(entry: &Entry) -> bool {
 fn deadline(entry: &Entry, origin: i64) -> Option<Deadline> {
     match (&entry.record.event, entry.record.member?) {
         (
-            Happening::RemoteIo(RemoteIoEvent::Applied { outputs, source, missing, heard, .. }),
+            Happening::RemoteIo(RemoteIoEvent::Applied {
+                outputs,
+                driven,
+                source,
+                missing,
+                heard,
+                ..
+            }),
             Member::RemoteIo(program),
         ) => Some(Deadline {
             program,
@@ -321,7 +328,7 @@ fn deadline(entry: &Entry, origin: i64) -> Option<Deadline> {
             source: *source,
             missing: *missing,
             heard: *heard,
-            outputs: outputs.to_string(),
+            outputs: driven.as_ref().unwrap_or(outputs).to_string(),
         }),
         _ => None,
     }

@@ -45,11 +45,15 @@ descriptions! { station: StationEvent, members: Members;
 
 descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
     Sampled { inputs, .. } => "sampled" Info format!("samples {}", members.inputs(inputs));
-    Applied { outputs, source, word_of, missing, .. } => "applied" Info format!(
-        "drives {}, {}",
-        members.outputs(outputs),
-        source_text(*source, *word_of, *missing, members)
-    );
+    Applied { outputs, driven, source, word_of, missing, .. } => "applied" Info {
+        let from = source_text(*source, *word_of, *missing, members);
+        match driven {
+            None => format!("drives {}, {from}", members.outputs(outputs)),
+            Some(driven) => format!(
+                "drives {}; {from} and without forces: {}", members.outputs(driven), members.outputs(outputs)
+            ),
+        }
+    };
     StartedCold { awaits_release: false, .. } => "started-cold" Notice
         "starts its program from the initial state";
     StartedCold { awaits_release: true, .. } => "started-cold" Notice
@@ -104,10 +108,13 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
     RefusalEnded { member } => "refusal-ended" Notice refusal_ended_text(*member, members);
     Outvoted { theirs, stations, others } => "outvoted" Alarm outvoted_text(theirs, *stations, *others);
     Stalled { late, .. } => "stalled" Notice format!("host stall: woken {late:.1?} late");
-    Forced { force, .. } => "forced" Alarm {
+    Forced { force, .. } => "forced" Alarm members.force(force);
+    ForceRefused { force, refusal, .. } => "force-refused" Warning {
         let (signal, value) = (members.place(force.signal), members.value(force.signal, force.value));
-        format!("{signal} is forced to {value} for {} s by {}: {}", force.seconds, force.owner, force.reason)
+        format!("refuses to force {signal} to {value} for {}: {refusal}", force.owner)
     };
+    UnforceRefused { signal, refusal, .. } => "unforce-refused" Warning
+        format!("refuses to end a force of {}: {refusal}", members.place(*signal));
     Written { write, .. } => "written" Notice {
         let place = SignalPlace::Input(write.input);
         let (input, value) = (members.place(place), members.value(place, write.value));

@@ -6,7 +6,7 @@ use std::ops::Deref;
 use understudy_journal::{Happening, Members, NamedSignal, Record};
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_typed::Elementary;
-use understudy_wire::{Image, Member, PointValue, SignalPlace, Write, WriteId};
+use understudy_wire::{Force, Image, Member, PointValue, SignalPlace, Write, WriteId};
 
 use crate::value::{is_declared, stored_text};
 
@@ -53,6 +53,11 @@ impl Names<'_> {
     /// `input start`; the number of the first bit where the program is not known.
     pub(super) fn place(&self, place: SignalPlace) -> String {
         place_text(self.by, place, self.members)
+    }
+
+    /// A force with its end, its operator and its reason.
+    pub(super) fn force(&self, force: &Force) -> String {
+        force_text(self.by, force, self.members)
     }
 
     /// The value of a signal with its unit.
@@ -153,6 +158,14 @@ fn signal_value(
             format!("16#{stored:0digits$X}")
         }
     }
+}
+
+/// A force with its end, its operator and its reason.
+pub(crate) fn force_text(by: Option<Member>, force: &Force, members: &Members) -> String {
+    let signal = place_text(by, force.signal, members);
+    let value = signal_value(by, force.signal, force.value, members);
+    let Force { seconds, owner, reason, .. } = force;
+    format!("{signal} is forced to {value} for {seconds} s by {owner}: {reason}")
 }
 
 fn number_text(of: Elementary, stored: u64, unit: Option<&str>) -> String {

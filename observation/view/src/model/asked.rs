@@ -227,11 +227,7 @@ impl Model {
     pub(crate) fn no_cycle(&self, program: ProgramId, cycle: i64) -> ViewError {
         let steps = self.history(program).map(History::steps);
         let ends = steps.and_then(|steps| Some((steps.front()?.cycle, steps.back()?.cycle)));
-        ViewError::NoCycle {
-            cycle,
-            program: self.program_name(program).to_owned(),
-            known: ends.map_or("none".to_owned(), |(from, to)| format!("{from} to {to}")),
-        }
+        ViewError::NoCycle { cycle, program: self.program_name(program).to_owned(), known: ends }
     }
 
     pub(crate) fn program_name(&self, program: ProgramId) -> &str {

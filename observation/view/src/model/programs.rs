@@ -9,9 +9,12 @@ use understudy_wire::{
 
 use super::Model;
 use super::standing::{Change, ProgramChange, StationChange};
-use crate::describe::{PROGRAM_FAULT, describe, program_fault_text, source_text};
+use crate::describe::{PROGRAM_FAULT, describe, force_text, program_fault_text, source_text};
 use crate::event::{Event, Level};
 use crate::stop::{self, Stop};
+
+/// The alarm of forced signals.
+const FORCED: &str = "forced";
 
 /// The alarm of fail-safe outputs.
 pub(super) const FAIL_SAFE: &str = "fail-safe";
@@ -166,10 +169,7 @@ impl Model {
                 self.refusal_ends(&record.name, *member, cycle);
                 None
             }
-            RemoteIoEvent::Forced { force, .. } => {
-                alarm = Some("forced");
-                own(ProgramChange::Forced(force.clone()))
-            }
+            RemoteIoEvent::Forced { force, .. } => own(ProgramChange::Forced(force.clone())),
             RemoteIoEvent::Unforced { signal, .. } => own(ProgramChange::Unforced(*signal)),
             RemoteIoEvent::SignalValidity { input, valid, .. } => {
                 own(ProgramChange::Validity(*input, *valid))
@@ -179,13 +179,32 @@ impl Model {
         if let Some(change) = change {
             self.changes.reported(Member::RemoteIo(program), cycle, change);
         }
-        let standing = self.changes.now().program(program);
-        if standing.is_none_or(|own| own.forced.is_empty()) {
-            self.alarms.over(&subject("forced"), cycle);
-        }
+        self.alarm_of_forces(record, program, cycle, event);
         if let Some(alarm) = alarm {
             let text = describe(record, &self.members, &self.writes).text;
             self.alarms.raise(subject(alarm), cycle, text);
+        }
+    }
+
+    /// One alarm names all forces of a remote I/O. A further force asks for an acknowledgement again; the end of one does not.
+    fn alarm_of_forces(
+        &mut self,
+        record: &Record,
+        program: ProgramId,
+        cycle: i64,
+        event: &RemoteIoEvent,
+    ) {
+        let subject = (record.name.clone(), FORCED);
+        let standing = self.changes.now().program(program);
+        let forced = standing.map_or(&[][..], |own| &own.forced);
+        let texts =
+            forced.iter().map(|forced| force_text(record.member, &forced.force, &self.members));
+        let text = texts.collect::<Vec<_>>().join("; ");
+        match event {
+            _ if text.is_empty() => self.alarms.over(&subject, cycle),
+            RemoteIoEvent::Forced { .. } => self.alarms.replace(subject, cycle, text, true),
+            RemoteIoEvent::Unforced { .. } => self.alarms.replace(subject, cycle, text, false),
+            _ => {}
         }
     }
 
@@ -197,11 +216,14 @@ impl Model {
         moment: Moment,
         event: &RemoteIoEvent,
     ) {
-        let RemoteIoEvent::Applied { sampled, outputs, source, missing, heard, .. } = event else {
+        let RemoteIoEvent::Applied { sampled, source, missing, heard, .. } = event else {
+            return;
+        };
+        let Some(driven) = event.driven() else {
             return;
         };
         self.timings.decided(moment, cycle);
-        self.series.applied(program, cycle, sampled.as_ref(), outputs, *source);
+        self.series.applied(program, cycle, sampled.as_ref(), driven, *source);
         self.received_at(cycle, *heard);
         let track = &mut self.programs[program.index()];
         track.tally.push(cycle, *source, record.at_ns);

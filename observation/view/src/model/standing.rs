@@ -8,11 +8,19 @@ use understudy_wire::{Force, Member, ProgramId, ProgramSet, SignalPlace, Station
 use crate::protection::{LostState, Protection};
 use crate::station::StationStanding;
 
+/// A force in effect.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct ForcedSignal {
+    pub(crate) force: Force,
+    /// The cycle in which it was given.
+    pub(crate) since: i64,
+}
+
 /// Standing of a program at its remote I/O, from the records up to a cycle.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ProgramStanding {
     pub(crate) awaits_release: bool,
-    pub(crate) forced: Vec<Force>,
+    pub(crate) forced: Vec<ForcedSignal>,
     /// Whether signals of other programs are valid, by the first bit of their inputs; those that its remote I/O has reported.
     pub(crate) validity: BTreeMap<u16, bool>,
     /// Stations whose state of it its remote I/O has found faulty.
@@ -141,7 +149,7 @@ impl Standing {
             }
             Change::Program(program, change) => {
                 if let Some(own) = self.programs.get_mut(program.index()) {
-                    change.apply(own);
+                    change.apply(own, cycle);
                 }
             }
         }
@@ -179,6 +187,7 @@ impl Standing {
             }
         }
         for program in &mut self.programs {
+            program.forced.iter_mut().for_each(|forced| shift(Some(&mut forced.since), by));
             shift(program.protection.as_mut().map(|of| &mut of.since), by);
             shift(program.lost.as_mut().map(|of| &mut of.since), by);
         }
@@ -297,7 +306,7 @@ pub(super) enum ProgramChange {
 }
 
 impl ProgramChange {
-    fn apply(&self, own: &mut ProgramStanding) {
+    fn apply(&self, own: &mut ProgramStanding, cycle: i64) {
         match self {
             Self::StartedCold { awaits_release } => {
                 own.awaits_release = *awaits_release;
@@ -310,10 +319,10 @@ impl ProgramChange {
             Self::Excluded(stations) => own.excluded = own.excluded.or(*stations),
             Self::Readmitted(station) => own.excluded.remove(*station),
             Self::Forced(force) => {
-                own.forced.retain(|other| other.signal != force.signal);
-                own.forced.push(force.clone());
+                own.forced.retain(|other| other.force.signal != force.signal);
+                own.forced.push(ForcedSignal { force: force.clone(), since: cycle });
             }
-            Self::Unforced(signal) => own.forced.retain(|other| other.signal != *signal),
+            Self::Unforced(signal) => own.forced.retain(|other| other.force.signal != *signal),
             Self::Validity(input, valid) => {
                 own.validity.insert(*input, *valid);
             }

@@ -18,7 +18,7 @@ use crate::alarm::{Alarm, AlarmState, PROCESS};
 use crate::describe::{missing_text, program_fault_text};
 use crate::history::Driven;
 use crate::margin::{Margin, Outcome};
-use crate::model::{Model, Standing};
+use crate::model::{ForcedSignal, Model, Standing};
 use crate::process_alarm::ProcessAlarm;
 use crate::station::StationState;
 use crate::value::{forced_point, forced_value, named};
@@ -260,7 +260,7 @@ impl Picture<'_> {
             fail_safe,
             awaits_release: own.awaits_release,
             forced: self.forced(program),
-            forces: own.forced,
+            forces: own.forced.into_iter().map(|forced| forced.force).collect(),
             validity: self
                 .cycle
                 .map_or_else(BTreeMap::new, |cycle| self.model.validity(program, cycle)),
@@ -293,7 +293,7 @@ impl Picture<'_> {
     fn forced(&self, program: ProgramId) -> Vec<String> {
         let own = self.standing.program(program);
         let forced = own.into_iter().flat_map(|own| &own.forced);
-        let texts = forced.map(|force| {
+        let texts = forced.map(|ForcedSignal { force, .. }| {
             let controller = &self.model.cluster().controllers()[program.index()];
             let (name, value) = match forced_point(controller, force) {
                 Some(point) if point.of == Elementary::Bool => {

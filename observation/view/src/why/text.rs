@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde_json::Value;
 use understudy_typed::Elementary;
 
-use super::{Reason, Why};
+use super::{Reason, Why, WhyForced};
 use crate::value::{stored_text, value_text};
 
 impl Why {
@@ -22,10 +22,7 @@ impl Why {
                 self.remote_io
             );
         }
-        if let Some(source) = self.source {
-            let why = self.missing.map_or(String::new(), |missing| format!(": {missing}"));
-            let _ = writeln!(text, "  {} drives it, {source}{why}", self.remote_io);
-        }
+        self.write_driving(&mut text);
         if let Some(scanned) = &self.scanned {
             let scanned = shown(scanned, self.of);
             let _ = writeln!(text, "  the scan of this cycle yields {scanned}");
@@ -62,17 +59,55 @@ impl Why {
                 let _ = writeln!(text, "    {values}");
             }
         }
+        // Of a forced output the value without the force.
+        let it = if self.forced.is_some() { "that" } else { "it" };
         if let Some(configured) = &self.ramp_to {
             let configured = shown(configured, self.of);
-            let _ = writeln!(text, "  it is on its ramp to the fail-safe value {configured}");
-        } else if self.because.is_none() || self.source == Some(FAIL_SAFE) {
-            let _ = writeln!(text, "  it is the configured fail-safe value");
+            let _ = writeln!(text, "  {it} is on its ramp to the fail-safe value {configured}");
+        } else if self.source == Some(FAIL_SAFE) {
+            let _ = writeln!(text, "  {it} is the configured fail-safe value");
         }
         if let Some(reason) = &self.because {
             line(&mut text, reason, self.cycle, "");
             children(&mut text, reason, "");
         }
         text
+    }
+}
+
+impl Why {
+    /// The remote I/O that drives an output, with the force that is in effect or the cycle that it missed.
+    fn write_driving(&self, text: &mut String) {
+        if let Some(force) = &self.forced {
+            let WhyForced { owner, reason, seconds, since, .. } = force;
+            let _ = writeln!(
+                text,
+                "  forced by {owner} since cycle {since}, for {seconds} s: {reason}"
+            );
+        }
+        if let Some(kept) = self.kept_since {
+            let _ = writeln!(
+                text,
+                "  {} missed this deadline: the device kept the value of cycle {kept}",
+                self.remote_io
+            );
+        }
+        let Some(source) = self.source else {
+            return;
+        };
+        let why = self.missing.map_or(String::new(), |missing| format!(": {missing}"));
+        let unforced = self.forced.as_ref().and_then(|force| force.unforced.as_ref());
+        let _ = match unforced {
+            Some(value) => {
+                let value = shown(value, self.of);
+                writeln!(
+                    text,
+                    "  {} drives it; without the force it would be {value}, {source}{why}",
+                    self.remote_io
+                )
+            }
+            None => writeln!(text, "  {} drives it, {source}{why}", self.remote_io),
+        };
     }
 }
 

@@ -10,6 +10,7 @@ mod diffs;
 mod directory;
 mod drawings;
 mod fold;
+mod forced;
 mod hostile;
 mod losses;
 mod margin;

@@ -59,13 +59,13 @@ PROGRAM ramp
 END_PROGRAM
 ";
 
-const PLAIN: &str = "title = \"a ramp\"\ncycles = 400\n";
+pub(crate) const PLAIN: &str = "title = \"a ramp\"\ncycles = 400\n";
 
 const KILLED: &str = "title = \"a ramp\"\ncycles = 300\n\
     [[step]]\nat = 180\naction = \"crash\"\nstation = \"keep-io\"\n\
     [[step]]\nat = 220\naction = \"restart\"\nstation = \"keep-io\"\n";
 
-fn ramp() -> Cluster {
+pub(crate) fn ramp() -> Cluster {
     let loaded = read_with("cluster.toml", CLUSTER, Overrides::default(), &mut |name| match name {
         "keep.st" => Ok(KEEP.to_owned()),
         "ramp.st" => Ok(RAMP.to_owned()),

@@ -104,14 +104,6 @@ pub(super) fn outputs_read(sections: &[RemoteIoSection]) -> BTreeSet<String> {
     from.map(|from| from.value.clone()).collect()
 }
 
-fn place(point: &Point) -> PointPlace {
-    PointPlace {
-        // Images are at most 64 Kbit wide, which is checked elsewhere.
-        bit: u16::try_from(point.bit).unwrap_or(u16::MAX),
-        of: point.of,
-    }
-}
-
 fn misfit(message: String, span: Range<usize>, help: &str) -> Diagnostic {
     Diagnostic::error("U0225", message, span).with_help(help.to_owned())
 }
@@ -191,7 +183,7 @@ fn operator(
         }
     };
     let input = OperatorInput {
-        place: place(point),
+        place: PointPlace::of(point),
         kind,
         initial: initial.or(low).unwrap_or(0),
         role: [Role::Operator, Role::Engineer][text.role],
@@ -241,7 +233,7 @@ fn valid_bit(
         diagnostics.push(misfit(message, span.clone(), help));
         return None;
     }
-    Some(valid.map(|valid| place(valid).bit))
+    Some(valid.map(|valid| PointPlace::of(valid).bit))
 }
 
 /// A signal as it is declared.
@@ -283,7 +275,7 @@ impl Signal<'_> {
         let valid = valid_bit(valid, span, diagnostics)?;
         Some(InputSourceKind::Operator(OperatorDeclaration {
             input: OperatorInput {
-                place: place(point),
+                place: PointPlace::of(point),
                 kind: OperatorInputKind::Group { stale_after: self.stale_after, valid },
                 initial: default?,
                 role: Role::Operator,
@@ -349,8 +341,8 @@ impl Signal<'_> {
         let valid = valid_bit(valid, span, diagnostics)?;
         let signal = SignalInput {
             from: ProgramId(source as u8),
-            output: place(found).bit,
-            place: place(point),
+            output: PointPlace::of(found).bit,
+            place: PointPlace::of(point),
             valid,
             default: default?,
             stale_after: self.stale_after,

@@ -45,6 +45,35 @@ fn check(inputs: &str) -> String {
     findings(&load(&with_inputs(inputs), &FILES).reports)
 }
 
+/// An error elsewhere, or one in the section itself: no finding follows that is not there without it.
+#[test]
+fn an_error_makes_no_source_of_an_input_a_second_one() {
+    let plant = "PROGRAM plant
+VAR_INPUT velocity : REAL; END_VAR
+VAR_OUTPUT there : BOOL; END_VAR
+there := velocity > 1.0;
+END_PROGRAM";
+    let files = [FILES[0], FILES[1], ("plant.st", plant)];
+    let inputs = "start = { operator = \"level\" }\nspeed = { operator = \"setpoint\", low = 0, high = 9 }\nready = { from = \"right.done\", default = false }\n";
+    let plant = "[[plant]]\ncontroller = \"left\"\nladder = \"plant.st\"\n";
+    let text = with_inputs(inputs) + plant;
+    let right = load(&text, &files);
+    assert!(right.cluster.is_some(), "{}", findings(&right.reports));
+    for (from, to) in [
+        ("period = \"20ms\"", "period = \"20\""),
+        ("ladder = \"right.st\"", "ladder = \"none.st\""),
+        ("default = false", "default = 7"),
+        (
+            "[[plant]]",
+            "[[alarm]]\nsignal = \"left.none\"\nname = \"a\"\nwhen = true\ntext = \"b\"\n[[plant]]",
+        ),
+    ] {
+        assert!(text.contains(from), "{from}");
+        let found = findings(&load(&text.replace(from, to), &files).reports);
+        assert!(found.contains("error") && !found.contains("U0224"), "{to}: {found}");
+    }
+}
+
 #[test]
 fn a_remote_io_is_told_the_sources_of_its_inputs() {
     let text = with_inputs(

@@ -70,6 +70,11 @@ impl Session {
         Self { id, owner: None, input: None, value: None, progress, idle: 0 }
     }
 
+    /// Whether somebody has asked for the write since this remote I/O started.
+    pub(super) fn has_caller(&self) -> bool {
+        self.owner.is_some()
+    }
+
     pub(super) fn is_decided(&self) -> bool {
         matches!(self.progress, Progress::InEffect { .. })
     }
@@ -113,6 +118,13 @@ impl Sessions {
             }
         }
         Ok(())
+    }
+
+    /// The caller of a write that stations recall asks for its outcome.
+    pub(super) fn asked_again(&mut self, write: &Write) {
+        if let Ok(place) = self.0.binary_search_by_key(&write.id.session, |it| it.id.session) {
+            self.0[place].owner.get_or_insert_with(|| write.owner.as_str().into());
+        }
     }
 
     /// Forgets decided sessions that have not written for `cycles`.

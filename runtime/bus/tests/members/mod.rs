@@ -94,6 +94,10 @@ impl Machine for Chatter {
             Input::RemoteIo(RemoteIoInput::Field(_)) => self.report_once(Chat::Sensed),
             Input::RemoteIo(RemoteIoInput::Release) => {
                 self.said.push_back(Output::Report(Chat::Released));
+                self.said.push_back(Output::Obeyed(Ok(())));
+            }
+            Input::RemoteIo(RemoteIoInput::Unforce(_)) => {
+                self.said.push_back(Output::Obeyed(Ok(())));
             }
             Input::RemoteIo(_) => {}
         }
