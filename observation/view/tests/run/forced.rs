@@ -111,7 +111,7 @@ fn the_alarm_of_forces_names_each_of_them() {
     records.iter().take(2000).for_each(|record| model.note(record));
     let of = records.iter().find(|record| record.member == Some(Member::RemoteIo(ProgramId(0))));
     let of = of.expect("it reports").clone();
-    let at = records.iter().take(2000).filter_map(|record| moment(&record.event)).last();
+    let at = records.iter().take(2000).filter_map(|record| moment(&record.event)).next_back();
     let moment = at.expect("a cycle");
     let mut report = |event| {
         model.note(&Record { event: Happening::RemoteIo(event), ..of.clone() });

@@ -71,7 +71,7 @@ const FLAGS: [&str; 2] = ["p", "q"];
 
 fn random(seed: u64) -> Diagram {
     let mut dice = Dice::new(seed);
-    let of = if seed % 2 == 0 { "BOOL" } else { "INT" };
+    let of = if seed.is_multiple_of(2) { "BOOL" } else { "INT" };
     let is_bit = of == "BOOL";
     let (givens, boxes, takens) = (2 + dice.below(4), 1 + dice.below(4), 2 + dice.below(4));
     let modifier = |dice: &mut Dice, has_any: bool| Modifier {
