@@ -195,11 +195,6 @@ impl Force {
         same_side && own.start < others.end && others.start < own.end
     }
 
-    /// Whether all its bits are in an image of that width.
-    pub fn fits(&self, width: usize) -> bool {
-        usize::from(self.signal.first_bit()) + usize::from(self.value.width()) <= width
-    }
-
     /// Checks duration, value, operator and reason.
     ///
     /// # Errors
@@ -308,6 +303,5 @@ mod tests {
             let bit = force(signal, true.into());
             assert_eq!((wide.overlaps(&bit), bit.overlaps(&wide)), (expected, expected));
         }
-        assert!(wide.fits(64) && !wide.fits(63));
     }
 }
