@@ -184,16 +184,19 @@ fn every_command_is_done_or_refused_and_is_in_the_journal() {
     let run = fs::canonicalize(runs.join("latest")).expect("a run");
     assert_eq!(page.end(), 0);
     let journal = fs::read_to_string(run.join("journal.jsonl")).expect("a journal");
-    let records =
-        journal.lines().map(|line| serde_json::from_str::<Value>(line).expect("a record"));
-    let commanded: Vec<Value> = records
-        .map(|record| record["event"].clone())
-        .filter(|event| event["event"] == "commanded")
-        .collect();
+    let events = |name: &str| -> Vec<Value> {
+        let records =
+            journal.lines().map(|line| serde_json::from_str::<Value>(line).expect("a record"));
+        let events = records.map(|record| record["event"].clone());
+        events.filter(|event| event["event"] == name).collect()
+    };
+    let commanded = events("commanded");
     assert_eq!(commanded.len(), 14, "{commanded:?}");
     assert!(commanded.iter().all(|event| event["owner"] == "anna" && event["reason"] == "a test"));
     let refused = commanded.iter().filter(|event| event["refused"].is_string());
-    assert_eq!(refused.count(), 6);
+    assert_eq!(refused.count(), 5);
+    // By its remote I/O, which knows its signals.
+    assert_eq!(events("force-refused").len(), 1);
     let summary = fs::read_to_string(run.join("summary.json")).expect("a summary");
     let summary: Value = serde_json::from_str(&summary).expect("JSON");
     let wrong = |remote_io: &Value| remote_io["counts"]["wrong"] == 0;

@@ -30,6 +30,8 @@ impl<'a> Lowering<'a> {
         let kept = (self.program.clone(), self.names.clone(), self.calls.clone());
         let at = (std::mem::take(&mut self.addresses), std::mem::take(&mut self.extents));
         let known = self.routines.clone();
+        // A program with an error is not executed for that reason.
+        let is_whole = !understudy_text::has_errors(&self.diagnostics);
         let warned = (self.subranges.len(), self.without_cycle.len(), self.sets_cycle);
         for program in programs {
             let Some(&unit) = self.unit_names.get(&program.name.key()) else {
@@ -39,7 +41,7 @@ impl<'a> Lowering<'a> {
                 continue;
             }
             let named = self.named_programs.get(&unit).cloned();
-            if named.is_none() && !is_chosen {
+            if named.is_none() && !is_chosen && is_whole {
                 let message =
                     format!("nothing runs the PROGRAM `{}`: it is not kept", program.name);
                 let help = "name it in a CONFIGURATION, call it, or remove it";
