@@ -38,6 +38,8 @@ struct Now {
     finished: BTreeMap<ProgramId, u64>,
     masters: BTreeSet<StationId>,
     cuts: BTreeSet<(Member, Member)>,
+    /// Members whose journals are not received.
+    detached: BTreeSet<Member>,
 }
 
 /// The newest cycle and all deadlines, counted from the origin.
@@ -157,6 +159,7 @@ impl<'e> Naive<'e> {
         let member = Member::RemoteIo(program);
         let process = now.processes.get(&member).copied();
         let is_down = matches!(process, Some("killed" | "ended"));
+        let reports = matches!(process, None | Some("running")) && !now.detached.contains(&member);
         let own = || self.deadlines.iter().filter(|of| of.program == program);
         let driven = own().find(|of| of.cycle == cycle).filter(|_| !is_down);
         let count = |source| {
@@ -188,7 +191,8 @@ impl<'e> Naive<'e> {
             ],
             awaits_release: now.awaits_release.contains(&program),
             forced: now.forced.iter().filter(|(of, _)| *of == program).count(),
-            protected: now.protected.get(&program).copied(),
+            // Not known where the remote I/O does not report.
+            protected: now.protected.get(&program).copied().filter(|_| reports),
             lost: now.lost.contains(&program),
             finished: now.finished.get(&program).copied(),
             remote_io: state.to_owned(),
@@ -367,6 +371,12 @@ impl Now {
             }
         }
         match (&entry.record.event, entry.record.member) {
+            (Happening::Run(RunEvent::Attached { member }), _) => {
+                self.detached.remove(member);
+            }
+            (Happening::Run(RunEvent::Detached { member, .. }), _) => {
+                self.detached.insert(*member);
+            }
             (Happening::Run(RunEvent::Fault { action, member, .. }), _) => match action {
                 Action::Continue => {
                     self.processes.insert(*member, "running");
