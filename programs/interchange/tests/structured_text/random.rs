@@ -11,6 +11,11 @@ use self::text::Text;
 use crate::execution::{check, check_bits, typed};
 use crate::support::{program, read};
 
+/// A branch of a CASE may assign a known value outside a subrange.
+fn is_outside(found: &Diagnostic) -> bool {
+    found.code == "U1043"
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
 
@@ -19,7 +24,7 @@ proptest! {
         let mut dice = Dice::new(seed);
         let source = Text::random(&mut dice).to_string();
         // A counter that an inner loop assigns under a condition is refused, and so is a loop that does not end.
-        let is_refused = |found: &Diagnostic| matches!(found.code, "U1048" | "U1056") && found.message.contains("no ladder");
+        let is_refused = |found: &Diagnostic| matches!(found.code, "U1048" | "U1056") && found.message.contains("no ladder") || is_outside(found);
         prop_assume!(!read(&source).diagnostics.iter().any(is_refused));
         let ladder = program(&source);
         let typed = typed(&source, &parse(&source).0).expect("a sound program");
@@ -30,6 +35,7 @@ proptest! {
     fn an_exact_circuit_scans_as_its_text_executes(seed: u64) {
         let mut dice = Dice::new(seed);
         let source = Text::random(&mut dice).to_string();
+        prop_assume!(!read(&source).diagnostics.iter().any(is_outside));
         let typed = typed(&source, &parse(&source).0).expect("a sound program");
         match understudy_bits::exact(&typed) {
             Ok(circuit) => check_bits(&source, &circuit, &typed, seed),
