@@ -3,6 +3,7 @@
 use std::fmt::{Debug, Write as _};
 use std::sync::{Mutex, PoisonError};
 
+use time::OffsetDateTime;
 use tracing::field::{Field, Visit};
 use tracing::level_filters::LevelFilter;
 use tracing::{Event, Subscriber};
@@ -80,27 +81,18 @@ fn dated(reason: &str) -> String {
     let reason = reason.replace(" (UNIX)", "");
     let words = reason.split(' ').map(|word| {
         let digits = word.trim_end_matches([',', '.']);
-        match digits.parse::<u64>() {
-            // Shorter numbers are spans of time.
-            Ok(seconds) if digits.len() >= 9 => word.replace(digits, &date(seconds)),
-            _ => word.to_owned(),
-        }
+        // Shorter numbers are spans of time.
+        let seconds = digits.parse().ok().filter(|_| digits.len() >= 9);
+        seconds.and_then(date).map_or_else(|| word.to_owned(), |date| word.replace(digits, &date))
     });
     words.collect::<Vec<_>>().join(" ")
 }
 
-/// `2026-11-26T17:00:00Z`: the proleptic Gregorian calendar, by eras of 400 years that begin in March.
-fn date(seconds: u64) -> String {
-    let (days, rest) = (seconds / 86_400 + 719_468, seconds % 86_400);
-    let (era, day) = (days / 146_097, days % 146_097);
-    let year = (day - day / 1_460 + day / 36_524 - day / 146_096) / 365;
-    let day = day - (365 * year + year / 4 - year / 100);
-    let month = (5 * day + 2) / 153;
-    let (day, month) =
-        (day - (153 * month + 2) / 5 + 1, if month < 10 { month + 3 } else { month - 9 });
-    let year = year + era * 400 + u64::from(month <= 2);
-    let (hour, minute, second) = (rest / 3_600, rest / 60 % 60, rest % 60);
-    format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}Z")
+/// `2026-11-26T17:00:00Z`; nothing beyond the calendar.
+fn date(seconds: i64) -> Option<String> {
+    let time = OffsetDateTime::from_unix_timestamp(seconds).ok()?;
+    let (date, (hour, minute, second)) = (time.date(), time.to_hms());
+    Some(format!("{date}T{hour:02}:{minute:02}:{second:02}Z"))
 }
 
 #[cfg(test)]
@@ -113,8 +105,8 @@ mod tests {
         let said = "invalid peer certificate: certificate expired: verification time 2026-11-26T16:59:05Z, but certificate is not valid after 2024-02-29T12:34:56Z (86502249 seconds ago)";
         assert_eq!(reason(message).as_deref(), Some(said));
         assert_eq!(reason("Too many open files (os error 24). Hint: increase it."), None);
-        assert_eq!(date(0), "1970-01-01T00:00:00Z");
-        assert_eq!(date(951_782_399), "2000-02-28T23:59:59Z");
-        assert_eq!(date(951_868_800), "2000-03-01T00:00:00Z");
+        assert_eq!(date(0).as_deref(), Some("1970-01-01T00:00:00Z"));
+        assert_eq!(date(951_782_399).as_deref(), Some("2000-02-28T23:59:59Z"));
+        assert_eq!(date(951_868_800).as_deref(), Some("2000-03-01T00:00:00Z"));
     }
 }
