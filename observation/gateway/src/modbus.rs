@@ -227,27 +227,30 @@ fn is_of_run(request: &Request<'_>) -> bool {
 }
 
 fn answer(image: &ProcessImage, request: &Request<'_>) -> Result<Response, ExceptionCode> {
-    let (area, address, count) = match *request {
-        Request::ReadCoils(address, count) => (Area::Coil, address, count),
-        Request::ReadDiscreteInputs(address, count) => (Area::DiscreteInput, address, count),
-        Request::ReadInputRegisters(address, count)
-        | Request::ReadHoldingRegisters(address, count) => (Area::Register, address, count),
-        _ => return Err(ExceptionCode::IllegalFunction),
+    let known = |area, address, count, response| {
+        let first = usize::from(address);
+        let is_known = image.is_known(area, &(first..first + usize::from(count)));
+        is_known.then_some(response).ok_or(ExceptionCode::GatewayTargetDevice)
     };
-    let registers = || part(&image.registers, address, count, MOST_REGISTERS);
-    let response = match *request {
-        Request::ReadCoils(..) => {
-            Response::ReadCoils(part(&image.coils, address, count, MOST_BITS)?)
+    match *request {
+        Request::ReadCoils(address, count) => {
+            let coils = part(&image.coils, address, count, MOST_BITS)?;
+            known(Area::Coil, address, count, Response::ReadCoils(coils))
         }
-        Request::ReadDiscreteInputs(..) => {
-            Response::ReadDiscreteInputs(part(&image.inputs, address, count, MOST_BITS)?)
+        Request::ReadDiscreteInputs(address, count) => {
+            let inputs = part(&image.inputs, address, count, MOST_BITS)?;
+            known(Area::DiscreteInput, address, count, Response::ReadDiscreteInputs(inputs))
         }
-        Request::ReadHoldingRegisters(..) => Response::ReadHoldingRegisters(registers()?),
-        _ => Response::ReadInputRegisters(registers()?),
-    };
-    let first = usize::from(address);
-    let is_known = image.is_known(area, &(first..first + usize::from(count)));
-    is_known.then_some(response).ok_or(ExceptionCode::GatewayTargetDevice)
+        Request::ReadInputRegisters(address, count) => {
+            let registers = part(&image.registers, address, count, MOST_REGISTERS)?;
+            known(Area::Register, address, count, Response::ReadInputRegisters(registers))
+        }
+        Request::ReadHoldingRegisters(address, count) => {
+            let registers = part(&image.registers, address, count, MOST_REGISTERS)?;
+            known(Area::Register, address, count, Response::ReadHoldingRegisters(registers))
+        }
+        _ => Err(ExceptionCode::IllegalFunction),
+    }
 }
 
 /// Consecutive values of a table.
