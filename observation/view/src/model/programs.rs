@@ -197,15 +197,18 @@ impl Model {
         let subject = (record.name.clone(), FORCED);
         let standing = self.changes.now().program(program);
         let forced = standing.map_or(&[][..], |own| &own.forced);
+        if forced.is_empty() {
+            return self.alarms.over(&subject, cycle);
+        }
+        let asks_again = match event {
+            RemoteIoEvent::Forced { .. } => true,
+            RemoteIoEvent::Unforced { .. } => false,
+            _ => return,
+        };
         let texts =
             forced.iter().map(|forced| force_text(record.member, &forced.force, &self.members));
         let text = texts.collect::<Vec<_>>().join("; ");
-        match event {
-            _ if text.is_empty() => self.alarms.over(&subject, cycle),
-            RemoteIoEvent::Forced { .. } => self.alarms.replace(subject, cycle, text, true),
-            RemoteIoEvent::Unforced { .. } => self.alarms.replace(subject, cycle, text, false),
-            _ => {}
-        }
+        self.alarms.replace(subject, cycle, text, asks_again);
     }
 
     fn applied(
