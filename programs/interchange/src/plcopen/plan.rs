@@ -24,7 +24,7 @@ use self::walk::Walk;
 use super::document::{Edge, Graph, Kind, Language, Modifier};
 use super::power::Power;
 
-pub(crate) use self::places::Places;
+pub(crate) use self::places::{Named, Places};
 
 /// Distances between comments and rungs that are measured; with more, comments stand at the end.
 const MAXIMUM_DISTANCES: usize = 10_000_000;

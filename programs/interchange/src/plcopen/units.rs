@@ -4,7 +4,7 @@ use understudy_ladder::Name;
 use understudy_text::Diagnostic;
 
 use super::document::{Body, Ignored, Pou, PouKind, Project, Section, VariableType};
-use super::plan::Places;
+use super::plan::{Named, Places};
 use super::standard::StandardBlock;
 
 /// The unit and all units that it uses, itself first.
@@ -44,17 +44,13 @@ fn words(text: &str) -> impl Iterator<Item = &str> {
 
 /// Where the variables of a unit are.
 pub(crate) fn places(project: &Project, pou: &Pou) -> Places {
-    let mut places = Places::default();
-    let has_in_out = pou.variables.iter().any(|known| known.section == Section::InOut);
-    for known in pou.variables.iter().chain(&project.globals) {
-        if let Some(address) = &known.address {
-            places.located(&known.name, address);
-        }
-        if has_in_out && matches!(known.section, Section::InOut | Section::External) {
-            places.of_caller(&known.name);
-        }
-    }
-    places
+    let variables = pou.variables.iter().chain(&project.globals);
+    Places::of_unit(variables.map(|known| Named {
+        name: &known.name,
+        address: known.address.as_deref(),
+        is_in_out: known.section == Section::InOut,
+        is_external: known.section == Section::External,
+    }))
 }
 
 /// Whether a block of that type keeps something from scan to scan.

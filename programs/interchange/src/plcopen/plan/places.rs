@@ -16,24 +16,40 @@ pub(crate) enum Place {
 /// The area of variables that a caller gives: two of them may be one variable.
 const OF_CALLER: char = '@';
 
+/// A variable that a unit names.
+#[derive(Clone, Copy)]
+pub(crate) struct Named<'v> {
+    pub(crate) name: &'v str,
+    pub(crate) address: Option<&'v str>,
+    /// The caller of the unit gives it.
+    pub(crate) is_in_out: bool,
+    pub(crate) is_external: bool,
+}
+
 /// The addresses of the variables of a unit.
 #[derive(Debug, Default)]
 pub(crate) struct Places {
-    /// By name in capitals.
+    /// The place of each variable with an address, by its name in capitals.
     addresses: HashMap<String, Place>,
 }
 
 impl Places {
-    /// Notes the address of a variable.
-    pub(crate) fn located(&mut self, name: &str, address: &str) {
-        if let Some(place) = direct(address) {
-            self.addresses.entry(name.to_uppercase()).or_insert(place);
+    /// Where the variables that a unit names are: its own, and the global ones.
+    pub(crate) fn of_unit<'v>(variables: impl Iterator<Item = Named<'v>> + Clone) -> Self {
+        let mut places = Self::default();
+        let has_in_out = variables.clone().any(|variable| variable.is_in_out);
+        for variable in variables {
+            let mut note = |place| {
+                places.addresses.entry(variable.name.to_uppercase()).or_insert(place);
+            };
+            if let Some(place) = variable.address.and_then(direct) {
+                note(place);
+            }
+            if has_in_out && (variable.is_in_out || variable.is_external) {
+                note(Place::Wide(OF_CALLER));
+            }
         }
-    }
-
-    /// Notes that the caller of the unit gives a variable.
-    pub(crate) fn of_caller(&mut self, name: &str) {
-        self.addresses.entry(name.to_uppercase()).or_insert(Place::Wide(OF_CALLER));
+        places
     }
 
     /// The places of all variables in an expression.

@@ -15,7 +15,7 @@ use crate::plcopen::standard::StandardBlock;
 struct Writes {
     /// To variables, also to instances of blocks, and to bits at addresses.
     by_place: HashMap<Place, Vec<usize>>,
-    /// To anything in an area.
+    /// The steps that write to anything in an area.
     by_area: HashMap<char, Vec<usize>>,
     /// Through pointers, and by units of the file.
     anywhere: Vec<usize>,

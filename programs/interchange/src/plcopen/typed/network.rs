@@ -18,7 +18,7 @@ use understudy_typed::Comparison;
 use super::make;
 use super::values::{Values, unit};
 use crate::plcopen::document::{Edge, Graph};
-use crate::plcopen::plan::{Action, Places, Plan, plan_numbers};
+use crate::plcopen::plan::{Action, Named, Places, Plan, plan_numbers};
 use crate::plcopen::power::{Power, Read};
 use crate::plcopen::standard::StandardBlock;
 
@@ -359,18 +359,13 @@ impl<'a> Network<'a> {
 
 /// Where the variables of a unit are.
 fn places(file: &File, declarations: &[Declaration]) -> Places {
-    let mut places = Places::default();
-    let has_in_out = declarations.iter().any(|known| known.class == Class::InOut);
-    for known in declarations.iter().chain(&file.globals) {
-        if let Some(address) = &known.address {
-            places.located(known.name.as_str(), address.as_str());
-        }
-        let is_of_caller = matches!(known.class, Class::InOut | Class::External);
-        if has_in_out && is_of_caller {
-            places.of_caller(known.name.as_str());
-        }
-    }
-    places
+    let variables = declarations.iter().chain(&file.globals);
+    Places::of_unit(variables.map(|known| Named {
+        name: known.name.as_str(),
+        address: known.address.as_ref().map(|address| address.as_str()),
+        is_in_out: known.class == Class::InOut,
+        is_external: known.class == Class::External,
+    }))
 }
 
 /// Whether a block acts of itself: one that keeps something, or a function that does more than answer.
