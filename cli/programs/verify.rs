@@ -11,7 +11,7 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use understudy_cluster::{Cluster, Overrides};
-use understudy_interchange::{Source, Wanted};
+use understudy_interchange::{NOT_EXECUTED, Source, Wanted};
 use understudy_ladder::Program;
 use understudy_logic::Circuit;
 use understudy_parity::generate;
@@ -108,7 +108,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     let wanted = Wanted { period: arguments.period, program: arguments.program.as_deref() };
     let (source, mut file, period) = files::program(&arguments.file, wanted)?;
     // What a program misses of one that is not executed: a proof would be about initial values.
-    for found in file.report.diagnostics.iter_mut().filter(|found| found.code == "U1085") {
+    for found in file.report.diagnostics.iter_mut().filter(|found| found.code == NOT_EXECUTED) {
         found.severity = Severity::Error;
     }
     if file.report.has_errors() {

@@ -20,6 +20,9 @@ use crate::written::{WriteError, Written, write};
 /// Code of the warning on a program that nothing runs: it is not kept.
 pub const IDLE_PROGRAM: &str = "U1055";
 
+/// Code of the warning on what a program reads of one that is not executed.
+pub const NOT_EXECUTED: &str = "U1085";
+
 /// Code of an address that cannot be used.
 const ADDRESS: &str = "U1083";
 

@@ -14,7 +14,7 @@ mod twincat;
 mod typed_text;
 mod written;
 
-pub use apart::{Apart, Copies, IDLE_PROGRAM, read_apart};
+pub use apart::{Apart, Copies, IDLE_PROGRAM, NOT_EXECUTED, read_apart};
 pub use diagrams::{DrawnBody, DrawnUnit, draw_typed, drawn_units, listing};
 pub use format::{Format, Reading, read, read_ladder, unknown_form};
 pub use source::{Source, SourceFile, Wanted, no_program, read_source};

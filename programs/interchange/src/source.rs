@@ -12,6 +12,7 @@ use understudy_structured_text::parse;
 use understudy_text::{Diagnostic, Severity};
 use understudy_typed::{Elementary, Program as Typed};
 
+use crate::apart::NOT_EXECUTED;
 use crate::format::{Format, Reading, read, unknown_form};
 use crate::plcopen;
 use crate::text::{Whole, whole};
@@ -73,8 +74,8 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
         return SourceFile { diagnostics: parsed.1, ..ladder };
     }
     let read = whole(text, parsed, wanted.program, wanted.period);
-    let missing = read.diagnostics.iter().filter(|found| found.code == "U1085").cloned();
-    let missing: Vec<Diagnostic> = missing.collect();
+    let missing = read.diagnostics.iter().filter(|found| found.code == NOT_EXECUTED);
+    let missing: Vec<Diagnostic> = missing.cloned().collect();
     let is_more = |typed: &Typed| {
         let is_every_scan = matches!(typed.tasks.as_slice(), [task] if task.every == 1);
         !is_every_scan || has_numbers_as_points(typed)
