@@ -335,9 +335,9 @@ impl RemoteIo {
     /// Whether the current cycle took no time, and is one of those that this remote I/O finds in its buffers after it was suspended: its deadline is
     /// over, the device kept its last values, and it is not driven or recorded now as if it had been driven then.
     fn slept_through(&self, now: Time, next: Time) -> bool {
-        let period = self.settings.agreement.schedule.period();
-        let took_time = next.since(self.member.clock.anchor()) >= period / 2;
-        !took_time && self.resumed.is_some_and(|resumed| now.since(resumed) < period)
+        let schedule = &self.settings.agreement.schedule;
+        let took_time = schedule.took_time(next.since(self.member.clock.anchor()));
+        !took_time && self.resumed.is_some_and(|resumed| now.since(resumed) < schedule.period())
     }
 
     /// Notes that the host has woken this remote I/O too late to keep its times.

@@ -58,7 +58,7 @@ impl Station {
         let agreement = &self.settings.agreement;
         // One that stood still goes through what it has missed at once: those cycles took no time in which samples could come.
         let began = self.member.clock.anchor();
-        let took_time = began.since(self.looked_at) >= agreement.schedule.period() / 2;
+        let took_time = agreement.schedule.took_time(began.since(self.looked_at));
         self.looked_at = began;
         // A remote I/O that starts listens first, longest where a station is missing.
         let bound = missing_after(agreement.schedule.period()).max(agreement.listen_cycles * 6);

@@ -181,6 +181,12 @@ impl Schedule {
         self.grace
     }
 
+    /// Whether a cycle that lasted so long took its time. One that a member finds in its buffers after it stood still does not: nothing could arrive in
+    /// it, and nothing was driven.
+    pub fn took_time(&self, lasted: Duration) -> bool {
+        lasted >= self.period / 2
+    }
+
     /// Delay of a wake-up from which a member reports a host stall.
     pub fn stall(&self) -> Duration {
         self.stall
