@@ -45,7 +45,7 @@ pub struct Station {
     cycle: CycleNotes,
     /// The cycle that ended last.
     closed: Option<Moment>,
-    /// Whom it received in the last two cycles in which it received somebody, the last one first.
+    /// The members that it received in the last two cycles in which it received any, the last one first.
     company: [Company; 2],
     started: Time,
     role: Role,

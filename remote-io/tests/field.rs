@@ -133,7 +133,7 @@ fn a_forced_signal_is_sampled_and_driven_so_until_its_time_is_over() {
     let mut bench = Bench { remote_io: RemoteIo::new(Time::default(), settings()), cycle: 0 };
     bench.tell(Input::RemoteIo(RemoteIoInput::Field(&Image::from_bits([true, false]))));
     let started = (0..60).find_map(|_| bench.cycle().0);
-    assert!(started.is_some(), "it starts cold where nobody holds a state");
+    assert!(started.is_some(), "it starts cold where no station holds a state");
     let force = |signal, value: bool, seconds| Force {
         signal,
         value: value.into(),
@@ -260,7 +260,7 @@ fn a_write_is_refused_while_no_station_computes_the_program() {
     let settings = Settings { operator_inputs: vec![level], ..settings() };
     let mut bench = Bench { remote_io: RemoteIo::new(Time::default(), settings), cycle: 0 };
     let started = (0..60).find_map(|_| bench.cycle().0);
-    assert!(started.is_some(), "it starts cold where nobody holds a state");
+    assert!(started.is_some(), "it starts cold where no station holds a state");
     assert_eq!(bench.cycle().1, Source::FailSafe);
     let write = Write {
         id: WriteId { session: 1, number: 1 },
@@ -360,7 +360,7 @@ fn without_sensors_nothing_is_sampled_and_the_program_stands_still() {
     bench.tell(Input::RemoteIo(RemoteIoInput::Field(&sensors)));
     // It listens first whether somebody holds a state.
     let started = (0..60).find_map(|_| bench.cycle().0);
-    let genesis = started.expect("it starts cold where nobody holds a state");
+    let genesis = started.expect("it starts cold where no station holds a state");
     bench.tell(Input::RemoteIo(RemoteIoInput::FieldLost));
     for _ in 0..5 {
         let (sampled, source, missing) = bench.cycle();

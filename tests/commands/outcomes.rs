@@ -11,7 +11,7 @@ const CLUSTER: &str = "[cluster]\nname = \"tank\"\n\n[[controller]]\nname = \"fi
 const FILL: &str = "PROGRAM fill\n  VAR_INPUT full : BOOL; END_VAR\n  VAR_OUTPUT valve : BOOL; END_VAR\n  \
                     valve := NOT full;\nEND_PROGRAM\n";
 
-/// A tank that is full for ever, or that runs over.
+/// A tank that stays full, or that runs over.
 fn tank(limit: u32) -> String {
     format!(
         "PROGRAM tank\n  VAR_INPUT valve : BOOL; END_VAR\n  VAR_OUTPUT full : BOOL; plant_fault : BOOL; END_VAR\n  \

@@ -36,7 +36,7 @@ fn expires(folder: &Path, date: Date) {
 }
 
 #[test]
-fn a_certificate_that_has_expired_is_named_by_whoever_knows_it() {
+fn an_expired_certificate_is_named_where_it_is_known() {
     let _one = some_at_a_time();
     let folder = empty_folder("expired");
     let path = addressed_cell(&folder);

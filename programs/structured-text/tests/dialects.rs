@@ -180,7 +180,7 @@ fn memory_at_addresses_that_overlap_is_refused() {
 }
 
 /// Inputs and outputs of every pair of sizes at every small address: those that share bits of the process image, by the count of the standard or by
-/// that of bytes, have a warning with both places, or an error where they have one size. So does nobody else.
+/// that of bytes, have a warning with both places, or an error where they have one size. No other pair has one.
 #[test]
 fn inputs_and_outputs_that_share_bits_are_named() {
     const SIZES: [(char, &str, u64); 5] = [

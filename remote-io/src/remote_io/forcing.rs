@@ -80,7 +80,7 @@ impl Forcing {
 }
 
 impl RemoteIo {
-    /// Why a force cannot be done: whoever gives it, it is of a signal as a whole, and of a value that the signal can have.
+    /// Why a force cannot be done: every client forces a signal as a whole, to a value that the signal can have.
     fn force_refusal(&self, force: &Force) -> Option<OrderRefusal> {
         if force.check().is_err() {
             return Some(OrderRefusal::Incomplete);

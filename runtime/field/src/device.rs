@@ -156,7 +156,7 @@ impl Device {
         let state = self.shared.lock();
         let is_new = state.number != std::mem::replace(&mut self.looked_at, state.number);
         let age = state.seen_at.elapsed();
-        // An answer that nobody has looked at gets old too, where this process was suspended.
+        // An answer that was not looked at gets old too, where this process was suspended.
         if age > self.stale_after && matches!(state.seen, Look::Sensors(_)) {
             let was_stale = std::mem::replace(&mut self.stale, true);
             let age_ms = age.as_millis();

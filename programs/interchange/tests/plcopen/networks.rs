@@ -268,7 +268,7 @@ struct Rules<'a> {
     delays: Vec<(u16, u16)>,
     /// What was at each pin with an edge, by object and pin.
     before: HashMap<(usize, usize), bool>,
-    /// Of this scan.
+    /// Values of this scan.
     given: Vec<Option<u16>>,
     is_open: Vec<bool>,
     is_done: Vec<bool>,

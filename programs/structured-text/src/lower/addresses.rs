@@ -27,7 +27,7 @@ struct Part {
 }
 
 impl Part {
-    /// The part of so many bits at an address such as `%MW3`, or of the size in the address; nothing for an incomplete address.
+    /// The part of `size` bits at an address such as `%MW3`, or of the size in the address; nothing for an incomplete address.
     fn of(address: &str, size: Option<u64>) -> Option<Self> {
         let key = normal(address);
         let area = key.chars().nth(1).filter(|area| matches!(area, 'I' | 'Q' | 'M'))?;

@@ -70,7 +70,7 @@ impl Session {
         Self { id, owner: None, input: None, value: None, progress, idle: 0 }
     }
 
-    /// Whether somebody has asked for the write since this remote I/O started.
+    /// Whether a caller has asked for the write since this remote I/O started.
     pub(super) fn has_caller(&self) -> bool {
         self.owner.is_some()
     }
