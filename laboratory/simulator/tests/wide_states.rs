@@ -153,6 +153,25 @@ fn another_station_goes_on_where_the_giver_is_killed() {
     }
 }
 
+/// A controller takes its state over while its remote I/O is down, and is accounted for as soon as it has it: the remote I/O asks nothing when it
+/// is back.
+#[test]
+fn a_station_that_took_a_state_over_is_accounted_for_at_once() {
+    let remote_io = Member::RemoteIo(understudy_wire::ProgramId(0));
+    for back in 205..220 {
+        let faults = [
+            fault(143, station(0), Action::Crash),
+            fault(154, station(1), Action::Crash),
+            fault(194, remote_io, Action::Crash),
+            fault(196, station(0), Action::Restart),
+            fault(199, station(1), Action::Restart),
+            fault(back, remote_io, Action::Restart),
+        ];
+        let (simulation, _) = run(64, 0.0, &faults, 300, 0);
+        assert!(simulation.synchronised(), "the remote I/O is back in cycle {back}");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(24) })]
 

@@ -1,7 +1,7 @@
 //! The newest sample of a program that a station remembers, for a remote I/O that has lost its memory, and which other stations cannot have proved
 //! an output of a newer one.
 
-use understudy_wire::{Moment, Recalled, Sample, SamplesReceived, StationId, StationSet};
+use understudy_wire::{Holding, Moment, Recalled, Sample, SamplesReceived, StationId, StationSet};
 
 use super::Replica;
 use crate::settings::Program;
@@ -64,17 +64,19 @@ impl Replica {
         }
     }
 
-    /// A station reports at `now` to hold the state of the cycle `stepped`. If that is no newer than the newest sample
+    /// A station reports at `now` the state that it holds. If that is no newer than the newest sample
     /// received here, `silent_after` cycles after it, the remote I/O is not received there either. No newer output was computed from its state
     /// if that station received samples itself, as it recalls, or if it has received none since it started, or none after the one that accounts
     /// for it, and holds the state that it was given here after that; unless it is taking over another one.
     pub(crate) fn receive_holding(
         &mut self,
         station: StationId,
-        stepped: Moment,
+        holding: &Holding,
         theirs: Option<&Recalled>,
         (now, silent_after): (Moment, u32),
     ) {
+        let stepped = holding.stepped;
+        self.is_taken_over(station, holding.lineage);
         let gives_to = self.gives_to(station);
         let Remembered::Received(recalled) = &mut self.remembered else {
             return;

@@ -14,7 +14,7 @@
 use std::collections::VecDeque;
 
 use understudy_executable::Scratch;
-use understudy_wire::{Digest, Image, Partial, Segment, SegmentMask, StationId, Transfer};
+use understudy_wire::{Digest, Image, Lineage, Partial, Segment, SegmentMask, StationId, Transfer};
 
 use super::log::Log;
 use super::{Held, Remembered, Replica, Standing, State};
@@ -266,6 +266,11 @@ impl Replica {
     /// Whether a station takes over a state from this one: what it proves then is not known here.
     pub(super) fn gives_to(&self, station: StationId) -> bool {
         self.snapshots.iter().any(|snapshot| snapshot.to == station)
+    }
+
+    /// A station reports to hold the state of `lineage`: a snapshot of it for that station has arrived.
+    pub(super) fn is_taken_over(&mut self, station: StationId, lineage: Lineage) {
+        self.snapshots.retain(|it| it.to != station || it.held.state.lineage != lineage);
     }
 
     /// Whether it asks other stations for a state: it has none, and replays none.

@@ -60,7 +60,7 @@ impl Station {
         for holding in holdings {
             if let Some(replica) = replica_mut(&mut self.replicas, holding.program) {
                 let theirs = recalled.iter().find(|it| it.program == holding.program);
-                replica.receive_holding(station, holding.stepped, theirs, (now, silent_after));
+                replica.receive_holding(station, holding, theirs, (now, silent_after));
             }
         }
     }
