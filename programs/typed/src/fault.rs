@@ -15,7 +15,7 @@ use crate::types::Elementary;
 /// Why an operation has no result, with the values that explain it. The codes are stable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cause {
-    /// Code 1: an integer division, or MOD, by 0.
+    /// Code 1: an integer division by 0.
     DivisionByZero {
         /// What was to be divided, as it is stored.
         dividend: u64,

@@ -25,7 +25,7 @@ pub enum Operation {
     Multiply(Elementary),
     /// a / b: integers and times towards 0, reals; a divisor of 0 is a fault, but of reals.
     Divide(Elementary),
-    /// a − (a / b) · b of integers and times; a divisor of 0 is a fault.
+    /// a − (a / b) · b of integers and times; 0 for a divisor of 0, as in the standard.
     Modulo(Elementary),
     /// −a: integers, reals, times.
     Negate(Elementary),

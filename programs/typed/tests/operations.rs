@@ -38,7 +38,7 @@ fn expected(operation: Operation, of: Elementary, a: i128, b: i128) -> Option<u6
         Operation::Subtract(_) => a - b,
         Operation::Multiply(_) => (a.rem_euclid(1 << 64)).wrapping_mul(b.rem_euclid(1 << 64)),
         Operation::Divide(_) => a.checked_div(b)?,
-        Operation::Modulo(_) => a.checked_rem(b)?,
+        Operation::Modulo(_) => a.checked_rem(b).unwrap_or(0),
         Operation::Negate(_) => -a,
         Operation::Absolute(_) => a.abs(),
         Operation::Minimum(_) => a.min(b),

@@ -85,6 +85,16 @@ impl<O: Copy + Into<u32>, R: Row + ?Sized> Run<'_, O, R> {
                     set!(a, (get!(b) as $signed).$function(divisor) as $unsigned as u64)
                 }};
             }
+            // The remainder by 0 is 0.
+            macro_rules! remainder {
+                ($signed:ty, $unsigned:ty) => {{
+                    let remainder = match get!(c) as $signed {
+                        0 => 0,
+                        divisor => (get!(b) as $signed).wrapping_rem(divisor),
+                    };
+                    set!(a, remainder as $unsigned as u64)
+                }};
+            }
             macro_rules! real {
                 ($type:ty, $function:ident) => {
                     set!(a, <$type>::unpack(get!(b)).$function(<$type>::unpack(get!(c))).pack())
@@ -218,10 +228,10 @@ impl<O: Copy + Into<u32>, R: Row + ?Sized> Run<'_, O, R> {
                 Code::DivideS32 => divide!(i32, u32, wrapping_div),
                 Code::DivideS64 => divide!(i64, u64, wrapping_div),
                 Code::DivideU => divide!(u64, u64, wrapping_div),
-                Code::ModuloS16 => divide!(i16, u16, wrapping_rem),
-                Code::ModuloS32 => divide!(i32, u32, wrapping_rem),
-                Code::ModuloS64 => divide!(i64, u64, wrapping_rem),
-                Code::ModuloU => divide!(u64, u64, wrapping_rem),
+                Code::ModuloS16 => remainder!(i16, u16),
+                Code::ModuloS32 => remainder!(i32, u32),
+                Code::ModuloS64 => remainder!(i64, u64),
+                Code::ModuloU => remainder!(u64, u64),
                 Code::And => set!(a, get!(b) & get!(c)),
                 Code::Or => set!(a, get!(b) | get!(c)),
                 Code::Xor => set!(a, get!(b) ^ get!(c)),

@@ -25,8 +25,8 @@ impl Operation {
             }
             O::Divide(Elementary::Real) => binary(operands, f32::divide),
             O::Divide(Elementary::Lreal) => binary(operands, f64::divide),
-            O::Divide(of) => quotient(of, operands)?.0,
-            O::Modulo(of) => quotient(of, operands)?.1,
+            O::Divide(of) => quotient(of, operands)?,
+            O::Modulo(of) => remainder(of, operands),
             O::Negate(Elementary::Real) => unary(operands, f32::negate),
             O::Negate(Elementary::Lreal) => unary(operands, f64::negate),
             O::Negate(of) => operands[0].wrapping_neg() & of.mask(),
@@ -96,15 +96,20 @@ fn real(function: RealFunction, of: Elementary, operands: &[u64]) -> u64 {
     }
 }
 
-/// Quotient, towards 0, and remainder; both wrap.
-fn quotient(of: Elementary, operands: &[u64]) -> Result<(u64, u64), Cause> {
+/// Quotient, towards 0; it wraps.
+fn quotient(of: Elementary, operands: &[u64]) -> Result<u64, Cause> {
     let (dividend, divisor) = (of.signed(operands[0]), of.signed(operands[1]));
     if divisor == 0 {
         return Err(Cause::DivisionByZero { dividend: operands[0], of });
     }
-    // Of 65 bits at most, so neither overflows here.
-    let (quotient, remainder) = (dividend / divisor, dividend % divisor);
-    Ok((quotient as u64 & of.mask(), remainder as u64 & of.mask()))
+    // Of 65 bits at most, so it does not overflow here.
+    Ok((dividend / divisor) as u64 & of.mask())
+}
+
+/// Remainder of that quotient, with the sign of the dividend; 0 for a divisor of 0, as the standard has it.
+fn remainder(of: Elementary, operands: &[u64]) -> u64 {
+    let (dividend, divisor) = (of.signed(operands[0]), of.signed(operands[1]));
+    dividend.checked_rem(divisor).unwrap_or(0) as u64 & of.mask()
 }
 
 fn extreme(comparison: Comparison, of: Elementary, operands: &[u64]) -> u64 {

@@ -135,10 +135,7 @@ pub(super) fn is_plain(expression: &Expression) -> bool {
             ExpressionKind::Load(place) => place.indices.is_empty() && !place.is_by_reference(),
             ExpressionKind::Apply(operation, _) => !matches!(
                 operation,
-                Operation::Divide(_)
-                    | Operation::Modulo(_)
-                    | Operation::Multiplex(_)
-                    | Operation::Text(_)
+                Operation::Divide(_) | Operation::Multiplex(_) | Operation::Text(_)
             ),
             ExpressionKind::Call(_) => false,
             _ => true,

@@ -206,7 +206,7 @@ impl Compiler<'_> {
                 let codes = [Code::TruncateReal, Code::TruncateLreal];
                 self.whole(codes, from, target, *value, to)?;
             }
-            (O::Divide(of) | O::Modulo(of), [left, right]) => {
+            (O::Divide(of), [left, right]) => {
                 let of_type = Elementary::ALL.iter().position(|each| *each == of)?;
                 self.emit_with(binary(operation)?, of_type as u8, to, *left, *right);
             }
