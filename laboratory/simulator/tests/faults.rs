@@ -274,6 +274,39 @@ fn a_remote_io_that_stood_still_holds_no_output_of_before() {
     }
 }
 
+/// A remote I/O that goes on after it was suspended finds the only station with its state back, with samples that became void meanwhile: the program
+/// continues, and no person is asked.
+#[test]
+fn a_remote_io_that_stood_still_does_not_take_what_it_missed_for_a_lost_state() {
+    for (from, phase) in (430..450).flat_map(|from| [0.0, 0.3, 0.6, 0.9].map(|phase| (from, phase)))
+    {
+        let mut simulation =
+            Simulation::new(press_cell::parts(Mode::Full, 1), Network::default(), 1);
+        let steps = [
+            (30, UNDERSTUDY, Action::Stop),
+            (400, ROBOT, Action::Stop),
+            (420, UNDERSTUDY, Action::Continue),
+            (from, ROBOT_IO, Action::Stop),
+            (460, ROBOT, Action::Continue),
+            (480, ROBOT_IO, Action::Continue),
+        ];
+        for (at_cycle, member, action) in steps {
+            simulation.schedule(Fault { at_cycle, phase, member, action });
+        }
+        let mut lost = Vec::new();
+        let mut observe = |_, cycle: Option<u64>, _, record: Record<'_>| {
+            if let Record::RemoteIo(event @ RemoteIoEvent::StateLost { .. }) = record
+                && cycle.is_some_and(|cycle| cycle >= 480)
+            {
+                lost.push(event.clone());
+            }
+        };
+        simulation.run(700, 100, &mut observe).expect("the cluster gets ready");
+        assert_eq!(lost, [], "suspended in cycle {from} at {phase}");
+        assert!(simulation.synchronised(), "suspended in cycle {from} at {phase}");
+    }
+}
+
 /// Up to a slot and far beyond it: a slow station is late, then silent, and never wrong.
 #[test]
 fn a_slow_station_is_late_and_then_silent() {

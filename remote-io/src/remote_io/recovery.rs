@@ -36,7 +36,10 @@ impl RemoteIo {
         // Frames received while this remote I/O was suspended are read at once and count as one cycle: the stations may
         // have changed.
         let period = self.settings.agreement.schedule.period();
-        let counted = now.since(self.looked) * 2 >= period;
+        let unseen = now.since(self.looked);
+        let counted = unseen * 2 >= period;
+        // What it saw before it was suspended says nothing of the stations now: one that held the state may be back.
+        let was_suspended = unseen >= period * 2;
         if counted {
             self.looked = now;
         }
@@ -48,11 +51,9 @@ impl RemoteIo {
                     .holders
                     .holdings()
                     .find_map(|(station, holding)| on_it(holding).then_some(station));
-                *unfollowed = if follower.is_some() || !self.holders.any_living() {
-                    0
-                } else {
-                    unfollowed.saturating_add(u32::from(counted))
-                };
+                let begins = was_suspended || follower.is_some() || !self.holders.any_living();
+                *unfollowed =
+                    if begins { 0 } else { unfollowed.saturating_add(u32::from(counted)) };
                 let waited = unfollowed.saturating_sub(listen_cycles);
                 if let Some(from) = follower
                     && self.question.take().is_some()
