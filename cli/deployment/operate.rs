@@ -337,8 +337,8 @@ fn write_elsewhere(
             Err(BusError::AnswerLost { .. }) => return Err(Refusal::Undecided),
             answer => answer.map_err(said)?,
         };
-        let answer: WriteAnswer = serde_json::from_str(&text)
-            .map_err(|_| Refusal::Said(format!("U0556: {text:.200}")))?;
+        let answer: WriteAnswer =
+            serde_json::from_str(&text).map_err(|_| Refusal::of_answer(format!("{text:.200}")))?;
         Done::of_write(answer.outcome)
     });
     let cycle = done.map_err(|refusal| refused(&refusal))?.cycle.unwrap_or_default();
@@ -359,7 +359,11 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
     })?;
     let hash = cluster.agreement().cluster;
     let tls = tls_keys(&keys.tls);
-    let call = || Call::to(address, hash, &arguments.name, &tls);
+    let configuration = cluster.agreement().configuration;
+    let call = || {
+        let call = Call::to(address, hash, &arguments.name, &tls)?;
+        Ok(call.with_configuration(configuration))
+    };
     let record = |answer: &Answer| {
         if arguments.what.is_order()
             && let Ok(call) = call()
@@ -422,6 +426,7 @@ fn ask_elsewhere(
         let take = |told: Told<'_>| {
             let line = match told {
                 Told::Line(line) => line,
+                Told::By(_) => return true,
                 // Standard output has records alone.
                 Told::Lost(lines) => {
                     return writeln!(std::io::stderr(), "{lines} lines were lost on their way")

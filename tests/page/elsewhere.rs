@@ -1,15 +1,15 @@
 //! What a page says of members on other machines: attached while they run for long, while some of them are gone, and while some run another program.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use nix::sys::signal::Signal;
 use serde_json::Value;
 
 use crate::shared::DEADLINE;
-use crate::shared::deployed::{Deployed, text};
+use crate::shared::deployed::{Deployed, MEMBERS, text};
 use crate::{Page, empty_folder, member, one_at_a_time, understudy};
 
 /// Cycles of 50 ms in 2 s.
@@ -140,6 +140,82 @@ fn protection_is_known_at_once_and_a_remote_io_that_is_gone_is_an_alarm() {
     }
 }
 
+/// The same cluster with other outputs of the robot, with the same points.
+fn with_another_program(running: &Deployed, folder: &Path) -> PathBuf {
+    let ladder = fs::read_to_string(folder.join("robot.ladder")).expect("it is ours");
+    let other = folder.join("other");
+    fs::create_dir_all(&other).expect("a folder");
+    fs::copy(folder.join("press.ladder"), other.join("press.ladder")).expect("copied");
+    let changed = ladder.replacen("moving_right arm_up /stop", "moving_right arm_up", 1);
+    assert_ne!(changed, ladder);
+    fs::write(other.join("robot.ladder"), changed).expect("written");
+    let cluster = other.join("cluster.toml");
+    fs::copy(&running.cluster, &cluster).expect("copied");
+    cluster
+}
+
+/// The epochs of the deadlines in a journal.
+fn epochs(journal: &Path) -> BTreeSet<u64> {
+    let text = fs::read_to_string(journal).unwrap_or_default();
+    let records = text.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
+    let applied = records.filter(|record| record["event"]["event"] == "applied");
+    applied.filter_map(|record| record["event"]["moment"]["epoch"].as_u64()).collect()
+}
+
+/// All members end, and start at once with another program: its values are not those of the cluster file of the page.
+#[test]
+fn a_change_of_the_program_under_a_page_shows_nothing_of_the_new_one() {
+    let _turn = one_at_a_time();
+    let folder = empty_folder("elsewhere-changed");
+    let mut running = Deployed::start(&folder);
+    let runs = folder.join("runs");
+    let page = first_page(&running, &runs);
+    page.wait_for("a healthy cluster", is_healthy);
+    let other = with_another_program(&running, &folder);
+    for (name, _) in MEMBERS {
+        running.process(name).kill().expect("it runs");
+        running.process(name).wait().expect("it ends");
+    }
+    for (name, _) in MEMBERS {
+        running.start_with(name, &other);
+    }
+    page.wait_for("members with another configuration", |state| {
+        ["robot", "press", "understudy", "robot-io", "press-io"]
+            .into_iter()
+            .all(|name| is_detached(state, name))
+    });
+    // An order for the program of the file is taken for no other one.
+    let operator = running.keys.join("members/engineer");
+    let call = |cluster: &Path, what: &[&str]| {
+        let member = ["operate", text(cluster), "--name", "robot-io", "--keys", text(&operator)];
+        let output = understudy(&[&member[..], what].concat()).output().expect("it is built");
+        String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned()
+    };
+    let force = ["force", "grip=true", "--seconds", "60", "--reason", "a test"];
+    let said = call(&running.cluster, &force);
+    assert!(said.contains("U0563"), "{said}");
+    let said = call(&other, &force);
+    assert!(!said.contains("U0563") && !said.contains("error"), "{said}");
+    let said = call(&running.cluster, &["status"]);
+    assert!(said.contains("U0563") && !said.contains("grip"), "{said}");
+    // The new cluster drives its outputs by now.
+    let started = Instant::now();
+    let new = loop {
+        let new = epochs(&running.journal("robot-io"));
+        if !new.is_empty() {
+            break new;
+        }
+        assert!(started.elapsed() < DEADLINE, "it does not start");
+    };
+    assert_eq!(page.end(), 0);
+    let journal = runs.join("latest/journal.jsonl");
+    let shown = epochs(&journal);
+    assert!(!shown.is_empty() && shown.is_disjoint(&new), "{shown:?}, and {new:?} is the other");
+    let text = fs::read_to_string(journal).expect("a journal");
+    let said = text.lines().filter(|line| line.contains("it runs configuration"));
+    assert!(said.count() >= 7, "{text}");
+}
+
 /// A roll-out machine by machine, or a wrong download.
 #[test]
 fn a_controller_and_a_remote_io_with_another_program_drive_nothing_and_are_alarms() {
@@ -148,16 +224,7 @@ fn a_controller_and_a_remote_io_with_another_program_drive_nothing_and_are_alarm
     let mut running = Deployed::start(&folder);
     let first = first_page(&running, &folder.join("first"));
     first.wait_for("a healthy cluster", is_healthy);
-    // The robot's outputs are those of another program, with the same points.
-    let ladder = fs::read_to_string(folder.join("robot.ladder")).expect("it is ours");
-    let wrong = folder.join("wrong");
-    fs::create_dir_all(&wrong).expect("a folder");
-    fs::copy(folder.join("press.ladder"), wrong.join("press.ladder")).expect("copied");
-    let changed = ladder.replacen("moving_right arm_up /stop", "moving_right arm_up", 1);
-    assert_ne!(changed, ladder);
-    fs::write(wrong.join("robot.ladder"), changed).expect("written");
-    let other = wrong.join("cluster.toml");
-    fs::copy(&running.cluster, &other).expect("copied");
+    let other = with_another_program(&running, &folder);
     for name in ["robot", "robot-io"] {
         running.process(name).kill().expect("it runs");
         running.process(name).wait().expect("it ends");

@@ -60,7 +60,7 @@ impl Drop for Running {
 }
 
 /// The members of the press cell, with the command that runs each.
-const MEMBERS: [(&str, &str); 7] = [
+pub(crate) const MEMBERS: [(&str, &str); 7] = [
     ("robot", "node"),
     ("press", "node"),
     ("understudy", "node"),

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
-use understudy_bus::{BusError, Call, Request, Told};
+use understudy_bus::{BusError, Call, Reporter, Request, Told};
 use understudy_cluster::Cluster;
 use understudy_journal::{Record, repeated};
 use understudy_view::{Filter, Listing};
@@ -53,11 +53,17 @@ fn is_of_every_cycle(line: &str) -> bool {
 /// Asks a member for its state.
 pub(super) fn ask(call: &Call, cluster: &Cluster, name: &str) -> Result<Answer, BusError> {
     let ready = call.ask(&Request::Status)?;
-    let mut present = Present::default();
+    let ours = Reporter::with(cluster.agreement().configuration);
+    let (mut present, mut other) = (Present::default(), None);
     let started = Instant::now();
     let followed = call.follow(PATIENCE, |told| {
         let wants_more = match told {
             Told::Line(line) => present.take(line),
+            Told::By(reporter) => {
+                other =
+                    reporter.filter(|theirs| theirs.configuration != ours.configuration).cloned();
+                true
+            }
             Told::Lost(_) => true,
         };
         wants_more && started.elapsed() < PATIENCE
@@ -65,7 +71,14 @@ pub(super) fn ask(call: &Call, cluster: &Cluster, name: &str) -> Result<Answer, 
     let mut result: Value =
         serde_json::from_str(&ready).unwrap_or_else(|_| json!({ "text": ready }));
     let mut lines = Vec::new();
-    if let Ok(mut listing) = Listing::new(cluster, Filter { ordinary: true, ..Filter::default() }) {
+    if let Some(other) = &other {
+        lines.push(format!(
+            "U0563: {name} runs configuration {}, and the cluster file is configuration {}: its signals are not those of the file",
+            other.configuration, ours.configuration
+        ));
+    } else if let Ok(mut listing) =
+        Listing::new(cluster, Filter { ordinary: true, ..Filter::default() })
+    {
         for record in present.in_effect.iter().chain(&present.newest) {
             lines.extend(
                 listing.take(record).iter().map(|line| format!("{}: {}", line.event, line.text)),

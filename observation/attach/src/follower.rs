@@ -64,9 +64,8 @@ impl Follower {
         while !self.ends.load(Ordering::Relaxed) {
             let reason = match call {
                 Ok(call) => {
-                    self.follow(call);
                     said.clear();
-                    "it ceased to be heard".to_owned()
+                    self.follow(call).unwrap_or_else(|| "it ceased to be heard".to_owned())
                 }
                 Err(reason) => reason,
             };
@@ -82,25 +81,28 @@ impl Follower {
         }
     }
 
-    /// Until it is silent for too long.
-    fn follow(&self, call: Call) {
+    /// Until it is silent for too long, or starts again with what cannot be shown here: the reason.
+    fn follow(&self, call: Call) -> Option<String> {
         let member = self.peer.member;
         let call = Arc::new(call);
         self.calls.set(member, Some(Arc::clone(&call)));
-        let mut heard = false;
+        let (mut heard, mut other) = (false, None);
         // The caller reports that it cannot be followed.
         let _ = call.follow(self.line.patience, |followed| {
-            if !std::mem::replace(&mut heard, true)
-                && self.told.blocking_send(Told::Attached(member)).is_err()
-            {
-                return false;
-            }
             let told = match followed {
+                Followed::By(reporter) => {
+                    let checked = reporter.ok_or(Vain::Older).and_then(|by| self.line.check(by));
+                    other = checked.err().map(Vain::words);
+                    return other.is_none()
+                        && (std::mem::replace(&mut heard, true)
+                            || self.told.blocking_send(Told::Attached(member)).is_ok());
+                }
                 Followed::Line(line) => Told::Line(member, line.to_owned()),
                 Followed::Lost(lines) => Told::Lost(member, lines),
             };
             self.told.blocking_send(told).is_ok() && !self.ends.load(Ordering::Relaxed)
         });
         self.calls.set(member, None);
+        other
     }
 }

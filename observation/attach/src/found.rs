@@ -4,7 +4,7 @@ use std::net::TcpStream;
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_bus::{BusError, Call, Peer, Request, TlsKeys};
+use understudy_bus::{BusError, Call, Peer, Reporter, Request, TlsKeys};
 use understudy_cluster::{AlarmDeclaration, Cluster, Security};
 use understudy_journal::check_version;
 use understudy_wire::{ClusterHash, ConfigurationHash};
@@ -45,6 +45,8 @@ pub(crate) enum Vain {
     Other(String),
     /// Its records have another version.
     Version(u32),
+    /// Its understudy is older and does not tell its configuration with its records.
+    Older,
 }
 
 impl Vain {
@@ -53,6 +55,9 @@ impl Vain {
             Self::Nobody(reason) | Self::NotAdmitted(reason) => reason,
             Self::Other(theirs) => format!("it runs configuration {theirs}"),
             Self::Version(found) => format!("it reports version {found} of the journal"),
+            Self::Older => {
+                "it does not report its configuration: run this understudy there".to_owned()
+            }
         }
     }
 }
@@ -107,7 +112,8 @@ fn why_nobody(called: Vec<(Peer, Result<Call, Vain>)>, ours: ConfigurationHash) 
             }
             Err(Vain::Nobody(reason)) => silent.push(unheard(reason)),
             Err(Vain::NotAdmitted(reason)) => strange.push(unheard(reason)),
-            Ok(_) => {}
+            // Only what it tells later shows this.
+            Err(Vain::Older) | Ok(_) => {}
         }
     }
     if strange.is_empty() {
@@ -135,13 +141,17 @@ impl Line {
             let reason = "it believes the certificate, and does not answer its holder";
             Vain::NotAdmitted(reason.to_owned())
         })?;
-        if theirs != self.configuration.to_string() {
-            return Err(Vain::Other(theirs));
-        }
         let status = call.ask(&Request::Status).unwrap_or_default();
-        let version = version_of(&status);
-        check_version(version).map_err(|wrong| Vain::Version(wrong.found))?;
-        Ok(call)
+        self.check(&Reporter { configuration: theirs, version: version_of(&status) })?;
+        Ok(call.with_configuration(self.configuration))
+    }
+
+    /// Whether records have the configuration of the cluster file, and a version that is read here.
+    pub(crate) fn check(&self, reporter: &Reporter) -> Result<(), Vain> {
+        if reporter.configuration != self.configuration.to_string() {
+            return Err(Vain::Other(reporter.configuration.clone()));
+        }
+        check_version(reporter.version).map_err(|wrong| Vain::Version(wrong.found))
     }
 }
 

@@ -257,7 +257,7 @@ impl Recorder {
                 answer.map(|text| serde_json::from_str::<WriteAnswer>(&text).map_err(|_| text));
             commanded.answer(match answer {
                 Ok(Ok(answer)) => Done::of_write(answer.outcome),
-                Ok(Err(why)) => Err(Refusal::Force(why)),
+                Ok(Err(why)) => Err(Refusal::of_answer(why)),
                 Err(_) => Err(Refusal::Undecided),
             });
         });

@@ -11,7 +11,7 @@
 //! | `write/operator`, `write/engineer` | asked with a write as JSON: its outcome | operators; engineers | no |
 //! | `command/force`, `command/unforce` | asked with a force or a signal as JSON: done, or why not | engineers | no |
 //! | `refused` | asked with a refused order of a person as JSON: it is recorded | all | no |
-//! | `journal` | told: the lines of its journal, those of a moment at once; twice a second those in effect again | all | no |
+//! | `journal` | told: the lines of its journal, those of a moment at once; twice a second those in effect again; with its configuration | all | no |
 //!
 //! and under `understudy/cluster/<member>`, for callers whose cluster file may be another one: asked, the hash of the configuration.
 //!
@@ -47,7 +47,8 @@ use crate::orders::{Control, Order, Unknown};
 use crate::rights::run_in_background;
 use crate::writes::{self, Callers};
 
-pub(crate) use followed::{Batch, Gaps, Telemetry, followed};
+pub use followed::Reporter;
+pub(crate) use followed::{Gaps, Head, Telemetry, followed};
 pub use tls::{Admitted, TlsKeys, Validity};
 pub(crate) use tls::{REFUSED_KEY, WRITE_KEYS, endpoint, hash_key, insert, prefix, tls_config};
 
@@ -258,7 +259,7 @@ impl<E: Send + 'static> Channel<E> {
             // A viewer that attaches now knows the present soon, and not when something changes.
             let repetition = self.settings.in_effect.repetition();
             if let Some(opened) = opened.as_ref().filter(|_| !repetition.is_empty()) {
-                let _ = opened.journal.put(repetition).wait();
+                let _ = opened.journal.put(self.telemetry.repeated(&repetition)).wait();
             }
             // One look later than it was seen, so that the answer is out before its channel ends.
             if stopping {
@@ -339,11 +340,14 @@ impl<E: Send + 'static> Channel<E> {
             let key = format!("{}/{what}", self.prefix);
             answers.push(answer(&session, key, move |_| text.clone())?);
         }
-        let hash = ConfigurationHash::of(self.settings.configuration.as_bytes()).to_string();
+        let own = ConfigurationHash::of(self.settings.configuration.as_bytes());
         let key = hash_key(&self.name);
-        answers.push(answer(&session, key, move |_| hash.clone())?);
+        answers.push(answer(&session, key, move |_| own.to_string())?);
         let control = self.control.clone();
-        let release = move |_: &Query| given(&control, Order::Release);
+        let release = move |query: &Query| {
+            let order = of_configuration(query, own).map(|()| Order::Release);
+            order.map_or_else(|reason| reason, |order| given(&control, order))
+        };
         let key = format!("{}/command/release", self.prefix);
         answers.push(answer(&session, key, release)?);
         let wanted = Arc::clone(&self.stop_wanted);
@@ -355,15 +359,15 @@ impl<E: Send + 'static> Channel<E> {
         answers.push(answer(&session, key, stop)?);
         for word in ["force", "unforce", "choose"] {
             let control = self.control.clone();
-            let force = move |query: &Query| match with_value(word, query) {
-                Ok(order) => given(&control, order),
-                Err(reason) => reason,
+            let force = move |query: &Query| {
+                let order = of_configuration(query, own).and_then(|()| with_value(word, query));
+                order.map_or_else(|reason| reason, |order| given(&control, order))
             };
             let key = format!("{}/command/{word}", self.prefix);
             answers.push(answer(&session, key, force)?);
         }
         for (role, key) in WRITE_KEYS {
-            answers.push(self.answer_writes(&session, role, key)?);
+            answers.push(self.answer_writes(&session, role, key, own)?);
         }
         answers.push(self.answer_refused(&session)?);
         let relay = Relay::start(listener, self.connections.clone(), PATIENCE, inner)?;
@@ -378,6 +382,7 @@ impl<E> Channel<E> {
         session: &zenoh::Session,
         role: Role,
         key: &str,
+        own: ConfigurationHash,
     ) -> zenoh::Result<Queryable<()>> {
         let key = format!("{}/{key}", self.prefix);
         let (control, callers, clock) = (self.control.clone(), self.callers.clone(), self.clock);
@@ -385,7 +390,9 @@ impl<E> Channel<E> {
         session
             .declare_queryable(declared)
             .callback(move |query: Query| {
-                let refused = match with_value("write", &query) {
+                let order =
+                    of_configuration(&query, own).and_then(|()| with_value("write", &query));
+                let refused = match order {
                     Ok(Order::Write(write)) => {
                         let write = Write { role, ..write };
                         let id = write.id;
@@ -423,6 +430,17 @@ fn given(control: &Control, order: Order) -> String {
             "U0581: the member does not answer: the command may be done; ask for its state"
                 .to_owned()
         }
+    }
+}
+
+/// Whether an order is for this configuration, where its sender says one: the signals of another one are others.
+fn of_configuration(query: &Query, own: ConfigurationHash) -> Result<(), String> {
+    let theirs = query.attachment().map(|theirs| theirs.to_bytes());
+    match theirs.map(|theirs| String::from_utf8_lossy(&theirs).into_owned()) {
+        Some(theirs) if theirs != own.to_string() => Err(format!(
+            "U0563: this member runs configuration {own}, and the order is for configuration {theirs:.32}: take the file that it runs"
+        )),
+        _ => Ok(()),
     }
 }
 

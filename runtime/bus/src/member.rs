@@ -9,8 +9,9 @@ use nix::sys::prctl::set_pdeathsig;
 use nix::sys::signal::Signal;
 use serde::Serialize;
 use understudy_cycle::Machine;
+use understudy_wire::ConfigurationHash;
 
-use crate::channel::{Channel, ChannelSettings, followed};
+use crate::channel::{Channel, ChannelSettings, Reporter, followed};
 use crate::clock::Clock;
 use crate::control::{Commands, ending_signals, watch};
 use crate::endpoints::Endpoints;
@@ -85,7 +86,8 @@ where
     let _member = span.clone().entered();
     let (output, telemetry): (Box<dyn Write + Send>, _) = match channel {
         Some(settings) => {
-            let (output, telemetry) = followed(output);
+            let configuration = ConfigurationHash::of(settings.configuration.as_bytes());
+            let (output, telemetry) = followed(output, Reporter::with(configuration));
             (Box::new(output), Some((settings, telemetry)))
         }
         None => (Box::new(output), None),

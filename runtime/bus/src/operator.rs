@@ -5,11 +5,14 @@ use std::net::{SocketAddr, TcpStream};
 use std::time::Duration;
 
 use serde_json::json;
-use understudy_wire::{ClusterHash, Force, Role, SignalPlace, StateChoice, Write};
+use understudy_wire::{
+    ClusterHash, ConfigurationHash, Force, Role, SignalPlace, StateChoice, Write,
+};
 use zenoh::Wait;
 
 use crate::channel::{
-    Batch, Gaps, REFUSED_KEY, TlsKeys, WRITE_KEYS, endpoint, hash_key, insert, prefix, tls_config,
+    Gaps, Head, REFUSED_KEY, Reporter, TlsKeys, WRITE_KEYS, endpoint, hash_key, insert, prefix,
+    tls_config,
 };
 use crate::error::{BusError, reason};
 use crate::refused_orders::RefusedOrder;
@@ -65,6 +68,11 @@ impl Request {
         }
     }
 
+    /// Whether it means signals or states of a program: a member with another configuration would take it for others.
+    fn is_of_configuration(&self) -> bool {
+        matches!(self, Self::Write(_)) || self.is_command() && *self != Self::Stop
+    }
+
     /// Whether it is answered by [`DONE`](crate::DONE), or with the reason why it is not done.
     pub fn is_command(&self) -> bool {
         self.key().starts_with("command/") && !matches!(self, Self::Write(_))
@@ -87,6 +95,8 @@ impl Request {
 /// What comes of a journal that is followed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Told<'a> {
+    /// The process that tells the lines that follow; nothing where an older version does.
+    By(Option<&'a Reporter>),
     /// A line.
     Line(&'a str),
     /// So many lines were lost on their way: they are in the journal of the member itself.
@@ -99,9 +109,18 @@ pub struct Call {
     prefix: String,
     address: SocketAddr,
     name: String,
+    /// Configuration that orders are for.
+    configuration: Option<ConfigurationHash>,
 }
 
 impl Call {
+    /// The same call, whose orders are for this configuration: a member with another one takes none.
+    #[must_use]
+    pub fn with_configuration(mut self, configuration: ConfigurationHash) -> Self {
+        self.configuration = Some(configuration);
+        self
+    }
+
     /// Calls the member `name` of a cluster, which listens at `address`.
     ///
     /// # Errors
@@ -137,6 +156,7 @@ impl Call {
             prefix: prefix(cluster, name),
             address,
             name: name.to_owned(),
+            configuration: None,
         })
     }
 
@@ -158,6 +178,11 @@ impl Call {
                 _ => format!("{}/{}", self.prefix, request.key()),
             })
             .payload(request.payload())
+            .attachment(
+                self.configuration
+                    .filter(|_| request.is_of_configuration())
+                    .map(|configuration| configuration.to_string()),
+            )
             .timeout(PATIENCE)
             .wait()
             .map_err(|_| unanswered())?;
@@ -188,8 +213,8 @@ impl Call {
         info.routers_zid().wait().next().is_some() || info.peers_zid().wait().next().is_some()
     }
 
-    /// Gives each line of the member's journal to `take`, and what was lost on the way, until that says false, or `patience` passes without
-    /// a line.
+    /// Gives each line of the member's journal to `take`, with who tells it and what was lost on the way, until that says false, or `patience`
+    /// passes without a line.
     ///
     /// # Errors
     /// [`BusError::Unanswered`] where the journal cannot be followed.
@@ -214,12 +239,7 @@ impl Call {
             match subscriber.recv_timeout(patience) {
                 Ok(Some(sample)) => {
                     let bytes = sample.payload().to_bytes();
-                    let text = String::from_utf8_lossy(&bytes);
-                    let mut told = text.lines().map(|line| match Batch::of_line(line) {
-                        Some(batch) => Told::Lost(gaps.before(batch)),
-                        None => Told::Line(line),
-                    });
-                    if !told.all(|told| told == Told::Lost(0) || take(told)) {
+                    if !tell(&String::from_utf8_lossy(&bytes), &mut gaps, &mut take) {
                         return Ok(());
                     }
                 }
@@ -227,6 +247,21 @@ impl Call {
             }
         }
     }
+}
+
+/// Gives what was told at once to `take`, until that says false.
+fn tell(text: &str, gaps: &mut Gaps, take: &mut impl FnMut(Told<'_>) -> bool) -> bool {
+    let mut lines = text.lines();
+    let mut rest = lines.clone();
+    let head = rest.next().and_then(Head::of_line);
+    if head.is_some() {
+        lines = rest;
+    }
+    if !take(Told::By(head.as_ref().and_then(|head| head.reporter.as_ref()))) {
+        return false;
+    }
+    let lost = head.map_or(0, |head| gaps.before(head.lines));
+    (lost == 0 || take(Told::Lost(lost))) && lines.all(|line| take(Told::Line(line)))
 }
 
 /// Why no TLS connection to an address is opened. Zenoh says the same of a machine that is not there, of a key that is not accepted and of a clock

@@ -1,15 +1,19 @@
 //! A writer whose lines others can follow.
 //!
-//! Lines are numbered, so that who follows knows where some are lost. Those that are told at once begin with a line of their own:
+//! Lines are numbered, so that who follows knows where some are lost. Those that are told at once begin with a line of their own, which says
+//! the configuration of the process that tells them: a member may start again with another one while it is followed.
 //!
 //! ```text
-//!   {"lines":{"first":1234,"count":17}}
+//!   {"lines":{"first":1234,"count":17},"reporter":{"configuration":"0123456789abcdef","version":3}}
 //! ```
 
 use std::io::{self, Write};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 
 use serde::{Deserialize, Serialize};
+use understudy_wire::ConfigurationHash;
+
+use crate::journal::JOURNAL_VERSION;
 
 /// Lines of the journal that wait for those who follow it, at most; they lose what comes on top.
 const WAITING_LINES: usize = 1024;
@@ -35,18 +39,37 @@ pub(crate) struct Followed<W> {
     lines: SyncSender<Line>,
 }
 
+/// The process that tells lines.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Reporter {
+    /// Hash of its configuration.
+    pub configuration: String,
+    /// Version of its journal.
+    pub version: u32,
+}
+
+impl Reporter {
+    /// This program with a configuration.
+    pub fn with(configuration: ConfigurationHash) -> Self {
+        Self { configuration: configuration.to_string(), version: JOURNAL_VERSION }
+    }
+}
+
 /// A channel that is not started yet.
 pub(crate) struct Telemetry {
     pub(super) lines: Receiver<Line>,
     pub(super) wake: SyncSender<Line>,
+    reporter: Reporter,
+    /// Number of the last line that was told.
+    told: u64,
     /// A line that did not follow the one before it.
     next: Option<Line>,
 }
 
-pub(crate) fn followed<W: Write>(inner: W) -> (Followed<W>, Telemetry) {
+pub(crate) fn followed<W: Write>(inner: W, reporter: Reporter) -> (Followed<W>, Telemetry) {
     let (sender, lines) = sync_channel(WAITING_LINES);
     let followed = Followed { inner, begun: Vec::new(), count: 0, lines: sender.clone() };
-    (followed, Telemetry { lines, wake: sender, next: None })
+    (followed, Telemetry { lines, wake: sender, reporter, told: 0, next: None })
 }
 
 impl<W: Write> Write for Followed<W> {
@@ -89,8 +112,21 @@ impl Telemetry {
                 Err(TryRecvError::Empty | TryRecvError::Disconnected) => {}
             }
         }
-        let mut told = batch.line();
-        told.extend_from_slice(&text);
+        self.told = batch.first.saturating_add(batch.count).saturating_sub(1);
+        self.told_at_once(batch, &text)
+    }
+
+    /// Lines without numbers, as they are told at once.
+    pub(super) fn repeated(&self, text: &[u8]) -> Vec<u8> {
+        self.told_at_once(Batch { first: self.told.saturating_add(1), count: 0 }, text)
+    }
+
+    fn told_at_once(&self, lines: Batch, text: &[u8]) -> Vec<u8> {
+        let head = Head { lines, reporter: Some(self.reporter.clone()) };
+        // Writing to memory does not fail.
+        let mut told = serde_json::to_vec(&head).unwrap_or_default();
+        told.push(b'\n');
+        told.extend_from_slice(text);
         told
     }
 
@@ -107,27 +143,21 @@ pub(crate) struct Batch {
     count: u64,
 }
 
-#[derive(Serialize, Deserialize)]
-struct BatchLine {
-    lines: Batch,
+/// The line that says which lines follow, and whose they are.
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct Head {
+    pub(crate) lines: Batch,
+    /// Nothing where an older version tells them.
+    pub(crate) reporter: Option<Reporter>,
 }
 
 /// The beginning of a line that says which lines follow.
 const BEGINS: &str = "{\"lines\":";
 
-impl Batch {
-    fn line(self) -> Vec<u8> {
-        // Writing to memory does not fail.
-        let mut text = serde_json::to_vec(&BatchLine { lines: self }).unwrap_or_default();
-        text.push(b'\n');
-        text
-    }
-
-    /// Which lines a line says that follow; nothing for a line of the journal.
+impl Head {
+    /// What a line says of those that follow; nothing for a line of the journal.
     pub(crate) fn of_line(line: &str) -> Option<Self> {
-        let found: Option<BatchLine> =
-            line.starts_with(BEGINS).then(|| serde_json::from_str(line).ok()).flatten();
-        found.map(|found| found.lines)
+        line.starts_with(BEGINS).then(|| serde_json::from_str(line).ok()).flatten()
     }
 }
 
@@ -149,6 +179,10 @@ impl Gaps {
 mod tests {
     use super::*;
 
+    fn reporter() -> Reporter {
+        Reporter::with(ConfigurationHash::of(b"a cluster"))
+    }
+
     /// What is told next, without waiting.
     fn told(telemetry: &mut Telemetry) -> Option<String> {
         let first = telemetry.take_next().or_else(|| telemetry.lines.try_recv().ok())?;
@@ -157,7 +191,7 @@ mod tests {
 
     #[test]
     fn what_is_written_is_followed_line_by_line_and_never_waited_for() {
-        let (mut followed, telemetry) = followed(Vec::new());
+        let (mut followed, telemetry) = followed(Vec::new(), reporter());
         followed.write_all(b"one\ntw").expect("it is memory");
         followed.write_all(b"o\n").expect("it is memory");
         let lines = telemetry.lines.try_iter().map(|line| (line.number, line.text));
@@ -174,25 +208,40 @@ mod tests {
     /// Whatever finds no room in the queue, or is dropped on its way, is counted before the next line.
     #[test]
     fn who_follows_knows_what_is_lost() {
-        let (mut followed, mut telemetry) = followed(Vec::new());
+        let (mut followed, mut telemetry) = followed(Vec::new(), reporter());
         let mut gaps = Gaps::default();
         let (mut next, mut lost_in_all, mut taken) = (0, 0, 0);
         for round in 0..60_u32 {
+            let mut repeats = round % 4 == 1;
             let many = if round % 7 == 3 { WAITING_LINES + 50 } else { 40 };
             for _ in 0..many {
                 followed.write_all(format!("{next}\n").as_bytes()).expect("it is memory");
                 next += 1;
             }
-            while let Some(text) = told(&mut telemetry) {
+            loop {
+                let text = match told(&mut telemetry) {
+                    Some(text) => text,
+                    None if std::mem::take(&mut repeats) => {
+                        let text = telemetry.repeated(b"again\n");
+                        String::from_utf8(text).expect("text")
+                    }
+                    None => break,
+                };
                 // On its way.
                 if round % 5 == 2 {
                     continue;
                 }
                 let (head, lines) = text.split_once('\n').expect("lines");
-                let lost = gaps.before(Batch::of_line(head).expect("a head"));
+                let head = Head::of_line(head).expect("a head");
+                assert_eq!(head.reporter, Some(reporter()));
+                let lost = gaps.before(head.lines);
                 let first = if taken == 0 { 0 } else { lost };
-                for (place, line) in lines.lines().enumerate() {
-                    assert_eq!(Batch::of_line(line), None);
+                if head.lines.count == 0 {
+                    // The lines before a repetition may be lost as well.
+                    taken += first;
+                }
+                for (place, line) in lines.lines().filter(|line| *line != "again").enumerate() {
+                    assert!(Head::of_line(line).is_none());
                     let missing = if place == 0 { first } else { 0 };
                     assert_eq!(line, (taken + missing).to_string(), "round {round}");
                     taken += missing + 1;
