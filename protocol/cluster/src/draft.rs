@@ -14,7 +14,7 @@ use understudy_text::duration;
 use understudy_typed::Elementary;
 use understudy_wire::MAXIMUM_STATE_BITS;
 
-use crate::fields::MAXIMUM_NAME_LENGTH;
+use crate::address::MAXIMUM_NAME_LENGTH;
 use crate::format::{LONGEST_PERIOD, SHORTEST_PERIOD};
 use crate::read::MARK;
 use crate::value::value_text;

@@ -4,7 +4,7 @@
 //! reported and the default goes on in its place, so that the rest is still checked.
 
 use std::collections::BTreeMap;
-use std::net::{IpAddr, Ipv4Addr, SocketAddr, SocketAddrV4};
+use std::net::{SocketAddr, SocketAddrV4};
 use std::ops::Range;
 use std::time::Duration;
 
@@ -13,11 +13,11 @@ use understudy_text::Diagnostic;
 pub(crate) use understudy_text::tables::Placed;
 use understudy_text::tables::{Codes, Constant, Value, unknown_key};
 
+use crate::address::{
+    MAXIMUM_NAME_LENGTH, MULTICAST_GROUPS, is_multicast_range, is_name, why_unreachable,
+};
 use crate::format::{Key, Kind, OPERATOR_INPUT, POINT, SIGNAL_INPUT, Section};
 use crate::place::{ByteOrder, Place, PlaceError, Registers, register};
-
-/// The longest name of a member, in characters.
-pub const MAXIMUM_NAME_LENGTH: usize = 48;
 
 /// Names of one place that are looked up and not found; those past it are only counted, so that no file takes long.
 pub(crate) const MAXIMUM_MISFITS: usize = 100;
@@ -30,37 +30,6 @@ pub(crate) const CODES: Codes = Codes {
     out_of_bounds: "U0205",
     unknown_word: "U0207",
 };
-
-/// Why no other member can reach one at this address; nothing where it could.
-pub fn why_unreachable(address: SocketAddr) -> Option<&'static str> {
-    let host = address.ip().to_canonical();
-    let is_broadcast = matches!(host, IpAddr::V4(host) if host.is_broadcast());
-    if host.is_unspecified() {
-        Some("it means every interface of the machine that listens, and cannot be called")
-    } else if host.is_multicast() || is_broadcast {
-        Some("it means many devices at once")
-    } else if address.port() == 0 {
-        Some("port 0 means any free port, and cannot be called")
-    } else {
-        None
-    }
-}
-
-/// Multicast groups of the frames of one cluster.
-pub const MULTICAST_GROUPS: u8 = 33;
-
-/// Whether the frames of a cluster can have multicast groups from this address on.
-pub fn is_multicast_range(first: SocketAddrV4) -> bool {
-    let last = u32::from(*first.ip()).saturating_add(u32::from(MULTICAST_GROUPS) - 1);
-    first.ip().is_multicast() && Ipv4Addr::from(last).is_multicast() && first.port() != 0
-}
-
-/// Whether a member can have this name.
-pub fn is_name(text: &str) -> bool {
-    let legal = |character: char| character.is_ascii_alphanumeric() || "-_".contains(character);
-    let starts = text.starts_with(|first: char| first.is_ascii_alphabetic());
-    starts && text.chars().all(legal) && text.len() <= MAXIMUM_NAME_LENGTH
-}
 
 /// A signal with its place in a device.
 #[derive(Debug)]

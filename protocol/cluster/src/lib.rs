@@ -7,6 +7,7 @@
 //!
 //! The format is described in `docs/reference/cluster-file.md`.
 
+mod address;
 mod alarm;
 mod canonical;
 mod cluster;
@@ -25,14 +26,14 @@ mod template;
 mod undriven;
 mod value;
 
+pub use address::{
+    MAXIMUM_NAME_LENGTH, MULTICAST_GROUPS, is_multicast_range, is_name, why_unreachable,
+};
 pub use alarm::{AlarmCondition, AlarmDeclaration, MAXIMUM_ALARMS, Priority};
 pub use cluster::{Cluster, Controller, Link, PlantPlace, RemoteIo, Security, Understudy};
 pub use code::Code;
 pub use device::{BAUD_RATES, Binding, Connection, FieldDevice, Parity, SerialLine, Side};
 pub use draft::{Draft, DraftProgram, MAXIMUM_PROGRAM_NAME};
-pub use fields::{
-    MAXIMUM_NAME_LENGTH, MULTICAST_GROUPS, is_multicast_range, is_name, why_unreachable,
-};
 pub use place::{BitPlace, ByteOrder, Place, PlaceError, RegisterTable, Registers};
 pub use read::{Loaded, MAXIMUM_TEXT_BYTES, Overrides, read, read_with};
 pub use schema::schema;

@@ -4,7 +4,7 @@ use schemars::Schema;
 use serde_json::{Map, Value, json};
 use understudy_text::duration;
 
-use crate::fields::MAXIMUM_NAME_LENGTH;
+use crate::address::MAXIMUM_NAME_LENGTH;
 use crate::format::{
     CLUSTER, CONTROLLER, FIELD, Key, Kind, OPERATOR_INPUT, POINT, PRESS_PARAMETERS,
     ROBOT_PARAMETERS, SECTIONS, SIGNAL_INPUT, Section,
