@@ -6,11 +6,11 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_ladder::Program as Ladder;
+use understudy_ladder::{Program as Ladder, Signal};
 use understudy_structured_text::lower::another_interval;
 use understudy_structured_text::parse;
 use understudy_text::{Diagnostic, Severity};
-use understudy_typed::{Elementary, Program as Typed};
+use understudy_typed::{Elementary, Points, Program as Typed};
 
 use crate::apart::NOT_EXECUTED;
 use crate::format::{Format, Reading, read, unknown_form};
@@ -118,8 +118,10 @@ pub(crate) fn another_period(
 fn source(whole: Whole) -> SourceFile {
     let mut diagnostics = whole.diagnostics;
     let library = (!whole.checked.is_empty()).then_some(Source::Library(whole.checked));
-    let has_numbers = whole.typed.as_ref().is_some_and(has_numbers_as_points);
-    let source = match (whole.ladder.filter(|_| !has_numbers), whole.typed) {
+    let is_same =
+        |ladder: &Ladder| whole.typed.as_ref().is_none_or(|typed| has_points_of(ladder, typed));
+    let ladder = whole.ladder.filter(is_same);
+    let source = match (ladder, whole.typed) {
         (Some(ladder), _) => {
             diagnostics.extend(whole.reasons);
             diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
@@ -138,6 +140,19 @@ fn source(whole: Whole) -> SourceFile {
 fn has_numbers_as_points(program: &Typed) -> bool {
     let mut points = program.inputs.iter().chain(&program.outputs);
     points.any(|point| point.of != Elementary::Bool)
+}
+
+/// Whether a ladder has the points of a program, all of them bits, under their names.
+fn has_points_of(ladder: &Ladder, program: &Typed) -> bool {
+    let own = |points: &Points| -> Vec<String> {
+        points.iter().filter(|point| point.slot != 0).map(|point| point.name.clone()).collect()
+    };
+    let names = |signals: &[Signal]| -> Vec<String> {
+        signals.iter().map(|signal| signal.name.to_string()).collect()
+    };
+    !has_numbers_as_points(program)
+        && names(&ladder.inputs) == own(&program.inputs)
+        && names(&ladder.outputs) == own(&program.outputs)
 }
 
 /// Whether a signal has a name as the bits of a number have, such as `speed.0`.

@@ -69,6 +69,8 @@ struct Unrolling<'a> {
     cells: HashMap<u64, usize>,
     /// Cells of variables that people see.
     shown: HashSet<usize>,
+    /// Names of the points that no variable is, such as `%QX1.1` and the elements of an array at an address.
+    unnamed: HashMap<u64, String>,
     inputs: HashMap<u64, Elementary>,
     blocks: HashMap<u64, String>,
     timers: HashMap<u64, usize>,
@@ -137,6 +139,7 @@ impl<'a> Unrolling<'a> {
             resolved: Resolved::default(),
             cells: HashMap::new(),
             shown: HashSet::new(),
+            unnamed: HashMap::new(),
             inputs: points.map(|point| (64 * u64::from(point.slot), point.of)).collect(),
             blocks: HashMap::new(),
             timers: HashMap::new(),
@@ -203,6 +206,14 @@ impl<'a> Unrolling<'a> {
                     point.of.article(),
                     point.of
                 )));
+            }
+        }
+        let points = program.inputs.iter().chain(program.outputs.iter());
+        for point in points.filter(|point| point.slot != 0) {
+            let address = 64 * u64::from(point.slot);
+            if program.part_at(address).is_none() {
+                let name = self.unique(&shaped(point.name.trim_start_matches('%')));
+                self.unnamed.insert(address, name);
             }
         }
         for variable in &program.variables {
@@ -279,7 +290,9 @@ impl<'a> Unrolling<'a> {
         };
         let whole = variable.filter(|variable| variable.of.elementary().is_some());
         let address_of = whole.and_then(|variable| variable.address.as_deref());
-        let name = self.unique(&wanted);
+        let unnamed = self.unnamed.get(&address).cloned();
+        let name = unnamed.clone().unwrap_or_else(|| self.unique(&wanted));
+        let address_of = address_of.or(unnamed.as_deref());
         let cell = self.add(Cell {
             name,
             kind,
@@ -291,7 +304,7 @@ impl<'a> Unrolling<'a> {
             description: whole.and_then(|variable| variable.description.clone()),
         })?;
         self.cells.insert(address, cell);
-        if self.program.part_at(address).is_some() {
+        if role == Role::Output || self.program.part_at(address).is_some() {
             self.shown.insert(cell);
         }
         Ok(cell)
@@ -324,14 +337,10 @@ impl<'a> Unrolling<'a> {
 
     /// A name for an address, and its type.
     fn name(&self, address: u64, of: Elementary) -> (String, Type) {
-        let shape = |name: &str| {
-            let name = name.replace("][", ".").replace(['[', ','], ".");
-            name.replace([']', ' '], "")
-        };
         let slot = address / 64;
         let state = u64::from(self.program.state);
         if let Some(part) = self.program.part_at(address) {
-            return (shape(&part.name), part.of);
+            return (shaped(&part.name), part.of);
         }
         let names = self.around.names;
         let (list, slot) =
@@ -343,7 +352,7 @@ impl<'a> Unrolling<'a> {
         }
         .part_at(64 * slot + address % 64);
         match part {
-            Some(part) => (shape(&part.name), part.of),
+            Some(part) => (shaped(&part.name), part.of),
             None => (format!("memory.{slot}"), Type::Elementary(of)),
         }
     }
@@ -400,6 +409,12 @@ impl<'a> Unrolling<'a> {
             }
         }
     }
+}
+
+/// `lamps[0][1]` as a ladder names it: `lamps.0.1`.
+fn shaped(name: &str) -> String {
+    let name = name.replace("][", ".").replace(['[', ','], ".");
+    name.replace([']', ' '], "")
 }
 
 fn drop_unread(steps: &mut Vec<Step>, kept: &HashSet<usize>) {

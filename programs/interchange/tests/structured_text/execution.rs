@@ -14,12 +14,17 @@ use crate::support::PERIOD;
 
 /// Bits of the points of a ladder: its names, and where each stands in the image of the typed program.
 fn places(names: &[&str], points: &understudy_typed::Points) -> Vec<usize> {
-    let known = points.bit_names();
+    let known: Vec<String> = points.bit_names().iter().map(|name| shaped(name)).collect();
     let place = |name: &&str| {
         let found = known.iter().position(|known| known == name);
         found.unwrap_or_else(|| panic!("no bit `{name}` in {known:?}"))
     };
     names.iter().map(place).collect()
+}
+
+/// The name of a point as a ladder has it: that of `%QX1.1` is `QX1.1`, that of `lamps[0]` is `lamps.0`.
+fn shaped(name: &str) -> String {
+    name.trim_start_matches('%').replace('[', ".").replace(']', "")
 }
 
 /// The typed program of a file.
@@ -85,6 +90,65 @@ fn ladders_keep_outputs_within_their_subranges() {
         let circuit = understudy_bits::exact(&typed).expect("a circuit");
         check_bits(&text, &circuit, &typed, 3);
     }
+}
+
+/// An output that only an address names is driven as every other one, by the ladder and by the file as it is read.
+#[test]
+fn outputs_that_only_an_address_names_are_driven() {
+    let blocks = "
+        FUNCTION_BLOCK Lamp VAR_INPUT i : BOOL; END_VAR VAR_OUTPUT o : BOOL; END_VAR o := NOT i; END_FUNCTION_BLOCK
+        FUNCTION_BLOCK Wired VAR_INPUT i : BOOL; END_VAR VAR o AT %QX0.3 : BOOL; END_VAR o := NOT i; END_FUNCTION_BLOCK
+        FUNCTION Shown : BOOL VAR_INPUT i : BOOL; END_VAR %QX2.0 := NOT i; Shown := i; END_FUNCTION";
+    for (variables, body) in [
+        ("", "%QX1.1 := NOT a;"),
+        ("", "IF a AND b THEN %QX1.1 := TRUE; ELSIF b THEN %QX1.1 := FALSE; END_IF;"),
+        ("", "%QX1.1 := %QX1.2 XOR a; %QX1.2 := %QX1.1 OR b;"),
+        ("", "q := %IX0.4 AND a; %QX1.1 := %IX0.5;"),
+        ("lamps AT %QX0.0 : ARRAY [0..1] OF BOOL;", "lamps[0] := a; lamps[1] := NOT b;"),
+        ("lamps AT %QX0.0 : ARRAY [0..1] OF BOOL;", "q := lamps[1]; lamps[0] := NOT a;"),
+        ("l : Lamp;", "l(i := a, o => %QX1.1);"),
+        ("w : Wired;", "w(i := a);"),
+        ("", "q := Shown(a);"),
+        ("t : TON;", "t(IN := a, PT := T#300ms, Q => %QX1.1); q := t.Q;"),
+    ] {
+        let text = format!(
+            "{blocks} PROGRAM p VAR_INPUT a : BOOL; b : BOOL; END_VAR VAR_OUTPUT q : BOOL; END_VAR VAR {variables} END_VAR {body} END_PROGRAM"
+        );
+        outputs_are_driven(&text);
+    }
+    for body in ["LDN a\nST %QX1.1", "LD a\nS %QX1.1\nLD b\nR %QX1.1", "LD a\nST lamps[1]"] {
+        let text = format!(
+            "PROGRAM p VAR_INPUT a : BOOL; b : BOOL; END_VAR VAR_EXTERNAL lamps : ARRAY [0..1] OF BOOL; END_VAR\n{body}\nEND_PROGRAM
+            CONFIGURATION c VAR_GLOBAL lamps AT %QX4.0 : ARRAY [0..1] OF BOOL; END_VAR
+            RESOURCE r ON PLC TASK t(INTERVAL := T#100ms, PRIORITY := 1); PROGRAM x WITH t : p; END_RESOURCE END_CONFIGURATION"
+        );
+        outputs_are_driven(&text);
+    }
+}
+
+/// The ladder of a text drives all outputs of its program; read as a source, it has its points under their names.
+fn outputs_are_driven(text: &str) {
+    let (file, found) = parse(text);
+    assert!(!understudy_text::has_errors(&found), "{found:#?}\n{text}");
+    let typed = typed(text, &file).unwrap_or_else(|| panic!("no program: {text}"));
+    let reading = read(Format::StructuredText, "p.st", text, None);
+    let ladder = reading.program.unwrap_or_else(|| panic!("{:#?}\n{text}", reading.diagnostics));
+    let wanted = typed.outputs.iter().filter(|point| point.slot != 0);
+    let mut wanted: Vec<String> = wanted.map(|point| shaped(&point.name)).collect();
+    let mut found: Vec<String> = ladder.outputs.iter().map(|it| it.name.to_string()).collect();
+    (wanted.sort(), found.sort());
+    assert_eq!(found, wanted, "{text}");
+    check(text, &ladder, &typed, 7);
+    let wanted = Wanted { period: Some(PERIOD), program: None };
+    let source = understudy_interchange::read_source("p.st", text, wanted).source;
+    let Some(understudy_interchange::Source::Typed(program)) = source else {
+        panic!("read as {source:?}: {text}");
+    };
+    let names = |program: &Program| {
+        let outputs = program.outputs.iter();
+        outputs.map(|point| point.name.clone()).collect::<Vec<String>>()
+    };
+    assert_eq!(names(&program), names(&typed), "{text}");
 }
 
 /// Compares the scans of an exact circuit with those of its program, bit by bit.
