@@ -241,6 +241,17 @@ fn intermediate_results_have_32_bits() {
         "t[256] := 7; x := t[u + 1]; FOR y := 0 TO u + 1 DO ; END_FOR;",
         "7 257",
     );
+    for of in ["USINT", "UINT", "UDINT", "ULINT", "BYTE", "WORD"] {
+        for (last, wanted) in [(-5, "0 0"), (0, "0 0"), (1, "1 1"), (3, "3 3")] {
+            let known = format!("i : {of}; k : INT := {last}; z : {of} := 9;");
+            let turns = "FOR i := 0 TO k - 1 DO x := x + 1; END_FOR; FOR z := 0 TO k - 1 BY 1 DO y := y + 1; END_FOR;";
+            once("x : INT; y : INT;", &known, turns, wanted);
+        }
+        // The counter has its first value where no turn is made.
+        let known = format!("i : {of} := 9; k : INT := -1;");
+        once("x : INT;", &known, "FOR i := 7 TO k DO ; END_FOR; x := TO_INT(i);", "7");
+    }
+    once("x : INT;", "i : UINT; u : UINT;", "FOR i := 0 TO u - 1 DO x := x + 1; END_FOR;", "0");
     // Functions keep the type of their inputs.
     once("x : INT;", "raw : INT := 4095;", "x := DIV(MUL(raw, 100), 4095);", "3");
     once("x : REAL;", "raw : INT := 4095;", "x := INT_TO_REAL(raw * 100);", "16284");
@@ -315,6 +326,52 @@ fn warnings(declared: &str, body: &str) -> String {
     let text = format!("PROGRAM main VAR {declared} END_VAR {body} END_PROGRAM");
     let (_, found) = read(&text, None);
     shown(&text, &found, Severity::Warning)
+}
+
+#[test]
+fn numbers_that_no_type_has_are_warned_of() {
+    let declared = "a : SINT; b : USINT; ud : UDINT; d : DINT; l : LINT; ul : ULINT; lw : LWORD; n : INT; q : BOOL; u : UINT; i : UINT;";
+    for body in [
+        "q := ul = l;",
+        "q := n < ul;",
+        "q := lw >= d;",
+        "a := MAX(a, b);",
+        "l := MAX(ud, d);",
+        "l := SEL(q, ud, d);",
+        "n := MUX(n, a, b);",
+        "FOR i := 0 TO ABS(n) - TO_INT(i) - 1 DO u := i; END_FOR;",
+    ] {
+        let found = warnings(declared, body);
+        assert!(found.contains("U1080"), "{body} {found}");
+    }
+    for body in [
+        "q := ul > 5;",
+        "q := ul = ud;",
+        "q := l < ud;",
+        "q := ud > d;",
+        "n := MAX(n, a);",
+        "l := MAX(l, d);",
+        "d := LIMIT(0, d, 5);",
+        "FOR i := 0 TO u DO n := n + 1; END_FOR;",
+        "FOR i := 0 TO n - 1 DO d := d + 1; END_FOR;",
+    ] {
+        assert_eq!(warnings(declared, body), "", "{body}");
+    }
+}
+
+#[test]
+fn a_misspelt_instance_is_no_list_of_global_variables() {
+    let text = |name: &str| {
+        format!(
+            "VAR_GLOBAL run : BOOL; END_VAR FUNCTION_BLOCK motor VAR_INPUT run : BOOL; END_VAR VAR_OUTPUT on : BOOL; END_VAR on := run; END_FUNCTION_BLOCK
+            PROGRAM main VAR_INPUT s : BOOL; END_VAR VAR_OUTPUT q : BOOL; END_VAR VAR pump1 : motor; END_VAR {name}.run := s; pump1(); q := pump1.on; END_PROGRAM"
+        )
+    };
+    for (name, is_known) in [("pump1", true), ("pmup1", false), ("pump", false), ("GVL", true)] {
+        let (_, found) = read(&text(name), None);
+        let unknown = found.iter().any(|found| found.code == "U1041");
+        assert_eq!(unknown, !is_known, "{name}: {found:?}");
+    }
 }
 
 #[test]

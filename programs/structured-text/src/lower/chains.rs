@@ -274,6 +274,11 @@ impl Lowering<'_> {
         };
         self.seen(&left, common, span);
         self.seen(&right, common, span);
+        if is_whole(common) {
+            // No type has all numbers of both.
+            self.changed(&left.value, common, span);
+            self.changed(&right.value, common, span);
+        }
         let operands = vec![convert(left.value, common), convert(right.value, common)];
         Some(Valued::typed(apply(Operation::Compare(comparison, common), operands, of)))
     }

@@ -303,6 +303,19 @@ impl Lowering<'_> {
         Some(fold::convert(value, target))
     }
 
+    /// Warns where a whole number becomes another one in a type that it takes by itself; a constant that the type has stays.
+    pub(super) fn changed(&mut self, value: &Expression, to: Elementary, span: &Span) {
+        let Some(from) = value.of.elementary().filter(|of| is_whole(*of) && is_whole(to)) else {
+            return;
+        };
+        let (least, most) = limits(to);
+        let possible = ranges(value, Some(&self.facts)).possible;
+        if !possible.is_within((least, most)) {
+            let found = self.describe(&value.of);
+            self.converted((&found, from), to, span);
+        }
+    }
+
     /// Warns where a whole number becomes one of a type that does not have all numbers of its own.
     pub(super) fn converted(
         &mut self,

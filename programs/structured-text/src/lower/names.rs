@@ -236,21 +236,24 @@ impl<'a> Lowering<'a> {
         if self.base_is_unknown() && self.follows_an_error() {
             return;
         }
-        let help = {
-            let own = self.scope.symbols.iter().flat_map(|symbols| symbols.iter());
-            let own = own.filter_map(|(_, symbol)| match symbol {
-                Symbol::Variable(variable) => Some(variable.name.as_str()),
-                _ => None,
-            });
-            let globals = self.global_declarations.values();
-            let globals = globals.map(|declaration| declaration.name.as_str());
-            let mut known: Vec<&str> = own.chain(globals).collect();
-            known.sort_unstable();
-            spelling::question(name.as_str(), known)
-                .unwrap_or_else(|| "declare it, such as `VAR … : INT; END_VAR`".to_owned())
-        };
+        let help = self.spelt_alike(name);
+        let help = help.unwrap_or_else(|| "declare it, such as `VAR … : INT; END_VAR`".to_owned());
         let message = format!("`{name}` is not declared");
         self.error_with("U1041", message, name.span(), help);
+    }
+
+    /// The question whether a declared name that is spelt alike is meant.
+    pub(super) fn spelt_alike(&self, name: &Name) -> Option<String> {
+        let own = self.scope.symbols.iter().flat_map(|symbols| symbols.iter());
+        let own = own.filter_map(|(_, symbol)| match symbol {
+            Symbol::Variable(variable) => Some(variable.name.as_str()),
+            _ => None,
+        });
+        let globals = self.global_declarations.values();
+        let globals = globals.map(|declaration| declaration.name.as_str());
+        let mut known: Vec<&str> = own.chain(globals).collect();
+        known.sort_unstable();
+        spelling::question(name.as_str(), known)
     }
 
     pub(super) fn constant_state(&mut self, key: (Option<Owner>, String)) -> Option<ConstantState> {

@@ -126,9 +126,11 @@ impl Lowering<'_> {
                 return self.own_part(path);
             }
             None => {
-                // A list of global variables may stand in front.
+                // A list of global variables may stand in front, but no misspelt name of a variable.
                 let global = match steps.first() {
-                    Some(Step::Field(name)) => self.global(&name.key()),
+                    Some(Step::Field(name)) if self.spelt_alike(&path.root).is_none() => {
+                        self.global(&name.key())
+                    }
                     _ => None,
                 };
                 let Some(Symbol::Variable(variable)) = global else {

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use understudy_text::Diagnostic;
 use understudy_typed::{
-    Branch, Case, Elementary, Expression, For, Operation, Place, Statement, StatementKind, Type,
+    Branch, Case, Comparison, Elementary, Expression, ExpressionKind as Kind, For, Operation,
+    Place, Statement, StatementKind, Type,
 };
 
 use crate::lexer::code_refused;
@@ -339,9 +340,11 @@ impl Lowering<'_> {
         let whole = Place { of: wanted, ..target.place.clone() };
         let from = self.stored_at(&written.from, &whole);
         let to = self.bound(&written.to, counter);
+        let (to, passes) = to.map_or((None, None), |(to, passes)| (Some(to), passes));
+        let passes = self.repeated(passes, &target.place, (&written.to, counter));
         let to = to.filter(|to| self.within(to, &target.place, &written.to.span).is_some());
         let by = match &written.by {
-            Some(by) => self.bound(by, counter),
+            Some(by) => self.bound(by, counter).map(|(by, _)| by),
             None => Some(number(Type::Elementary(counter), 1)),
         };
         self.facts.forget();
@@ -356,17 +359,46 @@ impl Lowering<'_> {
         // A bit string counts as the unsigned number of its width, which is stored alike.
         let mut place = target.place;
         place.of = Type::Elementary(counter);
-        Some(StatementKind::For(Box::new(For {
-            counter: place,
-            from: reinterpret(from, counter),
-            to,
-            by,
-            body: statements,
-        })))
+        let from = reinterpret(from, counter);
+        let first = passes.as_ref().map(|_| (place.clone(), from.clone()));
+        let turns =
+            StatementKind::For(Box::new(For { counter: place, from, to, by, body: statements }));
+        let Some((condition, (place, from))) = passes.zip(first) else {
+            return Some(turns);
+        };
+        // An end below 0, which no unsigned counter has, makes no turn.
+        let line = self.line(&written.counter.span);
+        let statement = |kind| Statement { line, kind };
+        let branch = Branch { condition, body: vec![statement(turns)] };
+        let otherwise = vec![statement(StatementKind::Assign(place, from))];
+        Some(StatementKind::If(vec![branch], otherwise))
     }
 
-    /// A bound or a step, which may be of a wider type than the counter: then it is limited to it.
-    fn bound(&mut self, written: &syntax::Expression, counter: Elementary) -> Option<Expression> {
+    /// The condition of a loop, where it can be evaluated once more than it is written: it calls nothing, and the counter does not change it. Warns
+    /// otherwise.
+    fn repeated(
+        &mut self,
+        condition: Option<Expression>,
+        counter: &Place,
+        (written, of): (&syntax::Expression, Elementary),
+    ) -> Option<Expression> {
+        let condition = condition?;
+        if is_repeatable(&condition, counter) {
+            return Some(condition);
+        }
+        let message = format!("an end below 0 of a FOR with a counter of type {of} counts as 0");
+        let help = "count with an INT or DINT";
+        self.warn("U1080", message, written.span.clone(), help);
+        None
+    }
+
+    /// A bound or a step, which may be of a wider type than the counter: then it is limited to it. Where it can be below 0 and the counter cannot, with
+    /// the condition that it is not.
+    fn bound(
+        &mut self,
+        written: &syntax::Expression,
+        counter: Elementary,
+    ) -> Option<(Expression, Option<Expression>)> {
         let wanted = Type::Elementary(counter);
         let operand = self.operand(written, Some(&wanted));
         let from = match &operand {
@@ -380,6 +412,13 @@ impl Lowering<'_> {
                 let mut value = reinterpret(value, from);
                 let constant =
                     |limit: i128| number(Type::Elementary(from), limit as u64 & from.mask());
+                let possible = ranges(&value, Some(&self.facts)).possible.ends();
+                let is_positive = (low < 0 && least == 0 && possible.0 < 0).then(|| {
+                    let operands = vec![value.clone(), constant(0)];
+                    let of = Type::Elementary(Elementary::Bool);
+                    let compare = Operation::Compare(Comparison::GreaterOrEqual, from);
+                    apply(compare, operands, of)
+                });
                 if high > most {
                     value = apply(
                         Operation::Minimum(from),
@@ -394,9 +433,19 @@ impl Lowering<'_> {
                         Type::Elementary(from),
                     );
                 }
-                Some(convert(value, counter))
+                Some((convert(value, counter), is_positive))
             }
-            (_, operand) => self.coerce(operand, &wanted, &written.span),
+            (_, operand) => Some((self.coerce(operand, &wanted, &written.span)?, None)),
         }
+    }
+}
+
+/// Whether an expression calls nothing and does not read what a loop counts with.
+fn is_repeatable(expression: &Expression, counter: &Place) -> bool {
+    match &expression.kind {
+        Kind::Constant(_) => true,
+        Kind::Load(place) => place.indices.is_empty() && place.root != counter.root,
+        Kind::Apply(_, operands) => operands.iter().all(|operand| is_repeatable(operand, counter)),
+        _ => false,
     }
 }

@@ -51,7 +51,10 @@ impl Lowering<'_> {
             lowered.push(match operand {
                 Operand::Typed(found) if found.of == of => found,
                 Operand::Typed(found) => match (of.elementary(), &of) {
-                    (Some(to), Type::Elementary(_)) => convert(found, to),
+                    (Some(to), Type::Elementary(_)) => {
+                        self.changed(&found, to, &value.span);
+                        convert(found, to)
+                    }
                     _ => found,
                 },
                 other => self.coerce(other, &of, &value.span)?,
