@@ -73,6 +73,8 @@ pub struct Step {
 #[derive(Debug, Clone)]
 pub struct History {
     program: ProgramId,
+    /// x(0).
+    initial: Option<Image>,
     referee: Referee,
     steps: VecDeque<Step>,
     most: usize,
@@ -121,6 +123,7 @@ impl History {
         let reset = reset.filter(|_| controller.code.typed().is_some());
         Some(Self {
             program,
+            initial: Image::from_words(executable.state_count(), executable.initial()).ok(),
             referee: Referee::new(&settings, executable),
             steps: VecDeque::new(),
             most: most.max(2),
@@ -174,6 +177,12 @@ impl History {
             self.end.reach();
         }
         found
+    }
+
+    /// Whether the scan of the step at `place` began in the initial state of the program.
+    pub(crate) fn begins_at(&self, place: usize) -> bool {
+        let own = self.steps.get(place).and_then(|step| step.sampled.as_ref());
+        own.is_some_and(|own| self.initial.as_ref() == Some(&own.state))
     }
 
     /// Whether somebody has looked for what is before the oldest state that is known.

@@ -21,7 +21,7 @@ const DEEPEST: usize = 24;
 /// Reasons in all.
 const MOST: usize = 300;
 
-/// Cycles that are gone back through to find what set a latch or started a timer.
+/// Cycles that are gone back through to find what started a timer: each of them is scanned.
 const FARTHEST: usize = 4096;
 
 pub(super) struct Explainer<'m> {
@@ -151,7 +151,7 @@ impl<'m> Explainer<'m> {
             registers.position(|register| register.name == name)
         });
         let mut at = place;
-        for _ in 0..FARTHEST {
+        loop {
             let before = self.history.before(at).ok_or(at)?;
             let state = self.history.steps()[before].sampled.as_ref();
             let was = register.and_then(|register| Some(state?.state.get(register)));
@@ -160,31 +160,27 @@ impl<'m> Explainer<'m> {
             }
             at = before;
         }
-        Err(at)
     }
 
     /// Why there is nothing before the step at `place`.
     fn end_of_history(&self, place: usize) -> &'static str {
-        if place == 0 && self.history.is_cut() {
-            "unchanged since before the oldest cycle that is remembered"
-        } else {
+        if self.history.begins_at(place) {
             "its initial value"
+        } else {
+            "unchanged since before the oldest cycle that is remembered"
         }
     }
 
     fn input(&self, name: &str, input: usize, value: bool, place: usize) -> Reason {
         let mut since = place;
-        for _ in 0..FARTHEST {
-            let Some(before) = self.history.before(since) else {
-                break;
-            };
+        while let Some(before) = self.history.before(since) {
             let sampled = self.history.steps()[before].sampled.as_ref();
             if sampled.is_none_or(|sampled| sampled.inputs.get(input) != value) {
                 break;
             }
             since = before;
         }
-        let known = self.history.before(since).is_some() || !self.history.is_cut();
+        let known = self.history.before(since).is_some() || self.history.begins_at(since);
         let text = match (since == place, known) {
             (true, true) => "input, new in this cycle".to_owned(),
             (false, true) => format!("input, since cycle {}", self.cycle(since)),

@@ -26,9 +26,6 @@ const MOST: usize = 200;
 /// Values that the statement of a program fault read.
 const MOST_FAILED: usize = 20;
 
-/// Cycles that are gone back through to find when a value changed.
-const FARTHEST: usize = 4096;
-
 /// Text of a reason whose causes are not shown.
 const OMITTED: &str = "; further causes omitted";
 
@@ -86,7 +83,7 @@ impl<'m> Explainer<'m> {
             let sampled = steps[*at].sampled.as_ref();
             sampled.is_some_and(|sampled| sampled.fault_is_new)
         };
-        let Some(at) = (0..=place).rev().take(FARTHEST).find(is_new) else {
+        let Some(at) = (0..=place).rev().find(is_new) else {
             self.history.end().reach();
             return None;
         };
@@ -269,9 +266,9 @@ impl<'m> Explainer<'m> {
         };
         let value = at(place)?;
         let (mut since, mut known) = (place, false);
-        for _ in 0..FARTHEST {
+        loop {
             let Some(before) = self.history.before(since) else {
-                known = !self.history.is_cut();
+                known |= self.history.begins_at(since);
                 break;
             };
             if at(before) != Some(value) {
@@ -297,10 +294,7 @@ impl<'m> Explainer<'m> {
         let now = stored(place);
         let mut since = place;
         let mut writer = None;
-        for _ in 0..FARTHEST {
-            let Some(before) = self.history.before(since) else {
-                break;
-            };
+        while let Some(before) = self.history.before(since) {
             if stored(before) != now {
                 writer = Some(before);
                 break;
@@ -308,9 +302,9 @@ impl<'m> Explainer<'m> {
             since = before;
         }
         let Some(writer) = writer else {
-            let text = match self.history.is_cut() {
-                true => "unchanged since before the oldest cycle that is remembered",
-                false => "its initial value",
+            let text = match self.history.begins_at(since) {
+                true => "its initial value",
+                false => "unchanged since before the oldest cycle that is remembered",
             };
             return self.leaf(&part.name, value, place, text);
         };

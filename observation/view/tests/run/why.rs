@@ -1,5 +1,6 @@
 //! Chains of reasons.
 
+use understudy_cluster::{Overrides, read_with};
 use understudy_view::Reason;
 
 use crate::support::{KILL_EACH, cell, model, scenario};
@@ -66,4 +67,76 @@ fn what_is_not_there_is_said() {
     assert!(model.why("press.%QX0.0", None).is_ok());
     let error = model.why("press.move_down", Some(5000)).expect_err("it has no answer");
     assert_eq!(error.code(), "U0575");
+}
+
+/// Its output and its memory change in the 60th scan, and never again.
+const ONCE: &str = "\
+PROGRAM once
+  VAR_INPUT run : BOOL; END_VAR
+  VAR_OUTPUT starts : INT; never : INT := 7; END_VAR
+  VAR n : DINT; END_VAR
+  n := n + 1;
+  IF n = 60 THEN starts := starts + 1; END_IF;
+  IF n < 0 THEN never := 8; END_IF;
+END_PROGRAM
+";
+
+const LATCH: &str = "\
+program latch
+input go
+output lamp
+memory never = 0
+memory lit = 0
+rung
+    go (S lit)
+rung
+    never (S never)
+rung
+    lit ( lamp )
+";
+
+const GO: &str = "\
+PROGRAM go
+  VAR_INPUT lamp : BOOL; END_VAR
+  VAR_OUTPUT go : BOOL; END_VAR
+  VAR n : DINT; END_VAR
+  n := n + 1;
+  go := n = 60;
+END_PROGRAM
+";
+
+/// A value that is kept for longer than any bound of a search was assigned where it was assigned: only what was never written is initial.
+#[test]
+fn a_value_that_was_assigned_long_ago_is_not_its_initial_value() {
+    let file = "[cluster]\nname = \"long\"\n\
+        [[controller]]\nname = \"once\"\nladder = \"once.st\"\n\
+        [[controller]]\nname = \"latch\"\nladder = \"latch.ladder\"\n\
+        [[plant]]\ncontroller = \"latch\"\nladder = \"go.st\"\n";
+    let loaded = read_with("cluster.toml", file, Overrides::default(), &mut |name| match name {
+        "once.st" => Ok(ONCE.to_owned()),
+        "latch.ladder" => Ok(LATCH.to_owned()),
+        "go.st" => Ok(GO.to_owned()),
+        _ => Err("no such file".to_owned()),
+    });
+    let cluster = loaded.cluster.unwrap_or_else(|| panic!("{:?}", loaded.reports));
+    // Of the last of them the first cycles are not remembered any more.
+    for (cycles, is_remembered) in [(1000, true), (5000, true), (9000, false)] {
+        let text = format!("title = \"long\"\ncycles = {cycles}\n");
+        let model = model(&cluster, &scenario(&cluster, &text), 1);
+        let because = |signal: &str| {
+            let why = model.why(signal, Some(cycles - 10)).expect("it is known");
+            why.because.expect("nothing is fail-safe")
+        };
+        let assigned = because("once.starts").text;
+        let set = because("latch.lamp").because.remove(0).text;
+        let never = because("once.never").text;
+        if is_remembered {
+            assert!(assigned.starts_with("assigned in cycle "), "{cycles}: {assigned}");
+            assert!(set.starts_with("is set in cycle "), "{cycles}: {set}");
+            assert_eq!(never, "its initial value");
+        } else {
+            let before = "unchanged since before the oldest cycle that is remembered";
+            assert_eq!([assigned, set, never], [before; 3], "{cycles}");
+        }
+    }
 }
