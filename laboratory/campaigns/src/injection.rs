@@ -230,11 +230,11 @@ fn small(
     let (faultload, seed) = plan.draw(&target, run);
     let drawn = faultload.size().0;
     let found = Violating { faultload, cycles: plan.cycles, seed, symptom: symptom.clone() };
-    let shortens = plan.property != Property::Unprotected;
+    let judges_at_end = plan.property == Property::Unprotected;
     let mut attempt = |faultload: &Faultload, cycles: u64, seed: u64| {
         bench.run(faultload, cycles, seed, plan.property).symptom
     };
-    let small = minimise(found, schedule, shortens, &mut attempt);
+    let small = minimise(found, schedule, judges_at_end, &mut attempt);
     Failure::new(cluster, plan, run, drawn, &small)
 }
 

@@ -35,14 +35,15 @@ pub(super) struct Violating {
 /// Runs a faultload for so many cycles from a seed.
 pub(super) type Try<'a> = dyn FnMut(&Faultload, u64, u64) -> Option<Symptom> + 'a;
 
-/// The smallest violating run that is found from `found`. Cycles are cut to the first symptom where `shortens`.
+/// The smallest violating run that is found from `found`. Cycles are cut to the first symptom, unless the property is judged at the end of the run:
+/// then faults keep their ends, because one that lasts violates it by itself.
 pub(super) fn minimise(
     found: Violating,
     schedule: &Schedule,
-    shortens: bool,
+    judges_at_end: bool,
     attempt: &mut Try<'_>,
 ) -> Violating {
-    let mut search = Search { best: found, shortens, trials: 0, attempt };
+    let mut search = Search { best: found, judges_at_end, trials: 0, attempt };
     search.shorten();
     search.drop_network();
     search.drop_injections();
@@ -53,7 +54,7 @@ pub(super) fn minimise(
 
 struct Search<'a, 'b> {
     best: Violating,
-    shortens: bool,
+    judges_at_end: bool,
     trials: u32,
     attempt: &'a mut Try<'b>,
 }
@@ -82,7 +83,7 @@ impl Search<'_, '_> {
 
     /// Ends the run a little behind the first symptom, without what strikes later.
     fn shorten(&mut self) {
-        if !self.shortens {
+        if self.judges_at_end {
             return;
         }
         let cycles = self.best.symptom.cycle + 1 + MARGIN_CYCLES;
@@ -132,7 +133,7 @@ impl Search<'_, '_> {
         let mut place = 0;
         // The list of candidates is made anew after each that is taken, and gone on with from there.
         while let Some(candidate) =
-            candidates(&self.best.faultload, schedule).into_iter().nth(place)
+            candidates(&self.best.faultload, schedule, self.judges_at_end).into_iter().nth(place)
         {
             if self.trials == MAXIMUM_TRIALS {
                 return false;
@@ -149,11 +150,12 @@ impl Search<'_, '_> {
 }
 
 /// Every faultload that is one step simpler; each comes before those that are simpler by less.
-fn candidates(faultload: &Faultload, schedule: &Schedule) -> Vec<Faultload> {
+fn candidates(faultload: &Faultload, schedule: &Schedule, keeps_ends: bool) -> Vec<Faultload> {
     let mut list = Vec::new();
     for (place, injection) in faultload.injections.iter().enumerate() {
-        let simpler = simpler_injections(injection);
-        list.extend(simpler.into_iter().map(|injection| {
+        let simpler = simpler_injections(injection).into_iter();
+        let simpler = simpler.filter(|simpler| !keeps_ends || ends_as(simpler, injection));
+        list.extend(simpler.map(|injection| {
             let mut faultload = faultload.clone();
             faultload.injections[place] = injection;
             faultload
@@ -169,6 +171,30 @@ fn candidates(faultload: &Faultload, schedule: &Schedule) -> Vec<Faultload> {
     list.extend(simpler_members(faultload, schedule));
     list.retain(|candidate| candidate != faultload && is_possible(candidate));
     list
+}
+
+/// Whether the last action on each member and link is the same in both.
+fn ends_as(simpler: &Injection, whole: &Injection) -> bool {
+    let ends = |injection: &Injection| -> BTreeMap<(Member, Option<Member>), _> {
+        let lasts = |action| match action {
+            Action::Slow { by } | Action::Delay { by, .. } => !by.is_zero(),
+            _ => false,
+        };
+        let end = |action| (std::mem::discriminant(&action), lasts(action));
+        injection.steps.iter().map(|step| (struck(step), end(step.action))).collect()
+    };
+    let whole = ends(whole);
+    ends(simpler).iter().all(|(struck, end)| whole.get(struck) == Some(end))
+}
+
+/// The member that a step strikes, and of a link the other one.
+fn struck(step: &Fault) -> (Member, Option<Member>) {
+    match step.action {
+        Action::Cut { to } | Action::Heal { to } | Action::Delay { to, .. } => {
+            (step.member, Some(to))
+        }
+        _ => (step.member, None),
+    }
 }
 
 /// Nobody is crashed who is not there.
@@ -321,14 +347,7 @@ fn simpler_members(faultload: &Faultload, schedule: &Schedule) -> Vec<Faultload>
 /// Who is struck, in the order of the steps; less is simpler.
 fn rank(faultload: &Faultload) -> Vec<(Member, Option<Member>)> {
     let steps = faultload.injections.iter().flat_map(|injection| &injection.steps);
-    steps
-        .map(|step| match step.action {
-            Action::Cut { to } | Action::Heal { to } | Action::Delay { to, .. } => {
-                (step.member, Some(to))
-            }
-            _ => (step.member, None),
-        })
-        .collect()
+    steps.map(struck).collect()
 }
 
 #[cfg(test)]

@@ -28,15 +28,66 @@ fn schedule() -> Schedule {
 
 /// Minimises against `cause`, which is asked whether a faultload still violates; counts the trials.
 fn check(faultload: Faultload, cause: &dyn Fn(&Faultload) -> bool) -> (Violating, u32) {
+    check_judged(faultload, false, cause)
+}
+
+fn check_judged(
+    faultload: Faultload,
+    judges_at_end: bool,
+    cause: &dyn Fn(&Faultload) -> bool,
+) -> (Violating, u32) {
     let symptom = Symptom { cycle: CYCLES - 1, member: None, what: String::new() };
     let mut trials = 0;
     let found = Violating { faultload, cycles: CYCLES, seed: 1, symptom: symptom.clone() };
-    let small = minimise(found, &schedule(), false, &mut |faultload, _, _| {
+    let small = minimise(found, &schedule(), judges_at_end, &mut |faultload, _, _| {
         trials += 1;
         cause(faultload).then(|| symptom.clone())
     });
     assert!(cause(&small.faultload), "what is kept violates");
     (small, trials)
+}
+
+/// Of a property that is judged at the end of the run, a fault that lasts is no counterexample: each one that is left is over by then.
+#[test]
+fn faults_keep_their_ends_where_the_end_of_the_run_is_judged() {
+    let step = |at_cycle, rank, action| Fault {
+        at_cycle,
+        phase: 0.5,
+        member: Member::Station(StationId(rank)),
+        action,
+    };
+    let injection = |kind, steps| Injection { kind, role: Role::Controller, steps };
+    let to = Member::RemoteIo(ProgramId(0));
+    let by = Duration::from_millis(8);
+    let storm = [60, 70, 80, 90].map(|at| outage(1, at, 5).steps).concat();
+    let injections = vec![
+        outage(0, 60, 40),
+        injection(Kind::Crash, storm),
+        injection(Kind::Stop, vec![step(60, 2, Action::Stop), step(65, 2, Action::Continue)]),
+        injection(
+            Kind::OneWayCut,
+            vec![step(60, 3, Action::Cut { to }), step(75, 3, Action::Heal { to })],
+        ),
+        injection(
+            Kind::Slow,
+            vec![
+                step(60, 4, Action::Slow { by }),
+                step(75, 4, Action::Slow { by: Duration::ZERO }),
+            ],
+        ),
+    ];
+    for culprit in 0..injections.len() {
+        let member = injections[culprit].steps[0].member;
+        let strikes =
+            |faultload: &Faultload| faultload.steps().iter().any(|step| step.member == member);
+        let faultload = Faultload { injections: injections.clone(), network: None };
+        let (small, _) = check_judged(faultload, true, &strikes);
+        assert_eq!(small.faultload.injections.len(), 1, "{culprit}");
+        let steps = small.faultload.steps();
+        assert_eq!(steps.len(), 2, "{culprit}: a fault and its end of {steps:?}");
+        let end = injections[culprit].steps.last().expect("an end").action;
+        assert_eq!(steps.last().map(|step| step.action), Some(end), "{culprit}");
+    }
 }
 
 /// Every set of culprits among six outages is found, whatever it is.
