@@ -100,7 +100,8 @@ pub enum Event {
         /// Program of the state.
         program: ProgramId,
     },
-    /// No sample of a program was received for a second or some cycles, from its remote I/O or relayed: no output of the program is applied.
+    /// No sample of a program was received for a second or some cycles, from its remote I/O or relayed: its remote I/O does not live, is not
+    /// received, or samples nothing.
     SamplesMissing {
         /// Current cycle.
         moment: Moment,

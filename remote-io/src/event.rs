@@ -54,6 +54,10 @@ pub enum Event {
         born: Moment,
         /// Whether the operator has to release the outputs.
         awaits_release: bool,
+        /// The newest applied output, where the state that it came from is lost with all stations that held it; nothing at a first start, and
+        /// where the operator has chosen the initial state.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        lost: Option<Moment>,
     },
     /// After a restart, or when no living station is on this remote I/O's history: it continues from a lineage that a
     /// station holds.

@@ -372,7 +372,8 @@ impl RemoteIo {
         };
         self.miss_signals();
         self.note_lateness(now);
-        self.apply(Selection::Missing(Missing::NoCycle), None);
+        // Those of the last cycle are not received in this one.
+        self.apply(Selection::Missing(Missing::NoCycle), None, StationSet::EMPTY);
         self.note_idle();
         // One that was stopped for long does not make up for every deadline that it slept through.
         let passed = self.periods_late(now);

@@ -250,6 +250,55 @@ fn a_controller_and_a_remote_io_with_another_program_drive_nothing_and_are_alarm
     assert_eq!(driven.collect::<Vec<_>>(), [""; 0], "a wrong program drives");
 }
 
+/// What the alarm of a remote I/O says whose program was started from its initial state.
+const STATE_LOST: &str = "STATE LOST: starts its program from the initial state";
+
+#[test]
+fn stations_that_stop_together_are_shown_as_such_and_a_lost_state_is_an_alarm() {
+    let _turn = one_at_a_time();
+    let folder = empty_folder("elsewhere-stations");
+    let mut running = Deployed::start(&folder);
+    let first = first_page(&running, &folder.join("first"));
+    first.wait_for("a healthy cluster", is_healthy);
+    let stations = ["robot", "press", "understudy"];
+    for name in stations {
+        running.signal(name, Signal::SIGSTOP);
+    }
+    let state = first.wait_for("stations that are not received", |state| {
+        let mut states = stations.into_iter().map(|name| member(state, name));
+        states.all(|member| member["state"] == "not-received")
+            && alarms(state, "NOT protected").len() == 2
+    });
+    assert!(alarms(&state, "is broken").is_empty(), "{state:#}");
+    assert!(alarms(&state, NOT_DRIVEN).is_empty(), "{state:#}");
+    for name in stations {
+        running.signal(name, Signal::SIGCONT);
+    }
+    first.wait_for("a healthy cluster again", is_healthy);
+    assert!(!is_lost(&first.wait_for("cycles", |_| true)), "they kept their states");
+    // The two that hold the state of the robot's program.
+    for name in ["robot", "understudy"] {
+        running.process(name).kill().expect("it runs");
+        running.process(name).wait().expect("it ends");
+    }
+    for name in ["robot", "understudy"] {
+        running.start_with(name, &running.cluster.clone());
+    }
+    first.wait_for("an alarm", is_lost);
+    first.wait_for("a healthy cluster with a new state", is_healthy);
+    let late = attached(&running, &folder.join("late"));
+    late.wait_for("the same at a page that came later", is_lost);
+}
+
+/// Whether an alarm says that the robot's state is lost, acknowledged or not.
+fn is_lost(state: &Value) -> bool {
+    let mut alarms = state["alarms"].as_array().expect("alarms").iter();
+    alarms.any(|alarm| {
+        alarm["who"] == "robot-io"
+            && alarm["what"].as_str().is_some_and(|what| what.contains(STATE_LOST))
+    })
+}
+
 /// What the alarm of a remote I/O says whose plant is suspended or has ended.
 const NO_FIELD: &str = "its plant has sent nothing";
 

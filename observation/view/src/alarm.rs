@@ -156,6 +156,19 @@ impl Alarms {
         self.raise_alarm(subject, cycle, text, |alarm| alarm.priority = Some(Priority::Critical));
     }
 
+    /// Raises an alarm of high priority about something that has happened and is over: it stays open until it is acknowledged. The same record may be
+    /// read again.
+    pub(crate) fn occurred(&mut self, subject: Subject, cycle: i64, text: String) {
+        let mut known = self.alarms.values();
+        if known.any(|alarm| alarm.is_of(&subject) && alarm.text == text) {
+            return;
+        }
+        self.raise_alarm(subject.clone(), cycle, text, |alarm| {
+            alarm.priority = Some(Priority::High)
+        });
+        self.over(&subject, cycle);
+    }
+
     /// Raises an alarm on a signal; `since_before` where it may have been active before.
     pub(crate) fn raise_process(
         &mut self,

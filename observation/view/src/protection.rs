@@ -10,7 +10,7 @@ pub struct Protection {
     pub protected: bool,
     /// The first cycle, from the origin.
     pub since: i64,
-    /// The stations that cannot prove the outputs; none where the program is protected.
+    /// The stations that cannot prove the outputs in this cycle; none where the program is protected.
     pub lacking: Vec<LackingStation>,
 }
 
@@ -49,7 +49,8 @@ impl Protection {
             return "protected".to_owned();
         }
         let texts: Vec<&str> = self.lacking.iter().map(|one| one.text.as_str()).collect();
-        format!("NOT protected since cycle {}: {}", self.since, texts.join(", "))
+        let causes = if texts.is_empty() { "" } else { ": " };
+        format!("NOT protected since cycle {}{causes}{}", self.since, texts.join(", "))
     }
 }
 

@@ -1,7 +1,7 @@
 //! The deadline: something is driven at every one, and only what is true, held, or fail-safe.
 
 use understudy_cycle::Output;
-use understudy_wire::{Image, Moment, Source, Time};
+use understudy_wire::{Image, Moment, Source, StationSet, Time};
 
 use super::knowledge::Run;
 use super::{Applied, Authority, Deadline, Execution, Question, RemoteIo};
@@ -70,7 +70,7 @@ impl RemoteIo {
         } else {
             self.take_signals();
         }
-        self.apply(selection, sampled);
+        self.apply(selection, sampled, self.member.published());
         self.watch_protection();
     }
 
@@ -139,7 +139,13 @@ impl RemoteIo {
         history.newest().cloned().unwrap_or_else(|| self.field.clone())
     }
 
-    pub(super) fn apply(&mut self, selection: Selection, sampled: Option<Image>) {
+    /// Applies the outputs of a deadline, of a cycle in which these stations were received.
+    pub(super) fn apply(
+        &mut self,
+        selection: Selection,
+        sampled: Option<Image>,
+        heard: StationSet,
+    ) {
         let (outputs, source, word_of, missing) = match selection {
             Selection::Direct(outputs) => (outputs, Source::Direct, None, None),
             Selection::Reconstructed(outputs, understudy) => {
@@ -185,7 +191,7 @@ impl RemoteIo {
             source,
             word_of,
             missing,
-            heard: self.member.published(),
+            heard,
         });
     }
 

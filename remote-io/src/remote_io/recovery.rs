@@ -99,8 +99,8 @@ impl RemoteIo {
                 let asks = Event::ConfigurationDisputed { moment, stations, others };
                 self.ask(Question::ConfigurationDisputed, asks);
             }
-            Verdict::Cold => self.start(moment, None),
-            Verdict::Adopt(from, holding) => self.start(moment, Some((from, holding))),
+            Verdict::Cold => self.start_cold(moment, self.newest_applied()),
+            Verdict::Adopt(from, holding) => self.start(moment, (from, holding)),
             Verdict::Disputed(stations) => {
                 self.ask(Question::Disputed, Event::Disputed { moment, stations });
             }
@@ -158,13 +158,18 @@ impl RemoteIo {
             return;
         }
         self.question = Some(Question::StateLost);
-        let applied = self.knowledge.floor().map(|floor| floor.moment);
+        let applied = self.newest_applied();
         let asks =
             self.settings.stale_state == StaleState::Operator || self.may_have_the_wrong_program();
         self.report(Event::StateLost { moment, applied, newest: newest.stepped, holder, asks });
         if !asks {
-            self.start(moment, None);
+            self.start_cold(moment, applied);
         }
+    }
+
+    /// The cycle of the newest applied output.
+    fn newest_applied(&self) -> Option<Moment> {
+        self.knowledge.floor().map(|floor| floor.moment)
     }
 
     /// Applies the operator's choice.
@@ -173,12 +178,12 @@ impl RemoteIo {
         let newest = self.holders.newest().map(|(from, newest)| (from, *newest));
         match (self.question, choice, newest) {
             (Some(Question::StateLost | Question::ConfigurationDisputed), StateChoice::Cold, _) => {
-                self.start(moment, None)
+                self.start_cold(moment, None)
             }
             (Some(_), StateChoice::Newest { cycle }, Some((from, newest)))
                 if cycle.is_none_or(|cycle| cycle == newest.stepped.cycle) =>
             {
-                self.start(moment, Some((from, newest)));
+                self.start(moment, (from, newest));
             }
             (question, ..) => {
                 let newest = newest.filter(|_| question.is_some());
@@ -191,24 +196,30 @@ impl RemoteIo {
         self.obeyed(Ok(()));
     }
 
-    /// Starts to sample: from the state of a station, or cold.
-    fn start(&mut self, moment: Moment, state: Option<(StationId, Holding)>) {
-        let capacity = self.settings.agreement.history;
-        let history = match state {
-            Some((from, holding)) => {
-                let lineage = holding.lineage;
-                self.report(Event::AdoptedLineage { moment, lineage, from });
-                History::from(holding.born, lineage, capacity)
-            }
-            None => {
-                let awaits_release = self.settings.release == Release::Operator;
-                self.authority =
-                    if awaits_release { Authority::Operator } else { Authority::Proof };
-                self.last_true = None;
-                self.report(Event::StartedCold { born: moment, awaits_release });
-                History::genesis(self.settings.hash, moment, capacity)
-            }
-        };
+    /// Starts to sample from the state of a station.
+    fn start(&mut self, moment: Moment, (from, holding): (StationId, Holding)) {
+        let lineage = holding.lineage;
+        self.report(Event::AdoptedLineage { moment, lineage, from });
+        let history = History::from(holding.born, lineage, self.settings.agreement.history);
+        self.sample_from(moment, history, Some((from, holding)));
+    }
+
+    /// Starts to sample from the initial state; with the newest applied output, where the state that it came from is lost and no person has chosen so.
+    fn start_cold(&mut self, moment: Moment, lost: Option<Moment>) {
+        let awaits_release = self.settings.release == Release::Operator;
+        self.authority = if awaits_release { Authority::Operator } else { Authority::Proof };
+        self.last_true = None;
+        self.report(Event::StartedCold { born: moment, awaits_release, lost });
+        let history = History::genesis(self.settings.hash, moment, self.settings.agreement.history);
+        self.sample_from(moment, history, None);
+    }
+
+    fn sample_from(
+        &mut self,
+        moment: Moment,
+        history: History,
+        state: Option<(StationId, Holding)>,
+    ) {
         if self.knowledge.floor().is_none() {
             self.remember(moment, state);
         }

@@ -160,9 +160,11 @@ fn journal(cluster: &Cluster, steps: &[Step]) -> Vec<(i64, Record)> {
                     heard: StationSet::EMPTY,
                 })
             }
-            Step::StartedCold => {
-                of_member(RemoteIoEvent::StartedCold { born: moment(cycle), awaits_release: false })
-            }
+            Step::StartedCold => of_member(RemoteIoEvent::StartedCold {
+                born: moment(cycle),
+                awaits_release: false,
+                lost: None,
+            }),
             Step::Killed => {
                 runs = false;
                 fault(Action::Crash)

@@ -272,7 +272,7 @@ impl Dice<'_> {
                 asks: true,
             },
             7 => RemoteIoEvent::StateRecovered { moment, from: station },
-            8 => RemoteIoEvent::StartedCold { born: moment, awaits_release: true },
+            8 => RemoteIoEvent::StartedCold { born: moment, awaits_release: true, lost: None },
             9 => RemoteIoEvent::Released { moment },
             10 => RemoteIoEvent::ValueFault {
                 moment,

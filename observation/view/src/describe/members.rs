@@ -33,7 +33,7 @@ descriptions! { station: StationEvent, members: Members;
         format!("does not publish for {}: its state was found faulty", program_name(*program, members));
     Readmitted { program, .. } => "readmitted" Notice
         format!("is readmitted and requests the state of {}", program_name(*program, members));
-    SamplesMissing { program, .. } => "samples-missing" Alarm
+    SamplesMissing { program, .. } => "samples-missing" Warning
         format!("receives no samples of {}", members.name(Member::RemoteIo(*program)));
     SamplesReturned { program, .. } => "samples-returned" Notice
         format!("receives samples of {} again", members.name(Member::RemoteIo(*program)));
@@ -54,10 +54,17 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
             ),
         }
     };
-    StartedCold { awaits_release: false, .. } => "started-cold" Notice
+    StartedCold { awaits_release: false, lost: None, .. } => "started-cold" Notice
         "starts its program from the initial state";
-    StartedCold { awaits_release: true, .. } => "started-cold" Notice
+    StartedCold { awaits_release: true, lost: None, .. } => "started-cold" Notice
         "starts its program from the initial state; the operator has to release its outputs";
+    StartedCold { awaits_release, lost: Some(lost), .. } => "started-cold" Alarm {
+        let release = if *awaits_release { "; the operator has to release its outputs" } else { "" };
+        format!(
+            "STATE LOST: starts its program from the initial state, since no station has the state of its newest applied output (cycle {} of the cluster){release}",
+            lost.cycle.0
+        )
+    };
     AdoptedLineage { lineage, from, .. } => "adopted-lineage" Notice
         format!("continues from the state of {}, at lineage {lineage}", name(*from, members));
     Disputed { stations: who, .. } => "disputed" Alarm format!(

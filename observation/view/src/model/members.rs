@@ -55,11 +55,6 @@ impl Model {
             StationEvent::RefusalEnded { member } => {
                 self.refusal_ends(&record.name, *member, cycle);
             }
-            StationEvent::SamplesMissing { program, .. } => {
-                let remote_io = self.members.name(Member::RemoteIo(*program));
-                let reason = format!("{} receives no samples of {remote_io}", record.name);
-                self.not_driven(*program, cycle, &reason);
-            }
             _ => {}
         }
         let own = |change| Some(Change::Station(station, change));

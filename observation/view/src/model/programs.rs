@@ -16,6 +16,9 @@ use crate::stop::{self, Stop};
 /// The alarm of forced signals.
 const FORCED: &str = "forced";
 
+/// The alarm of a program that was started from its initial state because its state is lost.
+const STARTED_COLD: &str = "started-cold";
+
 /// The alarm of fail-safe outputs.
 pub(super) const FAIL_SAFE: &str = "fail-safe";
 
@@ -29,8 +32,6 @@ pub(super) struct ProgramTrack {
     pub(super) inputs: Option<Image>,
     source: Option<Source>,
     pub(super) tally: Tally,
-    /// The stations that it received at the last two deadlines: a single frame may be lost.
-    heard: [StationSet; 2],
     /// Whether its outputs were provable in any cycle.
     pub(super) served: bool,
     stop: Stop,
@@ -42,14 +43,9 @@ impl ProgramTrack {
             inputs: None,
             source: None,
             tally: Tally::new(most),
-            heard: [StationSet::EMPTY; 2],
             served: false,
             stop: Stop::default(),
         }
-    }
-
-    pub(super) fn hears(&self) -> StationSet {
-        self.heard[0].or(self.heard[1])
     }
 
     pub(super) fn shift(&mut self, by: i64) {
@@ -121,8 +117,12 @@ impl Model {
         let own = |change| Some(Change::Program(program, change));
         let mut alarm = None;
         let change = match event {
-            RemoteIoEvent::StartedCold { awaits_release, .. } => {
+            RemoteIoEvent::StartedCold { awaits_release, lost, .. } => {
                 self.alarms.all_over(&record.name, &QUESTIONS, cycle);
+                if lost.is_some() {
+                    let text = describe(record, &self.members, &self.writes).text;
+                    self.alarms.occurred(subject(STARTED_COLD), cycle, text);
+                }
                 own(ProgramChange::StartedCold { awaits_release: *awaits_release })
             }
             RemoteIoEvent::Released { .. } => {
@@ -230,7 +230,6 @@ impl Model {
         self.received_at(cycle, *heard);
         let track = &mut self.programs[program.index()];
         track.tally.push(cycle, *source, record.at_ns);
-        track.heard = [*heard, track.heard[0]];
         if let Some(inputs) = sampled {
             track.inputs = Some(inputs.clone());
         }

@@ -20,6 +20,7 @@ use crate::history::Driven;
 use crate::margin::{Margin, Outcome};
 use crate::model::{ForcedSignal, Model, Standing};
 use crate::process_alarm::ProcessAlarm;
+use crate::protection::Protection;
 use crate::station::StationState;
 use crate::value::{forced_point, forced_value, named};
 
@@ -264,12 +265,17 @@ impl Picture<'_> {
             validity: self
                 .cycle
                 .map_or_else(BTreeMap::new, |cycle| self.model.validity(program, cycle)),
-            protection: own.protection.filter(|_| self.reports(program)),
+            protection: self.protection(program),
             silent_cycles: model.silent_cycles(self.standing, program, self.cycle),
             lost: own.lost,
             finished: own.plant.map(|(finished, _)| finished),
             plant_faults: own.plant.map(|(_, plant_faults)| plant_faults),
         }
+    }
+
+    fn protection(&self, program: ProgramId) -> Option<Protection> {
+        let cycle = self.cycle.filter(|_| self.reports(program))?;
+        self.model.protection_in(self.standing, program, cycle)
     }
 
     fn fault(&self, program: ProgramId) -> Option<String> {

@@ -3,7 +3,10 @@
 use std::sync::Arc;
 
 use understudy_journal::{Happening, Record, RunEvent};
-use understudy_view::{Bounds, LostState, Model, Protection, RemoteIoState};
+use understudy_node::Event as StationEvent;
+use understudy_view::{
+    Alarm, Bounds, LostState, Model, Protection, RemoteIoState, Snapshot, StationState,
+};
 use understudy_wire::{Member, ProgramId, StationId};
 
 use crate::complete::without_remote_io;
@@ -216,4 +219,140 @@ fn the_cause_of_lost_outputs_is_the_newest_true_one() {
     }
     let alarm = model.alarms().find(|alarm| alarm.alarm == "fail-safe").expect("an alarm");
     assert_eq!(alarm.text, "robot and understudy are not received");
+}
+
+/// What is shown of the robot's protection and of the stations after each cycle from `from` on, by a viewer that is told of no action.
+fn shown(faults: &str, cycles: u64, from: i64) -> Vec<Snapshot> {
+    let cell = cell();
+    let text = format!("title = \"shown\"\ncycles = {cycles}\n{faults}");
+    let mut model = Model::new(Arc::new(cell.clone()), Bounds::default());
+    let mut shown = Vec::new();
+    let mut newest = None;
+    for record in records(&cell, &scenario(&cell, &text), 1) {
+        if matches!(record.event, Happening::Run(RunEvent::Fault { .. })) {
+            continue;
+        }
+        model.note(&record);
+        if model.newest() != newest && model.newest() >= Some(from) && model.has_origin() {
+            newest = model.newest();
+            shown.push(model.snapshot());
+        }
+    }
+    shown
+}
+
+/// A deadline without a cycle receives no station, so no station is shown as publishing, and no link is the cause where no member receives it.
+#[test]
+fn stations_that_stop_together_are_not_received_and_no_link_is_broken() {
+    for subset in 1..8_u8 {
+        let names = ["robot", "press", "understudy"];
+        let away = names.into_iter().enumerate().filter(|(place, _)| subset >> place & 1 == 1);
+        let away: Vec<&str> = away.map(|(_, name)| name).collect();
+        let faults = away.iter().map(|name| fault(100, name, "stop")).collect::<String>();
+        let shown = shown(&faults, 250, 110);
+        assert!(shown.len() > 50, "{away:?}: {} cycles", shown.len());
+        for snapshot in shown {
+            let context = format!("{away:?} in {:?}", snapshot.cycle);
+            for station in &snapshot.stations {
+                let is_away = away.contains(&station.name.as_str());
+                let publishes = station.state == StationState::Publishing;
+                assert_eq!(publishes, !is_away, "{context}: {station:?}");
+            }
+            for program in &snapshot.programs {
+                let protection = program.protection.as_ref().expect("it was reported");
+                assert_eq!(
+                    protection.lacking.iter().find(|one| one.link.is_some()),
+                    None,
+                    "{context}"
+                );
+                let lacking: Vec<&str> =
+                    protection.lacking.iter().map(|one| one.station.as_str()).collect();
+                let expected = [program.program.as_str(), "understudy"];
+                let expected: Vec<&str> =
+                    expected.into_iter().filter(|name| away.contains(name)).collect();
+                assert_eq!(lacking, expected, "{context}");
+            }
+            let false_link = |alarm: &&Alarm| alarm.text.contains("is broken");
+            assert_eq!(snapshot.alarms.iter().find(false_link), None, "{context}");
+        }
+    }
+}
+
+/// Of two stations that failed the first comes back: it is no cause any more.
+#[test]
+fn a_station_that_publishes_again_is_no_cause_of_lost_protection() {
+    for first in ["robot", "understudy"] {
+        let faults = fault(100, "robot", "crash")
+            + &fault(100, "understudy", "crash")
+            + &fault(200, first, "restart");
+        let mut returned = 0;
+        for snapshot in shown(&faults, 400, 110) {
+            let robot = &snapshot.programs[0];
+            let protection = robot.protection.as_ref().expect("it was reported");
+            let lacking: Vec<&str> =
+                protection.lacking.iter().map(|one| one.station.as_str()).collect();
+            let publishes = |name: &str| {
+                let mut stations = snapshot.stations.iter();
+                stations.any(|of| of.name == name && of.publishes_for.contains(&robot.program))
+            };
+            for name in ["robot", "understudy"] {
+                let context = format!("{first} in {:?}: {}", snapshot.cycle, protection.text());
+                assert_eq!(lacking.contains(&name), !publishes(name), "{context}");
+            }
+            returned += usize::from(publishes(first));
+        }
+        assert!(returned > 50, "{first} was back in {returned} cycles");
+    }
+}
+
+/// All stations fail together and come back without a state: a counter of a running plant is 0, and that is an alarm. A first start is none.
+#[test]
+fn a_state_that_all_stations_have_lost_is_an_alarm() {
+    let kinds = ["started-cold", "state-lost"];
+    let faults: Vec<String> = ["robot", "press", "understudy"]
+        .into_iter()
+        .map(|name| fault(100, name, "crash") + &fault(120, name, "restart"))
+        .collect();
+    for attached in [false, true] {
+        assert_eq!(alarms("", 300, &kinds, attached), [""; 0]);
+        let found = alarms(&faults.concat(), 300, &kinds, attached);
+        let [robot, press] = &found[..] else { panic!("{found:#?}") };
+        for (alarm, name) in [(robot, "robot-io"), (press, "press-io")] {
+            assert!(alarm.starts_with(&format!("{name} started-cold in 1")), "{alarm}");
+            assert!(
+                alarm.contains("STATE LOST: starts its program from the initial state"),
+                "{alarm}"
+            );
+        }
+        // A power failure of the whole plant is a first start.
+        let all: Vec<String> = ["robot", "press", "understudy", "robot-io", "press-io"]
+            .into_iter()
+            .map(|name| fault(100, name, "crash") + &fault(120, name, "restart"))
+            .collect();
+        assert_eq!(alarms(&all.concat(), 300, &kinds, attached), [""; 0]);
+    }
+    // A person has chosen it.
+    let cell = cell();
+    let model = model(&cell, &scenario(&cell, LOST_STATE), 1);
+    assert_eq!(model.alarms().filter(|alarm| alarm.alarm == "started-cold").count(), 0);
+}
+
+/// Without its state a program is not sampled, and its remote I/O passes every deadline: it holds its outputs, and says so itself.
+#[test]
+fn a_remote_io_that_samples_nothing_is_not_one_that_drives_nothing() {
+    let cell = cell();
+    let (lost, _) =
+        LOST_STATE.split_once("action = \"accept-state\"").expect("the operator chooses");
+    let (lost, _) = lost.rsplit_once("[[step]]").expect("a step");
+    let text = lost.replacen("cycles = 600", "cycles = 800", 1);
+    let records = records(&cell, &scenario(&cell, &text), 1);
+    let is_missing = |record: &Record| {
+        matches!(record.event, Happening::Station(StationEvent::SamplesMissing { .. }))
+    };
+    assert!(records.iter().any(is_missing), "no station lacks samples");
+    let mut model = Model::new(Arc::new(cell.clone()), Bounds::default());
+    records.iter().for_each(|record| model.note(record));
+    let found = model.alarms().filter(|alarm| alarm.alarm == "not-driven");
+    assert_eq!(found.map(|alarm| &alarm.text).collect::<Vec<_>>(), [""; 0]);
+    assert!(model.alarms().any(|alarm| alarm.alarm == "state-lost" && alarm.over.is_none()));
 }
