@@ -81,7 +81,7 @@ pub(super) fn tokens<'t>(
         } else if first.is_ascii_digit() {
             let end = rest.find(|next: char| !next.is_ascii_digit());
             push(Sign::Number, end.unwrap_or(rest.len()))
-        } else if first.is_alphabetic() || first == '_' {
+        } else if first.is_alphabetic() || matches!(first, '_' | '%') {
             push(Sign::Word, word_length(rest))
         } else {
             let place = offset + at..offset + at + first.len_utf8();
@@ -96,15 +96,52 @@ pub(super) fn tokens<'t>(
     tokens
 }
 
-/// Letters, digits and underscores, and a dot that stands before another such character (`pause.Q`).
+/// A name: letters, digits and underscores, a dot that stands before another such character (`pause.Q`), the index of an element (`step[3].done`), and
+/// the sign of an address in front (`%QX1.1`).
 fn word_length(text: &str) -> usize {
     let part = |character: char| character.is_alphanumeric() || character == '_';
-    let mut characters = text.char_indices().peekable();
-    while let Some((at, character)) = characters.next() {
-        let dot = character == '.' && characters.peek().is_some_and(|&(_, next)| part(next));
-        if !part(character) && !dot {
-            return at;
-        }
+    let mut at = usize::from(text.starts_with('%'));
+    loop {
+        let mut characters = text[at..].chars();
+        at += match characters.next() {
+            Some(character) if part(character) => character.len_utf8(),
+            Some('.') if characters.next().is_some_and(part) => 1,
+            Some('[') => match index_length(&text[at..]) {
+                0 => return at,
+                length => length,
+            },
+            _ => return at,
+        };
     }
-    text.len()
+}
+
+/// The length of `[3]` or `[-1,2]`; 0 of other brackets, such as those of `A[p U q]`.
+fn index_length(text: &str) -> usize {
+    let Some(end) = text.find(']') else {
+        return 0;
+    };
+    let index = &text[1..end];
+    let is_number = |number: &str| number.parse::<i64>().is_ok();
+    if index.split(',').all(is_number) { end + 1 } else { 0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_have_parts_indices_and_addresses() {
+        let words = |text: &str| {
+            let mut found = Vec::new();
+            let tokens = tokens(text, 0, &mut found);
+            assert_eq!(found, [], "{text}");
+            tokens.iter().map(|token| token.text.to_owned()).collect::<Vec<String>>()
+        };
+        for name in ["a", "pause.Q", "step[3].done", "c[-1,2]", "t[0][1].Q", "%QX1.1", "%IW4"] {
+            assert_eq!(words(&format!("never {name}")), ["never", name]);
+            assert_eq!(words(&format!("AG !({name}&b)")), ["AG", "!", "(", name, "&", "b", ")"]);
+        }
+        assert_eq!(words("A[p U q]"), ["A", "[", "p", "U", "q", "]"]);
+        assert_eq!(words("ABF 0..5 p"), ["ABF", "0", "..", "5", "p"]);
+    }
 }
