@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, SystemTime};
 
 use serde_json::{Value, json};
@@ -22,6 +23,9 @@ use understudy_text::{Diagnostic, Report, decode, has_errors};
 use crate::answer::{Answer, Status};
 use crate::kind::{self, Kind};
 
+/// The files that this command has read.
+static READ: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
 /// Text of a file.
 pub(crate) fn text(path: &Path) -> Result<String, Answer> {
     decoded(path, bytes(path)?)
@@ -29,8 +33,10 @@ pub(crate) fn text(path: &Path) -> Result<String, Answer> {
 
 /// Bytes of a file.
 pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>, Answer> {
-    fs::read(path)
-        .map_err(|error| Answer::failed(Status::BadInput, "U0601", unreadable(path, &error)))
+    let bytes = fs::read(path)
+        .map_err(|error| Answer::failed(Status::BadInput, "U0601", unreadable(path, &error)))?;
+    READ.lock().unwrap_or_else(PoisonError::into_inner).extend(fs::canonicalize(path));
+    Ok(bytes)
 }
 
 /// Decodes the bytes of a file.
@@ -292,12 +298,28 @@ pub(crate) fn make_folder(path: &Path) -> Result<(), Answer> {
     fs::create_dir_all(path).map_err(|error| unwritable(path, &error))
 }
 
+/// Writes the output file of a command, unless it is one of its inputs.
+///
+/// # Errors
+/// U0602 if it cannot be written, U0603 if the command has read it.
+pub(crate) fn write_output(path: &Path, text: &str) -> Result<(), Answer> {
+    let read = READ.lock().unwrap_or_else(PoisonError::into_inner);
+    if fs::canonicalize(path).is_ok_and(|path| read.contains(&path)) {
+        let message = format!(
+            "{} is what this command reads, and is not overwritten; choose another output file",
+            path.display()
+        );
+        return Err(Answer::failed(Status::BadInput, "U0603", message));
+    }
+    write(path, text)
+}
+
 /// Answers with a text and its JSON, or writes the text to the output file if one is given.
 pub(crate) fn deliver(output: Option<&Path>, text: &str, result: Value) -> Result<Answer, Answer> {
     let Some(path) = output else {
         return Ok(Answer::done(text, result));
     };
-    write(path, text)?;
+    write_output(path, text)?;
     Ok(Answer::done("", json!({})).and_written(path))
 }
 

@@ -156,7 +156,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
             Answer::done(format!("{text}{kept}"), result)
         }
         Some(path) => {
-            files::write(path, &text)?;
+            files::write_output(path, &text)?;
             let name = path.display().to_string();
             let result = json!({ "file": name, "text": null, "fidelity": fidelity });
             Answer::done(format!("written to {name}\n{kept}"), result).and_next(&[&"check", path])

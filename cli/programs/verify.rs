@@ -266,7 +266,7 @@ fn draw(
     proved: &ProgramAnswer,
 ) -> Result<String, Answer> {
     let page = draw_runs(ladder, period, subject.circuit(), &proved.runs());
-    files::write(path, &page.map_err(not_lowered)?)?;
+    files::write_output(path, &page.map_err(not_lowered)?)?;
     Ok(path.display().to_string())
 }
 

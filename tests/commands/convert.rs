@@ -80,3 +80,26 @@ rung
     assert_eq!(losses.len(), 1, "{losses:?}");
     assert_eq!(losses[0], interval);
 }
+
+#[test]
+fn what_is_read_is_not_written_over() {
+    let folder = empty_folder("converted-over");
+    let text =
+        "PROGRAM p VAR_INPUT a : BOOL; END_VAR VAR_OUTPUT q : BOOL; END_VAR q := a; END_PROGRAM\n";
+    fs::write(folder.join("p.st"), text).expect("written");
+    fs::create_dir(folder.join("sub")).expect("made");
+    for arguments in [
+        ["convert", "p.st", "p.st"].as_slice(),
+        &["convert", "p.st", "sub/../p.st"],
+        &["draw", "p.st", "--output", "p.st"],
+        &["verify", "p.st", "--draw", "p.st"],
+    ] {
+        let answer = understudy_in(&folder, arguments);
+        assert_eq!(answer.status, 2, "{arguments:?}: {}", answer.shown());
+        assert!(answer.errors.contains("error[U0603]"), "{arguments:?}: {}", answer.errors);
+        let kept = fs::read_to_string(folder.join("p.st")).expect("a text");
+        assert_eq!(kept, text, "{arguments:?}");
+    }
+    let answer = understudy_in(&folder, &["convert", "p.st", "q.st"]);
+    assert_eq!(answer.status, 0, "{}", answer.shown());
+}
