@@ -2,6 +2,8 @@
 //! the output of this program in this cycle. Protection lost for `flag_after` cycles in a row is reported, with the
 //! reason.
 
+use std::time::Duration;
+
 use smallvec::SmallVec;
 use understudy_cycle::Mode;
 use understudy_wire::{Body, Holding, Lineage, Moment, StationId, StationSet, Turn};
@@ -12,10 +14,13 @@ use crate::event::{Event, Lacking, LackingReason};
 /// Sets of stations, each of which proves the output by itself.
 const STATIONS_NEEDED: usize = 2;
 
+/// A program that was never protected is reported after this time: its understudy may join later than its controller.
+const FIRST_PROTECTION: Duration = Duration::from_secs(5);
+
 /// State kept from deadline to deadline.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub(super) struct Protection {
-    /// Last reported state; `None` before the program was protected for the first time.
+    /// Last reported state; `None` before the first report.
     reported: Option<bool>,
     /// Deadlines in a row without protection, and the cycle of the first of them.
     missed: u32,
@@ -32,6 +37,9 @@ impl RemoteIo {
 
     /// A deadline without a cycle: no station proves an output.
     pub(super) fn note_idle(&mut self) {
+        if self.protection.reported.is_none() {
+            return;
+        }
         let reason = LackingReason::NotReceived;
         let all = self.holders.stations();
         self.note_protection(all.map(|station| Lacking { station, reason }).collect());
@@ -46,7 +54,17 @@ impl RemoteIo {
         let proving = stations.saturating_sub(lacking.len());
         let paper = self.settings.agreement.mode == Mode::Paper;
         let protected = proving >= STATIONS_NEEDED && (lacking.is_empty() || !paper);
+        let agreement = &self.settings.agreement;
         let protection = &mut self.protection;
+        let patience = match protection.reported {
+            Some(_) => agreement.flag_after,
+            None => {
+                let cycles =
+                    FIRST_PROTECTION.as_nanos() / agreement.schedule.period().as_nanos().max(1);
+                let cycles = u32::try_from(cycles).unwrap_or(u32::MAX);
+                cycles.max(agreement.listen_cycles * 20).max(agreement.flag_after)
+            }
+        };
         if protected {
             protection.missed = 0;
             if protection.reported.replace(true) != Some(true) {
@@ -58,9 +76,7 @@ impl RemoteIo {
             protection.since = moment;
         }
         protection.missed = protection.missed.saturating_add(1);
-        if protection.missed >= self.settings.agreement.flag_after
-            && protection.reported == Some(true)
-        {
+        if protection.missed >= patience && protection.reported != Some(false) {
             protection.reported = Some(false);
             let since = protection.since;
             self.report(Event::Unprotected { moment, since, lacking });

@@ -356,3 +356,23 @@ fn a_remote_io_that_samples_nothing_is_not_one_that_drives_nothing() {
     assert_eq!(found.map(|alarm| &alarm.text).collect::<Vec<_>>(), [""; 0]);
     assert!(model.alarms().any(|alarm| alarm.alarm == "state-lost" && alarm.over.is_none()));
 }
+
+/// A program whose understudy was never there since its remote I/O started is not protected, and that is said.
+#[test]
+fn a_program_that_was_never_protected_is_an_alarm() {
+    for restarts in [true, false] {
+        let cell = cell();
+        let mut faults = fault(50, "understudy", "crash");
+        if restarts {
+            faults += &(fault(80, "robot-io", "crash") + &fault(100, "robot-io", "restart"));
+        }
+        let text = format!("title = \"alone\"\ncycles = 800\n{faults}");
+        let model = model(&cell, &scenario(&cell, &text), 1);
+        let of_robot = protection(&model).expect("it is reported");
+        assert!(!of_robot.protected);
+        let lacking: Vec<&str> = of_robot.lacking.iter().map(|one| one.text.as_str()).collect();
+        assert_eq!(lacking, ["understudy is killed"]);
+        let mut alarms = model.alarms().filter(|alarm| alarm.alarm == "unprotected");
+        assert!(alarms.any(|alarm| alarm.name == "robot-io" && alarm.over.is_none()));
+    }
+}
