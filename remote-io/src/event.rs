@@ -204,12 +204,15 @@ pub enum Event {
         /// Reason.
         refusal: WriteRefusal,
     },
-    /// All samples with a written value became void, and it is over: the write has no effect.
+    /// A write that was taken has no effect: all samples with its value became void, and it is over, or the input was forced.
     WriteVoid {
         /// Current cycle.
         moment: Moment,
         /// Identifier of the write.
         id: WriteId,
+        /// Reason.
+        #[serde(default = "before_reasons")]
+        refusal: WriteRefusal,
     },
     /// The value of a signal of another program has become valid, or too old.
     SignalValidity {
@@ -308,6 +311,11 @@ pub enum Event {
         /// Delay behind the time that it had asked for.
         late: Duration,
     },
+}
+
+/// The only reason of a `write-void` of journals that do not state it.
+fn before_reasons() -> WriteRefusal {
+    WriteRefusal::Void
 }
 
 impl Event {

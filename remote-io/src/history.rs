@@ -74,39 +74,53 @@ impl History {
         (0..=self.samples.len()).rev().find(|&place| self.lineage_after(place) == lineage)
     }
 
+    /// Whether the state at `place`, where it was before [`Self::make_room`], is part of the history after the next sample. A void sample that is
+    /// made again with equal inputs has the same lineage, and is another sample.
+    pub(crate) fn keeps(&self, place: usize) -> bool {
+        let slides = usize::from(self.samples.len() == self.capacity);
+        (slides..=self.samples.len()).contains(&place)
+    }
+
     /// A station holds the state at `place`.
     pub(crate) fn confirm(&mut self, place: usize) {
         self.confirmed = self.confirmed.max(place);
     }
 
-    /// Appends this cycle's sample; answers with how many older ones became void by it.
+    /// Makes room for this cycle's sample; answers with how many older ones become void by it.
     ///
     /// `living` are the oldest and the newest place that living stations hold, where one does; `floor` is the lineage
     /// after the newest applied sample.
-    pub(crate) fn push(
+    pub(crate) fn make_room(
         &mut self,
-        inputs: &Image,
         living: Option<(usize, usize)>,
         floor: Option<Lineage>,
     ) -> usize {
-        let mut void = 0;
-        if self.samples.len() == self.capacity {
-            let floor = floor.and_then(|floor| self.place(floor)).unwrap_or(0);
-            let newest = living.map_or(self.confirmed, |(_, newest)| newest).max(floor);
-            // Sliding on would lose the oldest living station, and nothing is lost by void samples.
-            let keeps_oldest = living.is_some_and(|(oldest, _)| oldest == 0);
-            if newest == 0 || (newest < self.samples.len() && keeps_oldest) {
-                void = self.samples.len() - newest;
-                self.samples.truncate(newest);
-                self.confirmed = self.confirmed.min(newest);
-            } else if let Some((_, after)) = self.samples.pop_front() {
-                self.base = after;
-                self.confirmed = self.confirmed.saturating_sub(1);
-            }
+        if self.samples.len() < self.capacity {
+            return 0;
+        }
+        let floor = floor.and_then(|floor| self.place(floor)).unwrap_or(0);
+        let newest = living.map_or(self.confirmed, |(_, newest)| newest).max(floor);
+        // Sliding on would lose the oldest living station, and nothing is lost by void samples.
+        let keeps_oldest = living.is_some_and(|(oldest, _)| oldest == 0);
+        if newest > 0 && (newest == self.samples.len() || !keeps_oldest) {
+            return 0;
+        }
+        let void = self.samples.len() - newest;
+        self.samples.truncate(newest);
+        self.confirmed = self.confirmed.min(newest);
+        void
+    }
+
+    /// Appends this cycle's sample. Where the window is full the oldest one leaves it.
+    pub(crate) fn push(&mut self, inputs: &Image) {
+        if self.samples.len() == self.capacity
+            && let Some((_, after)) = self.samples.pop_front()
+        {
+            self.base = after;
+            self.confirmed = self.confirmed.saturating_sub(1);
         }
         let after = self.head().after(inputs);
         self.samples.push_back((inputs.clone(), after));
-        void
     }
 
     fn lineage_after(&self, samples: usize) -> Lineage {
@@ -129,6 +143,18 @@ mod tests {
         History::genesis(ProgramHash(1), Moment::default(), capacity)
     }
 
+    /// Appends a sample; answers with how many became void.
+    fn push(
+        history: &mut History,
+        inputs: &Image,
+        living: Option<(usize, usize)>,
+        floor: Option<Lineage>,
+    ) -> usize {
+        let void = history.make_room(living, floor);
+        history.push(inputs);
+        void
+    }
+
     #[test]
     fn a_followed_history_slides() {
         let mut history = history(3);
@@ -136,7 +162,7 @@ mod tests {
         for cycle in 0..10 {
             let living = history.place(lineages[cycle]).expect("the last head");
             history.confirm(living);
-            let void = history.push(&input(cycle as u64), Some((living, living)), None);
+            let void = push(&mut history, &input(cycle as u64), Some((living, living)), None);
             assert_eq!(void, 0);
             lineages.push(history.head());
             assert_eq!(history.before(), lineages[cycle]);
@@ -152,12 +178,12 @@ mod tests {
             let mut last = history.head();
             for cycle in 0..followed {
                 let living = history.place(last).map(|place| (place, place));
-                history.push(&input(cycle), living, None);
+                push(&mut history, &input(cycle), living, None);
                 last = history.head();
                 history.confirm(history.place(last).expect("the head"));
             }
             for cycle in 0..20 {
-                history.push(&input(cycle), None, None);
+                push(&mut history, &input(cycle), None, None);
                 assert!(history.place(last).is_some(), "{followed} followed, then {cycle} alone");
             }
         }
@@ -171,7 +197,7 @@ mod tests {
             let mut history = history(4);
             let mut lineages = vec![history.head()];
             for cycle in 0..4 {
-                history.push(&input(cycle), Some((0, cycle as usize)), None);
+                push(&mut history, &input(cycle), Some((0, cycle as usize)), None);
                 lineages.push(history.head());
             }
             history.confirm(floor);
@@ -179,7 +205,7 @@ mod tests {
             for cycle in 4..30 {
                 let place = held.and_then(|held| history.place(lineages[held]));
                 let living = place.map(|place| (place, place));
-                history.push(&input(cycle), living, Some(lineages[floor]));
+                push(&mut history, &input(cycle), living, Some(lineages[floor]));
                 states.push(history.head());
                 let base = history.base();
                 assert!(

@@ -272,7 +272,7 @@ impl RemoteIo {
             RemoteIoInput::Release => self.release(),
             RemoteIoInput::Force(force) => self.force(now, force),
             RemoteIoInput::Unforce(signal) => self.unforce(signal),
-            RemoteIoInput::Write(write) => self.write(write),
+            RemoteIoInput::Write(write) => self.write(now, write),
         }
     }
 

@@ -122,8 +122,8 @@ impl Seen {
             Event::WriteRefused { write, refusal, .. } => {
                 self.outcomes.insert(write.id, refused(*refusal));
             }
-            Event::WriteVoid { id, .. } => {
-                self.outcomes.insert(*id, refused(WriteRefusal::Void));
+            Event::WriteVoid { id, refusal, .. } => {
+                self.outcomes.insert(*id, refused(*refusal));
             }
             Event::Applied { outputs, missing: None, .. } => {
                 self.outputs[program.index()] = Some(outputs.clone())

@@ -193,7 +193,9 @@ fn exception(refusal: &Refusal) -> ExceptionCode {
     match refusal.code().as_str() {
         "U0640" | "U0643" => ExceptionCode::IllegalDataAddress,
         "U0641" | "U0642" => ExceptionCode::IllegalDataValue,
-        "U0551" | "U0557" | "U0645" | "U0646" | "U0647" => ExceptionCode::ServerDeviceBusy,
+        "U0551" | "U0557" | "U0645" | "U0646" | "U0647" | "U0649" => {
+            ExceptionCode::ServerDeviceBusy
+        }
         _ => ExceptionCode::ServerDeviceFailure,
     }
 }

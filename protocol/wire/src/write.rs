@@ -166,6 +166,14 @@ pub enum WriteRefusal {
     /// The program does not run: its state is not known yet, is lost, or its sensors are unknown.
     #[error("the program does not run")]
     NotRunning,
+    /// The input is forced: no sample has the value.
+    #[error(
+        "the input is forced for at most {seconds} s more: end the force or wait, then repeat the write"
+    )]
+    Forced {
+        /// Seconds until the force ends by itself.
+        seconds: u32,
+    },
     /// The value ended, or another one replaced it, before outputs of a sample with it were applied.
     #[error("no output that was computed with the value was applied while it lasted")]
     Void,
@@ -183,6 +191,7 @@ impl WriteRefusal {
             Self::Busy => "U0645",
             Self::NotRunning => "U0646",
             Self::Void => "U0647",
+            Self::Forced { .. } => "U0649",
         }
     }
 }

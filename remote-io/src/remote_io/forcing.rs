@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use understudy_wire::{Force, Image, OrderRefusal, PointValue, SignalPlace, Time};
+use understudy_wire::{Force, Image, OrderRefusal, PointValue, SignalPlace, Time, WriteRefusal};
 
 use super::RemoteIo;
 use crate::event::Event;
@@ -48,6 +48,14 @@ impl Forcing {
     fn take_expired(&mut self, now: Time) -> Option<SignalPlace> {
         let expired = self.active.iter().position(|active| active.until <= now)?;
         Some(self.active.remove(expired).signal)
+    }
+
+    /// Why no write of the input with this first bit can have an effect: the input is forced.
+    pub(super) fn refuses_write(&self, input: u16, now: Time) -> Option<WriteRefusal> {
+        let signal = SignalPlace::Input(input);
+        let active = self.active.iter().find(|active| active.signal == signal)?;
+        let seconds = active.until.since(now).as_nanos().div_ceil(1_000_000_000);
+        Some(WriteRefusal::Forced { seconds: u32::try_from(seconds).unwrap_or(u32::MAX) })
     }
 
     /// u(i) with the forced values, as it is sampled.

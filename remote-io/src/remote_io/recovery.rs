@@ -223,7 +223,7 @@ impl RemoteIo {
         if self.knowledge.floor().is_none() {
             self.remember(moment, state);
         }
-        let void = self.writing.history_replaced(&self.settings.operator_inputs, moment);
+        let void = self.writing.lose(&self.settings.operator_inputs, moment, |_| true);
         self.report_void(&void);
         self.question = None;
         let adopted =

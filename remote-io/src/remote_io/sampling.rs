@@ -1,6 +1,6 @@
 //! The arbiter's side: what is added to the history of the program in each cycle.
 
-use understudy_wire::{Body, Image, Moment, Sample, Source, Time};
+use understudy_wire::{Body, Image, Moment, Sample, Source, Time, WriteId};
 
 use super::{Authority, Execution, RemoteIo};
 use crate::channel;
@@ -48,21 +48,11 @@ impl RemoteIo {
         };
         let moment = self.moment();
         self.see(moment, sensors);
-        let mut inputs = self.field.clone();
-        let operator_inputs = &self.settings.operator_inputs;
-        self.writing.put(operator_inputs, &mut inputs);
-        let validity = self.signals.put(&self.settings.signals, moment, &mut inputs);
-        let mut inputs = self.forcing.inputs(inputs);
-        if let Some(stop) = self.settings.stop
-            && self.program == Execution::Restarting
-        {
-            inputs.set(stop.reset, true);
-            self.program = Execution::Stopped;
-        }
         let floor = self.knowledge.floor();
         let Some(run) = self.knowledge.run_mut() else {
             return;
         };
+        let operator_inputs = &self.settings.operator_inputs;
         let history = &mut run.history;
         let places =
             self.holders.holdings().filter_map(|(_, holding)| history.place(holding.lineage));
@@ -71,9 +61,24 @@ impl RemoteIo {
             Some((oldest.min(place), newest.max(place)))
         });
         let before = self.writing.in_history(history);
-        let void = history.push(&inputs, living, floor.map(|floor| floor.lineage));
+        let void = history.make_room(living, floor.map(|floor| floor.lineage));
+        let kept =
+            |id: WriteId| before.iter().all(|(it, place)| *it != id || history.keeps(*place));
+        let mut void_writes = self.writing.lose(operator_inputs, moment, |id| !kept(id));
+        let mut inputs = self.field.clone();
+        self.writing.put(operator_inputs, history.newest(), &mut inputs);
+        let validity = self.signals.put(&self.settings.signals, moment, &mut inputs);
+        let mut inputs = self.forcing.inputs(inputs);
+        if let Some(stop) = self.settings.stop
+            && self.program == Execution::Restarting
+        {
+            inputs.set(stop.reset, true);
+            self.program = Execution::Stopped;
+        }
+        history.push(&inputs);
         run.sampled = true;
-        let void_writes = self.writing.sampled(operator_inputs, moment, history, &before);
+        let forced = |input| self.forcing.refuses_write(input, now);
+        void_writes.extend(self.writing.sampled(operator_inputs, moment, history, &forced));
         let base = history.base();
         let (born, before) = (history.born(), history.before());
         let body = Body::Sample(Sample {

@@ -3,7 +3,8 @@
 //! ```text
 //!   request ──► checked ──► part of the next sample ──► an output with it is applied ──► in effect
 //!                  │                   └── its samples become void, and it is over ──► no effect
-//!                  └── refused
+//!                  ├── the next sample has a forced value ──► no effect
+//!                  └── refused, also while the input is forced
 //! ```
 //!
 //! Invariant *One effect*: values and identifiers travel in the same samples, so that stations recall both or neither;
@@ -16,8 +17,8 @@ use std::time::Duration;
 use smallvec::SmallVec;
 use understudy_cycle::Output;
 use understudy_wire::{
-    Image, MAXIMUM_PULSES, Moment, Pulse, Recalled, Write, WriteAnswer, WriteId, WriteOutcome,
-    WriteRefusal,
+    Image, MAXIMUM_PULSES, Moment, Pulse, Recalled, Time, Write, WriteAnswer, WriteId,
+    WriteOutcome, WriteRefusal,
 };
 
 use self::sessions::{Progress, Session, Sessions};
@@ -47,7 +48,15 @@ struct Written {
     by: WriteId,
     /// Whether a sample has the value.
     is_sampled: bool,
+    /// Newest value that is in effect: the one of a level or a setpoint where a force has replaced the newer ones.
+    in_effect: u64,
 }
+
+/// Reason why a force keeps a write of an input out of the samples, by the first bit of the input; nothing where it is not forced.
+pub(super) type Forced<'a> = &'a dyn Fn(u16) -> Option<WriteRefusal>;
+
+/// Writes that have no effect, with the reason.
+type WithoutEffect = SmallVec<[(WriteId, WriteRefusal); 1]>;
 
 /// What became of a write.
 enum Taking {
@@ -66,6 +75,7 @@ impl Writing {
             left: 0,
             by: WriteId::default(),
             is_sampled: true,
+            in_effect: input.initial,
         });
         Self { values: values.collect(), sessions: Sessions::default() }
     }
@@ -87,7 +97,12 @@ impl Writing {
     }
 
     /// Checks a new write and takes it.
-    fn take(&mut self, inputs: &[OperatorInput], write: &Write) -> Result<Taking, WriteRefusal> {
+    fn take(
+        &mut self,
+        inputs: &[OperatorInput],
+        write: &Write,
+        forced: Forced<'_>,
+    ) -> Result<Taking, WriteRefusal> {
         let id = write.id;
         let before = self.sessions.get(id.session);
         let last = before.map_or(0, |session| session.id.number);
@@ -106,6 +121,9 @@ impl Writing {
             let expected = last.saturating_add(1);
             return Err(WriteRefusal::Order { expected });
         }
+        if let Some(refusal) = input.forced(forced) {
+            return Err(refusal);
+        }
         let is_undecided = before.is_some_and(|session| !session.is_decided());
         let is_pressed =
             matches!(input.kind, OperatorInputKind::Pulse(_)) && self.values[at].left > 0;
@@ -114,31 +132,43 @@ impl Writing {
         }
         self.sessions.put(Session::taken(write, at))?;
         let stored = write.value.stored();
-        self.values[at] =
-            Written { stored, left: input.samples(stored), by: id, is_sampled: false };
+        let left = input.samples(stored);
+        let value = &mut self.values[at];
+        *value = Written { stored, left, by: id, is_sampled: false, ..*value };
         Ok(Taking::New)
     }
 
-    /// Puts the values into u(i).
-    pub(super) fn put(&self, inputs: &[OperatorInput], image: &mut Image) {
+    /// Puts the values into u(i), which follows the sample `before`. A pulse begins after a FALSE in the history, so that it is seen: samples with
+    /// the end of an earlier one may be void, and a force may have ended.
+    pub(super) fn put(&self, inputs: &[OperatorInput], before: Option<&Image>, image: &mut Image) {
         for (input, written) in inputs.iter().zip(&self.values) {
-            input.place.set(image, written.stored);
+            let begins = matches!(input.kind, OperatorInputKind::Pulse(_)) && !written.is_sampled;
+            let waits = begins && before.is_none_or(|sample| input.place.get(sample) != 0);
+            input.place.set(image, if waits { 0 } else { written.stored });
             if let Some(valid) = input.valid() {
                 image.set(usize::from(valid), written.left > 0);
             }
         }
     }
 
-    /// The newest writes that a sample carries, one for each session.
+    /// The newest writes that a sample carries, one for each session. In place of a pulse that waits it carries the write before it.
     pub(super) fn ids(&self) -> SmallVec<[WriteId; 1]> {
-        self.sessions.ids()
+        let waits = |id| self.values.iter().any(|written| !written.is_sampled && written.by == id);
+        let ids = self
+            .sessions
+            .ids()
+            .into_iter()
+            .map(|id| WriteId { number: id.number - u32::from(waits(id)), ..id });
+        ids.filter(|id| id.number > 0).collect()
     }
 
     /// Pulses that are not over after the newest sample.
     pub(super) fn pulses(&self, inputs: &[OperatorInput]) -> SmallVec<[Pulse; 1]> {
         let values = inputs.iter().zip(&self.values);
         let pulses = values.filter(|(input, written)| {
-            matches!(input.kind, OperatorInputKind::Pulse(_)) && written.left > 0
+            matches!(input.kind, OperatorInputKind::Pulse(_))
+                && written.left > 0
+                && written.is_sampled
         });
         let mut pulses: SmallVec<[Pulse; 1]> = pulses
             .map(|(input, written)| Pulse { input: input.place.bit, left: written.left })
@@ -148,108 +178,122 @@ impl Writing {
         pulses
     }
 
-    /// Writes in samples of `history`: those that become void can be found afterwards.
-    pub(super) fn in_history(&self, history: &History) -> SmallVec<[WriteId; 1]> {
-        let sampled = self.sessions.iter().filter(|session| match session.progress {
-            Progress::Sampled { after, .. } => history.place(after).is_some(),
-            Progress::Taken | Progress::InEffect { .. } => false,
+    /// Writes in samples of `history`, with their places: those that become void can be found afterwards.
+    pub(super) fn in_history(&self, history: &History) -> SmallVec<[(WriteId, usize); 1]> {
+        let sampled = self.sessions.iter().filter_map(|session| match session.progress {
+            Progress::Sampled { after, .. } => Some((session.id, history.place(after)?)),
+            Progress::Taken | Progress::InEffect { .. } => None,
         });
-        sampled.map(|session| session.id).collect()
+        sampled.collect()
     }
 
-    /// The sample of `moment` has the values; writes `before` it that are no longer in the history became void. Pulses
-    /// advance. Answers with the writes that have no effect.
+    /// The samples of `lost` writes are no longer part of the history: values that hold are sampled again. Answers with the writes that have no
+    /// effect.
+    pub(super) fn lose(
+        &mut self,
+        inputs: &[OperatorInput],
+        moment: Moment,
+        lost: impl Fn(WriteId) -> bool,
+    ) -> WithoutEffect {
+        let mut void = WithoutEffect::new();
+        for session in self.sessions.iter_mut() {
+            if !matches!(session.progress, Progress::Sampled { .. }) || !lost(session.id) {
+                continue;
+            }
+            session.progress = Progress::Taken;
+            let Some(at) = session.input else {
+                continue;
+            };
+            let written = &mut self.values[at];
+            if written.by == session.id && !written.is_over(&inputs[at]) {
+                written.is_sampled = false;
+            } else {
+                void.push((session.id, WriteRefusal::Void));
+            }
+        }
+        self.sessions.drop_void(&void, moment);
+        void
+    }
+
+    /// The newest sample of `history`, of `moment`, has the values, except those of `forced` inputs and of pulses that wait. Pulses advance, and
+    /// end where they are forced. Answers with the writes that have no effect.
     pub(super) fn sampled(
         &mut self,
         inputs: &[OperatorInput],
         moment: Moment,
         history: &History,
-        before: &[WriteId],
-    ) -> SmallVec<[WriteId; 1]> {
-        let after = history.head();
-        let now = Progress::Sampled { first: moment, after };
-        let mut void = SmallVec::new();
+        forced: Forced<'_>,
+    ) -> WithoutEffect {
+        let now = Progress::Sampled { first: moment, after: history.head() };
+        let mut void = WithoutEffect::new();
         for session in self.sessions.iter_mut() {
-            let is_void = match session.progress {
-                Progress::Taken => {
-                    session.progress = now;
-                    false
-                }
-                Progress::Sampled { after, .. } => {
-                    before.contains(&session.id) && history.place(after).is_none()
-                }
-                Progress::InEffect { .. } => false,
-            };
-            if !is_void {
+            if session.progress != Progress::Taken {
                 continue;
             }
-            // A value that still holds is in this sample.
-            let still = session.input.is_none_or(|input| {
-                let written = &self.values[input];
-                written.by == session.id && !written.is_over(&inputs[input])
-            });
-            if still {
-                session.progress = now;
-            } else {
-                void.push(session.id);
+            let waits = session.input.is_some_and(|at| self.values[at].waits(&inputs[at], history));
+            match session.input.and_then(|at| inputs[at].forced(forced)) {
+                Some(refusal) => void.push((session.id, refusal)),
+                None if waits => {}
+                None => session.progress = now,
             }
         }
         self.sessions.drop_void(&void, moment);
-        for (input, written) in inputs.iter().zip(&mut self.values) {
-            written.is_sampled = true;
-            if written.left > 0 {
-                written.left -= 1;
-                match input.kind {
-                    // The last sample of a pulse is FALSE, so that the next one is seen.
-                    OperatorInputKind::Pulse(_) if written.left <= 1 => written.stored = 0,
-                    OperatorInputKind::Group { .. } if written.left == 0 => {
-                        written.stored = input.initial;
-                    }
-                    _ => {}
-                }
+        for (at, input) in inputs.iter().enumerate() {
+            let waits = self.values[at].waits(input, history);
+            let is_forced = input.forced(forced).is_some();
+            self.values[at].is_sampled = is_forced || !waits;
+            if is_forced {
+                self.replaced_by_force(input, at, &void);
+            } else if !waits {
+                self.values[at].advance(input);
             }
         }
         void
     }
 
-    /// The program continues from another history: values that hold are sampled again. Answers with the writes that have
-    /// no effect.
-    pub(super) fn history_replaced(
-        &mut self,
-        inputs: &[OperatorInput],
-        moment: Moment,
-    ) -> SmallVec<[WriteId; 1]> {
-        let mut void = SmallVec::new();
-        for session in self.sessions.iter_mut() {
-            if !matches!(session.progress, Progress::Sampled { .. }) {
-                continue;
-            }
-            session.progress = Progress::Taken;
-            let is_over = session.input.is_some_and(|input| {
-                let written = &self.values[input];
-                written.by != session.id || written.is_over(&inputs[input])
-            });
-            if is_over {
-                void.push(session.id);
-            }
+    /// A sample has a forced value in place of the one that was written to the operator input `at`. A write without an effect leaves the value
+    /// before it.
+    fn replaced_by_force(&mut self, input: &OperatorInput, at: usize, void: &WithoutEffect) {
+        let written = &mut self.values[at];
+        if matches!(input.kind, OperatorInputKind::Pulse(_)) {
+            // The rest of a pulse after the force would be a second effect.
+            (written.stored, written.left) = (0, 0);
+            return;
         }
-        self.sessions.drop_void(&void, moment);
-        void
+        if !void.iter().any(|(id, _)| *id == written.by) {
+            return;
+        }
+        let of_input = self.sessions.iter().filter(|session| session.input == Some(at));
+        let sampled = of_input.filter_map(|session| match session.progress {
+            Progress::Sampled { first, .. } => Some((first, session.id, session.value?)),
+            _ => None,
+        });
+        let newest = sampled.max_by_key(|(first, ..)| *first);
+        (written.stored, written.by) = newest
+            .map_or((written.in_effect, WriteId::default()), |(_, id, value)| (value.stored(), id));
     }
 
     /// Outputs of the sample of `moment` were applied. Answers with the writes that are in effect by it, and since when.
     pub(super) fn applied(&mut self, moment: Moment) -> SmallVec<[(WriteId, Moment); 1]> {
         let mut effective = SmallVec::new();
+        let mut values: SmallVec<[(Moment, usize, u64); 1]> = SmallVec::new();
         for session in self.sessions.iter_mut() {
             if let Progress::Sampled { first, .. } = session.progress
                 && first <= moment
             {
                 session.progress = Progress::InEffect { since: first };
+                if let (Some(input), Some(value)) = (session.input, session.value) {
+                    values.push((first, input, value.stored()));
+                }
                 // What stations recall was in effect before the restart, unless its caller still asks.
                 if session.has_caller() {
                     effective.push((session.id, first));
                 }
             }
+        }
+        values.sort_unstable();
+        for (_, input, value) in values {
+            self.values[input].in_effect = value;
         }
         effective
     }
@@ -283,13 +327,36 @@ impl Writing {
                 }
                 OperatorInputKind::Level | OperatorInputKind::Setpoint { .. } => (stored, 0),
             };
-            *written = Written { stored, left, by: WriteId::default(), is_sampled: true };
+            let by = WriteId::default();
+            *written = Written { stored, left, by, is_sampled: true, in_effect: stored };
         }
         self.sessions = Sessions::recalled(recalled.writes.iter().copied());
     }
 }
 
 impl Written {
+    /// Counts a sample with the value.
+    fn advance(&mut self, input: &OperatorInput) {
+        if self.left == 0 {
+            return;
+        }
+        self.left -= 1;
+        match input.kind {
+            // The last sample of a pulse is FALSE, so that the next one is seen.
+            OperatorInputKind::Pulse(_) if self.left <= 1 => self.stored = 0,
+            OperatorInputKind::Group { .. } if self.left == 0 => self.stored = input.initial,
+            _ => {}
+        }
+    }
+
+    /// Whether the newest sample of `history` has the FALSE that a pulse begins after, in place of the pulse.
+    fn waits(&self, input: &OperatorInput, history: &History) -> bool {
+        matches!(input.kind, OperatorInputKind::Pulse(_))
+            && !self.is_sampled
+            && self.stored != 0
+            && history.newest().is_some_and(|sample| input.place.get(sample) == 0)
+    }
+
     /// Whether the value ended by itself.
     fn is_over(&self, input: &OperatorInput) -> bool {
         match input.kind {
@@ -310,6 +377,15 @@ impl OperatorInput {
         }
     }
 
+    /// Reason why a force keeps a write of it out of the samples. A signal of another group is no order of a person: like those of other programs it
+    /// is followed under a force, so that it stays valid.
+    fn forced(&self, forced: Forced<'_>) -> Option<WriteRefusal> {
+        match self.kind {
+            OperatorInputKind::Group { .. } => None,
+            _ => forced(self.place.bit),
+        }
+    }
+
     /// Bit of u(i) that is TRUE while a value of another group holds.
     pub fn valid(&self) -> Option<u16> {
         match self.kind {
@@ -321,7 +397,7 @@ impl OperatorInput {
 
 impl RemoteIo {
     /// Takes a write, or answers it.
-    pub(super) fn write(&mut self, write: &Write) {
+    pub(super) fn write(&mut self, now: Time, write: &Write) {
         let moment = self.moment();
         let period = self.settings.agreement.schedule.period().as_nanos().max(1);
         let memory = u32::try_from(REMEMBERED_FOR.as_nanos().div_ceil(period));
@@ -333,7 +409,10 @@ impl RemoteIo {
         let inputs = &self.settings.operator_inputs;
         let taken = match self.writing.known(inputs, write) {
             Some(known) => known,
-            None if runs => self.writing.take(inputs, write),
+            None if runs => {
+                let forced = |input| self.forcing.refuses_write(input, now);
+                self.writing.take(inputs, write, &forced)
+            }
             None => Err(WriteRefusal::NotRunning),
         };
         match taken {
@@ -351,12 +430,11 @@ impl RemoteIo {
         }
     }
 
-    /// Answers writes whose samples became void.
-    pub(super) fn report_void(&mut self, writes: &[WriteId]) {
+    /// Answers writes that were taken and have no effect.
+    pub(super) fn report_void(&mut self, writes: &[(WriteId, WriteRefusal)]) {
         let moment = self.moment();
-        for &id in writes {
-            let refusal = WriteRefusal::Void;
-            self.report(Event::WriteVoid { moment, id });
+        for &(id, refusal) in writes {
+            self.report(Event::WriteVoid { moment, id, refusal });
             self.answer(id, WriteOutcome::Refused { refusal });
         }
     }

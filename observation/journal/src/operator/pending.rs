@@ -107,7 +107,7 @@ pub fn write_answer(record: &Record) -> Option<WriteAnswer> {
             (*id, WriteOutcome::InEffect { since: *since })
         }
         RemoteIoEvent::WriteRefused { write, refusal, .. } => (write.id, refused(*refusal)),
-        RemoteIoEvent::WriteVoid { id, .. } => (*id, refused(WriteRefusal::Void)),
+        RemoteIoEvent::WriteVoid { id, refusal, .. } => (*id, refused(*refusal)),
         _ => return None,
     };
     Some(WriteAnswer { id, outcome })

@@ -134,8 +134,8 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
         let (input, value) = (members.place(place), members.value(place, write.value));
         format!("refuses the value {value} of {} for {input}: {refusal}", write.owner)
     };
-    WriteVoid { id, .. } => "write-void" Warning
-        format!("{} is not in effect: no output that was computed with it was applied", members.write(*id));
+    WriteVoid { id, refusal, .. } => "write-void" Warning
+        format!("{} is not in effect: {refusal}", members.write(*id));
     SignalValidity { input, valid: true, .. } => "signal-validity" Notice format!(
         "the signal {} is valid at {}", members.source(*input), members.place(SignalPlace::Input(*input))
     );

@@ -154,9 +154,9 @@ impl Sessions {
     }
 
     /// The number of a write without an effect is free again.
-    pub(super) fn drop_void(&mut self, void: &[WriteId], moment: Moment) {
+    pub(super) fn drop_void(&mut self, void: &[(WriteId, WriteRefusal)], moment: Moment) {
         self.0.retain_mut(|session| {
-            if void.contains(&session.id) {
+            if void.iter().any(|(id, _)| *id == session.id) {
                 session.id.number -= 1;
                 session.value = None;
                 session.input = None;

@@ -1,0 +1,436 @@
+//! Writes of inputs that are forced: every order of forces, writes, ends of forces, and cycles with and without proved outputs.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Duration;
+
+use understudy_cycle::{Agreement, Input, Machine, Mode, Output, RemoteIoInput, Schedule};
+use understudy_remote_io::{
+    Event, OperatorInput, OperatorInputKind, PointPlace, Release, RemoteIo, Settings, StaleState,
+    ValueFault,
+};
+use understudy_typed::Elementary;
+use understudy_wire::{
+    Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Force, Frame, Header, Holding,
+    Image, Join, Lineage, Member, Moment, PointValue, ProgramHash, ProgramId, ProgramSet, Role,
+    Sample, SignalPlace, StateChoice, StationId, StationSet, Time, Turn, Word, Write, WriteAnswer,
+    WriteId, WriteOutcome, WriteRefusal,
+};
+
+const PERIOD: Duration = Duration::from_millis(10);
+const PROGRAM: ProgramId = ProgramId(0);
+const INITIAL: u64 = 7;
+/// Samples of a history.
+const HISTORY: usize = 3;
+
+fn moment(cycle: u64) -> Moment {
+    Moment { epoch: Epoch(1), cycle: Cycle(cycle) }
+}
+
+/// One step of a sequence.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Step {
+    /// The input is forced to FALSE, or to a number that no one writes.
+    ForceOff,
+    /// The input is forced to TRUE, or to another number that no one writes.
+    ForceOn,
+    /// Its force ends.
+    Unforce,
+    /// A caller writes the input, in a session of its own.
+    Write,
+    /// A cycle whose output is proved.
+    Proved,
+    /// A cycle that no station follows.
+    Unfollowed,
+    /// Cycles that no station follows, until their samples become void.
+    Void,
+    /// The stations come back with another state, and the operator accepts it.
+    Replaced,
+}
+
+use Step::*;
+
+const STEPS: [Step; 8] = [ForceOff, ForceOn, Unforce, Write, Proved, Unfollowed, Void, Replaced];
+
+/// What the stations hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stations {
+    Follow,
+    StayBehind,
+    Hold(Lineage),
+}
+
+/// A sample as it was sent.
+#[derive(Debug, Clone, Copy)]
+struct Sampled {
+    moment: Moment,
+    value: u64,
+    forced: bool,
+    void: bool,
+}
+
+#[derive(Clone)]
+struct Bench {
+    remote_io: RemoteIo,
+    kind: OperatorInputKind,
+    cycle: u64,
+    sample: Option<Sample>,
+    /// The newest state that the stations have proved.
+    held: Option<Holding>,
+    applied: Moment,
+    forced: bool,
+    trace: Vec<Sampled>,
+    /// Stored values by session.
+    writes: Vec<u64>,
+    outcomes: BTreeMap<u64, WriteOutcome>,
+    steps: Vec<Step>,
+}
+
+fn place(kind: OperatorInputKind) -> PointPlace {
+    let of = match kind {
+        OperatorInputKind::Setpoint { .. } => Elementary::Int,
+        _ => Elementary::Bool,
+    };
+    PointPlace { bit: 16, of }
+}
+
+impl Bench {
+    fn new(kind: OperatorInputKind) -> Self {
+        let place = place(kind);
+        let agreement = Agreement {
+            cluster: ClusterHash(1),
+            configuration: ConfigurationHash(2),
+            schedule: Schedule::new(PERIOD, 1, 1, 1).expect("within the bounds"),
+            mode: Mode::Full,
+            history: HISTORY,
+            flag_after: 3,
+            shadow_cycles: 1,
+            listen_cycles: 2,
+        };
+        let initial = if place.of == Elementary::Bool { 0 } else { INITIAL };
+        let settings = Settings {
+            program: PROGRAM,
+            agreement: Arc::new(agreement),
+            hash: ProgramHash(1),
+            undriven: Image::zero(32),
+            input_points: vec![place],
+            output_points: PointPlace::booleans(1),
+            operator_inputs: vec![OperatorInput { place, kind, initial, role: Role::Operator }],
+            signals: Vec::new(),
+            signal_sources: Vec::new(),
+            channels: Vec::new(),
+            stop: None,
+            diagnosis: None,
+            // Writes are taken while outputs are held.
+            hold_cycles: 1000,
+            fail_safe: Image::zero(1),
+            ramps: Vec::new(),
+            release: Release::Automatic,
+            value_fault: ValueFault::Hold,
+            stale_state: StaleState::Operator,
+        };
+        let mut bench = Self {
+            remote_io: RemoteIo::new(Time(0), settings),
+            kind,
+            cycle: 100,
+            sample: None,
+            held: None,
+            applied: Moment::default(),
+            forced: false,
+            trace: Vec::new(),
+            writes: Vec::new(),
+            outcomes: BTreeMap::new(),
+            steps: Vec::new(),
+        };
+        for _ in 0..20 {
+            bench.pass(Stations::Follow);
+        }
+        assert!(bench.held.is_some(), "the program runs");
+        bench
+    }
+
+    fn now(&self) -> Time {
+        Time(0) + PERIOD * self.cycle as u32
+    }
+
+    fn give(&mut self, now: Time, input: Input<'_>) {
+        self.remote_io.handle_input(now, input);
+        let mut answers = Vec::new();
+        while let Some(output) = self.remote_io.poll_output() {
+            match output {
+                Output::Send(frame) => {
+                    if let Body::Sample(sample) = &frame.body {
+                        self.sample = Some(sample.clone());
+                    }
+                }
+                Output::Report(event) => self.observe(&event),
+                Output::Answer(answer) => answers.push(answer),
+                _ => {}
+            }
+        }
+        answers.into_iter().for_each(|answer| self.answered(answer));
+    }
+
+    fn observe(&mut self, event: &Event) {
+        match event {
+            Event::Voided { samples, .. } => {
+                let valid = self.trace.iter_mut().rev().filter(|sampled| !sampled.void);
+                valid.take(*samples).for_each(|sampled| sampled.void = true);
+            }
+            Event::AdoptedLineage { .. } => {
+                let applied = self.applied;
+                let newer = self.trace.iter_mut().filter(|sampled| sampled.moment > applied);
+                newer.for_each(|sampled| sampled.void = true);
+                if let OperatorInputKind::Pulse(_) = self.kind {
+                    // The other state may have seen the button pressed.
+                    let moment = moment(self.cycle);
+                    self.trace.push(Sampled { moment, value: 1, forced: true, void: false });
+                }
+            }
+            Event::Sampled { moment, inputs, .. } => {
+                let (value, forced) = (place(self.kind).get(inputs), self.forced);
+                self.trace.push(Sampled { moment: *moment, value, forced, void: false });
+            }
+            Event::Applied { moment, missing: None, .. } => self.applied = *moment,
+            _ => {}
+        }
+    }
+
+    /// Every answer is true when it is given.
+    fn answered(&mut self, WriteAnswer { id, outcome }: WriteAnswer) {
+        let before = self.outcomes.insert(id.session, outcome);
+        assert_eq!(before, None, "{:?}: answered twice", self.steps);
+        let written = self.writes[id.session as usize];
+        match outcome {
+            WriteOutcome::InEffect { since } => {
+                let at = self.trace.iter().rposition(|sampled| sampled.moment == since);
+                let sampled = at.map(|at| self.trace[at]);
+                let has_effect = self.applied >= since
+                    && sampled.is_some_and(|it| it.value == written && !it.forced && !it.void);
+                assert!(has_effect, "{:?}: {sampled:?}", self.steps);
+            }
+            WriteOutcome::Refused { refusal: WriteRefusal::Forced { seconds } } => {
+                assert!(self.forced && (1..=60).contains(&seconds), "{:?}: {seconds}", self.steps);
+            }
+            WriteOutcome::Refused { .. } => {}
+        }
+    }
+
+    fn pass(&mut self, stations: Stations) {
+        self.cycle += 1;
+        let (start, deadline) = (self.now(), self.now() + PERIOD * 65 / 100);
+        self.sample = None;
+        self.receive(start, 0, Body::Sync);
+        let sample = self.sample.clone();
+        if let (Stations::Follow, Some(sample)) = (stations, &sample) {
+            self.held = Some(Holding {
+                program: PROGRAM,
+                born: sample.born,
+                lineage: sample.after,
+                stepped: moment(self.cycle),
+                digest: Digest(0),
+            });
+        }
+        for rank in [0, 1] {
+            let body = match (stations, sample.is_some(), self.held) {
+                (Stations::Follow, true, Some(held)) => turn(held),
+                (Stations::Hold(lineage), _, Some(held)) => join(Some(Holding { lineage, ..held })),
+                (_, _, held) => join(held),
+            };
+            self.receive(start, rank, body);
+        }
+        self.give(deadline, Input::Wakeup);
+    }
+
+    fn receive(&mut self, now: Time, rank: u8, body: Body) {
+        let header = Header {
+            cluster: ClusterHash(1),
+            configuration: ConfigurationHash(2),
+            moment: moment(self.cycle),
+            sender: Member::Station(StationId(rank)),
+            alone: false,
+        };
+        self.give(now, Input::Frame(&Arc::new(Frame { header, body })));
+    }
+
+    fn order(&mut self, input: RemoteIoInput<'_>) {
+        self.give(self.now() + PERIOD * 9 / 10, Input::RemoteIo(input));
+    }
+
+    fn value(&self, stored: u64) -> PointValue {
+        PointValue::new(place(self.kind).of.bits() as u32, stored)
+    }
+
+    fn force(&mut self, on: bool) {
+        let stored = match place(self.kind).of {
+            Elementary::Bool => u64::from(on),
+            _ => 90 + u64::from(on),
+        };
+        let (owner, reason) = ("anna".to_owned(), "a test".to_owned());
+        let signal = SignalPlace::Input(place(self.kind).bit);
+        let force = Force { signal, value: self.value(stored), seconds: 60, owner, reason };
+        self.order(RemoteIoInput::Force(&force));
+        self.forced = true;
+    }
+
+    fn unforce(&mut self) {
+        self.order(RemoteIoInput::Unforce(SignalPlace::Input(place(self.kind).bit)));
+        self.forced = false;
+    }
+
+    fn write(&mut self) {
+        let session = self.writes.len() as u64;
+        let stored = match self.kind {
+            OperatorInputKind::Setpoint { .. } => 10 + session,
+            _ => 1,
+        };
+        self.writes.push(stored);
+        let write = Write {
+            id: WriteId { session, number: 1 },
+            input: place(self.kind).bit,
+            value: self.value(stored),
+            role: Role::Operator,
+            owner: "anna".to_owned(),
+            reason: "a test".to_owned(),
+        };
+        self.order(RemoteIoInput::Write(&write));
+    }
+
+    fn step(&mut self, step: Step) {
+        self.steps.push(step);
+        match step {
+            ForceOff => self.force(false),
+            ForceOn => self.force(true),
+            Unforce => self.unforce(),
+            Write => self.write(),
+            Proved => self.pass(Stations::Follow),
+            Unfollowed => self.pass(Stations::StayBehind),
+            Void => (0..=HISTORY).for_each(|_| self.pass(Stations::StayBehind)),
+            Replaced => {
+                let other = Stations::Hold(Lineage(self.cycle));
+                while !self.remote_io.asks_operator() {
+                    self.pass(other);
+                }
+                self.order(RemoteIoInput::Choose(StateChoice::Newest { cycle: None }));
+                if let Some(held) = &mut self.held {
+                    let Stations::Hold(lineage) = other else { return };
+                    held.lineage = lineage;
+                }
+            }
+        }
+    }
+
+    /// The force ends, cycles are proved, and every write has had one effect or none.
+    fn settle(mut self) -> Outcomes {
+        self.unforce();
+        (0..8).for_each(|_| self.pass(Stations::Follow));
+        let steps = &self.steps;
+        assert_eq!(self.outcomes.len(), self.writes.len(), "{steps:?}: a write has no answer");
+        let valid: Vec<&Sampled> = self.trace.iter().filter(|sampled| !sampled.void).collect();
+        let effects = self.outcomes.iter().filter_map(|(session, outcome)| match outcome {
+            WriteOutcome::InEffect { since } => Some((*since, self.writes[*session as usize])),
+            WriteOutcome::Refused { .. } => None,
+        });
+        let effects: BTreeMap<Moment, u64> = effects.collect();
+        let last = self.trace.last().expect("a sample").value;
+        if let OperatorInputKind::Pulse(_) = self.kind {
+            let pairs = valid.windows(2);
+            let edges = pairs.filter(|it| !it[1].forced && it[1].value > 0 && it[0].value == 0);
+            let edges: Vec<Moment> = edges.map(|it| it[1].moment).collect();
+            let expected: Vec<Moment> = effects.keys().copied().collect();
+            assert_eq!(edges, expected, "{steps:?}: one edge for each pulse: {valid:?}");
+            assert_eq!(last, 0, "{steps:?}");
+        } else {
+            let initial = if place(self.kind).of == Elementary::Bool { 0 } else { INITIAL };
+            let expected = effects.last_key_value().map_or(initial, |(_, value)| *value);
+            assert_eq!(last, expected, "{steps:?}: {valid:?}");
+            for sampled in valid.iter().filter(|it| !it.forced && it.value != initial) {
+                let is_of_effect = effects
+                    .range(..=sampled.moment)
+                    .next_back()
+                    .is_some_and(|(_, value)| *value == sampled.value);
+                assert!(is_of_effect, "{steps:?}: {sampled:?} of a write without an effect");
+            }
+        }
+        let mut outcomes = Outcomes::default();
+        for outcome in self.outcomes.values() {
+            match outcome {
+                WriteOutcome::InEffect { .. } => outcomes.in_effect += 1,
+                WriteOutcome::Refused { refusal: WriteRefusal::Forced { .. } } => {
+                    outcomes.forced += 1;
+                }
+                WriteOutcome::Refused { .. } => outcomes.refused += 1,
+            }
+        }
+        outcomes
+    }
+}
+
+/// The number of writes by outcome.
+#[derive(Debug, Default, Clone, Copy)]
+struct Outcomes {
+    in_effect: u32,
+    forced: u32,
+    refused: u32,
+}
+
+fn turn(holding: Holding) -> Body {
+    Body::Turn(Turn {
+        heard: StationSet::EMPTY,
+        holdings: [holding].into_iter().collect(),
+        words: [Word { mask: ProgramSet::only(PROGRAM), sum: Image::zero(1) }]
+            .into_iter()
+            .collect(),
+        recalled: Vec::new(),
+        lacks: ProgramSet::EMPTY,
+        relayed: Vec::new(),
+    })
+}
+
+fn join(holding: Option<Holding>) -> Body {
+    Body::Join(Join {
+        wants: ProgramSet::EMPTY,
+        holdings: holding.into_iter().collect(),
+        recalled: Vec::new(),
+        lacks: ProgramSet::EMPTY,
+        partial: Vec::new(),
+    })
+}
+
+/// All sequences of steps that continue one, each to its end.
+fn explore(bench: &Bench, steps: u32, total: &mut Outcomes) {
+    if steps == 0 {
+        let outcomes = bench.clone().settle();
+        total.in_effect += outcomes.in_effect;
+        total.forced += outcomes.forced;
+        total.refused += outcomes.refused;
+        return;
+    }
+    // What changes nothing is left out.
+    let changes = |step: &Step| match step {
+        ForceOff => !bench.forced || bench.steps.last() == Some(&ForceOn),
+        ForceOn => !bench.forced || bench.steps.last() == Some(&ForceOff),
+        Unforce => bench.forced,
+        _ => true,
+    };
+    for step in STEPS.into_iter().filter(changes) {
+        let mut next = bench.clone();
+        next.step(step);
+        explore(&next, steps - 1, total);
+    }
+}
+
+/// A write that is in effect was sampled with its value, and one that is refused never has an effect, in every order of the steps.
+#[test]
+fn every_write_of_an_input_that_is_forced_has_a_true_answer() {
+    for (kind, steps) in [
+        (OperatorInputKind::Level, 5),
+        (OperatorInputKind::Pulse(2), 6),
+        (OperatorInputKind::Setpoint { low: 0, high: 80 }, 5),
+    ] {
+        let mut total = Outcomes::default();
+        explore(&Bench::new(kind), steps, &mut total);
+        let Outcomes { in_effect, forced, refused } = total;
+        assert!(in_effect > 1000 && forced > 1000 && refused > 100, "{kind:?}: {total:?}");
+    }
+}
