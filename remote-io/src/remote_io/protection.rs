@@ -1,6 +1,9 @@
 //! Whether the failure of one station would be masked now: the controller and an understudy, or two understudies, prove
 //! the output of this program in this cycle. Protection lost for `flag_after` cycles in a row is reported, with the
 //! reason.
+//!
+//! A remote I/O that has started reports which it is once an output was proved. After a cold start it gives the other
+//! stations time to start too; a state that it adopts is that of a cluster that runs.
 
 use std::time::Duration;
 
@@ -14,17 +17,26 @@ use crate::event::{Event, Lacking, LackingReason};
 /// Sets of stations, each of which proves the output by itself.
 const STATIONS_NEEDED: usize = 2;
 
-/// A program that was never protected is reported after this time: its understudy may join later than its controller.
+/// A program that has started cold and was never protected is reported after this time: its understudy may join later than its controller.
 const FIRST_PROTECTION: Duration = Duration::from_secs(5);
 
 /// State kept from deadline to deadline.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub(super) struct Protection {
-    /// Last reported state; `None` before the first report.
+    /// Last reported state; `None` until the first report.
     reported: Option<bool>,
+    /// Whether the program has started cold.
+    cold: bool,
     /// Deadlines in a row without protection, and the cycle of the first of them.
     missed: u32,
     since: Moment,
+}
+
+impl Protection {
+    /// The program starts, cold or from a state that a station holds.
+    pub(super) fn starts(&mut self, cold: bool) {
+        self.cold = cold;
+    }
 }
 
 impl RemoteIo {
@@ -37,9 +49,6 @@ impl RemoteIo {
 
     /// A deadline without a cycle: no station proves an output.
     pub(super) fn note_idle(&mut self) {
-        if self.protection.reported.is_none() {
-            return;
-        }
         let reason = LackingReason::NotReceived;
         let all = self.holders.stations();
         self.note_protection(all.map(|station| Lacking { station, reason }).collect());
@@ -56,14 +65,13 @@ impl RemoteIo {
         let protected = proving >= STATIONS_NEEDED && (lacking.is_empty() || !paper);
         let agreement = &self.settings.agreement;
         let protection = &mut self.protection;
-        let patience = match protection.reported {
-            Some(_) => agreement.flag_after,
-            None => {
-                let cycles =
-                    FIRST_PROTECTION.as_nanos() / agreement.schedule.period().as_nanos().max(1);
-                let cycles = u32::try_from(cycles).unwrap_or(u32::MAX);
-                cycles.max(agreement.listen_cycles * 20).max(agreement.flag_after)
-            }
+        let is_first = protection.reported.is_none();
+        let patience = if is_first && protection.cold {
+            let period = agreement.schedule.period().as_nanos().max(1);
+            let cycles = u32::try_from(FIRST_PROTECTION.as_nanos() / period).unwrap_or(u32::MAX);
+            cycles.max(agreement.listen_cycles * 20).max(agreement.flag_after)
+        } else {
+            agreement.flag_after
         };
         if protected {
             protection.missed = 0;
@@ -73,6 +81,9 @@ impl RemoteIo {
             return;
         }
         if protection.missed == 0 {
+            if is_first && proving == 0 {
+                return;
+            }
             protection.since = moment;
         }
         protection.missed = protection.missed.saturating_add(1);

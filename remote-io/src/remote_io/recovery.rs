@@ -220,6 +220,7 @@ impl RemoteIo {
         history: History,
         state: Option<(StationId, Holding)>,
     ) {
+        self.protection.starts(state.is_none());
         if self.knowledge.floor().is_none() {
             self.remember(moment, state);
         }
