@@ -377,7 +377,13 @@ impl Laboratory<'_> {
             journal.write(record);
         }
         self.account.observe(record);
-        self.orders.observe(record);
+        for decided in self.orders.observe(record) {
+            if let Some(event) = decided.record() {
+                self.note(event);
+                self.show_journal();
+            }
+            decided.answer();
+        }
         self.conductor.hear(record, Instant::now());
         if let Some(moment) = self.account.origin().filter(|_| !had_origin) {
             self.note(RunEvent::Origin { moment, cycle: 0 });

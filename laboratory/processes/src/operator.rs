@@ -26,36 +26,28 @@ impl Laboratory<'_> {
                 | Command::Unforce { .. }
                 | Command::Choose { .. }
         );
-        let done = self.obey_command(member, command, owner, reason).await;
+        let done = self.obey_command(member, &command).await;
+        let is_sent = is_decided_there && done.is_ok();
+        // Why it was refused is known later, and in the record. A write is recorded before samples have its value.
+        if !is_sent || matches!(command, Command::Write(_)) {
+            let refused = done.as_ref().err().map(ToString::to_string);
+            self.note(RunEvent::Commanded { member, command, owner, reason, refused });
+        }
         // The outcome comes with the journal of the remote I/O.
-        if is_decided_there && done.is_ok() {
+        if is_sent {
             return self.orders.add(commanded);
         }
         commanded.answer(done);
     }
 
-    async fn obey_command(
-        &mut self,
-        member: Member,
-        command: Command,
-        owner: String,
-        reason: String,
-    ) -> Result<Done, Refusal> {
+    async fn obey_command(&mut self, member: Member, command: &Command) -> Result<Done, Refusal> {
         // Whoever commands may make everybody stand still for as long as he wants.
         self.commanded = true;
-        let refusal = self.too_early().or_else(|| self.refusal(member, &command));
-        let done = match refusal {
+        let refusal = self.too_early().or_else(|| self.refusal(member, command));
+        match refusal {
             Some(refusal) => Err(refusal),
-            None => self.command(member, &command).await,
-        };
-        self.note(RunEvent::Commanded {
-            member,
-            command,
-            owner,
-            reason,
-            refused: done.as_ref().err().map(ToString::to_string),
-        });
-        done
+            None => self.command(member, command).await,
+        }
     }
 
     /// Why no command is taken before the scenario is over, where that is so.

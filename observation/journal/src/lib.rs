@@ -38,10 +38,10 @@ pub use members::{Members, NamedSignal};
 pub use named_files::{ALLOWED_FOLDERS, named_file};
 pub use numbering::Numbering;
 pub use operator::{
-    Acknowledgement, AlarmRefusal, Command, Commanded, Commander, Commands, DECIDED_WITHIN, Done,
-    MAXIMUM_SHELVING_SECONDS, OperatorAction, PendingOrders, Refusal, RequestedValue, RunSocket,
-    Shelving, Unshelving, WriteProblem, WriteRequest, WriteSessions, attempt_until_decided,
-    commands, find_alarm, force_value, new_write, write_answer,
+    Acknowledgement, AlarmRefusal, Command, Commanded, Commander, Commands, DECIDED_WITHIN,
+    DecidedOrder, Done, MAXIMUM_SHELVING_SECONDS, OperatorAction, PendingOrders, Refusal,
+    RequestedValue, RunSocket, Shelving, Unshelving, WriteProblem, WriteRequest, WriteSessions,
+    attempt_until_decided, commands, find_alarm, force_value, new_write, write_answer,
 };
 pub use packed_file::{SegmentFile, open_file};
 pub use place::{CheckpointPlace, Place, continuation_before, place_before};

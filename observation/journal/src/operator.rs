@@ -30,7 +30,7 @@ use understudy_cluster::AlarmDeclaration;
 
 pub use acknowledgement::Acknowledgement;
 pub use new_write::{RequestedValue, WriteProblem, WriteRequest, force_value, new_write};
-pub use pending::{PendingOrders, write_answer};
+pub use pending::{DecidedOrder, PendingOrders, write_answer};
 pub use sessions::{DECIDED_WITHIN, WriteSessions, attempt_until_decided};
 pub use shelving::{AlarmRefusal, MAXIMUM_SHELVING_SECONDS, Shelving, Unshelving, find_alarm};
 pub use socket::RunSocket;
@@ -269,6 +269,11 @@ pub struct Commanded {
 }
 
 impl Commanded {
+    /// Whether it writes an operator input.
+    fn is_write(&self) -> bool {
+        matches!(&self.action, OperatorAction::Command { command: Command::Write(_), .. })
+    }
+
     /// Says how it went.
     pub fn answer(self, done: Result<Done, Refusal>) {
         // Nobody waits for it where the page was closed.

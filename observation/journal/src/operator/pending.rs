@@ -13,15 +13,16 @@ pub struct PendingOrders(Vec<Commanded>);
 impl PendingOrders {
     /// Waits for the outcome of an order.
     pub fn add(&mut self, commanded: Commanded) {
-        // Callers that have given up do not come back.
-        self.0.retain(|waiting| !waiting.answer.is_closed());
+        // Callers that have given up do not come back, and their writes are in the journal.
+        self.0.retain(|waiting| !waiting.answer.is_closed() || !waiting.is_write());
         self.0.push(commanded);
     }
 
-    /// Answers the callers whose orders are decided by a record. Of equal orders the oldest is meant: a remote I/O takes them in their order.
-    pub fn observe(&mut self, record: &Record) {
+    /// The orders that are decided by a record, with their outcomes. Of equal orders the oldest is meant: a remote I/O takes them in their order.
+    pub fn observe(&mut self, record: &Record) -> Vec<DecidedOrder> {
+        let mut decided = Vec::new();
         if self.0.is_empty() {
-            return;
+            return decided;
         }
         let mut is_taken = false;
         for commanded in std::mem::take(&mut self.0) {
@@ -35,11 +36,44 @@ impl PendingOrders {
                 Some(done) => {
                     // Every attempt at a write is answered, and one of other orders.
                     is_taken = true;
-                    commanded.answer(done);
+                    decided.push(DecidedOrder { commanded, done });
                 }
                 None => self.0.push(commanded),
             }
         }
+        decided
+    }
+}
+
+/// An order whose outcome is known.
+#[derive(Debug)]
+pub struct DecidedOrder {
+    commanded: Commanded,
+    done: Result<Done, Refusal>,
+}
+
+impl DecidedOrder {
+    /// Its record, which says why it was refused; nothing for a write, which is recorded when it is sent.
+    pub fn record(&self) -> Option<RunEvent> {
+        match &self.commanded.action {
+            OperatorAction::Command { member, command, owner, reason }
+                if !self.commanded.is_write() =>
+            {
+                Some(RunEvent::Commanded {
+                    member: *member,
+                    command: command.clone(),
+                    owner: owner.clone(),
+                    reason: reason.clone(),
+                    refused: self.done.as_ref().err().map(ToString::to_string),
+                })
+            }
+            _ => None,
+        }
+    }
+
+    /// Answers its caller.
+    pub fn answer(self) {
+        self.commanded.answer(self.done);
     }
 }
 
@@ -111,4 +145,76 @@ pub fn write_answer(record: &Record) -> Option<WriteAnswer> {
         _ => return None,
     };
     Some(WriteAnswer { id, outcome })
+}
+
+#[cfg(test)]
+mod tests {
+    use understudy_wire::{Force, Moment, ProgramId, SignalPlace};
+
+    use super::*;
+
+    const MEMBER: Member = Member::RemoteIo(ProgramId(0));
+
+    /// The order of a caller who still waits, or has gone.
+    fn commanded(command: Command, is_gone: bool) -> (Commanded, impl Sized) {
+        let (answer, waits) = tokio::sync::oneshot::channel();
+        let (owner, reason) = ("anna".to_owned(), "a test".to_owned());
+        let action = OperatorAction::Command { member: MEMBER, command, owner, reason };
+        (Commanded { action, answer }, (!is_gone).then_some(waits))
+    }
+
+    fn record(event: RemoteIoEvent) -> Record {
+        let name = "robot-io".to_owned();
+        Record { at_ns: 1, name, member: Some(MEMBER), event: Happening::RemoteIo(event) }
+    }
+
+    /// Every order that a remote I/O decides is recorded once, with why it was refused, also where its caller has gone.
+    #[test]
+    fn the_record_of_an_order_has_its_outcome() {
+        let moment = Moment::default();
+        let signal = SignalPlace::Input(0);
+        let (owner, reason) = ("anna".to_owned(), "a test".to_owned());
+        let force = Force { signal, value: true.into(), seconds: 1, owner, reason };
+        let choose = |choice| Command::Choose { choice };
+        let refusal = OrderRefusal::NotForced;
+        let orders = [
+            (
+                choose(StateChoice::Cold),
+                RemoteIoEvent::StartedCold { born: moment, awaits_release: false, lost: None },
+                RemoteIoEvent::ChoiceRefused { moment, newest: None },
+            ),
+            (
+                Command::Force(force.clone()),
+                RemoteIoEvent::Forced { moment, force: force.clone() },
+                RemoteIoEvent::ForceRefused { moment, force, refusal },
+            ),
+            (
+                Command::Unforce { signal },
+                RemoteIoEvent::Unforced { moment, signal, expired: false },
+                RemoteIoEvent::UnforceRefused { moment, signal, refusal },
+            ),
+        ];
+        for (command, done, refused) in orders {
+            for (event, is_refused, is_gone) in [
+                (done.clone(), false, false),
+                (refused.clone(), true, false),
+                (done, false, true),
+                (refused, true, true),
+            ] {
+                let mut orders = PendingOrders::default();
+                let (first, _waits) = commanded(command.clone(), is_gone);
+                let (other, _other) =
+                    commanded(Command::Unforce { signal: SignalPlace::Output(9) }, false);
+                orders.add(first);
+                orders.add(other);
+                let decided = orders.observe(&record(event));
+                let records: Vec<Option<RunEvent>> =
+                    decided.iter().map(DecidedOrder::record).collect();
+                let [Some(RunEvent::Commanded { command: of, refused, .. })] = &records[..] else {
+                    panic!("{records:?}");
+                };
+                assert_eq!((of, refused.is_some()), (&command, is_refused));
+            }
+        }
+    }
 }

@@ -167,10 +167,12 @@ pub(crate) fn fault_text(action: Action, member: Member, members: &Members) -> S
             format!("{input} of {name} is the field's again")
         }
         Action::Choose { choice: StateChoice::Cold } => {
-            format!("the operator starts the program of {name} cold")
+            format!("the operator orders a cold start of the program of {name}")
         }
         Action::Choose { .. } => {
-            format!("the operator continues the program of {name} from the newest available state")
+            format!(
+                "the operator orders the program of {name} to continue from the newest available state"
+            )
         }
         other => format!("{} of {name}", other.word()),
     }
