@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 use understudy_bus::{BusError, Call, Reporter, Request, Told};
 use understudy_cluster::Cluster;
-use understudy_journal::{Record, repeated};
+use understudy_journal::{Record, records_not_over, repeated};
 use understudy_view::{Filter, Listing};
 
 use crate::answer::Answer;
@@ -68,6 +68,8 @@ pub(super) fn ask(call: &Call, cluster: &Cluster, name: &str) -> Result<Answer, 
         };
         wants_more && started.elapsed() < PATIENCE
     });
+    let all = std::mem::take(&mut present.in_effect);
+    present.in_effect = records_not_over(all);
     let mut result: Value =
         serde_json::from_str(&ready).unwrap_or_else(|_| json!({ "text": ready }));
     let mut lines = Vec::new();

@@ -214,3 +214,91 @@ fn of_run(event: &RunEvent) -> Option<Subject> {
         _ => return None,
     })
 }
+
+/// The records that no later one has ended: for a person who asks for the state. Viewers take all of
+/// them, since alarms that are over may wait for an acknowledgement.
+pub fn records_not_over(mut records: Vec<Record>) -> Vec<Record> {
+    let mut kept = Vec::new();
+    while let Some(record) = records.pop() {
+        if !kept.iter().any(|later| ends(later, &record)) {
+            kept.push(record);
+        }
+    }
+    kept.reverse();
+    kept
+}
+
+/// Whether a record ends the state that an earlier one of the same member says.
+fn ends(later: &Record, earlier: &Record) -> bool {
+    match (&later.event, &earlier.event) {
+        (Happening::RemoteIo(later), Happening::RemoteIo(earlier)) => {
+            let starts = |event: &RemoteIo| {
+                matches!(event, RemoteIo::StartedCold { .. } | RemoteIo::AdoptedLineage { .. })
+            };
+            match earlier {
+                RemoteIo::StateLost { .. }
+                | RemoteIo::Disputed { .. }
+                | RemoteIo::ConfigurationDisputed { .. }
+                | RemoteIo::ChoiceRefused { .. } => {
+                    starts(later) || matches!(later, RemoteIo::StateRecovered { .. })
+                }
+                RemoteIo::StartedCold { .. }
+                | RemoteIo::AdoptedLineage { .. }
+                | RemoteIo::StateRecovered { .. } => starts(later),
+                RemoteIo::ValueFault { .. } | RemoteIo::RecalledExclusion { .. } => {
+                    matches!(later, RemoteIo::Released { .. })
+                }
+                _ => false,
+            }
+        }
+        (Happening::Station(later), Happening::Station(earlier)) => match (later, earlier) {
+            (Station::Readmitted { program, .. }, Station::Excluded { program: of, .. })
+            | (Station::Excluded { program, .. }, Station::Readmitted { program: of, .. }) => {
+                program == of
+            }
+            _ => false,
+        },
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A question is over once the program starts or the state is there again, in every order of the records.
+    #[test]
+    fn a_question_that_was_answered_is_not_in_effect() {
+        let moment = r#""moment":{"epoch":1,"cycle":2}"#;
+        let event = |event: &str, more: &str| {
+            format!(
+                r#"{{"at_ns":1,"name":"robot-io","member":{{"remote-io":0}},"event":{{"event":"{event}",{more}}}}}"#
+            )
+        };
+        let read = |text: String| serde_json::from_str::<Record>(&text).expect("a record");
+        let newest = r#""newest":{"epoch":1,"cycle":1}"#;
+        let questions = [
+            event(
+                "state-lost",
+                &format!(r#"{moment},"applied":null,{newest},"holder":0,"asks":true"#),
+            ),
+            event("disputed", &format!(r#"{moment},"stations":3"#)),
+            event("configuration-disputed", &format!(r#"{moment},"stations":1,"others":1"#)),
+            event("choice-refused", &format!("{moment},{newest}")),
+        ];
+        let answers = [
+            event("started-cold", r#""born":{"epoch":1,"cycle":2},"awaits_release":false"#),
+            event("adopted-lineage", &format!(r#"{moment},"lineage":1,"from":0"#)),
+            event("state-recovered", &format!(r#"{moment},"from":0"#)),
+        ];
+        for (question, answer) in questions
+            .iter()
+            .flat_map(|question| answers.iter().map(move |answer| (question, answer)))
+        {
+            let (question, answer) = (read(question.clone()), read(answer.clone()));
+            let asked = vec![answer.clone(), question.clone()];
+            assert_eq!(records_not_over(asked.clone()), asked, "it is asked now");
+            assert_eq!(records_not_over(vec![question, answer.clone()]), [answer]);
+        }
+    }
+}

@@ -32,6 +32,7 @@ pub use alarm_fold::{AlarmChange, AlarmFold, AlarmTransition};
 pub use clock::monotonic_ns;
 pub use continuation::{Continuation, ProgramSoFar};
 pub use cycles::Cycles;
+pub use in_effect::records_not_over;
 pub use journal::{JOURNAL_LIMIT_BYTES, Journal, JournalError, JournalState, records, records_of};
 pub use kept::{KeptError, keep_cluster, kept_cluster};
 pub use members::{Members, NamedSignal};
