@@ -96,16 +96,15 @@ impl Arguments {
     }
 
     /// The record of an order that this answer refuses.
-    fn refused(&self, answer: &Answer) -> RefusedOrder {
+    fn refused(&self, answer: &Answer, owner: &str) -> RefusedOrder {
         let why = answer.failures.first().map_or_else(String::new, |failure| {
             let Failure { code, message } = failure;
             // Some messages begin with their code.
             let words = message.strip_prefix(&format!("{code}: ")).unwrap_or(message);
             format!("{code}: {words}")
         });
-        let owner = crate::inspect::top::owner();
         let signal = self.signal.as_deref().unwrap_or_default();
-        RefusedOrder::new(&self.word(), &self.name, &owner, why).with(signal, &self.reason)
+        RefusedOrder::new(&self.word(), &self.name, owner, why).with(signal, &self.reason)
     }
 
     /// Reply to `cold-start` or `accept-state`.
@@ -165,7 +164,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
 /// Sends the command to the laboratory that writes the run. The laboratory records one that is refused here, too.
 fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
     let word = arguments.word();
-    let ordered = command(arguments).and_then(|command| {
+    let owner = crate::inspect::top::owner();
+    let ordered = command(arguments, &owner).and_then(|command| {
         let run = written(arguments)?;
         let member = crate::member::find(run.cluster(), &arguments.name)?;
         Ok((run, member, command))
@@ -174,7 +174,7 @@ fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
         if arguments.what.is_order()
             && let Ok(run) = written(arguments)
         {
-            run.commander().refused_and_wait(arguments.refused(answer));
+            run.commander().refused_and_wait(arguments.refused(answer, &owner));
         }
     })?;
     let done = match command {
@@ -182,7 +182,7 @@ fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
         command => run.commander().act_and_wait(&OperatorAction::Command {
             member,
             command,
-            owner: crate::inspect::top::owner(),
+            owner,
             reason: arguments.reason.clone(),
         }),
     };
@@ -197,16 +197,18 @@ fn in_laboratory(arguments: &Arguments) -> Result<Answer, Answer> {
 }
 
 /// The command to a member of a laboratory.
-fn command(arguments: &Arguments) -> Result<Command, Answer> {
+fn command(arguments: &Arguments, owner: &str) -> Result<Command, Answer> {
     let word = arguments.word();
     Ok(match arguments.what {
-        What::Force => Command::Force(force(arguments, written(arguments)?.cluster())?),
+        What::Force => Command::Force(force(arguments, written(arguments)?.cluster(), owner)?),
         What::Unforce => {
             Command::Unforce { signal: place(arguments, written(arguments)?.cluster())?.0 }
         }
-        What::Write => {
-            Command::Write(write(arguments, written(arguments)?.cluster(), Role::Engineer)?)
-        }
+        What::Write => Command::Write(write(
+            arguments,
+            written(arguments)?.cluster(),
+            (owner, Role::Engineer),
+        )?),
         What::Kill => Command::Kill,
         What::Restart => Command::Restart,
         What::Release => Command::Release,
@@ -266,7 +268,7 @@ fn place<'a>(
 }
 
 /// A force of a signal as a whole.
-fn force(arguments: &Arguments, cluster: &Cluster) -> Result<Force, Answer> {
+fn force(arguments: &Arguments, cluster: &Cluster, owner: &str) -> Result<Force, Answer> {
     let (signal, of, text) = place(arguments, cluster)?;
     let value = force_value(text, of)
         .map_err(|message| Answer::failed(Status::BadInput, "U0556", message))?;
@@ -274,24 +276,27 @@ fn force(arguments: &Arguments, cluster: &Cluster) -> Result<Force, Answer> {
         signal,
         value,
         seconds: arguments.seconds,
-        owner: crate::inspect::top::owner(),
+        owner: owner.to_owned(),
         reason: arguments.reason.clone(),
     };
     force.check().map_err(|error| Answer::failed(Status::BadInput, "U0556", error.to_string()))?;
     Ok(force)
 }
 
-/// A write of an operator input.
-fn write(arguments: &Arguments, cluster: &Cluster, role: Role) -> Result<Write, Answer> {
+/// A write of an operator input, by a person with this role.
+fn write(
+    arguments: &Arguments,
+    cluster: &Cluster,
+    (owner, role): (&str, Role),
+) -> Result<Write, Answer> {
     let text = arguments.signal.as_deref().unwrap_or_default();
     let (input, value) = text.split_once('=').unwrap_or((text, ""));
     let member = crate::member::find(cluster, &arguments.name)?;
-    let owner = crate::inspect::top::owner();
     let request = WriteRequest {
         input: input.trim(),
         value: RequestedValue::Text(value),
         role,
-        owner: &owner,
+        owner,
         reason: &arguments.reason,
     };
     new_write(cluster, member, &request)
@@ -369,10 +374,10 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
             && let Ok(call) = call()
         {
             // A member of another version does not know the question.
-            let _ = call.ask(&Request::Refused(arguments.refused(answer)));
+            let _ = call.ask(&Request::Refused(arguments.refused(answer, &keys.name)));
         }
     };
-    let request = request(arguments, &cluster, keys.role).inspect_err(record)?;
+    let request = request(arguments, &cluster, (&keys.name, keys.role)).inspect_err(record)?;
     ask_elsewhere(arguments, &cluster, request, &call).inspect_err(|answer| {
         // What the member decides itself has a record already.
         let code = answer.failures.first().map(|failure| failure.code.as_str());
@@ -382,20 +387,20 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
     })
 }
 
-/// What a remote member is asked; nothing for its journal, which is followed.
+/// What a remote member is asked by the person of the keys; nothing for its journal, which is followed.
 fn request(
     arguments: &Arguments,
     cluster: &Cluster,
-    role: Role,
+    person: (&str, Role),
 ) -> Result<Option<Request>, Answer> {
     Ok(match arguments.what {
         What::Status => Some(Request::Status),
         What::Configuration => Some(Request::Configuration),
         What::Release => Some(Request::Release),
         What::ColdStart | What::AcceptState => Some(Request::Choose(arguments.choice())),
-        What::Force => Some(Request::Force(force(arguments, cluster)?)),
+        What::Force => Some(Request::Force(force(arguments, cluster, person.0)?)),
         What::Unforce => Some(Request::Unforce(place(arguments, cluster)?.0)),
-        What::Write => Some(Request::Write(write(arguments, cluster, role)?)),
+        What::Write => Some(Request::Write(write(arguments, cluster, person)?)),
         What::Stop => Some(Request::Stop),
         What::Journal => None,
         What::Kill

@@ -39,7 +39,7 @@ impl AttachArguments {
         self.keys.is_some()
     }
 
-    /// Connects to the members and writes their journals to a run below `out`.
+    /// Connects to the members and writes their journals to a run below `out`. Answers also with the person of the keys.
     pub(crate) fn attach(
         &self,
         cluster_file: &Path,
@@ -47,7 +47,7 @@ impl AttachArguments {
         out: &Path,
         journal_limit: u64,
         console: &mut Console,
-    ) -> Result<(RunDirectory, Attached), Answer> {
+    ) -> Result<(RunDirectory, Attached, String), Answer> {
         if cluster.security() == Security::Off {
             let error = AttachError::NoKeys;
             return Err(Answer::failed(Status::BadInput, error.code(), error));
@@ -69,7 +69,7 @@ impl AttachArguments {
         let attached = found
             .record(&directory, journal_limit)
             .map_err(|error| Answer::failed(Status::Failed, error.code(), error))?;
-        Ok((directory, attached))
+        Ok((directory, attached, keys.name))
     }
 }
 

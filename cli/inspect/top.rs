@@ -67,11 +67,11 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         return Err(Answer::failed(Status::BadInput, "U0578", message));
     }
     let mut terminal = ratatui::try_init().map_err(failed)?;
-    let commander = match &attached {
-        Some((_, attached)) => attached.commander(),
-        None => run.commander(),
+    let (commander, owner) = match &attached {
+        Some((_, attached, person)) => (attached.commander(), person.clone()),
+        None => (run.commander(), owner()),
     };
-    let shown = show(&mut terminal, &run, &commander);
+    let shown = show(&mut terminal, &run, &commander, &owner);
     ratatui::restore();
     shown.map_err(failed)?;
     Ok(Answer::done("", ()))
@@ -93,7 +93,8 @@ fn wait_for_a_cycle(run: &Run) {
     std::thread::sleep(ALL_SAY);
 }
 
-type Opened = (Run, Option<(RunDirectory, Attached)>);
+/// A run, and of one elsewhere how it is attached, with the person of the keys.
+type Opened = (Run, Option<(RunDirectory, Attached, String)>);
 
 fn open(arguments: &Arguments, console: &mut Console) -> Result<Opened, Answer> {
     if !arguments.elsewhere.is_wanted() {
@@ -107,18 +108,17 @@ fn open(arguments: &Arguments, console: &mut Console) -> Result<Opened, Answer> 
 }
 
 /// Records the acknowledgement of these alarms in the journal. They are shown as acknowledged once they are read there.
-fn acknowledge(seen: &[Alarm], commander: &Commander) {
-    let owner = owner();
+fn acknowledge(seen: &[Alarm], commander: &Commander, owner: &str) {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     let now = since.map_or(0, |since| since.as_secs());
     for alarm in seen {
-        let seen = alarm.acknowledgement(owner.clone(), now);
+        let seen = alarm.acknowledgement(owner.to_owned(), now);
         // An acknowledgement that cannot be written leaves the alarm unacknowledged.
         let _ = commander.acknowledge_and_wait(seen);
     }
 }
 
-/// User of this terminal.
+/// User of this terminal, where no keys name the person.
 pub(crate) fn owner() -> String {
     std::env::var("USER").unwrap_or_else(|_| "terminal".to_owned())
 }
@@ -149,6 +149,7 @@ fn show(
     terminal: &mut ratatui::DefaultTerminal,
     run: &Run,
     commander: &Commander,
+    owner: &str,
 ) -> io::Result<()> {
     let (mut model, mut following) = Following::of(run, Bounds::default());
     let mut screen = Screen::default();
@@ -200,7 +201,7 @@ fn show(
         let seen = screen.press(key, &model);
         // Those of a past that is not read yet have other numbers and times.
         if !seen.is_empty() && following.past_percent().is_none() {
-            acknowledge(&seen, commander);
+            acknowledge(&seen, commander, owner);
         }
     }
 }

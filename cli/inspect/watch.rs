@@ -232,7 +232,7 @@ fn watch_elsewhere(
     console: &mut Console,
 ) -> Result<Answer, Answer> {
     let (target, run) = (&arguments.target, &arguments.run);
-    let (directory, attached) =
+    let (directory, attached, _) =
         arguments.elsewhere.attach(target, cluster, &run.out, run.journal_limit, console)?;
     let commanding = page.commanding(attached.commander(), understudy_attach::impossible());
     serve_until_asked_to_end(directory.path(), page, commanding, console)

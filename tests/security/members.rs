@@ -67,12 +67,12 @@ fn an_operator_is_answered_until_revoked_and_nobody_else_is() {
     assert!(lines.status.success());
     assert_eq!(String::from_utf8_lossy(&lines.stdout).lines().count(), 3);
 
-    // An order with an unknown name, and one without the right to it, have records in the member's journal.
+    // An order with an unknown name, and one without the right to it, have records in the member's journal. The person is the one of the keys.
     let guest = of("guest");
-    for (keys, what, code, status) in [
-        (&operator, &["force", "nothing=1"][..], "U0556", 2),
-        (&operator, &["write", "nothing=1"], "U0640", 2),
-        (&guest, &["force", "grip=true"], "U0510", 1),
+    for (keys, person, what, code, status) in [
+        (&operator, "engineer", &["force", "nothing=1"][..], "U0556", 2),
+        (&operator, "engineer", &["write", "nothing=1"], "U0640", 2),
+        (&guest, "guest", &["force", "grip=true"], "U0510", 1),
     ] {
         let refused = operate(keys, what);
         assert_eq!((refused.0, codes(&refused.1)), (status, vec![code]), "{what:?}");
@@ -82,7 +82,7 @@ fn an_operator_is_answered_until_revoked_and_nobody_else_is() {
             let why = event["why"].as_str().unwrap_or_default();
             event["event"] == "order-refused"
                 && (&event["to"], &event["order"]) == (&"robot-io".into(), &what[0].into())
-                && event["signal"] == what[1]
+                && (&event["signal"], &event["owner"]) == (&what[1].into(), &person.into())
                 && why.starts_with(code)
         };
         let started = Instant::now();

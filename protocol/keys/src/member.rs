@@ -104,6 +104,8 @@ pub struct MemberKeys {
 /// The keys of a person, read and found good.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OperatorKeys {
+    /// Person that they were issued to.
+    pub name: String,
     /// Rights.
     pub role: understudy_wire::Role,
     /// Until when its certificate holds.
@@ -266,6 +268,7 @@ impl OperatorKeys {
             role: file.role.of_person().unwrap_or_default(),
             expires: file.expires,
             tls: tls(folder, &file, &revoked),
+            name: file.name,
         })
     }
 }
