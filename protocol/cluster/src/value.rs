@@ -60,8 +60,10 @@ pub fn stored_value(value: &Constant, of: Elementary) -> Result<u64, String> {
         (_, Constant::Whole(number)) if of.is_real() => real(*number as f64),
         (_, Constant::Number(number)) if of.is_real() && number.is_finite() => real(*number),
         (Elementary::Time, Constant::Text(text)) => {
-            let time = understudy_text::duration::parse(text).ok();
-            time.and_then(|time| i64::try_from(time.as_nanos()).ok()).map(|time| time as u64)
+            let negative = text.trim_start().strip_prefix('-');
+            let time = understudy_text::duration::parse(negative.unwrap_or(text)).ok();
+            let time = time.and_then(|time| i64::try_from(time.as_nanos()).ok());
+            time.map(|time| if negative.is_some() { -time } else { time } as u64)
         }
         (Elementary::Bool, _) => None,
         (_, Constant::Whole(number)) if !of.is_time() => whole(*number),
@@ -69,7 +71,7 @@ pub fn stored_value(value: &Constant, of: Elementary) -> Result<u64, String> {
     };
     found.ok_or_else(|| match of {
         Elementary::Bool => "write `true` or `false`".to_owned(),
-        Elementary::Time => "write a duration in quotes, such as \"1.5 s\"".to_owned(),
+        Elementary::Time => "write a duration, such as \"1.5 s\" or \"-20ms\"".to_owned(),
         _ if of.is_real() => "write a finite number, such as 12.5".to_owned(),
         _ if of.is_time() => "dates have no value here".to_owned(),
         _ => whole_number(of.limits()),
@@ -91,4 +93,24 @@ pub(crate) fn value_within(value: &Constant, declared: Declared) -> Result<u64, 
 
 fn whole_number((least, most): (i128, i128)) -> String {
     format!("write a whole number from {least} to {most}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is shown of a duration is taken as it is shown, below 0 too.
+    #[test]
+    fn a_duration_is_read_as_it_is_written() {
+        for nanoseconds in [0, 1, 20_000_000, 1_500_000_000, 3_600_000_000_000] {
+            for stored in [nanoseconds, -nanoseconds].map(|signed: i64| signed as u64) {
+                let text = value_text(Elementary::Time, stored);
+                let bare = text.trim_matches('"');
+                assert_eq!(typed_value(bare, Elementary::Time), Ok(stored), "{bare}");
+            }
+        }
+        for wrong in ["-", "--1s", "1.5", "-1", "1s-", ""] {
+            assert!(typed_value(wrong, Elementary::Time).is_err(), "{wrong}");
+        }
+    }
 }

@@ -174,7 +174,7 @@ pub fn examine_peers(
                     "configuration",
                     Health::Bad,
                     format!("{name} runs configuration {theirs}, and this is {configuration}"),
-                    "copy one cluster file and its ladders to every machine; `understudy check` shows the hash",
+                    "copy one cluster file and its ladders to every machine; `understudy doctor` shows the hash of each",
                 ),
                 (None, Some(reason)) => Finding::trouble(
                     "peer",

@@ -12,6 +12,7 @@ use understudy_wire::Image;
 
 use crate::plan::{Plan, Run, Table, Unread};
 use crate::serial;
+use crate::stream::DeviceStream;
 
 /// What went wrong with a device.
 #[derive(Debug, thiserror::Error)]
@@ -61,7 +62,7 @@ async fn open(connection: &Connection, unit: Slave) -> io::Result<Context> {
             let stream = TcpStream::connect(address).await?;
             // An exchange is many small requests, each of which is waited for.
             stream.set_nodelay(true)?;
-            Ok(tcp::attach_slave(stream, unit))
+            Ok(tcp::attach_slave(DeviceStream(stream), unit))
         }
         Connection::Rtu(line) => Ok(rtu::attach_slave(serial::open(line)?, unit)),
     }

@@ -12,5 +12,6 @@ mod exchange;
 mod number;
 mod plan;
 mod serial;
+mod stream;
 
 pub use device::{Device, Look};

@@ -281,4 +281,14 @@ mod tests {
         let distinct: std::collections::BTreeSet<_> = members.iter().collect();
         assert_eq!(distinct.len(), members.len());
     }
+
+    #[test]
+    fn the_table_of_faults_has_every_kind() {
+        let page = include_str!("../../../../docs/how-to/campaign.md");
+        let rows: Vec<&str> = page.lines().filter(|line| line.starts_with("| `")).collect();
+        for kind in Kind::ALL {
+            let word = format!("`{kind}`");
+            assert!(rows.iter().any(|row| row.contains(&word)), "{word}");
+        }
+    }
 }
