@@ -61,6 +61,9 @@ impl RemoteIo {
         }
         let moment = self.moment();
         let proving = stations.saturating_sub(lacking.len());
+        // In the paper's mode stations of other programs may lack, and this one is driven.
+        let own = lacking.iter().filter(|one| one.reason != LackingReason::Failed);
+        let is_driven = own.count() < stations;
         let paper = self.settings.agreement.mode == Mode::Paper;
         let protected = proving >= STATIONS_NEEDED && (lacking.is_empty() || !paper);
         let agreement = &self.settings.agreement;
@@ -81,7 +84,7 @@ impl RemoteIo {
             return;
         }
         if protection.missed == 0 {
-            if is_first && proving == 0 {
+            if is_first && !is_driven {
                 return;
             }
             protection.since = moment;
