@@ -166,6 +166,9 @@ pub enum WriteRefusal {
     /// The program does not run: its state is not known yet, is lost, or its sensors are unknown.
     #[error("the program does not run")]
     NotRunning,
+    /// The value ended, or another one replaced it, before outputs of a sample with it were applied.
+    #[error("no output that was computed with the value was applied while it lasted")]
+    Void,
     /// The input is forced: no sample has the value.
     #[error(
         "the input is forced for at most {seconds} s more: end the force or wait, then repeat the write"
@@ -174,9 +177,6 @@ pub enum WriteRefusal {
         /// Seconds until the force ends by itself.
         seconds: u32,
     },
-    /// The value ended, or another one replaced it, before outputs of a sample with it were applied.
-    #[error("no output that was computed with the value was applied while it lasted")]
-    Void,
 }
 
 impl WriteRefusal {
