@@ -194,7 +194,7 @@ fn every_command_is_done_or_refused_and_is_in_the_journal() {
     assert_eq!(commanded.len(), 14, "{commanded:?}");
     assert!(commanded.iter().all(|event| event["owner"] == "anna" && event["reason"] == "a test"));
     let refused = commanded.iter().filter(|event| event["refused"].is_string());
-    assert_eq!(refused.count(), 5);
+    assert_eq!(refused.count(), 6);
     // By its remote I/O, which knows its signals.
     assert_eq!(events("force-refused").len(), 1);
     let summary = fs::read_to_string(run.join("summary.json")).expect("a summary");
