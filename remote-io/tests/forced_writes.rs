@@ -258,7 +258,7 @@ impl Bench {
     }
 
     fn value(&self, stored: u64) -> PointValue {
-        PointValue::new(place(self.kind).of.bits() as u32, stored)
+        PointValue::new(place(self.kind).of.bits(), stored)
     }
 
     fn force(&mut self, on: bool) {

@@ -136,7 +136,8 @@ fn outputs_are_driven(text: &str) {
     let wanted = typed.outputs.iter().filter(|point| point.slot != 0);
     let mut wanted: Vec<String> = wanted.map(|point| shaped(&point.name)).collect();
     let mut found: Vec<String> = ladder.outputs.iter().map(|it| it.name.to_string()).collect();
-    (wanted.sort(), found.sort());
+    wanted.sort();
+    found.sort();
     assert_eq!(found, wanted, "{text}");
     check(text, &ladder, &typed, 7);
     let wanted = Wanted { period: Some(PERIOD), program: None };
