@@ -175,7 +175,7 @@ impl Model {
         self.received.note(cycle, heard);
         for station in heard.iter() {
             let own = self.changes.now().station(station);
-            if own.is_some_and(|own| !own.took_turns || own.refused) {
+            if own.is_some_and(|own| !own.took_turns || own.joining || own.refused) {
                 let change = Change::Station(station, StationChange::Received);
                 self.changes.push(cycle, change);
             }

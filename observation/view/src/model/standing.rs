@@ -273,6 +273,7 @@ impl StationChange {
             }
             Self::Received => {
                 own.took_turns = true;
+                own.joining = false;
                 own.refused = false;
             }
             Self::Refused => own.refused = true,
