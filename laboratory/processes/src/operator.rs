@@ -1,6 +1,6 @@
 //! What the laboratory does when somebody commands.
 
-use understudy_journal::{Command, Commanded, Done, OperatorAction, Refusal, RunEvent};
+use understudy_journal::{Command, Commanded, Done, OperatorAction, Refusal};
 use understudy_simulator::{Action, Fault};
 use understudy_wire::{Member, WriteRefusal};
 
@@ -9,8 +9,7 @@ use crate::process::Process;
 
 impl Laboratory<'_> {
     pub(super) async fn obey(&mut self, commanded: Commanded) {
-        let OperatorAction::Command { member, command, owner, reason } = commanded.action.clone()
-        else {
+        let OperatorAction::Command { member, command, .. } = commanded.action.clone() else {
             let alarms = &self.account.terms.alarms;
             let (event, done) = commanded.action.recorded(alarms, &self.refused_orders);
             if let Some(event) = event {
@@ -29,9 +28,10 @@ impl Laboratory<'_> {
         let done = self.obey_command(member, &command).await;
         let is_sent = is_decided_there && done.is_ok();
         // Why it was refused is known later, and in the record. A write is recorded before samples have its value.
-        if !is_sent || matches!(command, Command::Write(_)) {
-            let refused = done.as_ref().err().map(ToString::to_string);
-            self.note(RunEvent::Commanded { member, command, owner, reason, refused });
+        if (!is_sent || matches!(command, Command::Write(_)))
+            && let Some(event) = commanded.action.commanded(done.as_ref().err())
+        {
+            self.note(event);
         }
         // The outcome comes with the journal of the remote I/O.
         if is_sent {

@@ -266,26 +266,7 @@ impl Recorder {
     }
 
     async fn obey(&mut self, commanded: Commanded) {
-        if let OperatorAction::Command {
-            member,
-            command: command @ Command::Write(write),
-            owner,
-            reason,
-        } = &commanded.action
-        {
-            self.own(RunEvent::Commanded {
-                member: *member,
-                command: command.clone(),
-                owner: owner.clone(),
-                reason: reason.clone(),
-                refused: None,
-            });
-            self.journal.flush();
-            let (member, write) = (*member, write.clone());
-            return self.write(member, write, commanded);
-        }
-        let OperatorAction::Command { member, command, owner, reason } = commanded.action.clone()
-        else {
+        let OperatorAction::Command { member, command, .. } = commanded.action.clone() else {
             let (event, done) = commanded.action.recorded(&self.alarms, &self.refused_orders);
             if let Some(event) = event {
                 self.own(event);
@@ -294,16 +275,21 @@ impl Recorder {
             commanded.answer(done);
             return;
         };
+        if let Command::Write(write) = command {
+            self.commanded(&commanded, None);
+            return self.write(member, write, commanded);
+        }
         let done = self.command(member, &command).await;
-        self.own(RunEvent::Commanded {
-            member,
-            command,
-            owner,
-            reason,
-            refused: done.as_ref().err().map(ToString::to_string),
-        });
-        self.journal.flush();
+        self.commanded(&commanded, done.as_ref().err());
         commanded.answer(done);
+    }
+
+    /// Records a command, with why it was refused.
+    fn commanded(&mut self, commanded: &Commanded, refused: Option<&Refusal>) {
+        if let Some(event) = commanded.action.commanded(refused) {
+            self.own(event);
+            self.journal.flush();
+        }
     }
 
     async fn command(&self, member: Member, command: &Command) -> Result<Done, Refusal> {

@@ -205,6 +205,20 @@ impl OperatorAction {
         event.map_err(Refusal::Alarm)
     }
 
+    /// The record of a command to a member, with why it was refused; nothing for other actions.
+    pub fn commanded(&self, refused: Option<&Refusal>) -> Option<RunEvent> {
+        let Self::Command { member, command, owner, reason } = self else {
+            return None;
+        };
+        Some(RunEvent::Commanded {
+            member: *member,
+            command: command.clone(),
+            owner: owner.clone(),
+            reason: reason.clone(),
+            refused: refused.map(ToString::to_string),
+        })
+    }
+
     /// The record of an action that is no command to a member, and what it came to. A refused one has a record too, within `refused`.
     pub fn recorded(
         &self,

@@ -55,20 +55,10 @@ pub struct DecidedOrder {
 impl DecidedOrder {
     /// Its record, which says why it was refused; nothing for a write, which is recorded when it is sent.
     pub fn record(&self) -> Option<RunEvent> {
-        match &self.commanded.action {
-            OperatorAction::Command { member, command, owner, reason }
-                if !self.commanded.is_write() =>
-            {
-                Some(RunEvent::Commanded {
-                    member: *member,
-                    command: command.clone(),
-                    owner: owner.clone(),
-                    reason: reason.clone(),
-                    refused: self.done.as_ref().err().map(ToString::to_string),
-                })
-            }
-            _ => None,
+        if self.commanded.is_write() {
+            return None;
         }
+        self.commanded.action.commanded(self.done.as_ref().err())
     }
 
     /// Answers its caller.
