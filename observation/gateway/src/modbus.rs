@@ -229,27 +229,32 @@ fn is_of_run(request: &Request<'_>) -> bool {
 }
 
 fn answer(image: &ProcessImage, request: &Request<'_>) -> Result<Response, ExceptionCode> {
-    let known = |area, address, count, response| {
+    let known = |area, address, count| {
         let first = usize::from(address);
         let is_known = image.is_known(area, &(first..first + usize::from(count)));
-        is_known.then_some(response).ok_or(ExceptionCode::GatewayTargetDevice)
+        is_known.then_some(()).ok_or(ExceptionCode::GatewayTargetDevice)
+    };
+    let bits = |table, area, address, count| {
+        let bits = part(table, address, count, MOST_BITS)?;
+        known(area, address, count).map(|()| bits)
+    };
+    let registers = |address, count| {
+        let registers = part(&image.registers, address, count, MOST_REGISTERS)?;
+        known(Area::Register, address, count).map(|()| registers)
     };
     match *request {
         Request::ReadCoils(address, count) => {
-            let coils = part(&image.coils, address, count, MOST_BITS)?;
-            known(Area::Coil, address, count, Response::ReadCoils(coils))
+            bits(&image.coils, Area::Coil, address, count).map(Response::ReadCoils)
         }
         Request::ReadDiscreteInputs(address, count) => {
-            let inputs = part(&image.inputs, address, count, MOST_BITS)?;
-            known(Area::DiscreteInput, address, count, Response::ReadDiscreteInputs(inputs))
+            let inputs = bits(&image.inputs, Area::DiscreteInput, address, count);
+            inputs.map(Response::ReadDiscreteInputs)
         }
         Request::ReadInputRegisters(address, count) => {
-            let registers = part(&image.registers, address, count, MOST_REGISTERS)?;
-            known(Area::Register, address, count, Response::ReadInputRegisters(registers))
+            registers(address, count).map(Response::ReadInputRegisters)
         }
         Request::ReadHoldingRegisters(address, count) => {
-            let registers = part(&image.registers, address, count, MOST_REGISTERS)?;
-            known(Area::Register, address, count, Response::ReadHoldingRegisters(registers))
+            registers(address, count).map(Response::ReadHoldingRegisters)
         }
         _ => Err(ExceptionCode::IllegalFunction),
     }
