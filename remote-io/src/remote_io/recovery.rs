@@ -35,11 +35,11 @@ impl RemoteIo {
         let listen_cycles = self.settings.agreement.listen_cycles;
         // Frames received while this remote I/O was suspended are read at once and count as one cycle: the stations may
         // have changed.
-        let period = self.settings.agreement.schedule.period();
+        let schedule = &self.settings.agreement.schedule;
         let unseen = now.since(self.looked);
-        let counted = unseen * 2 >= period;
+        let counted = schedule.took_time(unseen);
         // What it saw before it was suspended says nothing of the stations now: one that held the state may be back.
-        let was_suspended = unseen >= period * 2;
+        let was_suspended = unseen >= schedule.period() * 2;
         if counted {
             self.looked = now;
         }

@@ -62,9 +62,9 @@ impl RemoteIo {
         });
         let before = self.writing.in_history(history);
         let void = history.make_room(living, floor.map(|floor| floor.lineage));
-        let kept =
-            |id: WriteId| before.iter().all(|(it, place)| *it != id || history.keeps(*place));
-        let mut void_writes = self.writing.lose(operator_inputs, moment, |id| !kept(id));
+        let is_lost =
+            |id: WriteId| before.iter().any(|(it, place)| *it == id && !history.keeps(*place));
+        let mut void_writes = self.writing.lose(operator_inputs, moment, is_lost);
         let mut inputs = self.field.clone();
         self.writing.put(operator_inputs, history.newest(), &mut inputs);
         let validity = self.signals.put(&self.settings.signals, moment, &mut inputs);
