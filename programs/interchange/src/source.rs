@@ -144,15 +144,13 @@ fn has_numbers_as_points(program: &Typed) -> bool {
 
 /// Whether a ladder has the points of a program, all of them bits, under their names.
 fn has_points_of(ladder: &Ladder, program: &Typed) -> bool {
-    let own = |points: &Points| -> Vec<String> {
-        points.iter().filter(|point| point.slot != 0).map(|point| point.name.clone()).collect()
-    };
-    let names = |signals: &[Signal]| -> Vec<String> {
-        signals.iter().map(|signal| signal.name.to_string()).collect()
+    let are_alike = |signals: &[Signal], points: &Points| {
+        let own = points.iter().filter(|point| point.slot != 0);
+        signals.iter().map(|it| it.name.as_str()).eq(own.map(|point| point.name.as_str()))
     };
     !has_numbers_as_points(program)
-        && names(&ladder.inputs) == own(&program.inputs)
-        && names(&ladder.outputs) == own(&program.outputs)
+        && are_alike(&ladder.inputs, &program.inputs)
+        && are_alike(&ladder.outputs, &program.outputs)
 }
 
 /// Whether a signal has a name as the bits of a number have, such as `speed.0`.

@@ -207,9 +207,6 @@ impl<'a> Unrolling<'a> {
                     point.of
                 )));
             }
-        }
-        let points = program.inputs.iter().chain(program.outputs.iter());
-        for point in points.filter(|point| point.slot != 0) {
             let address = 64 * u64::from(point.slot);
             if program.part_at(address).is_none() {
                 let name = self.unique(&shaped(point.name.trim_start_matches('%')));

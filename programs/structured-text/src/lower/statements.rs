@@ -360,18 +360,17 @@ impl Lowering<'_> {
         let mut place = target.place;
         place.of = Type::Elementary(counter);
         let from = reinterpret(from, counter);
-        let first = passes.as_ref().map(|_| (place.clone(), from.clone()));
+        let no_turn = StatementKind::Assign(place.clone(), from.clone());
         let turns =
             StatementKind::For(Box::new(For { counter: place, from, to, by, body: statements }));
-        let Some((condition, (place, from))) = passes.zip(first) else {
+        let Some(condition) = passes else {
             return Some(turns);
         };
         // An end below 0, which no unsigned counter has, makes no turn.
         let line = self.line(&written.counter.span);
         let statement = |kind| Statement { line, kind };
         let branch = Branch { condition, body: vec![statement(turns)] };
-        let otherwise = vec![statement(StatementKind::Assign(place, from))];
-        Some(StatementKind::If(vec![branch], otherwise))
+        Some(StatementKind::If(vec![branch], vec![statement(no_turn)]))
     }
 
     /// The condition of a loop, where it can be evaluated once more than it is written: it calls nothing, and the counter does not change it. Warns
