@@ -53,7 +53,7 @@ mod tests {
 
     use super::*;
 
-    /// A device that accepts, reads so many bytes, and closes.
+    /// A device that accepts, reads a request, and closes.
     #[test]
     fn a_device_that_closes_the_connection_is_named() {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();

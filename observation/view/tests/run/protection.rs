@@ -305,7 +305,7 @@ fn a_station_that_publishes_again_is_no_cause_of_lost_protection() {
     }
 }
 
-/// All stations fail together and come back without a state: a counter of a running plant is 0, and that is an alarm. A first start is none.
+/// All stations fail together and come back without a state: a counter of a running plant is 0, and that is an alarm. A first start raises no alarm.
 #[test]
 fn a_state_that_all_stations_have_lost_is_an_alarm() {
     let kinds = ["started-cold", "state-lost"];
