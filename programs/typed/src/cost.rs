@@ -291,7 +291,7 @@ fn applied(operation: Operation, operands: &[Expression]) -> u64 {
 }
 
 /// The turns of a loop at most, where its bounds are constants and its body leaves the counter alone.
-fn turns(each: &For) -> Option<u64> {
+pub(crate) fn turns(each: &For) -> Option<u64> {
     let of = each.counter.of.elementary()?;
     let constant = |expression: &Expression| match expression.kind {
         ExpressionKind::Constant(stored) => Some(of.signed(stored)),

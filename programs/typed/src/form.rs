@@ -63,15 +63,18 @@ impl Program {
     /// The name of the output that is TRUE while the program is stopped by a fault.
     pub const FAULT: &str = "program.fault";
 
-    /// Appends the two points that every program has, [`Program::RESET`] and [`Program::FAULT`], both of type BOOL, unless they are there, and gives
-    /// all points the initial values of their variables. A front end calls it after the declared points and the initial state.
+    /// Appends [`Program::RESET`] and [`Program::FAULT`], both of type BOOL, unless they are there, and gives all points the initial values of their
+    /// variables. A Boolean program that [cannot stop](Program::can_fault) has neither. A front end calls it after the declared points, the routines
+    /// and the initial state.
     ///
     /// They stand at slot 0, which no variable has: the input there is the reset and is not stored, the output there is whether slot 0 holds a fault.
     pub fn seal_points(&mut self) {
-        if self.inputs.iter().all(|point| point.slot != 0) {
+        let mut points = self.inputs.iter().chain(&self.outputs);
+        let stops = points.any(|point| point.of != Elementary::Bool) || self.can_fault();
+        if stops && self.inputs.iter().all(|point| point.slot != 0) {
             self.inputs.push(Self::RESET, Elementary::Bool, 0);
         }
-        if self.outputs.iter().all(|point| point.slot != 0) {
+        if stops && self.outputs.iter().all(|point| point.slot != 0) {
             self.outputs.push(Self::FAULT, Elementary::Bool, 0);
         }
         let state = self.initial_state();

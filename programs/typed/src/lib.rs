@@ -19,6 +19,7 @@ mod notation;
 mod operation;
 mod row;
 mod scan;
+mod stops;
 mod types;
 mod validate;
 mod visit;

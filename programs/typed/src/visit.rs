@@ -93,7 +93,12 @@ impl<'a> Uses<'a> {
 
 /// The bodies within a statement.
 pub(crate) fn bodies(statement: &Statement) -> Vec<&[Statement]> {
-    match &statement.kind {
+    bodies_of(&statement.kind)
+}
+
+/// The bodies within what a statement does.
+pub(crate) fn bodies_of(statement: &StatementKind) -> Vec<&[Statement]> {
+    match statement {
         StatementKind::If(branches, otherwise) => {
             let branches = branches.iter().map(|branch| &*branch.body);
             branches.chain([&**otherwise]).collect()

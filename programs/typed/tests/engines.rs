@@ -4,7 +4,7 @@ mod common;
 
 use common::Random;
 use proptest::prelude::*;
-use understudy_typed::{Fault, Interpreter, Machine, Program, Scratch};
+use understudy_typed::{Fault, Interpreter, Machine, Points, Program, Scratch};
 
 /// What the scans of a program came to.
 #[derive(Debug, Default)]
@@ -12,11 +12,15 @@ struct Account {
     scans: u64,
     faults: [u64; 8],
     resets: u64,
+    /// Programs of which it is known that they never stop.
+    steady: u64,
 }
 
 /// Runs both engines side by side.
 fn compare(program: &Program, seed: u64, scans: usize, account: &mut Account) {
     assert_eq!(program.validate(), Ok(()));
+    let can_fault = program.can_fault();
+    account.steady += u64::from(!can_fault);
     let interpreter = Interpreter::new(program);
     let machine = Machine::new(program);
     assert_eq!(machine.initial(), interpreter.initial());
@@ -50,6 +54,7 @@ fn compare(program: &Program, seed: u64, scans: usize, account: &mut Account) {
         }
         account.scans += 1;
         let fault = Fault::read(&state);
+        assert!(can_fault || fault.is_none(), "{fault:?}\n{program:#?}");
         if let (Some(fault), false) = (fault, was_faulted) {
             account.faults[usize::from(fault.cause.code())] += 1;
             assert!(fault.routine.is_none() || fault.line > 0, "{fault:?}");
@@ -83,6 +88,24 @@ fn random_programs_fault_in_every_way_and_run_besides() {
     assert!(faults < account.scans / 2, "{account:?}");
     assert!(account.faults[1..].iter().all(|&count| count > 0), "{account:?}");
     assert!(account.resets > 20, "{account:?}");
+}
+
+/// Small programs, among which are some that cannot stop.
+#[test]
+fn what_cannot_stop_does_not() {
+    let mut account = Account::default();
+    for seed in 0..600 {
+        let mut program = common::program(seed, 1);
+        program.outputs = program.outputs.iter().filter(|it| !it.of.is_real()).fold(
+            Points::default(),
+            |mut points, point| {
+                points.push(&point.name, point.of, point.slot);
+                points
+            },
+        );
+        compare(&program, seed, 12, &mut account);
+    }
+    assert!(account.steady > 0, "{account:?}");
 }
 
 /// A row of more slots than an operand of 16 bits can name.
