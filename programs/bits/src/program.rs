@@ -451,6 +451,9 @@ impl System {
                 _ => self.shown.push((name, value)),
             }
         }
+        if program.outputs.find(Program::FAULT).is_none() {
+            self.observed.push((format!("{prefix}{}", Program::FAULT), faulted));
+        }
         let mut rest: Vec<(u64, Term)> = after.iter().map(|(&at, &term)| (at, term)).collect();
         rest.sort_unstable();
         let is_point = |address: u64| {

@@ -4,6 +4,7 @@ mod running;
 
 use running::{check, once, program, read, shown};
 use understudy_text::Severity;
+use understudy_typed::{Points, Program};
 
 #[test]
 fn literals_take_the_type_of_what_stands_beside_them() {
@@ -249,6 +250,53 @@ fn globals_addresses_and_tasks() {
     assert_eq!(program.period, 10_000_000);
     let text = "PROGRAM main VAR a AT %IX0.1 : BOOL; q AT %QW0 : WORD; END_VAR q.0 := a OR %IX0.2; q.1 := %IX0.1; END_PROGRAM";
     check(text, &[(&[1, 0], "3"), (&[0, 1], "1")]);
+}
+
+/// A program of BOOL points has the fault and the reset where one of its statements can stop it, and a program of other points always.
+#[test]
+fn only_a_program_that_can_stop_has_a_fault() {
+    let check = |declared: &str, body: &str, expected: bool| {
+        let text = format!(
+            "FUNCTION half : INT VAR_INPUT x : INT; END_VAR half := x / 2; END_FUNCTION
+            FUNCTION ratio : INT VAR_INPUT x : INT; END_VAR ratio := 100 / x; END_FUNCTION
+            PROGRAM main VAR_INPUT a : BOOL; END_VAR VAR_OUTPUT q : BOOL; END_VAR VAR n : INT; i : INT; t : TON; r : REAL; s : STRING[3];
+            w : ARRAY [0..7] OF BOOL; {declared} END_VAR {body} END_PROGRAM"
+        );
+        let program = program(&text);
+        assert_eq!(program.can_fault(), expected, "{body}");
+        let has = |points: &Points, name: &str| points.find(name).is_some();
+        let found = has(&program.outputs, Program::FAULT);
+        assert_eq!(found, expected, "{body}");
+        assert_eq!(has(&program.inputs, Program::RESET), found, "{body}");
+    };
+    for (body, expected) in [
+        ("q := a; t(IN := a, PT := T#1s); q := t.Q AND t.ET > T#200ms;", false),
+        ("n := n + 1; q := n / 2 MOD 3 = 1;", false),
+        ("q := half(n) > 1;", false),
+        ("q := ratio(n) > 1;", true),
+        ("n := n / i;", true),
+        ("r := 1.0 / r; q := r > 0.5;", false),
+        ("w[2] := a; q := w[1];", false),
+        ("w[n] := a;", true),
+        ("q := w[n];", true),
+        ("FOR i := 0 TO 7 DO w[i] := a; END_FOR;", false),
+        ("FOR i := 0 TO 6 DO w[i + 1] := w[i]; END_FOR; q := w[7];", false),
+        ("FOR i := 7 TO 1 BY -1 DO w[i] := w[i - 1]; END_FOR;", false),
+        ("FOR i := 0 TO 8 DO w[i] := a; END_FOR;", true),
+        ("FOR i := 0 TO 7 DO w[i + 1] := a; END_FOR;", true),
+        ("FOR i := 0 TO 7 DO w[i] := a; i := i + 1; END_FOR;", true),
+        ("FOR i := 0 TO 7 DO ; END_FOR; w[i] := a;", true),
+        ("FOR i := 0 TO n DO q := a; END_FOR;", true),
+        ("WHILE a DO q := a; END_WHILE;", true),
+        ("n := MUX(n, 1, 2);", true),
+        ("s := 'abc'; q := s = 'b';", false),
+        ("s := CONCAT(s, 'b');", true),
+    ] {
+        check("", body, expected);
+    }
+    let text = "PROGRAM main VAR_INPUT n : INT; END_VAR VAR_OUTPUT q : BOOL; END_VAR q := n > 1; END_PROGRAM";
+    let program = program(text);
+    assert!(!program.can_fault() && program.outputs.find(Program::FAULT).is_some());
 }
 
 #[test]
