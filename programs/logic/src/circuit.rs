@@ -49,6 +49,12 @@ impl Circuit {
         &self.name
     }
 
+    /// The same under another name.
+    #[must_use]
+    pub fn named(self, name: &str) -> Self {
+        Self { name: name.to_owned(), ..self }
+    }
+
     /// The owner of all its expressions.
     pub fn graph(&self) -> &Graph {
         &self.graph
