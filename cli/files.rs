@@ -272,15 +272,7 @@ pub(crate) fn ladder_at(
     let read = read_ladder(&file.name, &file.text, period);
     let program = read.program.filter(|_| !has_errors(&read.diagnostics));
     let Some(program) = program else {
-        let typed = read_source(&file.name, &file.text, Wanted::default()).source;
-        let answer = Answer::bad_files(file.reports(read.diagnostics));
-        return Err(match typed {
-            Some(Source::Typed(typed)) if typed.tasks.len() == 1 => {
-                let message = "this command works on Boolean programs, and the program has numbers";
-                answer.and_failure(Status::BadInput, "U0438", message)
-            }
-            _ => answer,
-        });
+        return Err(Answer::bad_files(file.reports(read.diagnostics)));
     };
     Ok((program, file.reports(read.diagnostics), read.period))
 }
@@ -441,19 +433,33 @@ pub(crate) fn parity_of<'a>(
     if let Some(parity) = cluster.parity() {
         return Ok(Cow::Borrowed(parity));
     }
-    let bad = |code, message: String| Answer::failed(Status::BadInput, code, message);
-    let mut circuits = Vec::new();
-    for controller in cluster.controllers() {
-        let circuit = controller.code.exact_circuit().map_err(|inexact| {
-            let name = &controller.name;
-            let message = format!(
-                "`{command}` works on circuits, and the program of `{name}` has none: {inexact}"
-            );
-            bad("U0438", message)
-        })?;
-        circuits.push(circuit);
-    }
-    let circuits: Vec<&Circuit> = circuits.iter().map(AsRef::as_ref).collect();
-    let parity = generate(&circuits).map_err(|error| bad(error.code(), error.to_string()))?;
+    let (_, parity) = understudy_of(cluster).map_err(|(code, reason)| {
+        let message = match code {
+            "U0438" => format!("`{command}` works on circuits, and {reason}"),
+            _ => reason,
+        };
+        Answer::failed(Status::BadInput, code, message)
+    })?;
     Ok(Cow::Owned(parity))
+}
+
+/// The circuits of the programs of a cluster, and the generated controller.
+///
+/// # Errors
+/// A code and the reason: which program has no circuit, and which of its values is in the way.
+pub(crate) fn understudy_of(
+    cluster: &Cluster,
+) -> Result<(Vec<Circuit>, ParityController), (&'static str, String)> {
+    let circuits = cluster.circuits().map_err(|(name, inexact)| {
+        ("U0438", format!("the program of `{name}` has no circuit: {inexact}"))
+    })?;
+    let circuits: Vec<Circuit> = circuits.into_iter().map(Cow::into_owned).collect();
+    let parity = match cluster.parity() {
+        Some(parity) => parity.clone(),
+        None => {
+            let members: Vec<&Circuit> = circuits.iter().collect();
+            generate(&members).map_err(|error| (error.code(), error.to_string()))?
+        }
+    };
+    Ok((circuits, parity))
 }

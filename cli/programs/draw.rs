@@ -56,6 +56,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         (Source::Ladder(program), Form::Text) => (draw_text(&program), true),
         (Source::Ladder(program), Form::Svg) => (draw_svg(&program), true),
         (Source::Ladder(program), Form::Digraph) => (digraph::draw_svg(&program), true),
+        (_, Form::Digraph) => (digraph::draw_svg(&files::ladder(path)?.0), false),
         (_, form) => match typed(path, &mut file.report, wanted, form) {
             Ok(text) => (text, false),
             Err(answer) => return Err(answer.with_reports(file.reports())),
@@ -83,12 +84,8 @@ fn typed(
         _ => Bodies::AsRead,
     };
     let (text, found) = match form {
-        Form::Digraph => {
-            let message = "a digraph is made of one ladder, and the program is none: use --as svg";
-            return Err(Answer::failed(Status::BadInput, "U0438", message));
-        }
         Form::Text => listing(name, &report.text, wanted),
-        Form::Svg | Form::Fbd => draw_typed(name, &report.text, wanted, bodies),
+        Form::Svg | Form::Fbd | Form::Digraph => draw_typed(name, &report.text, wanted, bodies),
     };
     let Some(text) = text else {
         let message = format!(

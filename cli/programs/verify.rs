@@ -3,7 +3,6 @@
 mod answer;
 mod numbers;
 
-use std::borrow::Cow;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -13,8 +12,6 @@ use serde_json::json;
 use understudy_cluster::{Cluster, Overrides};
 use understudy_interchange::{NOT_EXECUTED, Source, Wanted};
 use understudy_ladder::Program;
-use understudy_logic::Circuit;
-use understudy_parity::generate;
 use understudy_text::duration::parse_positive;
 use understudy_text::{Diagnostic, Report, Severity, has_errors};
 use understudy_verification::program::{Bounds, Remarks, Subject};
@@ -43,9 +40,10 @@ Example:
   understudy verify examples/boiler/complete.ladder --period 100ms --budget 60s
   understudy verify examples/painting-system/painting-system.ladder --resources
 
-Without a property the command proves the standard property of every ladder program: each output can always be switched on and off again. It
+Without a property the command proves the standard property of every ladder: each output can always be switched on and off again. It
 also remarks on rungs without effect, coils with conflicting values in one scan, and sequence steps that are passed in one scan. Of a program
-with numbers it proves that no program fault stops it. For a cluster it proves that the understudy equals the sum of its members, or the
+of statements it proves the same where its inputs and outputs are BOOLs and all values are finite, and of one that can stop, that no program
+fault stops it. For a cluster it proves that the understudy equals the sum of its members, or the
 given properties of all programs together. Formulas, sentences and property files: docs/reference/properties.md.
 
 Exit status: 0 if everything is proved, 1 if a property fails or is undecided, 2 for invalid input.")]
@@ -314,27 +312,16 @@ fn used(arguments: &Arguments, patience: &Patience<'_>) -> Option<Resources> {
     arguments.resources.then(|| patience.resources())
 }
 
-/// Whether the generated understudy is the sum of its members. With programs that are no circuits stations execute all programs and add their
-/// outputs; then the parity controller is generated and compared that `understudy parity` prints.
+/// Whether the generated understudy is the sum of its members. With programs that are not executed as circuits stations execute all programs and add
+/// their outputs; then the parity controller is generated and compared that `understudy parity` prints.
 fn parity_proof(cluster: &Cluster, bounds: Bounds<'_>) -> UnderstudyProof {
-    let mut members: Vec<Circuit> = Vec::new();
-    for controller in cluster.controllers() {
-        match controller.code.exact_circuit() {
-            Ok(circuit) => members.push(circuit.into_owned()),
-            Err(inexact) => {
-                return UnderstudyProof::LeftOut(format!(
-                    "no parity controller is generated and compared, since the program of `{}` has no circuit: {inexact}; the understudy executes the programs themselves and adds their outputs",
-                    controller.name
-                ));
-            }
+    let (members, generated) = match files::understudy_of(cluster) {
+        Ok(found) => found,
+        Err((_, reason)) => {
+            return UnderstudyProof::LeftOut(format!(
+                "no parity controller is generated and compared, since {reason}; the understudy executes the programs themselves and adds their outputs"
+            ));
         }
-    }
-    let generated = match cluster.parity() {
-        Some(parity) => Cow::Borrowed(parity),
-        None => match generate(&members) {
-            Ok(parity) => Cow::Owned(parity),
-            Err(error) => return UnderstudyProof::LeftOut(error.to_string()),
-        },
     };
     match prove_parity_while(&members, generated.circuit(), bounds.nodes, bounds.go_on) {
         Ok(proof) => UnderstudyProof::Proved(format!(

@@ -26,10 +26,13 @@ fn what_is_written_is_read_again_by_every_command() {
         assert_eq!(answer.status, 0, "{from}: {}", answer.shown());
         assert_eq!(answer.json()["result"]["file"], to);
     }
-    for file in ["pump.xml", "again.xml", "probes.xml", "pump.st"] {
+    // Rungs are drawn, and statements are listed.
+    for (file, shown) in
+        [("pump.xml", "( )"), ("again.xml", ":="), ("probes.xml", "( )"), ("pump.st", ":=")]
+    {
         assert_eq!(understudy_in(&folder, &["check", file]).status, 0, "{file}");
         let drawn = understudy_in(&folder, &["draw", file]);
-        assert!(drawn.output.contains("( )"), "{file}: {}", drawn.shown());
+        assert!(drawn.output.contains(shown), "{file}: {}", drawn.shown());
     }
     let proved = understudy_in(&folder, &["verify", "again.xml", "--json"]);
     assert_ne!(proved.status, 2, "{}", proved.shown());

@@ -53,14 +53,12 @@ fn all_programs_of_a_file_are_meant() {
     let run = |arguments: &[&str]| understudy_in(&folder, arguments);
     assert_eq!(run(&["convert", "two.st", "two.xml"]).status, 0);
     for file in ["two.st", "two.xml"] {
-        // What one of them does shows in the proof, and what counts the rungs of a ladder takes no part of a file.
+        // What one of them does shows in the proof, and what counts rungs takes no part of a file.
         let refuted = run(&["verify", file, "--property", "never two.q"]);
         assert_eq!(refuted.status, 1, "{file}: {}", refuted.shown());
         for command in ["allocate", "resources"] {
-            let refused = run(&[command, file]);
-            assert_eq!(refused.status, 2, "{command} {file}: {}", refused.shown());
-            let said = &refused.errors;
-            assert!(said.contains("U1013") && !said.contains("has numbers"), "{}", refused.shown());
+            let counted = run(&[command, file]);
+            assert_eq!(counted.status, 0, "{command} {file}: {}", counted.shown());
         }
         for command in ["scan --digest 10", "verify", "draw"] {
             let words: Vec<&str> = command.split(' ').collect();

@@ -208,7 +208,7 @@ fn every_command_takes_a_project() {
             assert!(text.contains(name), "{text}");
         }
     }
-    assert_eq!(run(&["allocate", "bits"]).status, run(&["allocate", "cell04/MAIN.ladder"]).status);
+    assert_eq!(run(&["allocate", "bits"]).status, run(&["allocate", "cell04/MAIN.st"]).status);
     // Another compiler has no list of that name, and no block that nothing uses.
     for form in ["st", "plcopen"] {
         let written = run(&["convert", "numbers", "--to", form]).output;

@@ -91,3 +91,55 @@ fn conversions_keep_whole_numbers() {
         assert!(is_said, "{of}: {}", answer.shown());
     }
 }
+
+/// A program whose points are BOOLs and that counts inside is the same program in every command: its variables have the names and types of their
+/// declarations, and a command that needs a circuit derives one.
+#[test]
+fn numbers_inside_a_boolean_program_stay_numbers() {
+    let folder = empty_folder("whole_numbers_inside");
+    let counter = "PROGRAM parts\n  VAR_INPUT part : BOOL; clear : BOOL; END_VAR\n  VAR_OUTPUT full : BOOL; END_VAR\n  VAR count : INT; edge : R_TRIG; pause : TON; END_VAR\n  edge(CLK := part);\n  IF clear THEN count := 0; ELSIF edge.Q AND count < 5 THEN count := count + 1; END_IF;\n  pause(IN := count = 5, PT := T#30ms);\n  full := pause.Q;\nEND_PROGRAM\n";
+    let lamp = "program lamp\ninput key\noutput light\nrung\n    key ( light )\n";
+    let cluster = "[cluster]\nname = \"cell\"\n[[controller]]\nname = \"parts\"\nladder = \"parts.st\"\n[[controller]]\nname = \"lamp\"\nladder = \"lamp.ladder\"\n[[understudy]]\nname = \"u\"\n[[remote_io]]\ncontroller = \"parts\"\n[remote_io.inputs]\npart = { operator = \"pulse\" }\nclear = { operator = \"pulse\" }\n[[remote_io]]\ncontroller = \"lamp\"\n[remote_io.inputs]\nkey = { operator = \"pulse\" }\n";
+    let real = "PROGRAM level\n  VAR_INPUT part : BOOL; END_VAR\n  VAR_OUTPUT full : BOOL; END_VAR\n  VAR level : REAL; END_VAR\n  IF part THEN level := level + 0.5; END_IF;\n  full := level > 3.0;\nEND_PROGRAM\n";
+    for (name, text) in [
+        ("parts.st", counter),
+        ("lamp.ladder", lamp),
+        ("cell.toml", cluster),
+        ("level.st", real),
+        ("inputs.txt", "1 0\n0 1\n"),
+    ] {
+        fs::write(folder.join(name), text).expect("written");
+    }
+    let run = |arguments: &[&str]| {
+        let answer = understudy_in(&folder, arguments);
+        assert_eq!(answer.status, 0, "{}", answer.shown());
+        answer.output
+    };
+    assert!(run(&["check", "parts.st", "cell.toml"]).contains("operations a scan"));
+    // It cannot stop, so it has neither a fault nor a reset.
+    assert_eq!(run(&["scan", "parts.st", "--inputs", "inputs.txt"]), "1 0 -> 0\n0 1 -> 0\n");
+    let property = "never program.fault";
+    let proved = run(&["verify", "parts.st", "--property", property, "--property", "EF edge.Q"]);
+    assert!(proved.contains("full can always be switched on and off again"), "{proved}");
+    let proved = run(&["verify", "cell.toml"]);
+    assert!(proved.contains("the understudy equals the sum of its members"), "{proved}");
+    assert!(run(&["parity", "cell.toml"]).contains("parts.count.2"));
+    let counted = understudy_in(&folder, &["resources", "cell.toml", "--json"]).json();
+    let programs = counted["result"]["programs"].as_array().expect("a list");
+    let names: Vec<&str> = programs.iter().filter_map(|found| found["name"].as_str()).collect();
+    assert_eq!(names, ["parts", "lamp", "understudy"]);
+    assert_eq!(
+        (programs[0]["inputs"].as_u64(), programs[0]["outputs"].as_u64()),
+        (Some(2), Some(1))
+    );
+    run(&["simulate", "cell.toml", "--cycles", "30", "--seed", "1", "--out", "runs"]);
+    let why = run(&["why", "parts.full", "runs/latest", "--at", "20"]);
+    assert!(why.contains("full := pause.Q"), "{why}");
+    // What has no bits is named.
+    for command in [&["resources", "level.st"][..], &["verify", "level.st", "--smv", "scan"]] {
+        let answer = understudy_in(&folder, command);
+        assert_eq!(answer.status, 2, "{}", answer.shown());
+        assert!(answer.errors.contains("U0438"), "{}", answer.shown());
+        assert!(answer.errors.contains("level"), "{}", answer.shown());
+    }
+}

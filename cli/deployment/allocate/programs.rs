@@ -1,14 +1,17 @@
 //! Reads ladder programs and clusters from the command line.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Duration;
 
+use understudy_bits::exact;
 use understudy_cluster::{Cluster, Overrides};
-use understudy_interchange::USUAL_PERIOD;
-use understudy_ladder::Program;
+use understudy_interchange::{Source, USUAL_PERIOD, Wanted, read_ladder};
+use understudy_ladder::{Program, from_circuit};
 use understudy_logic::Circuit;
 use understudy_parity::{ParityController, generate};
 use understudy_text::{Report, duration};
+use understudy_typed::Program as Typed;
 
 use crate::answer::{Answer, Status};
 use crate::files;
@@ -35,8 +38,11 @@ pub(crate) struct Group {
 /// A program with its circuit.
 pub(crate) struct Member {
     pub(crate) name: String,
+    /// What is counted: of a program that is not drawn as a ladder, the rungs of its statements or of its circuit.
     pub(crate) ladder: Program,
     pub(crate) circuit: Circuit,
+    /// The program, where it is not drawn as a ladder.
+    pub(crate) typed: Option<Arc<Typed>>,
 }
 
 impl Group {
@@ -91,15 +97,7 @@ impl Programs {
         }
         for cluster in clusters {
             let prefix = prefix(cluster.name());
-            let mut controllers = cluster.controllers().iter();
-            if let Some(other) = controllers.find(|controller| controller.ladder().is_none()) {
-                let message = format!(
-                    "`allocate` counts rungs, and the program of `{}` is written in statements",
-                    other.name
-                );
-                return Err(Answer::failed(Status::BadInput, "U0438", message));
-            }
-            groups.push(of_cluster(cluster, prefix));
+            groups.push(of_cluster(cluster, prefix)?);
         }
         Ok(Self { groups, reports })
     }
@@ -118,11 +116,19 @@ impl Programs {
 }
 
 fn ladder(path: &Path, period: Duration) -> Result<(Member, Vec<Report>), Answer> {
-    let (program, reports, _) = files::ladder_at(path, Some(period))?;
-    let circuit =
-        program.lower(period).map_err(|error| Answer::failed(Status::BadInput, "U0436", error))?;
-    let member = Member { name: program.name.to_string(), ladder: program, circuit };
-    Ok((member, reports))
+    let (ladder, reports, _) = files::ladder_at(path, Some(period))?;
+    let wanted = Wanted { program: None, period: Some(period) };
+    let failed = |code, message: String| Answer::failed(Status::BadInput, code, message);
+    let typed = match files::program(path, wanted)?.0 {
+        Source::Typed(typed) => Some(typed),
+        Source::Ladder(_) | Source::Library(_) => None,
+    };
+    let circuit = match &typed {
+        Some(typed) => exact(typed).map_err(|inexact| failed("U0438", inexact.to_string())),
+        None => ladder.lower(period).map_err(|error| failed("U0436", error.to_string())),
+    };
+    let (name, circuit) = (ladder.name.to_string(), circuit?);
+    Ok((Member { name, ladder, circuit, typed }, reports))
 }
 
 fn of_ladders(members: Vec<Member>, period: Duration, prefix: String) -> Result<Group, Answer> {
@@ -138,19 +144,26 @@ fn of_ladders(members: Vec<Member>, period: Duration, prefix: String) -> Result<
     })
 }
 
-fn of_cluster(cluster: Cluster, prefix: String) -> Group {
-    let members = cluster.controllers().iter().filter_map(|controller| {
-        Some(Member {
+fn of_cluster(cluster: Cluster, prefix: String) -> Result<Group, Answer> {
+    let (circuits, parity) = files::understudy_of(&cluster)
+        .map_err(|(code, reason)| Answer::failed(Status::BadInput, code, reason))?;
+    let period = cluster.agreement().schedule.period();
+    let members = cluster.controllers().iter().zip(circuits).map(|(controller, circuit)| {
+        let of_text = |text| read_ladder(&controller.file, text, Some(period)).program;
+        let ladder = controller.ladder().cloned();
+        let ladder = ladder.or_else(|| controller.code.source_text().and_then(of_text));
+        Member {
             name: controller.name.clone(),
-            ladder: controller.ladder()?.clone(),
-            circuit: controller.circuit()?.clone(),
-        })
+            ladder: ladder.unwrap_or_else(|| from_circuit(&circuit)),
+            circuit,
+            typed: controller.code.typed().cloned(),
+        }
     });
-    Group {
+    Ok(Group {
         members: members.collect(),
-        parity: cluster.parity().cloned(),
-        period: cluster.agreement().schedule.period(),
+        parity: Some(parity),
+        period,
         cluster: Some(Box::new(cluster)),
         prefix,
-    }
+    })
 }

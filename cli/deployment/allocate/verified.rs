@@ -9,6 +9,7 @@ use understudy_logic::Circuit;
 use understudy_logic::bdd::Diagrams;
 use understudy_parity::generate;
 use understudy_text::{Report, has_errors};
+use understudy_verification::numbers::Model;
 use understudy_verification::program::{Bounds, Conclusion, Subject};
 use understudy_verification::property::{Properties, not_of_one_scan, read};
 use understudy_verification::prove_parity_while;
@@ -56,8 +57,13 @@ pub(super) fn members(
     patience: &Patience<'_>,
 ) -> Result<Vec<Member>, Answer> {
     let members = group.members.iter().enumerate().map(|(place, member)| {
-        let subject = Subject::new(&member.ladder, group.period)
-            .map_err(|error| Answer::failed(Status::BadInput, "U0436", error))?;
+        let subject = match &member.typed {
+            None => Subject::new(&member.ladder, group.period).map_err(|error| error.to_string()),
+            Some(typed) => Model::of_program(typed)
+                .map_err(|error| error.to_string())
+                .and_then(|model| model.exact().map_err(|error| error.to_string())),
+        };
+        let subject = subject.map_err(|error| Answer::failed(Status::BadInput, "U0436", error))?;
         let name = group.name(&member.name);
         patience.turn_to(format!("`{name}`"));
         let properties = asked.get(&name).map_or(&[][..], Vec::as_slice);

@@ -4,12 +4,15 @@
 use std::str::FromStr;
 use std::time::{Duration, Instant};
 
-use understudy_cluster::Cluster;
+use understudy_cluster::{Cluster, Controller};
+use understudy_executable::Interface;
 use understudy_ladder::Program;
-use understudy_logic::Circuit;
 use understudy_text::{Diagnostic, Report};
+use understudy_typed::Elementary;
 use understudy_verification::program::{Bounds, Subject};
 use understudy_verification::{Refutation, Work, prove_parity_while};
+
+use crate::files;
 
 /// Maximum number of listed states with inputs.
 const STATES: usize = 1 << 22;
@@ -85,12 +88,17 @@ impl Looking {
 
     /// Reports an understudy that is not the sum of its members; true if undecided.
     pub(super) fn at_understudy(&self, cluster: &Cluster, report: &mut Report) -> bool {
-        let Some(parity) = cluster.parity() else {
+        // Numbers take long to follow: `verify` does.
+        let points = |controller: &Controller| {
+            let Interface { inputs, outputs } = &controller.interface;
+            inputs.iter().chain(outputs.iter()).all(|point| point.of == Elementary::Bool)
+        };
+        if !cluster.controllers().iter().all(points) || Instant::now() >= self.end {
+            return false;
+        }
+        let Ok((members, parity)) = files::understudy_of(cluster) else {
             return false;
         };
-        let controllers = cluster.controllers().iter();
-        let members: Vec<Circuit> =
-            controllers.filter_map(|controller| controller.circuit().cloned()).collect();
         let go_on = |_: Work| Instant::now() < self.end;
         match prove_parity_while(&members, parity.circuit(), NODES, &go_on) {
             Ok(_) => false,

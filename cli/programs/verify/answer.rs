@@ -201,6 +201,12 @@ impl ProgramAnswer {
         }
     }
 
+    /// Adds what was found about the outputs.
+    pub(super) fn switched(&mut self, circuit: &Circuit, found: &[(Signal, OutputFinding)]) {
+        let found = found.iter().map(|(signal, finding)| switch(circuit, *signal, finding));
+        self.switches.extend(found);
+    }
+
     /// All counterexamples and witnesses with their titles.
     pub(super) fn runs(&self) -> Vec<Shown<'_>> {
         let switches =

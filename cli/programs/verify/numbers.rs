@@ -3,12 +3,12 @@
 use serde_json::json;
 use understudy_bits::{Code, Member, Source, Unsupported};
 use understudy_cluster::{Cluster, InputSourceKind, RemoteIo};
-use understudy_typed::{Point, Program};
+use understudy_typed::{Elementary, Point, Program};
 use understudy_verification::numbers::Model;
-use understudy_verification::program::Bounds;
+use understudy_verification::program::{Bounds, OutputFinding};
 use understudy_verification::property::{Property, read_one};
 use understudy_verification::smv;
-use understudy_verification::symbolic::Resolved;
+use understudy_verification::symbolic::{Resolved, Signal};
 
 use super::answer::{self, Finding, ProgramAnswer};
 use super::{Arguments, Asked, Smv, asked, bounds, used};
@@ -16,7 +16,7 @@ use crate::answer::{Answer, Status};
 use crate::files::{self, ProgramFile};
 use crate::patience::Patience;
 
-/// The standard property of a program with numbers.
+/// The standard property of a program that can stop.
 const STANDARD: &str = "never program.fault";
 
 /// Proves the properties of one program.
@@ -52,21 +52,29 @@ pub(super) fn of_program(
         let answer = files::deliver(output, &text, json!({ "text": text }))?;
         return Ok(answer.with_used(file.reports()));
     }
-    if asked.properties.is_empty() {
-        asked.properties.extend(standard_property(&model, STANDARD));
-    }
     let go_on = |work| patience.goes_on(work);
-    let proved = prove(&model, &program.name, asked, bounds(arguments, &go_on), patience);
+    let bounds = bounds(arguments, &go_on);
+    patience.turn_to("the states of every output".to_owned());
+    let switches = switches(&model, program, bounds);
+    if asked.properties.is_empty() {
+        asked.properties.extend(standard_property(&model, program, switches.is_empty()));
+    }
+    let mut proved = prove(&model, &program.name, asked, bounds, patience);
+    proved.switched(model.circuit(), &switches);
     Ok(answer::of_programs(vec![proved], None, None, used(arguments, patience))
         .with_used(file.reports())
         .and_next(&[&"init", &"cell", &"--from", &arguments.file]))
 }
 
-/// Proves the standard property of a program of a cluster.
+/// Proves the standard properties of a program of a cluster.
 pub(super) fn standard(program: &Program, bounds: Bounds<'_>) -> Result<ProgramAnswer, Answer> {
     let model = Model::of_program(program).map_err(|error| unsupported(&error))?;
     let mut proved = ProgramAnswer::of_numbers(&program.name, &model);
-    if let Some((property, formula)) = standard_property(&model, STANDARD) {
+    let switches = switches(&model, program, bounds);
+    proved.switched(model.circuit(), &switches);
+    if let Some((property, formula)) =
+        standard_property(&model, program, switches.is_empty())
+    {
         let answers = model.check(std::slice::from_ref(&formula), &[], bounds, &mut || {});
         let findings = answers
             .into_iter()
@@ -116,8 +124,25 @@ fn prove(
     proved
 }
 
-fn standard_property(model: &Model, text: &str) -> Option<(Property, Resolved)> {
-    let property = read_one(text).ok()?;
+/// Whether each output can always be switched on and off again, of a Boolean program.
+fn switches(model: &Model, program: &Program, bounds: Bounds<'_>) -> Vec<(Signal, OutputFinding)> {
+    let mut points = program.inputs.iter().chain(&program.outputs);
+    if points.any(|point| point.of != Elementary::Bool) {
+        return Vec::new();
+    }
+    model.switches(bounds)
+}
+
+/// The standard property, of a program that can stop, and where nothing else is proved.
+fn standard_property(
+    model: &Model,
+    program: &Program,
+    is_alone: bool,
+) -> Option<(Property, Resolved)> {
+    if !is_alone && program.outputs.find(Program::FAULT).is_none() {
+        return None;
+    }
+    let property = read_one(STANDARD).ok()?;
     let formula = model.resolve(&property).ok()?;
     Some((property, formula))
 }

@@ -12,12 +12,14 @@ mod replay;
 #[cfg(test)]
 mod tests;
 
+use std::collections::HashSet;
+
 use understudy_bits::{Derivation, Inexact, Meaning, Member, Node, System, Unsupported, Variable};
 use understudy_logic::Circuit;
 use understudy_text::Diagnostic;
 use understudy_typed::Program;
 
-use crate::program::{Answer as CircuitAnswer, Bounds, Subject};
+use crate::program::{Answer as CircuitAnswer, Bounds, OutputFinding, Subject};
 use crate::property::{Formula, Path, Property};
 use crate::symbolic::{Cone, Resolved, Signal, Trace};
 use replay::Replay;
@@ -56,7 +58,12 @@ impl Model {
     /// # Errors
     /// What of the program cannot be followed.
     pub fn of_program(program: &Program) -> Result<Self, Unsupported> {
-        Self::of(System::within_subranges(program)?)
+        let system = System::within_subranges(program)?;
+        let own = program.outputs.iter().filter(|point| point.name != Program::FAULT);
+        let own: HashSet<&str> = own.map(|point| point.name.as_str()).collect();
+        let outputs = system.observed.iter().take_while(|(name, _)| own.contains(name.as_str()));
+        let outputs = outputs.count();
+        Self::of(system, outputs)
     }
 
     /// All programs of a cluster; their signals stand behind the names of their controllers and a dot.
@@ -64,12 +71,13 @@ impl Model {
     /// # Errors
     /// What of a program cannot be followed.
     pub fn of_cluster(name: &str, members: &[Member<'_>]) -> Result<Self, Unsupported> {
-        Self::of(System::of_cluster(name, members)?)
+        Self::of(System::of_cluster(name, members)?, 0)
     }
 
-    fn of(system: System) -> Result<Self, Unsupported> {
+    /// The first BOOLs that can be named are the outputs of a program.
+    fn of(system: System, outputs: usize) -> Result<Self, Unsupported> {
         let derivation = Derivation::new(&system)?;
-        let subject = Subject::of(derivation.circuit.clone());
+        let subject = Subject::of(derivation.circuit.clone(), outputs);
         Ok(Self { system, derivation, subject })
     }
 
@@ -80,6 +88,23 @@ impl Model {
     pub fn exact_circuit(&self) -> Result<&Circuit, Inexact> {
         let gaps = self.derivation.gaps(&self.system);
         if gaps.is_empty() { Ok(self.circuit()) } else { Err(Inexact::Gaps(gaps)) }
+    }
+
+    /// The program as its circuit alone, where that is exact.
+    ///
+    /// # Errors
+    /// The values of the program that the circuit does not follow bit by bit.
+    pub fn exact(self) -> Result<Subject, Inexact> {
+        let gaps = self.derivation.gaps(&self.system);
+        if gaps.is_empty() { Ok(self.subject) } else { Err(Inexact::Gaps(gaps)) }
+    }
+
+    /// Whether each BOOL output can always be switched on and off again; nothing of a program without an exact circuit.
+    pub fn switches(&self, bounds: Bounds<'_>) -> Vec<(Signal, OutputFinding)> {
+        if self.exact_circuit().is_err() {
+            return Vec::new();
+        }
+        self.subject.switches(bounds)
     }
 
     /// The circuit that stands for the programs.

@@ -81,9 +81,9 @@ impl Subject {
         })
     }
 
-    /// A circuit as it is; all its outputs are the program's own.
-    pub(crate) fn of(circuit: Circuit) -> Self {
-        Self { outputs: circuit.outputs().len(), circuit, listed: OnceCell::new() }
+    /// A circuit as it is, of which the first outputs are the program's own.
+    pub(crate) fn of(circuit: Circuit, outputs: usize) -> Self {
+        Self { outputs, circuit, listed: OnceCell::new() }
     }
 
     /// What is proved about: the program's outputs come first, then its memory and pins.

@@ -3,12 +3,14 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_ladder::{Program, parse};
-use understudy_text::{Diagnostic, has_errors};
+use understudy_bits::{Inexact, exact};
+use understudy_ladder::{Program, from_circuit, parse};
+use understudy_text::{Diagnostic, Lines, has_errors};
+use understudy_typed::{Elementary, Program as Typed};
 
 use crate::plcopen::Fidelity;
-use crate::source::another_period;
-use crate::text::{several, whole};
+use crate::source::{Source, SourceFile, Wanted, no_program, read_source};
+use crate::text::whole;
 use crate::{digraph, ldmicro, plcopen, text as written, twincat};
 
 /// A form of programs.
@@ -37,6 +39,8 @@ pub struct Reading {
     pub diagnostics: Vec<Diagnostic>,
     /// What was kept and what was not, where the form has more than programs here have.
     pub fidelity: Fidelity,
+    /// The program was drawn as rungs or networks; statements that are rungs are not.
+    pub is_drawn: bool,
 }
 
 /// The endings of files that hold programs. XML has several forms, which its root tells apart.
@@ -145,11 +149,12 @@ fn read_form(
             Reading {
                 program: is_right.then_some(parsed.program),
                 diagnostics: parsed.diagnostics,
+                is_drawn: true,
                 ..Reading::default()
             }
         }
         Format::PlcOpen => match twincat::read(text) {
-            Some(parsed) => whole(text, parsed, unit, None).reading(),
+            Some(parsed) => whole(text, parsed, unit, None).reading(text),
             None => {
                 let read = plcopen::read(text, unit);
                 runs = read.runs;
@@ -158,12 +163,18 @@ fn read_form(
                     period: read.period,
                     diagnostics: read.diagnostics,
                     fidelity: read.fidelity,
+                    is_drawn: read.is_drawn,
                 }
             }
         },
         Format::Digraph => {
             let read = digraph::read(text);
-            Reading { program: read.program, diagnostics: read.diagnostics, ..Reading::default() }
+            Reading {
+                program: read.program,
+                diagnostics: read.diagnostics,
+                is_drawn: true,
+                ..Reading::default()
+            }
         }
         Format::LdMicro => {
             let read = ldmicro::read(stem(name), text);
@@ -171,6 +182,7 @@ fn read_form(
                 program: read.program,
                 period: read.period,
                 diagnostics: read.diagnostics,
+                is_drawn: true,
                 ..Reading::default()
             }
         }
@@ -194,26 +206,58 @@ fn stem(name: &str) -> &str {
     file.split('.').next().unwrap_or(file)
 }
 
-/// Reads a program wherever a ladder is asked for, whatever its form; `period` is from one scan to the next, where that is known. A ladder is
-/// all that the file runs, or the file is no ladder.
+/// Reads a program wherever a ladder is asked for, whatever its form; `period` is from one scan to the next, where that is known. A program that is
+/// not drawn is that of its statements where its points are BOOLs and rungs hold them, else that of its circuit, where its values are finite; see
+/// [`exact`]. It is all that the file runs.
 pub fn read_ladder(name: &str, text: &str, period: Option<Duration>) -> Reading {
-    let mut reading = match Format::of(name, text) {
-        Some(format) => {
-            let (mut reading, runs) = read_form(format, name, text, None);
-            if let [_, (_, second), ..] = runs.as_slice() {
-                let names = runs.iter().map(|(name, _)| name.as_str());
-                reading.diagnostics.push(several(runs.len(), names, second.clone()));
-                reading.diagnostics.sort_by_key(|found| found.span.start);
-                reading.program = None;
-            }
-            reading
+    let SourceFile { source, period: stated, mut diagnostics } =
+        read_source(name, text, Wanted { program: None, period });
+    let program = match source {
+        Some(Source::Ladder(ladder)) => Some(ladder),
+        Some(Source::Typed(typed)) => {
+            of_statements(name, text, &typed).or_else(|| match exact(&typed) {
+                Ok(circuit) => Some(from_circuit(&circuit)),
+                Err(inexact) => {
+                    diagnostics.push(no_circuit(text, &typed.name, &inexact));
+                    None
+                }
+            })
         }
-        None => Reading { diagnostics: vec![unknown_form(text)], ..Reading::default() },
+        Some(Source::Library(_)) => {
+            diagnostics.push(no_program());
+            None
+        }
+        None => None,
     };
-    let ladder = reading.program.as_ref();
-    let found = ladder.and_then(|ladder| another_period(ladder, reading.period, period));
-    reading.diagnostics.extend(found);
-    reading
+    Reading { program, period: stated, diagnostics, ..Reading::default() }
+}
+
+/// The rungs of a program whose points are BOOLs and that runs in every scan, where rungs hold its statements.
+fn of_statements(name: &str, text: &str, typed: &Typed) -> Option<Program> {
+    let mut points = typed.inputs.iter().chain(&typed.outputs);
+    let is_every_scan = typed.tasks.iter().all(|task| task.every == 1);
+    if !is_every_scan
+        || typed.tasks.len() > 1
+        || points.any(|point| point.of != Elementary::Bool || point.slot == 0)
+    {
+        return None;
+    }
+    let (reading, _) = read_form(Format::of(name, text)?, name, text, None);
+    reading.program
+}
+
+/// The finding on a program without a circuit where one is asked for.
+fn no_circuit(text: &str, name: &str, inexact: &Inexact) -> Diagnostic {
+    let span = match inexact {
+        Inexact::Unsupported(reason) if reason.line > 0 => {
+            Lines::new(text).range(reason.line as usize - 1)
+        }
+        _ => 0..0,
+    };
+    let message = format!("`{name}` is wanted as a circuit, and has none: {inexact}");
+    Diagnostic::error("U0438", message, span).with_help(
+        "a circuit has BOOLs, bit strings, integers, timers and counters; scan, verify and stations take the program as it is",
+    )
 }
 
 /// The finding on a file of which neither name nor contents tell the form.

@@ -50,6 +50,8 @@ pub struct Reading {
     pub diagnostics: Vec<Diagnostic>,
     /// What was kept, and what was not.
     pub fidelity: Fidelity,
+    /// The program is a drawing: rungs, or networks of bits and standard blocks.
+    pub(crate) is_drawn: bool,
     /// All that the tasks run, where this is more than the program that was read, which is the first: names with their places.
     pub(crate) runs: Vec<(String, Range<usize>)>,
 }
@@ -281,6 +283,7 @@ fn translate(text: &str, project: &Project, pou: &Pou, reading: &mut Reading) {
             }
             reading.fidelity.count(project, pou, &drawn.program);
             reading.program = Some(drawn.program);
+            reading.is_drawn = true;
             return;
         }
     }
@@ -298,7 +301,7 @@ fn translate(text: &str, project: &Project, pou: &Pou, reading: &mut Reading) {
             unit.kind = UnitKind::Program;
         }
     }
-    let found = whole(text, (file, found), Some(&pou.name), reading.period).reading();
+    let found = whole(text, (file, found), Some(&pou.name), reading.period).reading(text);
     reading.diagnostics.extend(found.diagnostics);
     let mut seen = Vec::new();
     reading.diagnostics.retain(|found| {

@@ -1,16 +1,13 @@
-//! A program from any form of file: a ladder where it is Boolean, else a typed program.
-//!
-//! A program whose inputs and outputs are whole numbers is executed as a typed program, also where a ladder could hold it: a number is a point with the
-//! type and the range of its declaration, on which all members agree. Bits of a ladder have neither.
+//! A program from any form of file: a ladder where it is drawn as one, else a typed program, whose points are those of its declarations.
 
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_ladder::{Program as Ladder, Signal};
+use understudy_ladder::Program as Ladder;
 use understudy_structured_text::lower::another_interval;
 use understudy_structured_text::parse;
 use understudy_text::{Diagnostic, Severity};
-use understudy_typed::{Elementary, Points, Program as Typed};
+use understudy_typed::{Elementary, Program as Typed};
 
 use crate::apart::NOT_EXECUTED;
 use crate::format::{Format, Reading, read, unknown_form};
@@ -21,9 +18,9 @@ use crate::twincat;
 /// What a file holds.
 #[derive(Debug, Clone)]
 pub enum Source {
-    /// A program whose points are bits: bits, timers, counters and bounded integers.
+    /// Rungs, or a network of bits and standard blocks.
     Ladder(Ladder),
-    /// A program with numbers, for one period.
+    /// Statements, lists, charts and networks, for one period.
     Typed(Arc<Typed>),
     /// Function blocks and functions without a program, each checked: their names.
     Library(Vec<String>),
@@ -60,14 +57,17 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
     if format == Format::StructuredText {
         return source(whole(text, parse(text), wanted.program, wanted.period));
     }
-    let Reading { program, period, mut diagnostics, .. } = read(format, name, text, wanted.program);
-    diagnostics.extend(program.as_ref().and_then(|it| another_period(it, period, wanted.period)));
-    let ladder = SourceFile { source: program.map(Source::Ladder), period, diagnostics };
+    let Reading { program, period, mut diagnostics, is_drawn, .. } =
+        read(format, name, text, wanted.program);
+    let ladder = program.as_ref().filter(|_| is_drawn);
+    diagnostics.extend(ladder.and_then(|it| another_period(it, period, wanted.period)));
+    let ladder = program.filter(|_| is_drawn).map(Source::Ladder);
+    let ladder = SourceFile { source: ladder, period, diagnostics };
     if format != Format::PlcOpen {
         return ladder;
     }
     let is_ladder = ladder.source.is_some();
-    // The points are those of the declarations, and what no ladder can hold may be a program with numbers, or a library.
+    // What is not drawn as a ladder is a program of statements, or a library.
     let parsed = plcopen::read_typed(text);
     if !is_ladder && parsed.1.iter().any(|found| found.code == "U1001") {
         // Nothing was read, so there is nothing to lower.
@@ -76,13 +76,13 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
     let read = whole(text, parsed, wanted.program, wanted.period);
     let missing = read.diagnostics.iter().filter(|found| found.code == NOT_EXECUTED);
     let missing: Vec<Diagnostic> = missing.cloned().collect();
-    let is_more = |typed: &Typed| {
+    // A ladder has neither an interval nor a number that it declares and leaves alone.
+    let is_all = |typed: &Typed| {
+        let mut points = typed.inputs.iter().chain(&typed.outputs);
         let is_every_scan = matches!(typed.tasks.as_slice(), [task] if task.every == 1);
-        !is_every_scan || has_numbers_as_points(typed)
+        is_every_scan && points.all(|point| point.of == Elementary::Bool)
     };
-    let has_bits =
-        matches!(&ladder.source, Some(Source::Ladder(ladder)) if has_bits_of_numbers(ladder));
-    if is_ladder && !has_bits && !read.typed.as_ref().is_some_and(is_more) {
+    if is_ladder && read.typed.as_ref().is_none_or(is_all) {
         let diagnostics = [ladder.diagnostics, missing].concat();
         return SourceFile { diagnostics, ..ladder };
     }
@@ -94,7 +94,7 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
         errors.filter(|it| it.severity == Severity::Error).count()
     };
     let is_other = |found: &Diagnostic| ["U1001", "U1006", "U1013"].contains(&found.code);
-    let may_be_ladder = !ladder.diagnostics.iter().any(is_other);
+    let may_be_ladder = is_drawn && !ladder.diagnostics.iter().any(is_other);
     let has_fewer = errors(&ladder.diagnostics) <= errors(&found.diagnostics);
     if found.source.is_none() && !is_ladder && may_be_ladder && has_fewer {
         found.diagnostics = ladder.diagnostics;
@@ -118,48 +118,11 @@ pub(crate) fn another_period(
 fn source(whole: Whole) -> SourceFile {
     let mut diagnostics = whole.diagnostics;
     let library = (!whole.checked.is_empty()).then_some(Source::Library(whole.checked));
-    let is_same =
-        |ladder: &Ladder| whole.typed.as_ref().is_none_or(|typed| has_points_of(ladder, typed));
-    let ladder = whole.ladder.filter(is_same);
-    let source = match (ladder, whole.typed) {
-        (Some(ladder), _) => {
-            diagnostics.extend(whole.reasons);
-            diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
-            Some(Source::Ladder(ladder))
-        }
-        (None, typed) => {
-            diagnostics.extend(whole.subranges);
-            diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
-            typed.map(|typed| Source::Typed(Arc::new(typed))).or(library)
-        }
-    };
+    diagnostics.extend(whole.subranges);
+    diagnostics.extend(whole.not_kept);
+    diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
+    let source = whole.typed.map(|typed| Source::Typed(Arc::new(typed))).or(library);
     SourceFile { source, period: whole.period, diagnostics }
-}
-
-/// Whether an input or an output is more than a bit.
-fn has_numbers_as_points(program: &Typed) -> bool {
-    let mut points = program.inputs.iter().chain(&program.outputs);
-    points.any(|point| point.of != Elementary::Bool)
-}
-
-/// Whether a ladder has the points of a program, all of them bits, under their names.
-fn has_points_of(ladder: &Ladder, program: &Typed) -> bool {
-    let are_alike = |signals: &[Signal], points: &Points| {
-        let own = points.iter().filter(|point| point.slot != 0);
-        signals.iter().map(|it| it.name.as_str()).eq(own.map(|point| point.name.as_str()))
-    };
-    !has_numbers_as_points(program)
-        && are_alike(&ladder.inputs, &program.inputs)
-        && are_alike(&ladder.outputs, &program.outputs)
-}
-
-/// Whether a signal has a name as the bits of a number have, such as `speed.0`.
-fn has_bits_of_numbers(ladder: &Ladder) -> bool {
-    let mut signals = ladder.inputs.iter().chain(&ladder.outputs);
-    signals.any(|signal| {
-        let end = signal.name.rsplit_once('.').map(|(_, end)| end);
-        end.is_some_and(|end| end.parse::<u8>().is_ok())
-    })
 }
 
 /// The error of a file that a program is wanted of, and that has none.

@@ -1,9 +1,10 @@
-//! From syntax to a program: a ladder where it is one, and the typed program that it comes from.
+//! From syntax to a typed program, and to rungs where a ladder is asked for.
 
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_ladder::{PERIODS, Program as Ladder};
+use understudy_ladder::PERIODS;
+use understudy_structured_text::lower::Names;
 use understudy_structured_text::syntax::{File, UnitKind};
 use understudy_structured_text::{Lowered, Options, lower, parse};
 use understudy_text::{Diagnostic, has_errors};
@@ -16,13 +17,12 @@ use crate::source::no_program;
 /// The shortest period that tasks of different intervals may need.
 const SHORTEST: Duration = Duration::from_millis(1);
 
-/// A program in both forms.
-#[derive(Default)]
+/// A program with its syntax.
 pub(crate) struct Whole {
-    /// The program with numbers; nothing where there are errors.
+    /// The program; nothing where there are errors.
     pub(crate) typed: Option<Typed>,
-    /// The same program as a ladder, where it is one.
-    pub(crate) ladder: Option<Ladder>,
+    file: File,
+    names: Names,
     /// The units of a library.
     pub(crate) checked: Vec<String>,
     /// The period by which the intervals of its tasks are counted.
@@ -31,8 +31,8 @@ pub(crate) struct Whole {
     pub(crate) diagnostics: Vec<Diagnostic>,
     /// Warnings of numbers that can leave their subranges; those of a ladder are among its own.
     pub(crate) subranges: Vec<Diagnostic>,
-    /// What was found of it as a ladder; an error where it is none.
-    pub(crate) reasons: Vec<Diagnostic>,
+    /// Warnings of what a written text keeps and a station does not.
+    pub(crate) not_kept: Vec<Diagnostic>,
 }
 
 /// Lowers the program of a file.
@@ -52,24 +52,39 @@ pub(crate) fn whole(
     diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
     let is_right = !has_errors(&diagnostics);
     let typed = typed.filter(|_| is_right);
-    let (ladder, reasons) = match &typed {
-        Some(typed) if typed.tasks.len() == 1 => ladders::ladder(text, &file, typed, &names),
-        Some(typed) => {
-            let programs = file.units.iter().filter(|unit| unit.kind == UnitKind::Program);
-            let names = programs.map(|unit| unit.name.as_str());
-            (None, vec![several(typed.tasks.len(), names, 0..0)])
-        }
-        None => (None, Vec::new()),
-    };
+    let not_kept = typed.iter().flat_map(|typed| not_kept(&file, typed)).collect();
     Whole {
         typed,
-        ladder,
+        file,
+        names,
         checked: if is_right { checked } else { Vec::new() },
         period: period.map(|interval| Duration::from_nanos(interval.unsigned_abs())),
         diagnostics,
         subranges,
-        reasons,
+        not_kept,
     }
+}
+
+/// Warnings of retention.
+fn not_kept(file: &File, program: &Typed) -> Vec<Diagnostic> {
+    let programs = file.units.iter().filter(|unit| unit.kind == UnitKind::Program);
+    let declared = programs.flat_map(|unit| &unit.declarations).chain(&file.globals);
+    let is_variable = |name: &str| {
+        let mut variables = program.variables.iter();
+        variables.any(|variable| {
+            let own = variable.name.rsplit('.').next().unwrap_or_default();
+            own.eq_ignore_ascii_case(name)
+        })
+    };
+    let retained = declared.filter(|it| it.retained && is_variable(it.name.as_str()));
+    let warnings = retained.map(|found| {
+        let message = format!(
+            "that `{}` is retained over a loss of power is not kept: the state of a program is kept by its replicas",
+            found.name
+        );
+        Diagnostic::warning("U1055", message, found.name.span())
+    });
+    warnings.collect()
 }
 
 /// The findings on intervals of tasks that no station has.
@@ -121,21 +136,33 @@ pub(crate) fn several<'a>(
 
 impl Whole {
     /// The ladder, or why it is none.
-    pub(crate) fn reading(self) -> Reading {
+    pub(crate) fn reading(self, text: &str) -> Reading {
+        let (ladder, reasons) = match &self.typed {
+            Some(typed) if typed.tasks.len() == 1 => {
+                ladders::ladder(text, &self.file, typed, &self.names)
+            }
+            Some(typed) => {
+                let programs = self.file.units.iter().filter(|unit| unit.kind == UnitKind::Program);
+                let names = programs.map(|unit| unit.name.as_str());
+                (None, vec![several(typed.tasks.len(), names, 0..0)])
+            }
+            None => (None, Vec::new()),
+        };
         let mut diagnostics = self.diagnostics;
-        if self.ladder.is_none() {
+        if ladder.is_none() {
             diagnostics.extend(self.subranges);
         }
         if self.typed.is_none() && !has_errors(&diagnostics) {
             diagnostics.push(no_program());
         }
-        diagnostics.extend(self.reasons);
+        diagnostics.extend(reasons);
+        diagnostics.extend(self.not_kept);
         diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
-        Reading { program: self.ladder, period: self.period, diagnostics, ..Reading::default() }
+        Reading { program: ladder, period: self.period, diagnostics, ..Reading::default() }
     }
 }
 
 /// Reads the program of a Structured Text as a ladder; `program` chooses one where there are several.
 pub(crate) fn read(text: &str, program: Option<&str>) -> Reading {
-    whole(text, parse(text), program, None).reading()
+    whole(text, parse(text), program, None).reading(text)
 }

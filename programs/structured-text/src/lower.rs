@@ -264,12 +264,7 @@ impl<'a> Lowering<'a> {
         }
         let is_whole = checked.is_empty() && !understudy_text::has_errors(&self.diagnostics);
         let is_whole = is_whole && !self.program.tasks.is_empty();
-        // A Boolean program that cannot stop has the points that it declares and no other.
-        let points = self.program.inputs.iter().chain(&self.program.outputs);
-        let has_numbers = points.into_iter().any(|point| point.of != Elementary::Bool);
-        if has_numbers || self.program.can_fault() {
-            self.program.seal_points();
-        }
+        self.program.seal_points();
         Lowered {
             program: is_whole.then_some(self.program),
             checked,

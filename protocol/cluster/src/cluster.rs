@@ -1,5 +1,6 @@
 //! A cluster as all its members know it.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::net::{SocketAddr, SocketAddrV4};
 use std::sync::Arc;
@@ -10,6 +11,7 @@ use crate::device::FieldDevice;
 use crate::source::{InputSource, OperatorDeclaration, SignalDeclaration};
 use crate::undriven::initial_image;
 use serde::{Deserialize, Serialize};
+use understudy_bits::Inexact;
 use understudy_cycle::{Agreement, Mode};
 use understudy_executable::Interface;
 use understudy_ladder::Program as LadderProgram;
@@ -98,7 +100,19 @@ impl Controller {
         })
     }
 
-    /// The circuit, of a program that is Boolean.
+    /// The circuit that does in every scan what the program does, under the name of the controller.
+    ///
+    /// # Errors
+    /// The values of the program that have no bits.
+    pub fn exact_circuit(&self) -> Result<Cow<'_, Circuit>, Inexact> {
+        let circuit = self.code.exact_circuit()?;
+        Ok(match circuit.name() == self.name {
+            true => circuit,
+            false => Cow::Owned(circuit.into_owned().named(&self.name)),
+        })
+    }
+
+    /// The circuit that stations execute, of a ladder.
     pub fn circuit(&self) -> Option<&Circuit> {
         self.code.circuit()
     }
@@ -288,6 +302,17 @@ impl Cluster {
     /// circuit.
     pub fn parity(&self) -> Option<&ParityController> {
         self.parity.as_ref()
+    }
+
+    /// The circuits that do in every scan what the programs do, in order.
+    ///
+    /// # Errors
+    /// The name of the first controller whose program has none, and which of its values have no bits.
+    pub fn circuits(&self) -> Result<Vec<Cow<'_, Circuit>>, (&str, Inexact)> {
+        let circuits = self.controllers.iter().map(|controller| {
+            controller.exact_circuit().map_err(|inexact| (controller.name.as_str(), inexact))
+        });
+        circuits.collect()
     }
 
     /// Every member: stations by rank, then remote I/Os, then plants.

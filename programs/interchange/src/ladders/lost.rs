@@ -10,7 +10,7 @@ use understudy_typed::{Elementary, Program, Type};
 /// Names that one finding lists.
 const MAXIMUM_LISTED: usize = 20;
 
-/// Retention, second names of one address, and what nothing uses.
+/// Second names of one address, and what nothing uses.
 pub(super) fn lost(text: &str, file: &File, program: &Program) -> Vec<Diagnostic> {
     let declared = |name: &str| {
         let units = file.units.iter().flat_map(|unit| &unit.declarations);
@@ -21,13 +21,6 @@ pub(super) fn lost(text: &str, file: &File, program: &Program) -> Vec<Diagnostic
     let mut found = Vec::new();
     for variable in &program.variables {
         let span = declared(&variable.name);
-        if variable.is_retained {
-            let message = format!(
-                "that `{}` is retained over a loss of power is not kept: the state of a circuit is kept by its copies",
-                variable.name
-            );
-            found.push(warning(message, span.clone()));
-        }
         if has_others(program, &variable.of) {
             let message = format!(
                 "`{}` has what a ladder does not hold and nothing here uses: not kept",

@@ -350,13 +350,15 @@ fn a_given_period_is_the_interval_of_the_written_task() {
     }
 }
 
-/// A ladder runs in every scan: where one is read for another period, this is said.
+/// A ladder runs in every scan: where one is read for another period, this is said. Of a document the interval is counted, also where a circuit is
+/// wanted.
 #[test]
 fn a_ladder_of_another_period_is_told() {
     let ld = "LDmicro0.1\nCYCLE=20000\n\nIO LIST\n    Xa at 0\n    Yb at 0\nEND\n\nPROGRAM\nRUNG\n    CONTACTS Xa 0\n    COIL Yb 0 0 0\nEND\n";
     let (name, text) = file(Language::Ladder, &[Every(20)]).expect("a file");
-    for (name, text) in [(name.as_str(), text.as_str()), ("blink.ld", ld)] {
-        for (period, is_told) in [(0, false), (20, false), (10, true), (40, true)] {
+    for (name, text, is_counted) in [(name.as_str(), text.as_str(), true), ("blink.ld", ld, false)]
+    {
+        for (period, is_told) in [(0, false), (20, false), (10, !is_counted), (40, true)] {
             let read = read_ladder(name, text, milliseconds(period));
             assert!(read.program.is_some(), "{name}: {:?}", read.diagnostics);
             assert_eq!(read.period, milliseconds(20), "{name}");
@@ -383,5 +385,18 @@ fn a_cycle_time_that_is_none_is_an_error() {
         let read = read_source("plant.plcproj", &joined.text, Wanted::default());
         assert!(has_errors(&read.diagnostics), "{written}");
         assert!(read.source.is_none(), "{written}");
+    }
+}
+
+/// Statements are the program that was written, whatever their points are; where a ladder is asked for, each of them has one.
+#[test]
+fn only_what_is_drawn_is_a_ladder() {
+    for language in LANGUAGES {
+        let (name, text) = file(language, &[Every(20)]).expect("a file");
+        let source = read_source(&name, &text, Wanted::default()).source;
+        let is_ladder = matches!(source, Some(Source::Ladder(_)));
+        assert_eq!(is_ladder, language == Language::Ladder, "{language:?}");
+        let read = read_ladder(&name, &text, None);
+        assert!(read.program.is_some(), "{language:?}: {:?}", read.diagnostics);
     }
 }

@@ -20,7 +20,7 @@ pub(super) fn read(
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<DiagnosisPlace> {
     let name = format!("{}.diagnosis", member.name);
-    let (_, circuit) = ladders.ladder(file, &name, period, diagnostics)?;
+    let circuit = ladders.circuit(file, &name, period, diagnostics)?;
     let (_, program) = member.code.as_ref()?;
     let (inputs, outputs) = (program.inputs.bit_names(), program.outputs.bit_names());
     match Diagnosis::new(&circuit, &inputs, &outputs) {

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_interchange::{Source, SourceFile, Wanted, no_program, read_source};
-use understudy_ladder::Program;
 use understudy_logic::Circuit;
 use understudy_text::{Diagnostic, Report};
 
@@ -81,18 +80,19 @@ impl<'a> Ladders<'a> {
         }
     }
 
-    /// As [`Self::code`], where only a ladder will do: the program and its circuit.
-    pub(crate) fn ladder(
+    /// As [`Self::code`], where a circuit is wanted.
+    pub(crate) fn circuit(
         &mut self,
         file: &Placed<String>,
         name: &str,
         period: Duration,
         diagnostics: &mut Vec<Diagnostic>,
-    ) -> Option<(Program, Circuit)> {
-        match self.code(file, name, period, diagnostics)? {
-            Code::Ladder(program, circuit) => Some((*program, circuit)),
-            Code::Typed(..) => {
-                let message = format!("`{}` has numbers, and a ladder is wanted", file.value);
+    ) -> Option<Circuit> {
+        let code = self.code(file, name, period, diagnostics)?;
+        match code.exact_circuit() {
+            Ok(circuit) => Some(circuit.into_owned().named(name)),
+            Err(inexact) => {
+                let message = format!("`{}` has no circuit: {inexact}", file.value);
                 diagnostics.push(Diagnostic::error("U0212", message, file.span.clone()));
                 None
             }
