@@ -24,6 +24,8 @@ const UNKNOWN_TURNS: u32 = 64;
 const ALL_TURNS: u32 = 20_000;
 /// Terms of a system.
 const ALL_TERMS: usize = 2_000_000;
+/// Statements of a scan: what is called again and again need not make terms.
+const ALL_STATEMENTS: usize = 1_000_000;
 /// Selections inside each other that a number can come through.
 const ALL_CASES: u32 = 1_000;
 /// Places that one computed index, or several together, may mean.
@@ -63,6 +65,8 @@ pub(super) struct Execution<'a> {
     pub(super) faulted: Term,
     elapsed: Term,
     turns: u32,
+    /// Statements that were executed.
+    executed: usize,
     line: u32,
 }
 
@@ -128,6 +132,7 @@ impl<'a> Execution<'a> {
             faulted,
             elapsed,
             turns: 0,
+            executed: 0,
             line: 0,
         }
     }
@@ -345,7 +350,11 @@ impl<'a> Execution<'a> {
 
     fn statements(&mut self, context: Context, statements: &[Statement]) -> Result<Left> {
         for (place, statement) in statements.iter().enumerate() {
-            if self.terms.len() > ALL_TERMS || self.terms.depth() > ALL_CASES {
+            self.executed += 1;
+            if self.terms.len() > ALL_TERMS
+                || self.terms.depth() > ALL_CASES
+                || self.executed > ALL_STATEMENTS
+            {
                 return self.unsupported(context, "the scan has too many values to follow");
             }
             let left = self.statement(context, statement)?;

@@ -7,6 +7,9 @@ use understudy_typed::{Case, Comparison, Statement};
 use super::{Context, Execution, Left, Result};
 use crate::term::Term;
 
+/// Branches of one IF that are followed each within the one before.
+const NESTED_BRANCHES: usize = 16;
+
 impl Execution<'_> {
     pub(super) fn branches(
         &mut self,
@@ -14,6 +17,9 @@ impl Execution<'_> {
         branches: &[understudy_typed::Branch],
         otherwise: &[Statement],
     ) -> Result<Left> {
+        if branches.len() > NESTED_BRANCHES {
+            return self.many_branches(context, branches, otherwise);
+        }
         let Some((first, rest)) = branches.split_first() else {
             return self.statements(context, otherwise);
         };
@@ -24,6 +30,57 @@ impl Execution<'_> {
             |this| this.branches(context, rest, otherwise),
         )?;
         Ok(self.one_of(condition, left))
+    }
+
+    /// As [`Self::branches`], one after the other: each under the condition that none before it was taken.
+    fn many_branches(
+        &mut self,
+        context: Context,
+        branches: &[understudy_typed::Branch],
+        otherwise: &[Statement],
+    ) -> Result<Left> {
+        let mut left = self.staying();
+        let mut open = self.terms.boolean(true);
+        let mut all = Vec::new();
+        for branch in branches {
+            let (changes, condition) =
+                self.within(open, |this| this.number(context, &branch.condition))?;
+            self.merge(open, changes, HashMap::new());
+            let here = self.terms.and(open, condition);
+            self.side(context, here, &branch.body, &mut left, &mut all)?;
+            let beyond = self.terms.not(condition);
+            open = self.terms.and(open, beyond);
+        }
+        self.side(context, open, otherwise, &mut left, &mut all)?;
+        self.merge_all(all);
+        Ok(left)
+    }
+
+    /// Executes what is executed under a condition, and adds what it changes to `all`.
+    fn side(
+        &mut self,
+        context: Context,
+        condition: Term,
+        body: &[Statement],
+        left: &mut Left,
+        all: &mut Vec<(Term, HashMap<u64, Term>)>,
+    ) -> Result<()> {
+        if self.terms.is(condition, false) {
+            return Ok(());
+        }
+        let (changes, away) = self.within(condition, |this| this.statements(context, body))?;
+        left.exit = self.terms.choose(condition, away.exit, left.exit);
+        left.next = self.terms.choose(condition, away.next, left.next);
+        left.back = self.terms.choose(condition, away.back, left.back);
+        all.push((condition, changes));
+        Ok(())
+    }
+
+    /// Keeps what was changed under conditions of which one at most holds.
+    fn merge_all(&mut self, all: Vec<(Term, HashMap<u64, Term>)>) {
+        for (condition, changes) in all {
+            self.merge(condition, changes, HashMap::new());
+        }
     }
 
     pub(super) fn cases(
@@ -49,19 +106,9 @@ impl Execution<'_> {
         sides.push((open, otherwise));
         let mut all = Vec::new();
         for (condition, body) in sides {
-            if self.terms.is(condition, false) {
-                continue;
-            }
-            let (changes, away) = self.within(condition, |this| this.statements(context, body))?;
-            left.exit = self.terms.choose(condition, away.exit, left.exit);
-            left.next = self.terms.choose(condition, away.next, left.next);
-            left.back = self.terms.choose(condition, away.back, left.back);
-            all.push((condition, changes));
+            self.side(context, condition, body, &mut left, &mut all)?;
         }
-        // One condition at most holds.
-        for (condition, changes) in all {
-            self.merge(condition, changes, HashMap::new());
-        }
+        self.merge_all(all);
         Ok(left)
     }
 
