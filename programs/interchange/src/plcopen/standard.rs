@@ -5,7 +5,7 @@
 pub(crate) struct StandardBlock {
     pub(crate) word: &'static str,
     /// Inputs, the one that the wire enters first.
-    inputs: &'static [&'static str],
+    pub(crate) inputs: &'static [&'static str],
     /// Outputs, the one that the wire leaves first.
     outputs: &'static [&'static str],
 }

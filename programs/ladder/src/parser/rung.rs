@@ -13,10 +13,6 @@ use crate::program::{
     Relation, Rung, Series,
 };
 
-/// The words of the function blocks.
-const BLOCK_WORDS: [&str; 10] =
-    ["TON", "TOF", "TP", "CTU", "CTD", "CTUD", "SR", "RS", "R_TRIG", "F_TRIG"];
-
 /// The largest counter preset, that of IEC 61131-3's INT.
 pub const MAXIMUM_PRESET_VALUE: u16 = 32_767;
 
@@ -226,14 +222,13 @@ impl Parser {
                 return None;
             }
         };
-        let known = BLOCK_WORDS.into_iter().find(|known| known.eq_ignore_ascii_case(&word));
-        let Some(known) = known else {
+        let Some(kind) = BlockKind::of_word(&word) else {
             let span = self.span();
             let diagnostic =
                 Diagnostic::error("U0104", format!("no block is called `{word}`"), span)
                     .with_label("expected TON, TOF, TP, CTU, CTD, CTUD, SR, RS, R_TRIG or F_TRIG");
             let upper = word.to_uppercase();
-            self.diagnostics.push(match nearest(&upper, BLOCK_WORDS) {
+            self.diagnostics.push(match nearest(&upper, BlockKind::ALL.map(BlockKind::word)) {
                 Some(near) => diagnostic.with_help(format!("did you mean `{near}`?")),
                 None => diagnostic,
             });
@@ -243,17 +238,10 @@ impl Parser {
         self.pass_inner_comments();
         let name = self.name("the block's name")?;
         self.pass_inner_comments();
-        let kind = match known {
-            "TON" => BlockKind::Ton(self.preset_time()),
-            "TOF" => BlockKind::Tof(self.preset_time()),
-            "TP" => BlockKind::Tp(self.preset_time()),
-            "CTU" => BlockKind::Ctu(self.preset_value()),
-            "CTD" => BlockKind::Ctd(self.preset_value()),
-            "CTUD" => BlockKind::Ctud(self.preset_value()),
-            "SR" => BlockKind::Sr,
-            "RS" => BlockKind::Rs,
-            "R_TRIG" => BlockKind::RTrig,
-            _ => BlockKind::FTrig,
+        let kind = match (kind.preset_time(), kind.preset_value()) {
+            (Some(_), _) => kind.with_time(self.preset_time()),
+            (_, Some(_)) => kind.with_value(self.preset_value()),
+            (None, None) => kind,
         };
         Some((kind, name))
     }

@@ -50,6 +50,45 @@ pub enum BlockKind {
 }
 
 impl BlockKind {
+    /// All of them, with presets of 0.
+    pub const ALL: [Self; 10] = [
+        Self::Ton(Duration::ZERO),
+        Self::Tof(Duration::ZERO),
+        Self::Tp(Duration::ZERO),
+        Self::Ctu(0),
+        Self::Ctd(0),
+        Self::Ctud(0),
+        Self::Sr,
+        Self::Rs,
+        Self::RTrig,
+        Self::FTrig,
+    ];
+
+    /// The block of a name in the standard, whatever its case, with a preset of 0.
+    pub fn of_word(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.word().eq_ignore_ascii_case(word))
+    }
+
+    /// The same timer with another preset; another block stays what it is.
+    pub fn with_time(self, time: Duration) -> Self {
+        match self {
+            Self::Ton(_) => Self::Ton(time),
+            Self::Tof(_) => Self::Tof(time),
+            Self::Tp(_) => Self::Tp(time),
+            other => other,
+        }
+    }
+
+    /// The same counter with another preset; another block stays what it is.
+    pub fn with_value(self, value: u16) -> Self {
+        match self {
+            Self::Ctu(_) => Self::Ctu(value),
+            Self::Ctd(_) => Self::Ctd(value),
+            Self::Ctud(_) => Self::Ctud(value),
+            other => other,
+        }
+    }
+
     /// Its name in the standard.
     pub fn word(self) -> &'static str {
         match self {

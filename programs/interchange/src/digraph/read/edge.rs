@@ -146,21 +146,15 @@ impl Reader {
             .parse::<u16>()
             .ok()
             .filter(|value| u64::from(*value) <= u64::from(MAXIMUM_PRESET_VALUE));
-        let kind = match word.as_str() {
-            "TON" => time.map(BlockKind::Ton),
-            "TOF" => time.map(BlockKind::Tof),
-            "TP" => time.map(BlockKind::Tp),
-            "CTU" => number.map(BlockKind::Ctu),
-            "CTD" => number.map(BlockKind::Ctd),
-            "CTUD" => number.map(BlockKind::Ctud),
-            "SR" => Some(BlockKind::Sr),
-            "RS" => Some(BlockKind::Rs),
-            "R_TRIG" => Some(BlockKind::RTrig),
-            "F_TRIG" => Some(BlockKind::FTrig),
-            other => {
-                self.error("U1061", format!("unknown block `{other}`"), xml::start_tag(node));
-                return None;
-            }
+        let Some(kind) = BlockKind::of_word(word.as_str()) else {
+            let message = format!("unknown block `{}`", word.as_str());
+            self.error("U1061", message, xml::start_tag(node));
+            return None;
+        };
+        let kind = match (kind.preset_time(), kind.preset_value()) {
+            (Some(_), _) => time.map(|time| kind.with_time(time)),
+            (_, Some(_)) => number.map(|number| kind.with_value(number)),
+            (None, None) => Some(kind),
         };
         if kind.is_none() {
             let message = format!("invalid preset `{}` of a {}", preset.as_str(), word.as_str());

@@ -178,17 +178,11 @@ impl Drawing<'_> {
         preset: Option<&Input>,
         span: &Range<usize>,
     ) -> Option<BlockKind> {
-        Some(match standard.word {
-            "TON" => BlockKind::Ton(self.time(preset, span)?),
-            "TOF" => BlockKind::Tof(self.time(preset, span)?),
-            "TP" => BlockKind::Tp(self.time(preset, span)?),
-            "CTU" => BlockKind::Ctu(self.count(preset, span)?),
-            "CTD" => BlockKind::Ctd(self.count(preset, span)?),
-            "CTUD" => BlockKind::Ctud(self.count(preset, span)?),
-            "SR" => BlockKind::Sr,
-            "RS" => BlockKind::Rs,
-            "R_TRIG" => BlockKind::RTrig,
-            _ => BlockKind::FTrig,
+        let kind = BlockKind::of_word(standard.word)?;
+        Some(match (kind.preset_time(), kind.preset_value()) {
+            (Some(_), _) => kind.with_time(self.time(preset, span)?),
+            (_, Some(_)) => kind.with_value(self.count(preset, span)?),
+            (None, None) => kind,
         })
     }
 
