@@ -35,8 +35,20 @@ pub(crate) fn text(path: &Path) -> Result<String, Answer> {
 pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>, Answer> {
     let bytes = fs::read(path)
         .map_err(|error| Answer::failed(Status::BadInput, "U0601", unreadable(path, &error)))?;
-    READ.lock().unwrap_or_else(PoisonError::into_inner).extend(fs::canonicalize(path));
+    note_read(path);
     Ok(bytes)
+}
+
+/// Keeps a file from being overwritten by this command.
+fn note_read(path: &Path) {
+    READ.lock().unwrap_or_else(PoisonError::into_inner).extend(fs::canonicalize(path));
+}
+
+/// Text of a file that another file names, from the folder of that one.
+pub(crate) fn named(folder: &Path, name: &str) -> Result<String, String> {
+    let text = named_file(folder, name)?;
+    note_read(&folder.join(name));
+    Ok(text)
 }
 
 /// Decodes the bytes of a file.
@@ -343,7 +355,7 @@ pub(crate) fn read_cluster(path: &Path, text: &str, overrides: Overrides) -> Loa
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
     let mut loaded =
         understudy_cluster::read_with(&path.display().to_string(), text, overrides, &mut |name| {
-            named_file(&folder, name)
+            named(&folder, name)
         });
     // Programs are named relative to the current folder.
     for report in loaded.reports.iter_mut().skip(1) {

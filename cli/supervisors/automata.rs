@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
-use understudy_journal::named_file;
 use understudy_supervisor::{
     Automaton, Model, draw_automaton_svg, draw_dot, read_ads, read_model, write_ads, write_model,
 };
@@ -95,7 +94,7 @@ pub(crate) fn is_model(path: &Path) -> bool {
 pub(crate) fn model(path: &Path) -> Result<Sources<Model>, Answer> {
     let text = files::text_of(Kind::Model, path)?;
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-    let read = read_model(&text, |file| named_file(&folder, file));
+    let read = read_model(&text, |file| files::named(&folder, file));
     let name = path.display().to_string();
     let mut reports = vec![Report { name, text, diagnostics: read.diagnostics }];
     reports.extend(

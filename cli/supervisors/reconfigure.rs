@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::Value;
-use understudy_journal::named_file;
 use understudy_ladder::print;
 use understudy_reconfiguration::project::{self, Loaded, Project};
 use understudy_reconfiguration::{Failure, Outcome, analyse};
@@ -88,7 +87,7 @@ fn read(path: &Path) -> Result<(Project, Vec<Report>), Answer> {
 pub(crate) fn read_project(path: &Path, text: &str) -> Loaded {
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
     let mut loaded =
-        project::read(&path.display().to_string(), text, &mut |name| named_file(&folder, name));
+        project::read(&path.display().to_string(), text, &mut |name| files::named(&folder, name));
     for report in loaded.reports.iter_mut().skip(1) {
         report.name = folder.join(&report.name).display().to_string();
     }

@@ -72,9 +72,7 @@ pub(super) fn standard(program: &Program, bounds: Bounds<'_>) -> Result<ProgramA
     let mut proved = ProgramAnswer::of_numbers(&program.name, &model);
     let switches = switches(&model, program, bounds);
     proved.switched(model.circuit(), &switches);
-    if let Some((property, formula)) =
-        standard_property(&model, program, switches.is_empty())
-    {
+    if let Some((property, formula)) = standard_property(&model, program, switches.is_empty()) {
         let answers = model.check(std::slice::from_ref(&formula), &[], bounds, &mut || {});
         let findings = answers
             .into_iter()
