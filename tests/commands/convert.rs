@@ -28,7 +28,7 @@ fn what_is_written_is_read_again_by_every_command() {
     }
     // Rungs are drawn, and statements are listed.
     for (file, shown) in
-        [("pump.xml", "( )"), ("again.xml", ":="), ("probes.xml", "( )"), ("pump.st", ":=")]
+        [("pump.xml", "( )"), ("again.xml", ":="), ("probes.xml", ":="), ("pump.st", ":=")]
     {
         assert_eq!(understudy_in(&folder, &["check", file]).status, 0, "{file}");
         let drawn = understudy_in(&folder, &["draw", file]);
@@ -89,20 +89,35 @@ fn what_is_read_is_not_written_over() {
     let folder = empty_folder("converted-over");
     let text =
         "PROGRAM p VAR_INPUT a : BOOL; END_VAR VAR_OUTPUT q : BOOL; END_VAR q := a; END_PROGRAM\n";
+    let rungs = "program p\ninput a\noutput q\nrung a (q)\n";
     fs::write(folder.join("p.st"), text).expect("written");
+    fs::write(folder.join("p.ladder"), rungs).expect("written");
     fs::create_dir(folder.join("sub")).expect("made");
     for arguments in [
         ["convert", "p.st", "p.st"].as_slice(),
         &["convert", "p.st", "sub/../p.st"],
         &["draw", "p.st", "--output", "p.st"],
-        &["verify", "p.st", "--draw", "p.st"],
+        &["verify", "p.ladder", "--draw", "p.ladder"],
     ] {
         let answer = understudy_in(&folder, arguments);
         assert_eq!(answer.status, 2, "{arguments:?}: {}", answer.shown());
         assert!(answer.errors.contains("error[U0603]"), "{arguments:?}: {}", answer.errors);
-        let kept = fs::read_to_string(folder.join("p.st")).expect("a text");
-        assert_eq!(kept, text, "{arguments:?}");
+        for (name, text) in [("p.st", text), ("p.ladder", rungs)] {
+            let kept = fs::read_to_string(folder.join(name)).expect("a text");
+            assert_eq!(kept, text, "{arguments:?}");
+        }
     }
+    // Nor are the programs that a cluster file names.
+    let cluster = "[cluster]\nname = \"cell\"\n[[controller]]\nname = \"p\"\nladder = \"p.st\"\n[[controller]]\nname = \"other\"\nladder = \"p.ladder\"\n[[understudy]]\nname = \"u\"\n[[remote_io]]\ncontroller = \"p\"\n[remote_io.inputs]\na = { operator = \"level\" }\n[[remote_io]]\ncontroller = \"other\"\n[remote_io.inputs]\na = { operator = \"level\" }\n";
+    fs::write(folder.join("cell.toml"), cluster).expect("written");
+    for (output, form) in [("p.st", "st"), ("sub/../p.ladder", "ladder")] {
+        let arguments = ["parity", "cell.toml", "--as", form, "--output", output];
+        let answer = understudy_in(&folder, &arguments);
+        assert_eq!(answer.status, 2, "{output}: {}", answer.shown());
+        assert!(answer.errors.contains("error[U0603]"), "{output}: {}", answer.errors);
+    }
+    assert_eq!(fs::read_to_string(folder.join("p.st")).expect("a text"), text);
+    assert_eq!(fs::read_to_string(folder.join("p.ladder")).expect("a text"), rungs);
     let answer = understudy_in(&folder, &["convert", "p.st", "q.st"]);
     assert_eq!(answer.status, 0, "{}", answer.shown());
 }

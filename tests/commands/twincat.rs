@@ -49,7 +49,7 @@ fn the_files_of_a_project_are_one_program() {
         let checked = run(&["check", project]);
         assert_eq!(checked.status, 0, "{}", checked.shown());
         assert!(checked.output.contains("E_Mode.TcDUT"), "{}", checked.output);
-        for form in ["st", "ladder"] {
+        for form in ["st", "plcopen"] {
             let written = run(&["convert", project, "--to", form]);
             assert_eq!(written.status, 0, "{}", written.shown());
         }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use understudy_interchange::{Format, digraph, ldmicro, read};
+use understudy_interchange::{Format, digraph, read};
 use understudy_ladder::{Program, check};
 
 use crate::attack::attack;
@@ -54,7 +54,7 @@ fn ldmicro() {
     let seeds =
         ["examples/other-tools/light.ld", "programs/interchange/tests/ldmicro/full-of-errors.ld"];
     attack("ldmicro", &seeds, |bytes| {
-        let reading = ldmicro::read("program", &text(bytes));
+        let reading = read(Format::LdMicro, "program.ld", &text(bytes), None);
         reading.program.iter().for_each(is_sound);
     });
 }

@@ -176,21 +176,13 @@ fn read_form(
                 ..Reading::default()
             }
         }
-        Format::LdMicro => {
-            let read = ldmicro::read(stem(name), text);
-            Reading {
-                program: read.program,
-                period: read.period,
-                diagnostics: read.diagnostics,
-                is_drawn: true,
-                ..Reading::default()
-            }
-        }
+        Format::LdMicro => whole(text, ldmicro::read(stem(name), text), unit, None).reading(text),
         Format::StructuredText => written::read(text, unit),
     };
     // Who writes a ladder sees what it has; from another form, it may have been lost on the way.
     if let Some(program) = &reading.program
         && format != Format::Ladder
+        && reading.is_drawn
         && program.rungs.is_empty()
     {
         let message = format!("the program `{}` has no rungs: it does nothing", program.name);
@@ -201,7 +193,7 @@ fn read_form(
 }
 
 /// The name of a file without its folder and ending.
-fn stem(name: &str) -> &str {
+pub(crate) fn stem(name: &str) -> &str {
     let file = name.rsplit(['/', '\\']).next().unwrap_or(name);
     file.split('.').next().unwrap_or(file)
 }

@@ -16,7 +16,7 @@
 //! ```
 //!
 //! Its numbers are shared by name between counters, resets, moves and comparisons, and its instructions act in the middle of a
-//! wire; so a rung is written out as statements and lowered as Structured Text is. What each element does is described in
+//! wire; so a rung is written out as the statements of a program. What each element does is described in
 //! `docs/reference/ldmicro.md`; what only a microcontroller has is listed with its line.
 
 mod limits;
@@ -25,48 +25,43 @@ mod statements;
 
 use std::time::Duration;
 
-use understudy_ladder::{Name, Program};
+use understudy_structured_text::parser::parse_at;
+use understudy_structured_text::syntax::{File, Name, ProgramInstance, Task};
 use understudy_text::{Diagnostic, has_errors};
 
-/// What was read.
-#[derive(Debug, Clone, Default)]
-pub struct Reading {
-    /// The program, where there are no errors.
-    pub program: Option<Program>,
-    /// The cycle time; `RTO` counts in cycles of it.
-    pub period: Option<Duration>,
-    /// Everything that was found, in the order of its place.
-    pub diagnostics: Vec<Diagnostic>,
-}
-
-/// Reads a file under the name `name`, which its format does not hold.
-pub fn read(name: &str, text: &str) -> Reading {
+/// Reads a file under the name `name`, which its format does not hold: one program, run at the cycle time of the file, and everything that was
+/// found, in the order of its place. The places are those of the elements.
+pub(crate) fn read(name: &str, text: &str) -> (File, Vec<Diagnostic>) {
     let (file, mut diagnostics) = parse::parse(text);
-    let mut program = None;
+    let mut program = File::default();
     if !has_errors(&diagnostics) {
-        let (written, found) = statements::statements(&file);
+        let (written, found) = statements::statements(name, &file);
         diagnostics.extend(found);
         if !has_errors(&diagnostics) {
-            let reading = crate::text::read(&written.text, None);
-            diagnostics.extend(
-                reading
-                    .diagnostics
-                    .into_iter()
-                    .map(|found| Diagnostic { span: written.place_of(found.span.start), ..found }),
-            );
-            program = reading.program;
+            let (read, found) = parse_at(&written.text, &|span| written.place_of(span.start));
+            diagnostics.extend(found);
+            program = read;
+            run(&mut program, file.period);
         }
     }
     diagnostics.sort_by_key(|found| found.span.start);
     diagnostics.dedup();
-    let mut program = program.filter(|_| !has_errors(&diagnostics));
-    if let Some(program) = &mut program {
-        let legal = |letter: char| {
-            if letter.is_alphanumeric() { letter } else { '_' }
-        };
-        let name: String = name.chars().map(legal).take(100).collect();
-        let starts = name.starts_with(|first: char| first.is_alphabetic());
-        program.name = Name::from(if starts { name } else { format!("program_{name}") });
+    (program, diagnostics)
+}
+
+/// Runs the program by a task of that interval.
+fn run(file: &mut File, interval: Option<Duration>) {
+    let interval = interval.and_then(|interval| i64::try_from(interval.as_nanos()).ok());
+    if let (Some(unit), Some(interval)) = (file.units.first(), interval) {
+        let of = unit.name.clone();
+        let task = Name::new("cycle", of.span());
+        file.instances.push(ProgramInstance {
+            name: of.clone(),
+            task: Some(task.clone()),
+            of,
+            connections: Vec::new(),
+        });
+        let (interval, priority) = (Some(interval), Some(0));
+        file.tasks.push(Task { name: task, interval, priority, single: None });
     }
-    Reading { program, period: file.period, diagnostics }
 }

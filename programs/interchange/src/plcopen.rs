@@ -10,7 +10,7 @@ mod ladder;
 pub(crate) mod literal;
 mod plan;
 mod power;
-mod standard;
+pub(crate) mod standard;
 mod structure;
 pub(crate) mod typed;
 mod units;

@@ -5,7 +5,6 @@ use std::time::Duration;
 
 use understudy_ladder::Program as Ladder;
 use understudy_structured_text::lower::another_interval;
-use understudy_structured_text::parse;
 use understudy_text::{Diagnostic, Severity};
 use understudy_typed::{Elementary, Program as Typed};
 
@@ -14,6 +13,7 @@ use crate::format::{Format, Reading, read, unknown_form};
 use crate::plcopen;
 use crate::text::{Whole, whole};
 use crate::twincat;
+use crate::typed_text::parsed;
 
 /// What a file holds.
 #[derive(Debug, Clone)]
@@ -48,14 +48,15 @@ pub struct SourceFile {
 
 /// Reads the program of the file `name`, and everything that is wrong with it.
 pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
-    if let Some(parsed) = twincat::read(text) {
-        return source(whole(text, parsed, wanted.program, wanted.period));
-    }
     let Some(format) = Format::of(name, text) else {
         return SourceFile { diagnostics: vec![unknown_form(text)], ..SourceFile::default() };
     };
-    if format == Format::StructuredText {
-        return source(whole(text, parse(text), wanted.program, wanted.period));
+    let statements = match format {
+        Format::PlcOpen => twincat::read(text),
+        _ => parsed(name, text),
+    };
+    if let Some(parsed) = statements {
+        return source(whole(text, parsed, wanted.program, wanted.period));
     }
     let Reading { program, period, mut diagnostics, is_drawn, .. } =
         read(format, name, text, wanted.program);
@@ -69,10 +70,6 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
     let is_ladder = ladder.source.is_some();
     // What is not drawn as a ladder is a program of statements, or a library.
     let parsed = plcopen::read_typed(text);
-    if !is_ladder && parsed.1.iter().any(|found| found.code == "U1001") {
-        // Nothing was read, so there is nothing to lower.
-        return SourceFile { diagnostics: parsed.1, ..ladder };
-    }
     let read = whole(text, parsed, wanted.program, wanted.period);
     let missing = read.diagnostics.iter().filter(|found| found.code == NOT_EXECUTED);
     let missing: Vec<Diagnostic> = missing.cloned().collect();
@@ -118,7 +115,6 @@ pub(crate) fn another_period(
 fn source(whole: Whole) -> SourceFile {
     let mut diagnostics = whole.diagnostics;
     let library = (!whole.checked.is_empty()).then_some(Source::Library(whole.checked));
-    diagnostics.extend(whole.subranges);
     diagnostics.extend(whole.not_kept);
     diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
     let source = whole.typed.map(|typed| Source::Typed(Arc::new(typed))).or(library);

@@ -4,33 +4,30 @@ use std::ops::Range;
 use std::time::Duration;
 
 use understudy_ladder::PERIODS;
-use understudy_structured_text::lower::Names;
-use understudy_structured_text::syntax::{File, UnitKind};
+use understudy_structured_text::syntax::{Body, File, Statement, StatementKind, Unit, UnitKind};
 use understudy_structured_text::{Lowered, Options, lower, parse};
 use understudy_text::{Diagnostic, has_errors};
 use understudy_typed::Program as Typed;
 
 use crate::format::Reading;
-use crate::ladders;
+use crate::rungs::rungs;
 use crate::source::no_program;
 
 /// The shortest period that tasks of different intervals may need.
 const SHORTEST: Duration = Duration::from_millis(1);
 
 /// A program with its syntax.
+#[derive(Default)]
 pub(crate) struct Whole {
     /// The program; nothing where there are errors.
     pub(crate) typed: Option<Typed>,
     file: File,
-    names: Names,
     /// The units of a library.
     pub(crate) checked: Vec<String>,
     /// The period by which the intervals of its tasks are counted.
     pub(crate) period: Option<Duration>,
     /// What was found of the program.
     pub(crate) diagnostics: Vec<Diagnostic>,
-    /// Warnings of numbers that can leave their subranges; those of a ladder are among its own.
-    pub(crate) subranges: Vec<Diagnostic>,
     /// Warnings of what a written text keeps and a station does not.
     pub(crate) not_kept: Vec<Diagnostic>,
 }
@@ -43,12 +40,16 @@ pub(crate) fn whole(
     period: Option<Duration>,
 ) -> Whole {
     let nanoseconds = |period: Duration| i64::try_from(period.as_nanos()).unwrap_or(i64::MAX);
+    if file.units.is_empty() && has_errors(&diagnostics) {
+        // Nothing was read, so there is nothing to lower.
+        return Whole { diagnostics, ..Whole::default() };
+    }
     let options = Options { text, program, period: period.map(nanoseconds) };
-    let Lowered { program: typed, checked, names, diagnostics: found, subranges } =
-        lower(&file, &options);
+    let Lowered { program: typed, checked, diagnostics: found } = lower(&file, &options);
     diagnostics.extend(found);
     let period = understudy_structured_text::lower::period(&file, program);
     diagnostics.extend(periods(&file, period));
+    diagnostics.extend(file.units.iter().filter_map(without_statements));
     diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
     let is_right = !has_errors(&diagnostics);
     let typed = typed.filter(|_| is_right);
@@ -56,13 +57,25 @@ pub(crate) fn whole(
     Whole {
         typed,
         file,
-        names,
         checked: if is_right { checked } else { Vec::new() },
         period: period.map(|interval| Duration::from_nanos(interval.unsigned_abs())),
         diagnostics,
-        subranges,
         not_kept,
     }
+}
+
+/// The warning of a program that does nothing.
+fn without_statements(unit: &Unit) -> Option<Diagnostic> {
+    let is_nothing = |statement: &Statement| matches!(statement.kind, StatementKind::Nothing);
+    let is_empty = match &unit.body {
+        Body::Statements(statements) => statements.iter().all(is_nothing),
+        Body::Instructions(lines) => lines.is_empty(),
+        Body::Chart(_) => false,
+    };
+    (is_empty && unit.kind == UnitKind::Program).then(|| {
+        let message = format!("`{}` has no statements", unit.name);
+        Diagnostic::warning("U1023", message, unit.name.span())
+    })
 }
 
 /// Warnings of retention.
@@ -138,9 +151,7 @@ impl Whole {
     /// The ladder, or why it is none.
     pub(crate) fn reading(self, text: &str) -> Reading {
         let (ladder, reasons) = match &self.typed {
-            Some(typed) if typed.tasks.len() == 1 => {
-                ladders::ladder(text, &self.file, typed, &self.names)
-            }
+            Some(typed) if typed.tasks.len() == 1 => rungs(text, &self.file, typed),
             Some(typed) => {
                 let programs = self.file.units.iter().filter(|unit| unit.kind == UnitKind::Program);
                 let names = programs.map(|unit| unit.name.as_str());
@@ -149,9 +160,6 @@ impl Whole {
             None => (None, Vec::new()),
         };
         let mut diagnostics = self.diagnostics;
-        if ladder.is_none() {
-            diagnostics.extend(self.subranges);
-        }
         if self.typed.is_none() && !has_errors(&diagnostics) {
             diagnostics.push(no_program());
         }

@@ -16,7 +16,8 @@ use understudy_typed::Program;
 
 use crate::apart::alone;
 use crate::diagrams::Style;
-use crate::format::Format;
+use crate::format::{Format, stem};
+use crate::ldmicro;
 use crate::lists::without_lists;
 use crate::plcopen;
 use crate::source::Wanted;
@@ -69,7 +70,6 @@ pub(crate) fn typed_text_with(
     let wanted = Wanted { period, ..wanted };
     let read = whole(text, (file.clone(), found), wanted.program, wanted.period);
     let mut diagnostics = read.diagnostics.clone();
-    diagnostics.extend_from_slice(&read.subranges);
     diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
     if has_errors(&diagnostics) || (read.typed.is_none() && read.checked.is_empty()) {
         return Ok((None, diagnostics));
@@ -146,10 +146,11 @@ pub(crate) fn parsed(name: &str, text: &str) -> Option<(File, Vec<Diagnostic>)> 
     if let Some(parsed) = twincat::read(text) {
         return Some(parsed);
     }
-    match Format::of(name, text) {
-        Some(Format::StructuredText) => Some(parse(text)),
-        Some(Format::PlcOpen) => Some(plcopen::read_typed(text)),
-        _ => None,
+    match Format::of(name, text)? {
+        Format::StructuredText => Some(parse(text)),
+        Format::PlcOpen => Some(plcopen::read_typed(text)),
+        Format::LdMicro => Some(ldmicro::read(stem(name), text)),
+        Format::Ladder | Format::Digraph => None,
     }
 }
 

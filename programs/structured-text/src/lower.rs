@@ -47,7 +47,7 @@ use std::ops::Range;
 use std::rc::Rc;
 
 use understudy_text::{Diagnostic, Lines, MAXIMUM_FINDINGS};
-use understudy_typed::{Elementary, EnumerationId, Program, Type, Variable};
+use understudy_typed::{Elementary, EnumerationId, Program, Type};
 
 use crate::library;
 use crate::syntax::{File, Name, Unit};
@@ -94,25 +94,8 @@ pub struct Lowered {
     pub program: Option<Program>,
     /// The units of a library, a file without a PROGRAM, which were checked one by one.
     pub checked: Vec<String>,
-    /// Names of what is not among the program's variables.
-    pub names: Names,
     /// What was found, in the order of the text.
     pub diagnostics: Vec<Diagnostic>,
-    /// Warnings of numbers that can leave their subranges. What becomes a ladder is examined more closely there.
-    pub subranges: Vec<Diagnostic>,
-}
-
-/// Memory that is none of a program's variables, and whose routines are the library's.
-#[derive(Debug, Clone, Default)]
-pub struct Names {
-    /// Memory of charts and lists; slots of the state.
-    pub hidden: Vec<Variable>,
-    /// Variables of functions, methods and VAR_TEMP; slots counted from the start of all frames.
-    pub frames: Vec<Variable>,
-    /// Subranges of the programs' variables and of global ones, by their names in capitals.
-    pub ranges: HashMap<String, (i128, i128)>,
-    /// For each routine, whether it is of a block of the library.
-    pub library: Vec<bool>,
 }
 
 /// Lowers the programs of a file, or checks the units of a library.
@@ -146,7 +129,6 @@ struct Lowering<'a> {
     lines: Lines<'a>,
     library_lines: Lines<'static>,
     diagnostics: Vec<Diagnostic>,
-    names: Names,
     program: Program,
     units: Vec<UnitEntry<'a>>,
     unit_names: HashMap<String, usize>,
@@ -219,7 +201,6 @@ impl<'a> Lowering<'a> {
             lines: Lines::new(text),
             library_lines: Lines::new(library::TEXT),
             diagnostics: Vec::new(),
-            names: Names::default(),
             program,
             units,
             unit_names,
@@ -253,11 +234,13 @@ impl<'a> Lowering<'a> {
 
     fn finish(mut self, checked: Vec<String>) -> Lowered {
         self.calls_without_cycle();
-        self.diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
-        self.diagnostics.dedup();
+        // A warning takes the place of no error.
         self.subranges.sort_by_key(|found| (found.span.start, found.span.end));
         self.subranges.dedup();
         self.subranges.truncate(MAXIMUM_FINDINGS - self.diagnostics.len().min(MAXIMUM_FINDINGS));
+        self.diagnostics.append(&mut self.subranges);
+        self.diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
+        self.diagnostics.dedup();
         if self.diagnostics.len() > MAXIMUM_FINDINGS {
             self.diagnostics.truncate(MAXIMUM_FINDINGS);
             self.diagnostics.push(Diagnostic::too_many(0));
@@ -268,9 +251,7 @@ impl<'a> Lowering<'a> {
         Lowered {
             program: is_whole.then_some(self.program),
             checked,
-            names: self.names,
             diagnostics: self.diagnostics,
-            subranges: self.subranges,
         }
     }
 

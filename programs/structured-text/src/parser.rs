@@ -50,6 +50,11 @@ pub fn parse(text: &str) -> (File, Vec<Diagnostic>) {
     read(text, |parser| parser.file())
 }
 
+/// As [`parse`], of a text that stands for a larger one, or for one in another language.
+pub fn parse_at(text: &str, places: Places<'_>) -> (File, Vec<Diagnostic>) {
+    read_at(text, places, |parser| parser.file())
+}
+
 /// The declaration part of a unit, a type or a list of variables, as TwinCAT and CODESYS keep them: the header of a unit with
 /// its blocks of variables and without its end, `VAR_GLOBAL … END_VAR`, `TYPE … END_TYPE`. A METHOD is a unit of the file.
 pub fn parse_declarations(text: &str) -> (File, Vec<Diagnostic>) {

@@ -37,8 +37,8 @@ enum Use {
     Timer,
 }
 
-/// The whole file as one PROGRAM.
-pub(super) fn statements(file: &File) -> (Written, Vec<Diagnostic>) {
+/// The whole file as one PROGRAM with a name like `name`.
+pub(super) fn statements(name: &str, file: &File) -> (Written, Vec<Diagnostic>) {
     let mut writer = Writer {
         period: file.period.unwrap_or(Duration::from_millis(10)),
         body: String::new(),
@@ -56,6 +56,10 @@ pub(super) fn statements(file: &File) -> (Written, Vec<Diagnostic>) {
     for (name, _) in &file.pins {
         writer.name(name, Use::Bit, &(0..0));
     }
+    let program = match writer.unique(name) {
+        made if made == "v_" => "program_1".to_owned(),
+        made => made,
+    };
     if writer.has_master {
         writer.helper("rungs_run", "BOOL");
         writer.line("rungs_run := TRUE;", &(0..0));
@@ -64,7 +68,7 @@ pub(super) fn statements(file: &File) -> (Written, Vec<Diagnostic>) {
         let rail = if writer.has_master { "rungs_run" } else { "TRUE" };
         writer.series(rung, rail.to_owned(), true);
     }
-    writer.finish(file)
+    writer.finish(&program, file)
 }
 
 fn has_master(element: &Element) -> bool {
@@ -267,12 +271,12 @@ impl Writer {
         if is_last { power } else { either("TRUE".into(), behind) }
     }
 
-    fn finish(mut self, file: &File) -> (Written, Vec<Diagnostic>) {
+    fn finish(mut self, program: &str, file: &File) -> (Written, Vec<Diagnostic>) {
         if !self.comments.is_empty() {
             self.line(";", &(0..0));
         }
         let mut diagnostics = self.diagnostics;
-        let mut head = String::from("PROGRAM ldmicro\n");
+        let mut head = format!("PROGRAM {program}\n");
         let pins: HashMap<&str, &str> =
             file.pins.iter().map(|(name, pin)| (name.as_str(), pin.as_str())).collect();
         // Inputs and outputs that the list names come first, in its order.

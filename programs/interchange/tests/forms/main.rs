@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use understudy_interchange::{Format, digraph, read};
+use understudy_interchange::{Format, digraph};
 use understudy_ladder::print;
 
-use crate::reading::reading;
+use crate::reading::{reading, source};
 
 mod intervals;
 mod outputs;
@@ -57,8 +57,8 @@ fn lines(text: &str) -> impl Iterator<Item = Range<usize>> {
 }
 
 fn check(format: Format, text: &str, pieces: impl Iterator<Item = Range<usize>>, allowed: &[&str]) {
-    let found = read(format, "file", text, None);
-    assert!(found.program.is_some(), "{:#?}", found.diagnostics);
+    let found = source(format, text);
+    assert!(found.source.is_some(), "{:#?}", found.diagnostics);
     let mut unread = unread(format, text, pieces);
     unread.retain(|unread| !allowed.iter().any(|allowed| unread.starts_with(allowed)));
     assert_eq!(unread, Vec::<String>::new(), "{}", reading(format, text));
@@ -140,7 +140,7 @@ fn an_empty_program_is_not_taken_without_a_word() {
         (Format::LdMicro, "LDmicro0.1\nPROGRAM\n"),
         (Format::Digraph, "<LadderDiagram name=\"p\"/>"),
     ] {
-        let found = read(format, "file", text, None).diagnostics;
+        let found = source(format, text).diagnostics;
         assert!(found.iter().any(|found| found.code == "U1023"), "{format:?}: {found:?}");
     }
 }
@@ -152,16 +152,16 @@ fn an_address_of_an_edge_that_is_not_the_declared_one_is_said() {
     let text = digraph::write(&program);
     let changed = text.replacen("<address>000.01</address>", "<address>000.02</address>", 1);
     assert_ne!(text, changed);
-    assert!(read(Format::Digraph, "file", &text, None).diagnostics.is_empty());
-    let found = read(Format::Digraph, "file", &changed, None).diagnostics;
+    assert!(source(Format::Digraph, &text).diagnostics.is_empty());
+    let found = source(Format::Digraph, &changed).diagnostics;
     assert_eq!(found.iter().map(|found| found.code).collect::<Vec<_>>(), ["U1068"]);
 }
 
 #[test]
 fn names_that_differ_by_case_alone_are_named_both() {
     let text = "PROGRAM p VAR_INPUT a : BOOL; A : BOOL; END_VAR VAR_OUTPUT y : BOOL; END_VAR y := a; END_PROGRAM";
-    let found = read(Format::StructuredText, "file", text, None);
-    assert!(found.program.is_none());
+    let found = source(Format::StructuredText, text);
+    assert!(found.source.is_none());
     let messages: Vec<&str> =
         found.diagnostics.iter().map(|found| found.message.as_str()).collect();
     assert!(
@@ -179,10 +179,10 @@ fn the_interval_of_a_task_is_a_time_within_the_bounds() {
         )
     };
     for interval in ["T#-10ms", "-T#10ms", "T#0s", "T#2h", "soon", "10"] {
-        let found = read(Format::StructuredText, "file", &text(interval), None);
-        assert!(found.program.is_none(), "{interval}");
+        let found = source(Format::StructuredText, &text(interval));
+        assert!(found.source.is_none(), "{interval}");
     }
-    let found = read(Format::StructuredText, "file", &text("T#20ms"), None);
+    let found = source(Format::StructuredText, &text("T#20ms"));
     assert_eq!(found.diagnostics, []);
     assert_eq!(found.period, Some(std::time::Duration::from_millis(20)));
 }
@@ -194,10 +194,10 @@ fn an_error_behind_many_warnings_is_an_error() {
         (0..300).map(|place| format!("w{place} AT %QW{place} : INT (0..1);\n")).collect();
     let text =
         format!("PROGRAM p VAR {words} y AT %QX0.0 : BOOL; END_VAR y := unknown; END_PROGRAM");
-    assert!(read(Format::StructuredText, "file", &text, None).program.is_none());
+    assert!(source(Format::StructuredText, &text).source.is_none());
     let persist = "RUNG\n    CONTACTS Xa 0\n    PERSIST Xa\n    COIL Yb 0 0 0\nEND\n".repeat(300);
     let text = format!("LDmicro0.1\nPROGRAM\n{persist}RUNG\n    WARP Xa\n    COIL Yc 0 0 0\nEND\n");
-    assert!(read(Format::LdMicro, "file", &text, None).program.is_none());
+    assert!(source(Format::LdMicro, &text).source.is_none());
     let edge = r#"<Edge type="OpenContactEdge" colour="red"><from>0</from><to>1</to><symbol>a</symbol></Edge>"#;
     let coil = r#"<Edge type="OpenOutputEdge"><from>1</from><to>2</to><symbol>y</symbol></Edge>"#;
     let graphs = format!("<Graph><Edges>{edge}{coil}</Edges></Graph>").repeat(300);
@@ -205,5 +205,5 @@ fn an_error_behind_many_warnings_is_an_error() {
     let text = format!(
         r#"<LadderDiagram name="p">{graphs}<Graph><Edges>{edge}{wrong}</Edges></Graph></LadderDiagram>"#
     );
-    assert!(read(Format::Digraph, "file", &text, None).program.is_none());
+    assert!(source(Format::Digraph, &text).source.is_none());
 }

@@ -5,27 +5,74 @@ mod random;
 #[allow(dead_code, reason = "other tests use the rest")]
 mod support;
 
+use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_interchange::ldmicro::read;
-use understudy_ladder::{Interpreter, print};
+use understudy_interchange::{Bodies, Format, Source, SourceFile, Wanted, read_source, typed_text};
+use understudy_typed::{Interpreter, Points, Program};
 
 use support::findings;
 
+/// Reads a file of that name.
+pub(crate) fn read(name: &str, text: &str) -> SourceFile {
+    read_source(&format!("{name}.ld"), text, Wanted::default())
+}
+
+/// The program of a file without errors.
+pub(crate) fn program(text: &str) -> Arc<Program> {
+    let found = read("program", text);
+    match found.source {
+        Some(Source::Typed(program)) => program,
+        _ => panic!("{:#?}\n{text}", found.diagnostics),
+    }
+}
+
+/// A program in execution, with BOOLs for its inputs and outputs.
+pub(crate) struct Running {
+    program: Arc<Program>,
+    state: Vec<u64>,
+}
+
+impl Running {
+    pub(crate) fn new(program: Arc<Program>) -> Self {
+        let state = Interpreter::new(&program).initial().to_vec();
+        Self { program, state }
+    }
+
+    /// The outputs of one scan.
+    pub(crate) fn scan(&mut self, inputs: &[bool]) -> Vec<bool> {
+        let own = |points: &Points| {
+            let own = points.iter().enumerate().filter(|(_, point)| point.slot != 0);
+            own.map(|(place, _)| place).collect::<Vec<usize>>()
+        };
+        let mut image = vec![0_u64];
+        for (place, bit) in own(&self.program.inputs).into_iter().zip(inputs) {
+            image[0] |= u64::from(*bit) << place;
+        }
+        let mut outputs = vec![0_u64];
+        Interpreter::new(&self.program).step(&mut self.state, &image, &mut outputs);
+        let places = own(&self.program.outputs).into_iter();
+        places.map(|place| outputs[0] >> place & 1 == 1).collect()
+    }
+}
+
 #[test]
-fn a_program_as_a_ladder() {
+fn a_program_as_a_text() {
     let text = include_str!("../../../../examples/other-tools/light.ld");
     let reading = read("light", text);
     assert_eq!(reading.period, Some(Duration::from_millis(10)));
-    let ladder = print(&reading.program.expect("a program without errors"));
-    insta::assert_snapshot!(format!("{ladder}\n{}", findings(text, reading.diagnostics)));
+    let written =
+        typed_text("light.ld", text, Wanted::default(), Format::StructuredText, Bodies::AsRead);
+    let (written, _) = written.expect("the text of the program");
+    let written = written.expect("a program without errors").text;
+    insta::assert_snapshot!(format!("{written}\n{}", findings(text, reading.diagnostics)));
 }
 
 #[test]
 fn everything_is_said_in_one_run() {
     let text = include_str!("full-of-errors.ld");
     let reading = read("errors", text);
-    assert!(reading.program.is_none());
+    assert!(reading.source.is_none());
     insta::assert_snapshot!(findings(text, reading.diagnostics));
     // What can only be said of a whole that was read.
     let text = "LDmicro0.1\nPROGRAM\nRUNG\nCONTACTS Ry 0\nMOVE Ry 3\nTON Ta 9\nTON Ta 9\nADD n 1 99999\nDIV n n n\nEND\n";
@@ -37,12 +84,10 @@ fn a_retentive_timer_keeps_its_time() {
     let text = "LDmicro0.1\nCYCLE=10000\nIO LIST\nXrun at 1\nXreset at 2\nYdone at 3\nEND\nPROGRAM\n\
                 RUNG\nCONTACTS Xrun 0\nRTO Tsum 30000\nCOIL Ydone 0 0 0\nEND\n\
                 RUNG\nCONTACTS Xreset 0\nRES Tsum\nEND\n";
-    let reading = read("sum", text);
-    let program = reading.program.expect("a program without errors");
-    let mut scans = Interpreter::new(&program, Duration::from_millis(10)).expect("a sound program");
+    let mut running = Running::new(program(text));
     let mut outputs = Vec::new();
     for (run, reset) in [(1, 0), (1, 0), (0, 0), (1, 0), (0, 0), (0, 1), (1, 0)] {
-        outputs.push(u8::from(scans.scan(&[run == 1, reset == 1])[0]));
+        outputs.push(u8::from(running.scan(&[run == 1, reset == 1])[0]));
     }
     assert_eq!(outputs, [0, 0, 0, 0, 1, 1, 0]);
 }
@@ -50,14 +95,14 @@ fn a_retentive_timer_keeps_its_time() {
 #[test]
 fn hostile_files_end() {
     let deep = format!("LDmicro0.1\nPROGRAM\nRUNG\n{}", "PARALLEL\nSERIES\n".repeat(50_000));
-    assert!(read("deep", &deep).program.is_none());
+    assert!(read("deep", &deep).source.is_none());
     let many = format!("LDmicro0.1\nPROGRAM\nRUNG\n{}END\n", "CONTACTS Xa 0\n".repeat(100_000));
-    assert!(read("many", &many).program.is_none());
+    assert!(read("many", &many).source.is_none());
     let long = format!(
         "LDmicro0.1\nPROGRAM\nRUNG\n{}COIL Ya 0 0 0\nEND\n",
         "CONTACTS Xa 0\n".repeat(5_000)
     );
-    assert!(read("long", &long).program.is_some());
+    assert!(read("long", &long).source.is_some());
     let text = include_str!("../../../../examples/other-tools/light.ld");
     for (end, _) in text.char_indices() {
         read("beginning", &text[..end]);

@@ -4,11 +4,10 @@ use std::collections::HashMap;
 use std::fmt::Write;
 
 use understudy_interchange::plcopen::read;
-use understudy_ladder::print;
 use understudy_logic::Running;
 
 use crate::meaning::{file, variables};
-use crate::support::{PERIOD, findings, program};
+use crate::support::{circuit, findings};
 use understudy_testing::random::Dice;
 
 const INPUTS: [&str; 3] = ["i0", "i1", "i2"];
@@ -211,8 +210,8 @@ fn lists_do_what_a_machine_of_one_result_does() {
         let mut dice = Dice::new(seed);
         let lines = lines(&mut dice);
         let list = written(&lines);
-        let program = program(&unit(&declared(), &list));
-        let mut run = Running::new(&program.lower(PERIOD).expect("it was checked"));
+        let circuit = circuit(&unit(&declared(), &list));
+        let mut run = Running::new(&circuit);
         let mut naive = Naive::default();
         for scan in 0..24 {
             let inputs = dice.bits(INPUTS.len());
@@ -221,8 +220,7 @@ fn lists_do_what_a_machine_of_one_result_does() {
             assert_eq!(
                 run.step(&inputs),
                 OUTPUTS.map(|name| naive.is(name)),
-                "seed {seed}, scan {scan}\n{list}\n{}",
-                print(&program)
+                "seed {seed}, scan {scan}\n{list}"
             );
         }
     }
@@ -231,8 +229,8 @@ fn lists_do_what_a_machine_of_one_result_does() {
 #[test]
 fn numbers_functions_and_calls_under_a_condition() {
     let list = "LD i0\nCALC t(IN := i1, PT := T#100ms)\nLD n\nADD 1\nMIN 5\nST n\nGE 3\nST q0\nLD n\nGT( 2\nADD 1\n)\nST q1\nLD t.Q\nST q2\n";
-    let program = program(&unit(&declared(), list));
-    let mut run = Running::new(&program.lower(PERIOD).expect("it was checked"));
+    let circuit = circuit(&unit(&declared(), list));
+    let mut run = Running::new(&circuit);
     let scans: Vec<Vec<bool>> = (0..5).map(|_| run.step(&[true, true, false])).collect();
     let shown = |place: usize| scans.iter().map(|scan| scan[place]).collect::<Vec<_>>();
     assert_eq!(shown(0), [false, false, true, true, true]);

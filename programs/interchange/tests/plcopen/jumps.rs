@@ -4,10 +4,10 @@ use std::collections::HashMap;
 use std::fmt::Write;
 
 use understudy_interchange::plcopen::read;
-use understudy_ladder::print;
+use understudy_interchange::{Bodies, Format, Wanted, typed_text};
 
 use crate::meaning::{RAIL, block, coil, contact, file, value, variables};
-use crate::support::{PERIOD, findings, program};
+use crate::support::{circuit, findings};
 use understudy_logic::Running;
 use understudy_testing::random::Dice;
 
@@ -210,8 +210,8 @@ fn what_is_skipped_and_what_is_not_called_stays_as_it_is() {
             all += &variables(&[("local", &format!("b{place}"), kind)]);
         }
         let text = file(&all, &drawn(&rungs));
-        let program = program(&text);
-        let mut run = Running::new(&program.lower(PERIOD).expect("it was checked"));
+        let circuit = circuit(&text);
+        let mut run = Running::new(&circuit);
         let mut naive = Naive::default();
         for scan in 0..30 {
             let inputs = dice.bits(INPUTS.len());
@@ -220,8 +220,7 @@ fn what_is_skipped_and_what_is_not_called_stays_as_it_is() {
             assert_eq!(
                 run.step(&inputs),
                 OUTPUTS.map(|name| naive.is(name)),
-                "seed {seed}, scan {scan}: {rungs:#?}\n{}",
-                print(&program)
+                "seed {seed}, scan {scan}: {rungs:#?}"
             );
         }
     }
@@ -279,8 +278,12 @@ fn comments_stay_above_what_they_stand_above() {
         "<label localId=\"6\" label=\"end\"><position x=\"60\" y=\"60\"/></label>".to_owned(),
     ];
     let text = file(&declared, &objects.concat());
-    let program = program(&text);
-    let commented = program.rungs.iter().filter(|rung| !rung.comments.is_empty());
-    let comments: Vec<_> = commented.flat_map(|rung| &rung.comments).collect();
-    assert_eq!(comments, ["What (*is*) skipped"]);
+    let form = Format::StructuredText;
+    let written = typed_text("file.xml", &text, Wanted::default(), form, Bodies::AsRead);
+    let written = written.expect("a text").0.expect("a program").text;
+    let lines: Vec<&str> = written.lines().map(str::trim).collect();
+    let place = lines.iter().position(|line| line.starts_with("(* What"));
+    let place = place.unwrap_or_else(|| panic!("no comment: {written}"));
+    assert!(lines[place].contains("skipped"), "{written}");
+    assert!(lines[place + 1].starts_with("q0 := i0"), "{written}");
 }

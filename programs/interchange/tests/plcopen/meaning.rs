@@ -7,7 +7,7 @@ use understudy_interchange::plcopen::read;
 use understudy_ladder::print;
 
 use crate::numbers::{Scans, typed};
-use crate::support::{PERIOD, data, findings, program};
+use crate::support::{PERIOD, circuit, data, findings};
 use understudy_logic::Running;
 use understudy_testing::random::Dice;
 
@@ -179,8 +179,7 @@ fn random_graphs_mean_what_a_naive_walk_finds() {
         let mut dice = Dice::new(seed);
         let cells = random_cells(&mut dice);
         let objects: String = cells.iter().map(element).collect();
-        let program = program(&file(&declared, &format!("{RAIL}{objects}")));
-        let circuit = program.lower(PERIOD).expect("it was checked");
+        let circuit = circuit(&file(&declared, &format!("{RAIL}{objects}")));
         let mut run = Running::new(&circuit);
         // With a number among its points the file is a program with numbers.
         let numbers = declared.clone() + &variables(&[("output", "n", "<INT/>")]);
@@ -205,12 +204,7 @@ fn random_graphs_mean_what_a_naive_walk_finds() {
             naive.scan(&order);
             let expected: Vec<bool> =
                 ["q0", "q1", "m0"].iter().map(|name| naive.values[*name]).collect();
-            assert_eq!(
-                run.step(&inputs),
-                expected,
-                "seed {seed}, scan {scan}\n{objects}\n{}",
-                print(&program)
-            );
+            assert_eq!(run.step(&inputs), expected, "seed {seed}, scan {scan}\n{objects}");
             let given: Vec<u64> = inputs.iter().map(|bit| u64::from(*bit)).collect();
             let mut shown = scans.scan(&given);
             assert_eq!(shown.pop(), Some(0));
@@ -230,7 +224,7 @@ fn dancing_lights_do_what_another_compiler_s_code_does() {
     let text = std::fs::read_to_string(file).expect("a file that exists");
     let vectors = std::fs::read_to_string(vectors).expect("a file that exists");
     let vectors: serde_json::Value = serde_json::from_str(&vectors).expect("vectors");
-    let circuit = program(&text).lower(PERIOD).expect("a sound program");
+    let circuit = circuit(&text);
     let mut run = Running::new(&circuit);
     let scans = vectors["scans"].as_array().expect("scans");
     for (number, scan) in scans.iter().enumerate() {
@@ -414,8 +408,7 @@ fn a_sequence_steps_as_its_chart_says() {
         "<body><LD>\n</LD></body>",
         &format!("{actions}{transitions}<body>{CHART}</body>"),
     );
-    let program = program(&text);
-    let circuit = program.lower(PERIOD).expect("it was checked");
+    let circuit = circuit(&text);
     let mut run = Running::new(&circuit);
     // a, b and then y, z: both branches begin together; y follows b while its step is active and is left as it is after that; z comes
     // two scans after its step.
@@ -434,7 +427,7 @@ fn a_sequence_steps_as_its_chart_says() {
         let inputs: Vec<bool> = inputs.chars().map(|bit| bit == '1').collect();
         let shown: String =
             run.step(&inputs).iter().map(|on| if *on { '1' } else { '0' }).collect();
-        assert_eq!(shown, *outputs, "scan {number}\n{}", print(&program));
+        assert_eq!(shown, *outputs, "scan {number}");
     }
 }
 
@@ -442,8 +435,7 @@ fn a_sequence_steps_as_its_chart_says() {
 fn units_of_the_file_stand_in_place_of_their_calls() {
     let path = format!("{}/../../examples/plcopen/probes.xml", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(path).expect("an example");
-    let program = program(&text);
-    let circuit = program.lower(PERIOD).expect("it was checked");
+    let circuit = circuit(&text);
     let mut run = Running::new(&circuit);
     let mut dice = Dice::new(3);
     let mut doubts = 0;
@@ -452,7 +444,7 @@ fn units_of_the_file_stand_in_place_of_their_calls() {
         doubts = if a != b || a != c { (doubts + 1).min(9) } else { 0 };
         let agreed = u8::from(a) + u8::from(b) + u8::from(c) >= 2;
         let expected = vec![agreed, doubts >= 5];
-        assert_eq!(run.step(&[a, b, c]), expected, "scan {scan}\n{}", print(&program));
+        assert_eq!(run.step(&[a, b, c]), expected, "scan {scan}");
     }
 }
 

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
+use understudy_bits::exact;
 use understudy_interchange::plcopen::{Reading, read};
+use understudy_interchange::{Source, SourceFile, Wanted, read_source};
 use understudy_ladder::Program;
 use understudy_logic::{Circuit, Running};
 use understudy_testing::skip;
@@ -44,6 +46,17 @@ pub(crate) fn program(text: &str) -> Program {
     let reading = read(text, None);
     let found = findings(text, &reading);
     reading.program.unwrap_or_else(|| panic!("no program: {found:#?}"))
+}
+
+/// The circuit of a file that has nothing wrong.
+pub(crate) fn circuit(text: &str) -> Circuit {
+    let wanted = Wanted { period: Some(PERIOD), program: None };
+    let SourceFile { source, diagnostics, .. } = read_source("file.xml", text, wanted);
+    match source {
+        Some(Source::Ladder(ladder)) => ladder.lower(PERIOD).expect("it was checked"),
+        Some(Source::Typed(program)) => exact(&program).expect("a circuit"),
+        other => panic!("no program: {other:?} {diagnostics:#?}\n{text}"),
+    }
 }
 
 /// Outputs of `scans` scans under random inputs that change now and then.

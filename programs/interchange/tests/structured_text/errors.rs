@@ -16,10 +16,3 @@ fn check(text: &str) -> String {
 fn everything_is_said_in_one_run() {
     insta::assert_snapshot!(check(include_str!("texts/full-of-errors.st")));
 }
-
-/// What can only be said of a text in which all else is well.
-#[test]
-fn calls_of_timers_that_no_clock_can_follow() {
-    let text = include_str!("texts/timers.st");
-    insta::assert_snapshot!(check(text));
-}

@@ -3,13 +3,89 @@
 use understudy_ladder::print;
 use understudy_logic::Running;
 
+use understudy_structured_text::parse;
+
+use crate::execution::{check, typed};
 use crate::support::{PERIOD, findings, program};
 
 #[test]
 fn a_text_as_a_ladder() {
-    insta::assert_snapshot!(print(&program(include_str!(
-        "../../../../examples/other-tools/press.st"
-    ))));
+    insta::assert_snapshot!(print(&program(include_str!("texts/rungs.st"))));
+}
+
+/// What rungs do not hold is refused, and never left out: each declaration with each use of it, alone and in a configuration.
+#[test]
+fn rungs_do_what_the_text_does_or_there_are_none() {
+    let declared = [
+        "VAR x : BOOL; END_VAR",
+        "VAR x : BOOL := TRUE; END_VAR",
+        "VAR x : BOOL := BOOL#1; END_VAR",
+        "VAR x : BOOL := NOT FALSE; END_VAR",
+        "VAR CONSTANT k : BOOL := TRUE; END_VAR VAR x : BOOL := k; END_VAR",
+        "VAR CONSTANT k : BOOL := NOT TRUE; x : BOOL := NOT k AND TRUE; END_VAR",
+        "VAR RETAIN x : BOOL := TRUE; END_VAR",
+        "VAR_TEMP x : BOOL; END_VAR",
+        "VAR_OUTPUT x : BOOL := TRUE; END_VAR",
+        "VAR_INPUT x : BOOL := TRUE; END_VAR",
+        "VAR_INPUT x : BOOL R_EDGE; END_VAR",
+        "VAR x AT %QX3.1 : BOOL := TRUE; again AT %QX3.1 : BOOL; END_VAR",
+        "VAR x AT %MX3.1 : BOOL := TRUE; END_VAR",
+        "VAR x AT %IX3.1 : BOOL; END_VAR",
+        "VAR_EXTERNAL x : BOOL; END_VAR",
+        "VAR x : flag; END_VAR",
+        "VAR t : TON := (PT := T#200ms); x : BOOL; END_VAR",
+        "VAR t : TON := (IN := TRUE, PT := T#200ms); x : BOOL; END_VAR",
+        "VAR c : CTU := (CV := 3); x : BOOL; END_VAR",
+        "VAR c : CTU := (PV := 2); x : BOOL; END_VAR",
+        "VAR r : R_TRIG; s : SR; x : BOOL; END_VAR",
+        "VAR w AT %QW3 : WORD; x AT %QX6.1 : BOOL; END_VAR",
+    ];
+    let uses = [
+        "q := x; x := a;",
+        "x := a OR x; q := x;",
+        "IF a THEN x := b; END_IF; q := x XOR b;",
+        "q := t.Q; t(IN := a); q := q AND t.Q OR x;",
+        "t(IN := a, PT := T#300ms); q := t.Q;",
+        "IF b THEN t(IN := a); END_IF; q := t.Q;",
+        "c(CU := a); q := c.Q; p := c.CV >= 2;",
+        "c(CU := a, R := b, PV := 4); c.PV := 3; q := c.Q;",
+        "c(a, b, 3); q := c.CV < 3;",
+        "r(CLK := a); s(S1 := r.Q, R := b); q := s.Q1; p := NOT r.Q;",
+        "q := r.Q AND x;",
+        "x := TRUE; q := %QX3.1; %QX7.0 := a; p := %QX7.0;",
+        "q := MAX(BOOL_TO_INT(a), 0) > 0;",
+        "q := SEL(a, b, x);",
+        "RETURN; q := a;",
+        "q := x; WHILE q AND a DO q := FALSE; END_WHILE;",
+    ];
+    let configurations = [
+        "",
+        "CONFIGURATION c RESOURCE r ON plc TASK t(INTERVAL := T#100ms); PROGRAM i WITH t : p0; END_RESOURCE END_CONFIGURATION",
+        "CONFIGURATION c VAR_GLOBAL go : BOOL; END_VAR RESOURCE r ON plc TASK t(SINGLE := go); PROGRAM i WITH t : p0; END_RESOURCE END_CONFIGURATION",
+        "CONFIGURATION c VAR_GLOBAL go AT %QX9.0 : BOOL; END_VAR RESOURCE r ON plc TASK t(INTERVAL := T#100ms); PROGRAM i WITH t : p0(q => go); END_RESOURCE END_CONFIGURATION",
+        "FUNCTION_BLOCK R_TRIG VAR_INPUT CLK : BOOL; END_VAR VAR_OUTPUT Q : BOOL; END_VAR Q := NOT CLK; END_FUNCTION_BLOCK",
+    ];
+    let (mut held, mut refused) = (0, 0);
+    for declared in declared {
+        for body in uses {
+            for around in configurations {
+                let text = format!(
+                    "TYPE flag : BOOL := TRUE; END_TYPE VAR_GLOBAL x : BOOL := TRUE; END_VAR {around}
+                     PROGRAM p0 VAR_INPUT a, b : BOOL; END_VAR VAR_OUTPUT q, p : BOOL; END_VAR {declared} {body} END_PROGRAM"
+                );
+                let (file, _) = parse(&text);
+                let Some(typed) = typed(&text, &file) else {
+                    continue;
+                };
+                match crate::support::read(&text).program {
+                    Some(_) => check(&text, &program(&text), &typed, 5),
+                    None => refused += 1,
+                }
+                held += 1;
+            }
+        }
+    }
+    assert!(held > 500 && refused > 200, "{held} programs, {refused} refused");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use understudy_interchange::{Format, Reading};
+use understudy_interchange::{Format, Reading, Wanted, read_source};
 use understudy_ladder::{Program, check};
 use understudy_text::Diagnostic;
 
@@ -13,7 +13,14 @@ pub(crate) fn read(text: &str) -> Reading {
     understudy_interchange::read(Format::StructuredText, "text.st", text, None)
 }
 
-/// The one program of a text without errors.
+/// What is found in a text that is read as it is.
+pub(crate) fn found(text: &str) -> Vec<Diagnostic> {
+    let read = read_source("text.st", text, Wanted { period: Some(PERIOD), program: None });
+    assert_eq!(understudy_text::has_errors(&read.diagnostics), read.source.is_none(), "{text}");
+    read.diagnostics
+}
+
+/// The rungs of the one program of a text without errors.
 pub(crate) fn program(text: &str) -> Program {
     let reading = read(text);
     let errors = understudy_text::has_errors(&reading.diagnostics);

@@ -2,11 +2,13 @@
 
 use std::time::Duration;
 
-use crate::support::read;
+use understudy_bits::exact;
 use understudy_ladder::Interpreter;
-
-use crate::support::program;
 use understudy_logic::Running;
+use understudy_structured_text::parse;
+
+use crate::execution::typed;
+use crate::support::{PERIOD, read};
 
 fn bits(text: &str) -> Vec<bool> {
     text.bytes().map(|byte| byte == b'1').collect()
@@ -18,39 +20,40 @@ fn the_text_of_all_blocks_does_what_matiec_makes_of_it() {
     let recorded: serde_json::Value =
         serde_json::from_str(include_str!("../../../ladder/tests/ladder/vectors/blocks.json"))
             .expect("a JSON document");
-    let program = program(text);
     let period = Duration::from_millis(recorded["period_ms"].as_u64().expect("a period"));
     assert_eq!(read(text).period, Some(period));
-    for (kind, signals) in [("inputs", &program.inputs), ("outputs", &program.outputs)] {
-        let found: Vec<(String, String)> = signals
-            .iter()
-            .map(|signal| {
-                let address = signal.address.as_ref().map(ToString::to_string);
-                (signal.name.to_string(), address.unwrap_or_default())
+    let typed = typed(text, &parse(text).0).expect("a sound program");
+    for (kind, points) in [("inputs", &typed.inputs), ("outputs", &typed.outputs)] {
+        let points = points.iter().filter(|point| point.slot != 0);
+        let found: Vec<(&str, &str)> = points
+            .map(|point| {
+                let shown = typed.variables.iter().find(|shown| shown.name == point.name);
+                let address = shown.and_then(|shown| shown.address.as_deref());
+                (point.name.as_str(), address.unwrap_or_default())
             })
             .collect();
-        let word = |signal: &serde_json::Value, key: &str| {
-            signal[key].as_str().expect("a word").to_owned()
-        };
         let expected = recorded[kind].as_array().expect("a list of signals").iter();
-        let expected: Vec<_> =
-            expected.map(|signal| (word(signal, "name"), word(signal, "address"))).collect();
+        let word = |signal: &'static str, of: &'_ serde_json::Value| {
+            of[signal].as_str().map(str::to_owned)
+        };
+        let expected: Vec<(String, String)> = expected
+            .map(|of| (word("name", of).expect("a name"), word("address", of).unwrap_or_default()))
+            .collect();
+        let expected: Vec<(&str, &str)> =
+            expected.iter().map(|(name, address)| (name.as_str(), address.as_str())).collect();
         assert_eq!(found, expected);
     }
-    let mut interpreter = Interpreter::new(&program, period).expect("a sound program");
-    let mut circuit = Running::new(&program.lower(period).expect("a sound program"));
+    let mut circuit = Running::new(&exact(&typed).expect("a circuit"));
     let scans = recorded["scans"].as_array().expect("a list of scans");
     assert_eq!(scans.len(), 2_000);
     for (number, scan) in scans.iter().enumerate() {
         let scan = scan.as_str().and_then(|scan| scan.split_once(' '));
         let (inputs, outputs) = scan.expect("inputs, a blank, outputs");
-        let inputs = bits(inputs);
-        assert_eq!(interpreter.scan(&inputs), bits(outputs), "interpreter, scan {number}");
-        assert_eq!(circuit.step(&inputs), bits(outputs), "circuit, scan {number}");
+        assert_eq!(circuit.step(&bits(inputs)), bits(outputs), "scan {number}");
     }
 }
 
-/// The cases of the ladder's own tests, once as blocks of the ladder and once, called under a condition, as bits.
+/// The cases of the ladder's own tests, as rungs and as circuits, and as circuits of calls under a condition.
 #[test]
 fn the_standard_blocks_do_what_the_standard_says() {
     let text = include_str!("../../../ladder/tests/ladder/vectors/semantics.txt");
@@ -88,31 +91,25 @@ fn the_standard_blocks_do_what_the_standard_says() {
                 names(&inputs, "in_"),
                 names(&outputs, "out_")
             );
-            let program = program(&source);
-            assert_eq!(
-                program.blocks().is_empty(),
-                call.starts_with("IF") && !matches!(kind, "TON" | "TOF" | "TP"),
-                "{source}"
-            );
-            let period = Duration::from_millis(100);
-            let mut scans = Interpreter::new(&program, period).expect("a sound program");
-            let mut circuit = Running::new(&program.lower(period).expect("a sound program"));
+            let typed = typed(&source, &parse(&source).0).expect("a sound program");
+            let mut circuits = vec![Running::new(&exact(&typed).expect("a circuit"))];
+            // A call under a condition is no rung.
+            let is_rung = !call.starts_with("IF");
+            let program = read(&source).program;
+            assert_eq!(program.is_some(), is_rung, "{source}");
+            let rungs = program.iter().map(|it| it.lower(PERIOD).expect("a sound program"));
+            circuits.extend(rungs.map(|circuit| Running::new(&circuit)));
+            let scans = program.iter().map(|it| Interpreter::new(it, PERIOD));
+            let mut scans: Vec<_> = scans.map(|scans| scans.expect("a sound program")).collect();
             for scan in 0..inputs[0].1.len() {
                 let at = |rows: &[(&str, Vec<bool>)]| -> Vec<bool> {
                     rows.iter().map(|(_, values)| values[scan]).collect()
                 };
-                assert_eq!(
-                    scans.scan(&at(&inputs)),
-                    at(&outputs),
-                    "{}, scan {scan}\n{source}",
-                    case[0]
-                );
-                assert_eq!(
-                    circuit.step(&at(&inputs)),
-                    at(&outputs),
-                    "{}, scan {scan}\n{source}",
-                    case[0]
-                );
+                let found = circuits.iter_mut().map(|circuit| circuit.step(&at(&inputs)));
+                let found = found.chain(scans.iter_mut().map(|scans| scans.scan(&at(&inputs))));
+                for found in found.collect::<Vec<_>>() {
+                    assert_eq!(found, at(&outputs), "{}, scan {scan}\n{source}", case[0]);
+                }
                 count += 1;
             }
         }

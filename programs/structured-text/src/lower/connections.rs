@@ -7,14 +7,13 @@ use understudy_typed::{
     StatementKind, Type,
 };
 
-use crate::syntax::{Class, Expression};
+use crate::syntax::Expression;
 
 use super::Lowering;
 use super::blocks::{Block, Routine};
 use super::fold::{apply, not};
-use super::names::Variable;
 use super::places::{load, place};
-use super::programs::{Instance, hidden};
+use super::programs::Instance;
 
 impl<'a> Lowering<'a> {
     /// A routine that copies what the program is connected to, before and behind its body.
@@ -59,7 +58,6 @@ impl<'a> Lowering<'a> {
         };
         self.scope = super::names::Scope::default();
         self.calls.push(vec![(routine.id.0, instance.name.span())]);
-        self.names.library.push(false);
         self.program.routines.push(Lowered {
             name: name.to_owned(),
             kind: RoutineKind::Block,
@@ -84,19 +82,6 @@ impl<'a> Lowering<'a> {
             return Vec::new();
         };
         let variable = |slot| place(Root::Global(slot), bool.clone());
-        for (name, slot) in [("event", slot), ("last", slot + 1)] {
-            let shown = Variable {
-                name: format!("{}.{name}", instance.name),
-                root: Root::Global(slot),
-                of: bool.clone(),
-                class: Class::Local,
-                is_constant: false,
-                is_point: false,
-                range: None,
-                span: span.clone(),
-            };
-            self.names.hidden.push(hidden(&shown, slot));
-        }
         let operands = vec![condition.clone(), not(load(variable(slot + 1)))];
         let begins = apply(Operation::And(Elementary::Bool), operands, bool.clone());
         let kinds = [

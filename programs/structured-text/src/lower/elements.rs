@@ -172,7 +172,6 @@ impl Lowering<'_> {
     ) -> RoutineId {
         let id = RoutineId(self.program.routines.len() as u32);
         self.calls.push(called.map(|called| (called.0, 0..0)).into_iter().collect());
-        self.names.library.push(false);
         self.program.routines.push(Routine {
             name,
             kind: RoutineKind::Block,

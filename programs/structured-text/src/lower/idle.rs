@@ -27,7 +27,7 @@ impl<'a> Lowering<'a> {
             .flat_map(|routine| Uses::of(&routine.body).reads)
             .filter_map(|place| address(place, None))
             .collect();
-        let kept = (self.program.clone(), self.names.clone(), self.calls.clone());
+        let kept = (self.program.clone(), self.calls.clone());
         let at = (std::mem::take(&mut self.addresses), std::mem::take(&mut self.extents));
         let known = self.routines.clone();
         // A program with an error is not executed for that reason.
@@ -78,7 +78,7 @@ impl<'a> Lowering<'a> {
             }
             self.warn_of_missing(program, written, (&read, &at.0));
         }
-        (self.program, self.names, self.calls) = kept;
+        (self.program, self.calls) = kept;
         (self.addresses, self.extents) = at;
         self.routines = known;
         self.elements = Default::default();

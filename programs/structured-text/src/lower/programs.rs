@@ -99,8 +99,6 @@ impl<'a> Lowering<'a> {
         if let Symbol::Variable(variable) = symbol
             && let Root::Global(slot) = variable.root
         {
-            let range = variable.range.map(|range| (name.to_ascii_uppercase(), range));
-            self.names.ranges.extend(range);
             self.program.variables.push(Shown {
                 name: name.to_owned(),
                 of: variable.of.clone(),
@@ -290,9 +288,6 @@ impl<'a> Lowering<'a> {
             };
             // Memories that no person declared, as of charts.
             if variable.name.contains('.') {
-                if let Root::Own(slot) = variable.root {
-                    self.names.hidden.push(hidden(variable, own + slot));
-                }
                 continue;
             }
             let parameter = block.parameters.iter().find(|found| found.name == variable.name);
@@ -303,8 +298,6 @@ impl<'a> Lowering<'a> {
                 _ => continue,
             };
             let shown = format!("{prefix}{}", variable.name);
-            let range = variable.range.map(|range| (shown.to_ascii_uppercase(), range));
-            self.names.ranges.extend(range);
             let is_connected = connections.iter().any(|connection| match connection {
                 Argument::Given(name, _) | Argument::Taken { from: name, .. } => {
                     name.is(&variable.name)
@@ -411,18 +404,6 @@ impl<'a> Lowering<'a> {
         self.scope = outside;
         let key = Key { owner, class, open };
         self.routine(key, &unit.name.span());
-    }
-}
-
-/// A variable that people do not see.
-pub(super) fn hidden(variable: &Variable, slot: u32) -> Shown {
-    Shown {
-        name: variable.name.clone(),
-        of: variable.of.clone(),
-        slot,
-        address: None,
-        description: None,
-        is_retained: false,
     }
 }
 

@@ -11,7 +11,6 @@ use crate::syntax::{Class, Declaration, Name, Span, UnitKind};
 use super::blocks::{Key, Parameter, Routine};
 use super::images::initial;
 use super::names::{Symbol, Variable};
-use super::programs::hidden;
 use super::types::Resolved;
 use super::{Lowering, MAXIMUM_FRAMES, MAXIMUM_ROUTINES};
 
@@ -95,16 +94,6 @@ impl<'a> Lowering<'a> {
             return None;
         }
         self.program.frames = frame.next;
-        for symbol in frame.symbols.values() {
-            if let Symbol::Variable(variable) = symbol
-                && let Root::Frame(slot) = variable.root
-            {
-                let mut found = hidden(variable, slot);
-                found.name = format!("{}.{}", unit.name, found.name);
-                self.names.frames.push(found);
-            }
-        }
-        self.names.library.push(self.units[key.owner.unit].is_library);
         let id = RoutineId(self.program.routines.len() as u32);
         let name = match key.owner.method {
             Some(_) => format!("{}.{}", self.units[key.owner.unit].unit.name, unit.name),

@@ -3,37 +3,23 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::Range;
 
-use understudy_structured_text::syntax::{Class, File, Name, TypeKind, UnitKind};
+use understudy_structured_text::syntax::{Class, File, Name, TypeKind, Unit, UnitKind};
 use understudy_text::Diagnostic;
-use understudy_typed::{Elementary, Program, Type};
 
 /// Names that one finding lists.
 const MAXIMUM_LISTED: usize = 20;
 
-/// Second names of one address, and what nothing uses.
-pub(super) fn lost(text: &str, file: &File, program: &Program) -> Vec<Diagnostic> {
-    let declared = |name: &str| {
-        let units = file.units.iter().flat_map(|unit| &unit.declarations);
-        let mut all = units.chain(&file.globals);
-        all.find(|found| found.name.is(name)).map_or(0..0, |found| found.name.span())
-    };
+/// Second names of one address, initial values of inputs, and what nothing uses; `others` are declarations of the program that no rung reads or writes.
+pub(super) fn lost(text: &str, file: &File, unit: &Unit, others: &[&Name]) -> Vec<Diagnostic> {
     let warning = |message: String, span| Diagnostic::warning("U1055", message, span);
     let mut found = Vec::new();
-    for variable in &program.variables {
-        let span = declared(&variable.name);
-        if has_others(program, &variable.of) {
-            let message = format!(
-                "`{}` has what a ladder does not hold and nothing here uses: not kept",
-                variable.name
-            );
-            found.push(warning(message, span));
-        }
+    for name in others {
+        let message =
+            format!("`{name}` is nothing that a ladder holds, and nothing here uses it: not kept");
+        found.push(warning(message, name.span()));
     }
     let mut first: BTreeMap<String, &Name> = BTreeMap::new();
-    let units = file.units.iter();
-    let programs =
-        units.filter(|unit| unit.kind == UnitKind::Program && unit.name.is(&program.name));
-    for declaration in programs.flat_map(|unit| &unit.declarations) {
+    for declaration in &unit.declarations {
         let name = &declaration.name;
         if declaration.class == Class::Input && declaration.initial.is_some() {
             let message = format!("the initial value of the input `{name}` is not kept");
@@ -59,21 +45,6 @@ pub(super) fn lost(text: &str, file: &File, program: &Program) -> Vec<Diagnostic
         found.extend(unused(text, file));
     }
     found
-}
-
-/// Whether a type has parts that no ladder holds; times are the presets of timers.
-fn has_others(program: &Program, of: &Type) -> bool {
-    match of {
-        Type::Elementary(of) | Type::Enumeration(_, of) => {
-            !of.is_integer() && !matches!(of, Elementary::Bool | Elementary::Time)
-        }
-        Type::Text(_) => true,
-        Type::Array(array) => has_others(program, &array.element),
-        Type::Structure(id, _) => {
-            let fields = &program.structures[id.0 as usize].fields;
-            fields.iter().any(|field| has_others(program, &field.of))
-        }
-    }
 }
 
 /// What is declared outside of the programs and not used elsewhere in the text.

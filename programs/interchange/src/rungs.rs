@@ -1,0 +1,302 @@
+//! Statements as rungs: a rung for each assignment of a BOOL and for each call of a standard block.
+//!
+//! ```text
+//! y := a AND NOT b;                   a /b ( y )
+//! pause(IN := a, PT := T#3s);         a {TON pause 3s}
+//! IF a THEN y := TRUE; END_IF;        a (S y )
+//! IF a THEN y := b; END_IF;           a ( then_1 )      [ then_1 b | /then_1 y ] ( y )
+//! ```
+//!
+//! Invariant: a rung reads what its statement reads, since both are executed in their order. What no rung holds is refused with its place: numbers
+//! but counters compared with a constant, loops, CASE, and calls of blocks under a condition.
+
+mod blocks;
+mod lost;
+mod network;
+mod signals;
+
+use std::collections::{HashMap, HashSet};
+
+use understudy_ladder::{
+    Coil, CoilKind, Contact, ContactKind, Element, MAXIMUM_RUNGS, Name, Namer, Program, Rung,
+    Series, check,
+};
+use understudy_structured_text::lower::event;
+use understudy_structured_text::syntax::{
+    Body, Expression, File, Name as SourceName, Path, Span, Statement, StatementKind, Unit,
+    UnitKind,
+};
+use understudy_text::{Diagnostic, Severity};
+use understudy_typed::Program as Typed;
+
+use self::network::Power;
+use self::signals::Known;
+
+/// Conditions of the branches before that a branch tests each for itself.
+const MAXIMUM_BEFORE: usize = 4;
+
+/// What is said of one program that no rungs hold, at most.
+const MAXIMUM_REFUSED: usize = 20;
+
+/// A program of one task as rungs, with what of its text they do not keep; nothing where no rungs hold it, with the reasons.
+pub(crate) fn rungs(text: &str, file: &File, typed: &Typed) -> (Option<Program>, Vec<Diagnostic>) {
+    let mut programs = file.units.iter().filter(|unit| unit.kind == UnitKind::Program);
+    let Some(unit) = programs.find(|unit| unit.name.is(&typed.name)) else {
+        return (None, Vec::new());
+    };
+    let refused = |what: &str| {
+        let refused = Refused { what: what.to_owned(), span: unit.name.span() };
+        (None, vec![refusal(unit, refused)])
+    };
+    let Body::Statements(statements) = &unit.body else {
+        return refused("its body is no list of statements");
+    };
+    if unit.extends.is_some() {
+        return refused("it extends another unit");
+    }
+    let mut runs = file.instances.iter().filter(|run| run.of == unit.name);
+    if runs.any(|run| !run.connections.is_empty() || event(file, run).is_some()) {
+        return refused("its task has an event, or its instance has connections");
+    }
+    let mut writer = Writer::new(file, unit, typed);
+    writer.statements(statements, None);
+    match writer.finish(statements) {
+        Ok((program, others)) => (Some(program), lost::lost(text, file, unit, &others)),
+        Err(found) => (None, found),
+    }
+}
+
+/// What no rung holds.
+struct Refused {
+    what: String,
+    span: Span,
+}
+
+type Found<T> = Result<T, Refused>;
+
+fn refused<T>(what: impl Into<String>, span: &Span) -> Found<T> {
+    Err(Refused { what: what.into(), span: span.clone() })
+}
+
+fn refusal(unit: &Unit, refused: Refused) -> Diagnostic {
+    let message = format!("`{}` is no ladder: {}", unit.name, refused.what);
+    let help =
+        "rungs hold BOOLs, timers, counters, latches and edges; .st and .xml hold every program";
+    Diagnostic::error("U1056", message, refused.span).with_help(help)
+}
+
+struct Writer<'f> {
+    file: &'f File,
+    unit: &'f Unit,
+    ladder: Program,
+    namer: Namer,
+    /// By name and by address, in capitals.
+    known: HashMap<String, Known>,
+    /// Blocks that were called.
+    called: HashSet<String>,
+    /// Blocks whose outputs are read, and where.
+    read: Vec<(String, Span)>,
+    /// For the next rung.
+    comments: Vec<String>,
+    refused: Vec<Refused>,
+}
+
+impl<'f> Writer<'f> {
+    /// Writes the rungs of statements, each under a bit where they are executed only then.
+    fn statements(&mut self, statements: &'f [Statement], guard: Option<&str>) {
+        for statement in statements {
+            let is_end = matches!(statement.kind, StatementKind::Nothing);
+            if !is_end {
+                self.comments.extend(statement.comments.iter().cloned());
+            }
+            if let Err(found) = self.statement(statement, guard) {
+                self.refused.push(found);
+            }
+        }
+    }
+
+    fn statement(&mut self, statement: &'f Statement, guard: Option<&str>) -> Found<()> {
+        let span = &statement.span;
+        let word = match &statement.kind {
+            StatementKind::Assign(target, value) => return self.assign(target, value, guard),
+            StatementKind::Call(path, arguments) => {
+                if guard.is_some() {
+                    return refused("it calls a block under a condition", span);
+                }
+                return self.call(path, arguments);
+            }
+            StatementKind::If(branches, otherwise) => {
+                return self.choice(branches, otherwise, guard);
+            }
+            StatementKind::Nothing => return Ok(()),
+            StatementKind::Case(..) => "CASE",
+            StatementKind::For(_) => "FOR",
+            StatementKind::While(..) => "WHILE",
+            StatementKind::Repeat(..) => "REPEAT",
+            StatementKind::Exit => "EXIT",
+            StatementKind::Continue => "CONTINUE",
+            StatementKind::Return => "RETURN",
+            StatementKind::Code(_) => "C code",
+        };
+        refused(format!("{word} is no rung"), span)
+    }
+
+    fn assign(&mut self, target: &Path, value: &Expression, guard: Option<&str>) -> Found<()> {
+        let target = self.target(target)?;
+        let power = self.power(value, false, 0)?;
+        let Some(guard) = guard else {
+            let (network, kind) = match power {
+                Power::On => (Vec::new(), CoilKind::Plain),
+                Power::Off => (Vec::new(), CoilKind::Negated),
+                Power::Through(series) => (series, CoilKind::Plain),
+            };
+            self.push(network, vec![coil(kind, &target)]);
+            return Ok(());
+        };
+        let (network, kind) = match power {
+            Power::On => (vec![contact(guard, false)], CoilKind::Set),
+            Power::Off => (vec![contact(guard, false)], CoilKind::Reset),
+            Power::Through(series) => {
+                let mut taken = vec![contact(guard, false)];
+                taken.extend(series);
+                let kept = vec![contact(guard, true), contact(&target, false)];
+                (vec![Element::Branches(vec![taken, kept])], CoilKind::Plain)
+            }
+        };
+        self.push(network, vec![coil(kind, &target)]);
+        Ok(())
+    }
+
+    /// `IF … THEN … ELSIF … ELSE … END_IF`: a bit says which branch is executed, since a branch may change what the conditions read.
+    fn choice(
+        &mut self,
+        branches: &'f [(Expression, Vec<Statement>)],
+        otherwise: &'f [Statement],
+        guard: Option<&str>,
+    ) -> Found<()> {
+        if let ([(condition, body)], []) = (branches, otherwise)
+            && let Some(latches) = self.latches(body)?
+        {
+            let mut network: Series = guard.map(|bit| contact(bit, false)).into_iter().collect();
+            match self.power(condition, false, 0)? {
+                Power::On => {}
+                Power::Off => return Ok(()),
+                Power::Through(series) => network.extend(series),
+            }
+            self.push(network, latches);
+            return Ok(());
+        }
+        let mut before: Series = guard.map(|bit| contact(bit, false)).into_iter().collect();
+        let mut bits = Vec::new();
+        for (condition, _) in branches {
+            let power = self.power(condition, false, 0)?;
+            let bit = self.memory("then");
+            let (network, kind) = match power {
+                Power::On => (before.clone(), CoilKind::Plain),
+                Power::Off => (Vec::new(), CoilKind::Negated),
+                Power::Through(series) => {
+                    (before.iter().cloned().chain(series).collect(), CoilKind::Plain)
+                }
+            };
+            self.push(network, vec![coil(kind, &bit)]);
+            before.push(contact(&bit, true));
+            if before.len() > MAXIMUM_BEFORE {
+                let rest = self.memory("rest");
+                self.push(before, vec![coil(CoilKind::Plain, &rest)]);
+                before = vec![contact(&rest, false)];
+            }
+            bits.push(bit);
+        }
+        if !otherwise.is_empty() {
+            let bit = self.memory("else");
+            self.push(before, vec![coil(CoilKind::Plain, &bit)]);
+            bits.push(bit);
+        }
+        let bodies = branches.iter().map(|(_, body)| body.as_slice()).chain([otherwise]);
+        for (bit, body) in bits.iter().zip(bodies) {
+            self.statements(body, Some(bit));
+        }
+        Ok(())
+    }
+
+    /// The set and reset coils of a body that is nothing else.
+    fn latches(&mut self, body: &[Statement]) -> Found<Option<Vec<Coil>>> {
+        let mut coils = Vec::new();
+        for statement in body {
+            let StatementKind::Assign(target, value) = &statement.kind else {
+                return Ok(None);
+            };
+            let kind = match network::constant(value) {
+                Some(true) => CoilKind::Set,
+                Some(false) => CoilKind::Reset,
+                None => return Ok(None),
+            };
+            coils.push(coil(kind, &self.target(target)?));
+        }
+        if coils.is_empty() {
+            return Ok(None);
+        }
+        self.comments.extend(body.iter().flat_map(|statement| &statement.comments).cloned());
+        Ok(Some(coils))
+    }
+
+    fn push(&mut self, network: Series, coils: Vec<Coil>) {
+        let comments = std::mem::take(&mut self.comments);
+        self.ladder.rungs.push(Rung { network, coils, comments, ..Rung::default() });
+    }
+
+    /// The program, and the names of what is declared, is no part of rungs, and is not used.
+    fn finish(
+        mut self,
+        statements: &[Statement],
+    ) -> Result<(Program, Vec<&'f SourceName>), Vec<Diagnostic>> {
+        for (block, span) in std::mem::take(&mut self.read) {
+            if !self.called.contains(&block) {
+                let what = format!("`{block}` is read and never called");
+                self.refused.push(Refused { what, span });
+            }
+        }
+        let declared = self.unit.declarations.iter().filter(|it| !it.constant);
+        let is_other = |known: &Known| match known {
+            Known::Other(_) => true,
+            Known::Block { name, .. } => !self.called.contains(name),
+            Known::Bit { .. } => false,
+        };
+        let is_left_out = |name: &SourceName| self.known.get(&name.key()).is_some_and(is_other);
+        let others = declared.map(|it| &it.name).filter(|name| is_left_out(name)).collect();
+        if self.ladder.rungs.len() > MAXIMUM_RUNGS {
+            let what = format!("it has more than {MAXIMUM_RUNGS} rungs");
+            let error = Refused { what, span: self.unit.name.span() };
+            return Err(vec![Diagnostic { code: "U1048", ..refusal(self.unit, error) }]);
+        }
+        if !self.refused.is_empty() {
+            let unit = self.unit;
+            let more = self.refused.len().saturating_sub(MAXIMUM_REFUSED);
+            self.refused.truncate(MAXIMUM_REFUSED);
+            if more > 0
+                && let Some(last) = self.refused.last_mut()
+            {
+                last.what = format!("{}, and {more} more", last.what);
+            }
+            return Err(self.refused.into_iter().map(|found| refusal(unit, found)).collect());
+        }
+        self.states();
+        if let Some(last) = statements.last()
+            && matches!(last.kind, StatementKind::Nothing)
+        {
+            self.ladder.footer.extend(last.comments.iter().cloned());
+        }
+        let found = check(&self.ladder).into_iter();
+        let errors: Vec<Diagnostic> = found.filter(|it| it.severity == Severity::Error).collect();
+        if errors.is_empty() { Ok((self.ladder, others)) } else { Err(errors) }
+    }
+}
+
+fn contact(operand: &str, negated: bool) -> Element {
+    let kind = if negated { ContactKind::NormallyClosed } else { ContactKind::NormallyOpen };
+    Element::Contact(Contact { kind, operand: Name::from(operand) })
+}
+
+fn coil(kind: CoilKind, target: &str) -> Coil {
+    Coil { kind, target: Name::from(target) }
+}
