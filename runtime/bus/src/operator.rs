@@ -165,7 +165,17 @@ impl Call {
     /// # Errors
     /// [`BusError::Unanswered`] where this certificate is not admitted to what was asked, [`BusError::AnswerLost`] where
     /// the answer does not arrive and what was asked may be done.
+    ///
+    /// A connection that is lost and opened anew in the middle looks as if the member had not admitted the question. A write, which has one effect
+    /// however often it is asked for, is asked for again before it is called refused.
     pub fn ask(&self, request: &Request) -> Result<String, BusError> {
+        match (self.ask_once(request), request) {
+            (Err(BusError::Unanswered { .. }), Request::Write(_)) => self.ask_once(request),
+            (answer, _) => answer,
+        }
+    }
+
+    fn ask_once(&self, request: &Request) -> Result<String, BusError> {
         let unanswered = || BusError::Unanswered {
             name: self.name.clone(),
             address: self.address,
