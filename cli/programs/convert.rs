@@ -11,9 +11,8 @@ use understudy_interchange::{
     Bodies, Compared, Format, Reading, Source, Wanted, WriteError, Written, read, read_source,
     typed_text, unknown_form, write,
 };
-use understudy_ladder::Program;
 use understudy_text::duration::parse_positive;
-use understudy_text::{Diagnostic, Lines, MAXIMUM_SHOWN, Report, shortened};
+use understudy_text::{Lines, MAXIMUM_SHOWN, Report, shortened};
 
 use crate::answer::{Answer, Status};
 use crate::files::{self, ProgramText};
@@ -96,12 +95,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let form = form_of_output(arguments);
     let failed = |error: WriteError| (code(&error), error.to_string());
     let as_it_is = Wanted { period: None, ..wanted };
-    let as_it_is = || read_source(&report.name, &report.text, as_it_is).source;
-    let has_numbers = reading.program.is_some() && matches!(as_it_is(), Some(Source::Typed(_)));
+    let as_it_is = read_source(&report.name, &report.text, as_it_is);
+    let is_typed = matches!(as_it_is.source, Some(Source::Typed(_)));
     let written = match (&reading.program, form) {
-        // What is no ladder may be a program with numbers; a form that has numbers keeps those that a ladder has as bits.
+        // Statements are written as they are in each form that has statements.
         (program, Ok(form @ (Form::St | Form::Plcopen | Form::PlcopenFbd)))
-            if program.is_none() || has_numbers =>
+            if program.is_none() || is_typed =>
         {
             let bodies = match form {
                 Form::PlcopenFbd => Bodies::Blocks,
@@ -115,15 +114,17 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
                     fidelity = fidelity_with_numbers(&report.text, wanted.program);
                     Some(Ok(written))
                 }
-                Err(error) => Some(Err(failed(error))),
+                Err(error) => {
+                    if is_typed {
+                        report.diagnostics = as_it_is.diagnostics;
+                    }
+                    Some(Err(failed(error)))
+                }
             }
         }
         (Some(program), form) => {
             let period = arguments.period.or(reading.period);
             let written = |form: Form| write(form.format(), program, period).map_err(failed);
-            if has_numbers {
-                report.diagnostics.extend(in_bits(program));
-            }
             Some(form.and_then(written))
         }
         (None, _) => None,
@@ -163,20 +164,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         }
     };
     Ok(answer.with_reports(joined.reports(report.diagnostics)))
-}
-
-/// The finding on numbers that a ladder has bit by bit.
-fn in_bits(program: &Program) -> Option<Diagnostic> {
-    let signals = program.inputs.iter().chain(&program.outputs);
-    let numbers = signals.filter_map(|signal| signal.name.strip_suffix(".0"));
-    let numbers: Vec<String> = numbers.map(|name| format!("`{name}`")).collect();
-    let message = format!(
-        "the written form has no numbers: {} as the bits of the values that the program reaches, such as {}.0",
-        numbers.join(", "),
-        numbers.first()?.trim_matches('`')
-    );
-    let help = "stations and `check` take numbers of the original; .st and .xml keep them";
-    Some(Diagnostic::warning("U1018", message, 0..0).with_help(help))
 }
 
 /// Code of the error that prevented the conversion.

@@ -29,8 +29,9 @@ use understudy_structured_text::syntax::{
 use understudy_text::{Diagnostic, Severity};
 use understudy_typed::Program as Typed;
 
+use self::lost::Lost;
 use self::network::Power;
-use self::signals::Known;
+use self::signals::{Known, Points};
 
 /// Conditions of the branches before that a branch tests each for itself.
 const MAXIMUM_BEFORE: usize = 4;
@@ -55,13 +56,16 @@ pub(crate) fn rungs(text: &str, file: &File, typed: &Typed) -> (Option<Program>,
         return refused("it extends another unit");
     }
     let mut runs = file.instances.iter().filter(|run| run.of == unit.name);
-    if runs.any(|run| !run.connections.is_empty() || event(file, run).is_some()) {
-        return refused("its task has an event, or its instance has connections");
+    if runs.clone().any(|run| event(file, run).is_some()) {
+        return refused("its task has an event");
+    }
+    if runs.any(|run| !run.connections.is_empty()) {
+        return refused("its instance has connections");
     }
     let mut writer = Writer::new(file, unit, typed);
     writer.statements(statements, None);
-    match writer.finish(statements) {
-        Ok((program, others)) => (Some(program), lost::lost(text, file, unit, &others)),
+    match writer.finish() {
+        Ok((program, lost)) => (Some(program), lost::lost(text, file, unit, &lost)),
         Err(found) => (None, found),
     }
 }
@@ -80,8 +84,7 @@ fn refused<T>(what: impl Into<String>, span: &Span) -> Found<T> {
 
 fn refusal(unit: &Unit, refused: Refused) -> Diagnostic {
     let message = format!("`{}` is no ladder: {}", unit.name, refused.what);
-    let help =
-        "rungs hold BOOLs, timers, counters, latches and edges; .st and .xml hold every program";
+    let help = "rungs hold BOOLs, timers, counters, latches and edges; `--to st` and `--to plcopen` write the program as it is";
     Diagnostic::error("U1056", message, refused.span).with_help(help)
 }
 
@@ -96,6 +99,9 @@ struct Writer<'f> {
     called: HashSet<String>,
     /// Blocks whose outputs are read, and where.
     read: Vec<(String, Span)>,
+    /// Inputs and outputs of the program, in capitals.
+    points: Points,
+    lost: Lost<'f>,
     /// For the next rung.
     comments: Vec<String>,
     refused: Vec<Refused>,
@@ -105,10 +111,7 @@ impl<'f> Writer<'f> {
     /// Writes the rungs of statements, each under a bit where they are executed only then.
     fn statements(&mut self, statements: &'f [Statement], guard: Option<&str>) {
         for statement in statements {
-            let is_end = matches!(statement.kind, StatementKind::Nothing);
-            if !is_end {
-                self.comments.extend(statement.comments.iter().cloned());
-            }
+            self.comments.extend(statement.comments.iter().cloned());
             if let Err(found) = self.statement(statement, guard) {
                 self.refused.push(found);
             }
@@ -245,11 +248,8 @@ impl<'f> Writer<'f> {
         self.ladder.rungs.push(Rung { network, coils, comments, ..Rung::default() });
     }
 
-    /// The program, and the names of what is declared, is no part of rungs, and is not used.
-    fn finish(
-        mut self,
-        statements: &[Statement],
-    ) -> Result<(Program, Vec<&'f SourceName>), Vec<Diagnostic>> {
+    /// The program, and what of its text it does not keep.
+    fn finish(mut self) -> Result<(Program, Lost<'f>), Vec<Diagnostic>> {
         for (block, span) in std::mem::take(&mut self.read) {
             if !self.called.contains(&block) {
                 let what = format!("`{block}` is read and never called");
@@ -263,7 +263,9 @@ impl<'f> Writer<'f> {
             Known::Bit { .. } => false,
         };
         let is_left_out = |name: &SourceName| self.known.get(&name.key()).is_some_and(is_other);
-        let others = declared.map(|it| &it.name).filter(|name| is_left_out(name)).collect();
+        self.lost.unused = declared.map(|it| &it.name).filter(|name| is_left_out(name)).collect();
+        self.points_are_signals();
+        self.drop_unused_globals();
         if self.ladder.rungs.len() > MAXIMUM_RUNGS {
             let what = format!("it has more than {MAXIMUM_RUNGS} rungs");
             let error = Refused { what, span: self.unit.name.span() };
@@ -281,14 +283,10 @@ impl<'f> Writer<'f> {
             return Err(self.refused.into_iter().map(|found| refusal(unit, found)).collect());
         }
         self.states();
-        if let Some(last) = statements.last()
-            && matches!(last.kind, StatementKind::Nothing)
-        {
-            self.ladder.footer.extend(last.comments.iter().cloned());
-        }
+        self.ladder.footer.append(&mut self.comments);
         let found = check(&self.ladder).into_iter();
         let errors: Vec<Diagnostic> = found.filter(|it| it.severity == Severity::Error).collect();
-        if errors.is_empty() { Ok((self.ladder, others)) } else { Err(errors) }
+        if errors.is_empty() { Ok((self.ladder, self.lost)) } else { Err(errors) }
     }
 }
 

@@ -7,7 +7,7 @@ use understudy_ladder::PERIODS;
 use understudy_structured_text::syntax::{Body, File, Statement, StatementKind, Unit, UnitKind};
 use understudy_structured_text::{Lowered, Options, lower, parse};
 use understudy_text::{Diagnostic, has_errors};
-use understudy_typed::Program as Typed;
+use understudy_typed::{Cost, Program as Typed};
 
 use crate::format::Reading;
 use crate::rungs::rungs;
@@ -15,6 +15,9 @@ use crate::source::no_program;
 
 /// The shortest period that tasks of different intervals may need.
 const SHORTEST: Duration = Duration::from_millis(1);
+
+/// Operations of a scan: some seconds on any machine, and no period is longer.
+const MAXIMUM_OPERATIONS: u64 = 1_000_000_000;
 
 /// A program with its syntax.
 #[derive(Default)]
@@ -50,6 +53,7 @@ pub(crate) fn whole(
     let period = understudy_structured_text::lower::period(&file, program);
     diagnostics.extend(periods(&file, period));
     diagnostics.extend(file.units.iter().filter_map(without_statements));
+    diagnostics.extend(typed.as_ref().and_then(too_long));
     diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
     let is_right = !has_errors(&diagnostics);
     let typed = typed.filter(|_| is_right);
@@ -75,6 +79,19 @@ fn without_statements(unit: &Unit) -> Option<Diagnostic> {
     (is_empty && unit.kind == UnitKind::Program).then(|| {
         let message = format!("`{}` has no statements", unit.name);
         Diagnostic::warning("U1023", message, unit.name.span())
+    })
+}
+
+/// The error on a program whose scan would not end in any period: calls that double from level to level are short in a text.
+fn too_long(program: &Typed) -> Option<Diagnostic> {
+    let Cost { straight, dearest_turn, .. } = Cost::new(program);
+    let operations = straight.max(dearest_turn);
+    (operations > MAXIMUM_OPERATIONS).then(|| {
+        let message = format!(
+            "a scan of `{}` takes up to {operations} operations; at most {MAXIMUM_OPERATIONS}",
+            program.name
+        );
+        Diagnostic::error("U1048", message, 0..0).with_help("call functions and blocks fewer times")
     })
 }
 

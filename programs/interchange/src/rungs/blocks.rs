@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use understudy_ladder::{
-    Block, BlockKind, CoilKind, Element, Feed, MAXIMUM_PRESET_VALUE, Name, Series,
+    Block, BlockKind, CoilKind, Element, Feed, MAXIMUM_PRESET_TIME, MAXIMUM_PRESET_VALUE, Name,
+    Series,
 };
 use understudy_structured_text::syntax::{
     Argument, Expression, ExpressionKind, Initializer, Literal, Path,
@@ -54,6 +55,12 @@ impl<'f> Writer<'f> {
                 kind = self.preset(kind, value)?;
                 has_preset = true;
                 continue;
+            }
+            let is_input = |pin: &str| {
+                pin == kind.wire_input() || kind.side_inputs().iter().any(|(side, _)| *side == pin)
+            };
+            if !is_input(&pin) {
+                return refused(format!("it gives `{}` an input `{pin}`", path.root), span);
             }
             let power = self.power(value, false, 0)?;
             if pin == kind.wire_input() {
@@ -107,7 +114,7 @@ impl<'f> Writer<'f> {
             Some(Literal::Time { nanoseconds, .. }) => u64::try_from(*nanoseconds).ok(),
             _ => None,
         };
-        let time = time.map(Duration::from_nanos);
+        let time = time.map(Duration::from_nanos).filter(|time| *time <= MAXIMUM_PRESET_TIME);
         let number = match literal {
             Some(Literal::Integer { value, .. }) => u16::try_from(*value).ok(),
             _ => None,
@@ -135,7 +142,7 @@ impl<'f> Writer<'f> {
     }
 
     /// The literal that a constant stands for.
-    fn constant(&self, path: &Path) -> Option<&'f Literal> {
+    pub(super) fn constant(&self, path: &Path) -> Option<&'f Literal> {
         let mut all = self.unit.declarations.iter().chain(&self.file.globals);
         let found = all.find(|found| found.name == path.root)?;
         match found.initial.as_ref()? {

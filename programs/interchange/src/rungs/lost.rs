@@ -9,11 +9,26 @@ use understudy_text::Diagnostic;
 /// Names that one finding lists.
 const MAXIMUM_LISTED: usize = 20;
 
-/// Second names of one address, initial values of inputs, and what nothing uses; `others` are declarations of the program that no rung reads or writes.
-pub(super) fn lost(text: &str, file: &File, unit: &Unit, others: &[&Name]) -> Vec<Diagnostic> {
+/// What a program as rungs does not keep, or has under another name.
+#[derive(Debug, Default)]
+pub(super) struct Lost<'f> {
+    /// Declarations of the program that are no part of rungs, and that no statement uses.
+    pub(super) unused: Vec<&'f Name>,
+    /// Names that a ladder cannot have, with those that it has in their place.
+    pub(super) renamed: Vec<(&'f Name, String)>,
+    /// Global variables that are signals of the ladder.
+    pub(super) globals: Vec<(&'f Name, String)>,
+}
+
+/// Second names of one address, initial values of inputs, and what nothing uses.
+pub(super) fn lost(text: &str, file: &File, unit: &Unit, lost: &Lost<'_>) -> Vec<Diagnostic> {
     let warning = |message: String, span| Diagnostic::warning("U1055", message, span);
     let mut found = Vec::new();
-    for name in others {
+    for (name, other) in &lost.renamed {
+        let message = format!("`{name}` is `{other}` in the ladder");
+        found.push(Diagnostic::warning("U1067", message, name.span()));
+    }
+    for name in &lost.unused {
         let message =
             format!("`{name}` is nothing that a ladder holds, and nothing here uses it: not kept");
         found.push(warning(message, name.span()));
@@ -42,13 +57,13 @@ pub(super) fn lost(text: &str, file: &File, unit: &Unit, others: &[&Name]) -> Ve
     }
     // The parts of a document are reported by their counts.
     if !text.trim_start_matches('\u{feff}').trim_start().starts_with('<') {
-        found.extend(unused(text, file));
+        found.extend(unused(text, file, lost));
     }
     found
 }
 
 /// What is declared outside of the programs and not used elsewhere in the text.
-fn unused(text: &str, file: &File) -> Option<Diagnostic> {
+fn unused(text: &str, file: &File, lost: &Lost<'_>) -> Option<Diagnostic> {
     let belongs = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
     let mut places: HashMap<String, Vec<usize>> = HashMap::new();
     for word in text.split(|letter| !belongs(letter)).filter(|word| !word.is_empty()) {
@@ -76,7 +91,8 @@ fn unused(text: &str, file: &File) -> Option<Diagnostic> {
         }
     }
     let globals = file.globals.iter().map(|global| &global.name);
-    unused.extend(globals.filter(|name| !is_named(name, &name.span())));
+    let is_kept = |name: &Name| lost.globals.iter().any(|(kept, _)| *kept == name);
+    unused.extend(globals.filter(|name| !is_named(name, &name.span()) && !is_kept(name)));
     let mut seen = HashSet::new();
     unused.retain(|name| seen.insert(name.key()));
     let first = unused.first()?;

@@ -182,7 +182,12 @@ impl Writer<'_> {
         let relation = if negated { relation.opposite() } else { relation };
         let sides = [(first, relation, second), (second, relation.mirrored(), first)];
         for (counter, relation, number) in sides {
-            if let ExpressionKind::Literal(Literal::Integer { value, .. }) = &number.kind
+            let literal = match &number.kind {
+                ExpressionKind::Literal(literal) => Some(literal),
+                ExpressionKind::Variable(path) if path.steps.is_empty() => self.constant(path),
+                _ => None,
+            };
+            if let Some(Literal::Integer { value, .. }) = literal
                 && let Some(counter) = self.counter(counter)
             {
                 let value = u16::try_from(*value).ok().filter(|it| *it <= MAXIMUM_PRESET_VALUE);

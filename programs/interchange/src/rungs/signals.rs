@@ -1,17 +1,18 @@
 //! Declarations as signals and blocks of a ladder.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use understudy_ladder::{
-    Area, BlockKind, Element, Language, Name, Namer, Program, Signal, parse_address, visit,
+    BlockKind, Element, Language, Name, Namer, Program, Signal, parse_address, visit,
 };
 use understudy_structured_text::syntax::{
     Class, Declaration, File, Initializer, Path, Span, TypeKind, Unit,
 };
-use understudy_typed::{Interpreter, Program as Typed};
+use understudy_typed::{Elementary, Interpreter, Program as Typed};
 
+use super::lost::Lost;
 use super::network::constant;
-use super::{Found, Writer, refused};
+use super::{Found, Refused, Writer, refused};
 
 /// What a name of the text stands for.
 #[derive(Debug, Clone)]
@@ -34,6 +35,24 @@ pub(super) enum Known {
     Other(String),
 }
 
+/// Inputs and outputs of a program by their names in capitals, with their names and types.
+#[derive(Debug, Default)]
+pub(super) struct Points {
+    inputs: BTreeMap<String, (String, Elementary)>,
+    outputs: BTreeMap<String, (String, Elementary)>,
+}
+
+impl Points {
+    fn of(program: &Typed) -> Self {
+        let named = |points: &understudy_typed::Points| {
+            let own = points.iter().filter(|point| point.slot != 0);
+            own.map(|point| (point.name.to_ascii_uppercase(), (point.name.clone(), point.of)))
+                .collect()
+        };
+        Self { inputs: named(&program.inputs), outputs: named(&program.outputs) }
+    }
+}
+
 impl<'f> Writer<'f> {
     pub(super) fn new(file: &'f File, unit: &'f Unit, typed: &Typed) -> Self {
         let name = Namer::new(Language::Ladder).name(unit.name.as_str());
@@ -47,6 +66,8 @@ impl<'f> Writer<'f> {
             known: HashMap::new(),
             called: HashSet::new(),
             read: Vec::new(),
+            points: Points::of(typed),
+            lost: Lost::default(),
             comments: Vec::new(),
             refused: Vec::new(),
         };
@@ -62,19 +83,27 @@ impl<'f> Writer<'f> {
             }
         }
         for declaration in &file.globals {
-            if !writer.known.contains_key(&declaration.name.key()) {
+            let key = declaration.name.key();
+            if !writer.known.contains_key(&key) {
                 writer.declare(declaration, &initial);
+                if let Some(Known::Bit { name, .. }) = writer.known.get(&key) {
+                    writer.lost.globals.push((&declaration.name, name.clone()));
+                }
             }
         }
         writer
     }
 
     /// `initial` has the values of variables before the first scan, by their names in capitals.
-    fn declare(&mut self, declaration: &Declaration, initial: &HashMap<String, bool>) {
+    fn declare(&mut self, declaration: &'f Declaration, initial: &HashMap<String, bool>) {
         let key = declaration.name.key();
         let is_kept = !matches!(declaration.class, Class::Temporary | Class::InOut);
         let known = match &declaration.of.kind {
-            TypeKind::Named(_) if declaration.edge.is_some() => Known::Other("an edge".to_owned()),
+            _ if declaration.class == Class::Temporary => Known::Other("a VAR_TEMP".to_owned()),
+            _ if declaration.class == Class::InOut => Known::Other("a VAR_IN_OUT".to_owned()),
+            TypeKind::Named(_) if declaration.edge.is_some() => {
+                Known::Other("an input with R_EDGE or F_EDGE".to_owned())
+            }
             TypeKind::Named(of) if of.is("BOOL") => match (initial.get(&key), &declaration.initial)
             {
                 (Some(value), _) if is_kept => self.signal(declaration, *value),
@@ -86,11 +115,14 @@ impl<'f> Writer<'f> {
                 {
                     self.signal(declaration, constant(value) == Some(true))
                 }
-                _ => Known::Other("no BOOL that is kept".to_owned()),
+                _ => Known::Other("no BOOL of the program".to_owned()),
             },
             TypeKind::Named(of) => match self.block(&of.key(), declaration) {
                 Some(kind) if is_kept => {
                     Known::Block { name: self.namer.name(declaration.name.as_str()), kind }
+                }
+                _ if BlockKind::of_word(&of.key()).is_some() => {
+                    Known::Other(format!("{}, with initial values or a body of its own", of.key()))
                 }
                 _ => Known::Other(of.key()),
             },
@@ -113,18 +145,22 @@ impl<'f> Writer<'f> {
 
     /// The signal that has the address of a declaration.
     fn at_address(&self, declaration: &Declaration) -> Option<&Known> {
-        self.known.get(&bit_address(&declaration.address.as_ref()?.key()))
+        let address = declaration.address.as_ref()?.key();
+        // `%I*` is a place that is still to be chosen, another one for each variable.
+        self.known.get(&bit_address(&address)).filter(|_| !address.ends_with('*'))
     }
 
-    fn signal(&mut self, declaration: &Declaration, initial: bool) -> Known {
+    fn signal(&mut self, declaration: &'f Declaration, initial: bool) -> Known {
         if let Some(known) = self.at_address(declaration) {
             return known.clone();
         }
         let address = declaration.address.as_ref();
         let initial = Some(initial).filter(|value| *value || declaration.initial.is_some());
         let name = self.namer.name(declaration.name.as_str());
+        if name != declaration.name.as_str() {
+            self.lost.renamed.push((&declaration.name, name.clone()));
+        }
         let located = address.and_then(|it| parse_address(it.as_str().trim_start_matches('%')));
-        let area = located.as_ref().map(|address| address.area);
         let signal = Signal {
             name: Name::at(name.as_str(), declaration.name.span()),
             address: located,
@@ -132,25 +168,74 @@ impl<'f> Writer<'f> {
             description: declaration.description.clone(),
             comments: Vec::new(),
         };
-        let known = self.place(signal, area, declaration.class);
-        if let Some(address) = address {
+        let known = self.place(&declaration.name.key(), signal);
+        if let Some(address) = address.filter(|address| !address.as_str().ends_with('*')) {
             self.known.insert(bit_address(&address.key()), known.clone());
         }
         known
     }
 
-    fn place(&mut self, mut signal: Signal, area: Option<Area>, class: Class) -> Known {
+    /// Declares the signal of a name or an address in capitals, as the input, the output or the memory that it is in the program.
+    fn place(&mut self, key: &str, mut signal: Signal) -> Known {
         let name = signal.name.to_string();
-        let is_input = class == Class::Input || area == Some(Area::Input);
+        let is_input = self.points.inputs.contains_key(key);
         if is_input {
             signal.initial = None;
             self.ladder.inputs.push(signal);
-        } else if class == Class::Output || area == Some(Area::Output) {
+        } else if self.points.outputs.contains_key(key) {
             self.ladder.outputs.push(signal);
         } else {
             self.ladder.memory.push(signal);
         }
         Known::Bit { name, is_input }
+    }
+
+    /// Refuses each input and output of the program that is none of the rungs.
+    pub(super) fn points_are_signals(&mut self) {
+        let sides = [
+            (&self.points.inputs, &self.ladder.inputs, "input"),
+            (&self.points.outputs, &self.ladder.outputs, "output"),
+        ];
+        let mut missing = Vec::new();
+        for (points, signals, side) in sides {
+            for (key, (shown, of)) in points {
+                let is_signal = match self.known.get(key) {
+                    Some(Known::Bit { name, .. }) => {
+                        signals.iter().any(|it| it.name.as_str() == name)
+                    }
+                    _ => false,
+                };
+                if !is_signal {
+                    let mut declared = self.unit.declarations.iter().chain(&self.file.globals);
+                    let place = declared.find(|found| found.name.key() == *key);
+                    let span = place.map_or(self.unit.name.span(), |found| found.name.span());
+                    let what = format!("its {side} `{shown}` : {of} is no signal of rungs");
+                    missing.push(Refused { what, span });
+                }
+            }
+        }
+        missing.sort_by_key(|refused| refused.span.start);
+        self.refused.extend(missing);
+    }
+
+    /// Leaves out the global variables that no rung reads or writes.
+    pub(super) fn drop_unused_globals(&mut self) {
+        let mut used: HashSet<&str> = HashSet::new();
+        for rung in &self.ladder.rungs {
+            visit(&rung.network, &mut |element| {
+                if let Element::Contact(contact) = element {
+                    used.insert(contact.operand.as_str());
+                }
+            });
+            used.extend(rung.coils.iter().map(|coil| coil.target.as_str()));
+        }
+        let unused = self.lost.globals.iter().filter(|(_, name)| !used.contains(name.as_str()));
+        let unused: HashSet<String> = unused.map(|(_, name)| name.clone()).collect();
+        self.ladder.memory.retain(|signal| !unused.contains(signal.name.as_str()));
+        let signals = self.ladder.inputs.iter().chain(&self.ladder.outputs);
+        let signals = signals.chain(&self.ladder.memory);
+        let kept: HashSet<&str> = signals.map(|signal| signal.name.as_str()).collect();
+        self.lost.globals.retain(|(_, name)| kept.contains(name.as_str()));
     }
 
     /// What a path begins with.
@@ -175,10 +260,9 @@ impl<'f> Writer<'f> {
         let plain = key.trim_start_matches('%');
         if let Some(address) = parse_address(plain) {
             let name = self.namer.name(plain);
-            let (address, area) = (Some(address.clone()), address.area);
-            let signal = Signal { address, ..Signal::new(name.as_str()) };
+            let signal = Signal { address: Some(address), ..Signal::new(name.as_str()) };
             let signal = Signal { name: Name::at(name, span.clone()), ..signal };
-            let known = self.place(signal, Some(area), Class::Local);
+            let known = self.place(key, signal);
             self.known.insert(key.to_owned(), known);
         }
     }

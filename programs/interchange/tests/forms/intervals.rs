@@ -160,12 +160,9 @@ fn expected(runs: &[Runs], period: u64) -> (Vec<u64>, bool, Option<u64>) {
         _ => None,
     });
     let common = intervals.reduce(divisor);
-    let (used, unit) = (if period == 0 { common.unwrap_or(10) } else { period }, common);
-    let every = runs.iter().map(|run| match (run, unit) {
-        (Every(interval), Some(unit)) => {
-            let scans = ((unit as f64 / used as f64).round() as u64).max(1);
-            interval / unit * scans
-        }
+    let used = if period == 0 { common.unwrap_or(10) } else { period };
+    let every = runs.iter().map(|run| match run {
+        Every(interval) => ((*interval as f64 / used as f64).round() as u64).max(1),
         _ => 1,
     });
     (every.collect(), common.is_none_or(|common| common % used == 0), common)

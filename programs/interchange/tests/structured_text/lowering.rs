@@ -4,6 +4,7 @@ use understudy_ladder::print;
 use understudy_logic::Running;
 
 use understudy_structured_text::parse;
+use understudy_typed::Points;
 
 use crate::execution::{check, typed};
 use crate::support::{PERIOD, findings, program};
@@ -39,6 +40,13 @@ fn rungs_do_what_the_text_does_or_there_are_none() {
         "VAR c : CTU := (PV := 2); x : BOOL; END_VAR",
         "VAR r : R_TRIG; s : SR; x : BOOL; END_VAR",
         "VAR w AT %QW3 : WORD; x AT %QX6.1 : BOOL; END_VAR",
+        "VAR x AT %I* : BOOL; y AT %I* : BOOL; END_VAR",
+        "VAR x AT %Q* : BOOL := TRUE; y AT %Q* : BOOL; END_VAR",
+        "VAR x AT %M* : BOOL := TRUE; END_VAR",
+        "VAR_OUTPUT n : INT := 5; x : BOOL; END_VAR",
+        "VAR_INPUT n : INT; x : BOOL; END_VAR",
+        "VAR_OUTPUT x : ARRAY [0..1] OF BOOL; END_VAR",
+        "VAR c : CTU; x : BOOL; END_VAR VAR CONSTANT two : INT := 2; END_VAR",
     ];
     let uses = [
         "q := x; x := a;",
@@ -50,6 +58,10 @@ fn rungs_do_what_the_text_does_or_there_are_none() {
         "c(CU := a); q := c.Q; p := c.CV >= 2;",
         "c(CU := a, R := b, PV := 4); c.PV := 3; q := c.Q;",
         "c(a, b, 3); q := c.CV < 3;",
+        "c(CU := a, R := b, PV := two); q := c.CV >= two;",
+        "t(EN := b, IN := a, PT := T#100ms); q := t.Q;",
+        "t(IN := a, PT := T#2400h1s); q := t.Q;",
+        "IF a THEN q := TRUE; (* at the end *) END_IF; p := y OR x; (* below *)",
         "r(CLK := a); s(S1 := r.Q, R := b); q := s.Q1; p := NOT r.Q;",
         "q := r.Q AND x;",
         "x := TRUE; q := %QX3.1; %QX7.0 := a; p := %QX7.0;",
@@ -78,7 +90,17 @@ fn rungs_do_what_the_text_does_or_there_are_none() {
                     continue;
                 };
                 match crate::support::read(&text).program {
-                    Some(_) => check(&text, &program(&text), &typed, 5),
+                    Some(ladder) => {
+                        check(&text, &program(&text), &typed, 5);
+                        let points =
+                            |points: &Points| points.iter().filter(|it| it.slot != 0).count();
+                        assert_eq!(ladder.inputs.len(), points(&typed.inputs), "{text}");
+                        assert_eq!(ladder.outputs.len(), points(&typed.outputs), "{text}");
+                        let printed = print(&ladder);
+                        let comments = ["at the end", "below"];
+                        let mut comments = comments.iter().filter(|it| text.contains(**it));
+                        assert!(comments.all(|comment| printed.contains(comment)), "{printed}");
+                    }
                     None => refused += 1,
                 }
                 held += 1;
@@ -86,6 +108,19 @@ fn rungs_do_what_the_text_does_or_there_are_none() {
         }
     }
     assert!(held > 500 && refused > 200, "{held} programs, {refused} refused");
+}
+
+/// A ladder has words of its own, which become other names, and says so.
+#[test]
+fn words_of_the_ladder_are_renamed_with_a_warning() {
+    let text = "PROGRAM rung VAR_INPUT input : BOOL; END_VAR VAR_OUTPUT memory : BOOL; END_VAR memory := input; END_PROGRAM";
+    let found = findings(text, crate::support::read(text).diagnostics);
+    assert_eq!(
+        found,
+        "1:24: U1067 Warning: `input` is `input_2` in the ladder\n1:57: U1067 Warning: `memory` is `memory_2` in the ladder\n"
+    );
+    let again = understudy_ladder::parse(&print(&program(text)));
+    assert!(!understudy_text::has_errors(&again.diagnostics), "{:?}", again.diagnostics);
 }
 
 #[test]

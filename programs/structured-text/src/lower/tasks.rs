@@ -90,40 +90,37 @@ fn nanoseconds(interval: i64) -> std::time::Duration {
 pub(super) struct Base {
     /// The interval of which all are multiples.
     pub(super) common: i64,
-    /// Scans in it.
-    scans: i64,
+    /// From one scan to the next.
+    period: i64,
 }
 
 impl Base {
-    /// The number of scans from one run of a program with this interval to the next.
+    /// The number of scans from one run of a program with this interval to the next: the nearest to it that there is.
     pub(super) fn every(self, interval: i64) -> u32 {
-        let scans = (interval / self.common).saturating_mul(self.scans);
+        let rest = interval % self.period;
+        let scans = interval / self.period + i64::from(rest >= self.period - rest);
         u32::try_from(scans).unwrap_or(u32::MAX).max(1)
     }
 }
 
 impl Lowering<'_> {
-    /// How the intervals of all tasks are counted, where they have one. Where the wanted period does not divide them they keep their
-    /// ratios, and come as near to what is declared as whole scans do.
+    /// How the intervals of all tasks are counted, where they have one. Of each that the wanted period does not divide it is said how often its program
+    /// runs instead.
     pub(super) fn base(&mut self, instances: &[Instance<'_>], wanted: Option<i64>) -> Option<Base> {
         let intervals = || instances.iter().filter_map(|instance| instance.interval);
         let common = intervals().reduce(divisor)?;
         let Some(wanted) = wanted.filter(|wanted| *wanted > 0) else {
-            return Some(Base { common, scans: 1 });
+            return Some(Base { common, period: common });
         };
-        if common % wanted == 0 {
-            return Some(Base { common, scans: common / wanted });
-        }
-        let rest = common % wanted;
-        let nearest = common / wanted + i64::from(rest >= wanted - rest);
-        let base = Base { common, scans: nearest.max(1) };
-        let slowest = instances.iter().filter(|instance| instance.interval.is_some());
-        if let Some(slowest) = slowest.max_by_key(|instance| instance.interval) {
-            let interval = slowest.interval.unwrap_or_default();
-            let found = i128::from(base.every(interval)) * i128::from(wanted);
-            let program = (slowest.name.as_str(), slowest.name.span());
-            let found = another_interval(program, (wanted, found), (interval, common));
-            self.report(found);
+        let base = Base { common, period: wanted };
+        for instance in instances {
+            let interval = instance.interval.unwrap_or(wanted);
+            if interval % wanted != 0 {
+                let found = i128::from(base.every(interval)) * i128::from(wanted);
+                let program = (instance.name.as_str(), instance.name.span());
+                let found = another_interval(program, (wanted, found), (interval, common));
+                self.report(found);
+            }
         }
         Some(base)
     }
