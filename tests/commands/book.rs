@@ -165,7 +165,7 @@ pub(crate) fn shell(folder: &Path, commands: &str) -> Output {
     let programs = Path::new(env!("CARGO_BIN_EXE_understudy")).parent().expect("a folder");
     let path = std::env::var("PATH").unwrap_or_default();
     Command::new("timeout")
-        .args(["300", "sh", "-e", "-c", commands])
+        .args(["900", "sh", "-e", "-c", commands])
         .current_dir(folder)
         .env("PATH", format!("{}:{path}", programs.display()))
         .env_remove("COLUMNS")

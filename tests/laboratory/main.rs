@@ -36,6 +36,8 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
 
+use understudy_testing::skip;
+
 use shared::{DEADLINE, answer, empty_folder, one_at_a_time, some_at_a_time, understudy};
 
 const PRESS_CELL: &str = "examples/press-cell/cluster.toml";
@@ -84,9 +86,19 @@ fn check(name: &str, scenario: &str, more: &[&str]) -> Value {
 /// Cycles that a busy machine may cost a run without a late wake-up to show for it; a failure that is not masked costs thirty and more.
 const TOLERATED_CYCLES: u64 = 5;
 
+/// Whether a run shows what it expects: not on a machine that other programs stopped for longer than a cycle may take.
+fn is_conclusive(summary: &Value) -> bool {
+    let late = summary["inconclusive"].as_str();
+    if let Some(late) = late {
+        skip(format_args!("inconclusive: {late}"));
+    }
+    late.is_none()
+}
+
 /// Every expectation of the scenario is met; those that count cycles may miss a few, because how punctual a machine is belongs into
-/// benchmarks.
+/// benchmarks. Of an inconclusive run nothing but its outputs is certain.
 fn assert_met(summary: &Value) {
+    let is_conclusive = is_conclusive(summary);
     let expectations = summary["expectations"].as_array().expect("expectations");
     for expectation in expectations {
         let expected = expectation["expected"].as_str().expect("text");
@@ -95,7 +107,8 @@ fn assert_met(summary: &Value) {
         let mut numbers = found.split(|character: char| !character.is_ascii_digit());
         let cycles = numbers.find_map(|number| number.parse::<u64>().ok());
         let few = counts_cycles && cycles.is_some_and(|cycles| cycles <= TOLERATED_CYCLES);
-        assert!(expectation["met"] == true || few, "{summary:#}");
+        let is_certain = is_conclusive || expected.contains("wrong");
+        assert!(expectation["met"] == true || few || !is_certain, "{summary:#}");
     }
 }
 
@@ -103,12 +116,21 @@ fn count(summary: &Value, remote_io: usize, source: &str) -> u64 {
     summary["remote_ios"][remote_io]["counts"][source].as_u64().expect("a count")
 }
 
+/// A remote I/O had outputs of a source in so many cycles or more, but for those in which the host stood still.
+fn assert_count(summary: &Value, remote_io: usize, source: &str, least: u64) {
+    let found = count(summary, remote_io, source);
+    let period = summary["circumstances"]["period_us"].as_u64().expect("a period");
+    let stalls = summary["stalls"].as_array().expect("a list").iter();
+    let late: u64 = stalls.filter_map(|stall| stall["late_us"].as_u64()).sum();
+    assert!(found + late.div_ceil(period) >= least, "{source}: {found}, {summary:#}");
+}
+
 #[test]
 fn each_station_is_killed_and_nothing_is_seen_of_it() {
     let summary = check("kill_each", "scenarios/kill-each.toml", &[]);
     assert_met(&summary);
     assert_eq!(summary["steps"].as_array().map(Vec::len), Some(6));
-    assert!(count(&summary, 0, "reconstructed") >= 30);
+    assert_count(&summary, 0, "reconstructed", 30);
 }
 
 #[test]
@@ -122,7 +144,8 @@ fn the_second_failure_in_the_papers_mode_is_fail_safe() {
     let scenario = "scenarios/paper-double-kill.toml";
     let summary = check("paper_double_kill", scenario, &["--mode", "paper"]);
     assert_met(&summary);
-    assert!(count(&summary, 0, "fail_safe") > 40 && count(&summary, 1, "fail_safe") > 40);
+    assert_count(&summary, 0, "fail_safe", 41);
+    assert_count(&summary, 1, "fail_safe", 41);
 }
 
 #[test]
@@ -136,7 +159,7 @@ fn stations_that_are_cut_off_are_masked_and_come_back() {
     let scenario = "examples/press-cell/cut-off-and-healed.toml";
     let summary = check("cut_off", scenario, &[]);
     assert_met(&summary);
-    assert!(count(&summary, 0, "reconstructed") >= 150);
+    assert_count(&summary, 0, "reconstructed", 150);
     // No proxy lies between the members for it.
     let circumstances = summary["circumstances"]["machine"].to_string();
     assert!(!circumstances.contains("proxy"), "{circumstances}");
@@ -147,7 +170,7 @@ fn a_broken_link_costs_no_protection() {
     let scenario = "examples/press-cell/broken-link.toml";
     let summary = check("broken_link", scenario, &[]);
     assert_met(&summary);
-    assert!(count(&summary, 0, "reconstructed") >= 290);
+    assert_count(&summary, 0, "reconstructed", 290);
 }
 
 #[test]
@@ -155,8 +178,8 @@ fn a_lost_state_is_not_replaced_by_an_older_one_until_the_operator_says_so() {
     let scenario = "examples/press-cell/lost-state.toml";
     let summary = check("lost_state", scenario, &[]);
     assert_met(&summary);
-    assert!(count(&summary, 0, "fail_safe") >= 90);
-    assert!(count(&summary, 0, "reconstructed") >= 190);
+    assert_count(&summary, 0, "fail_safe", 90);
+    assert_count(&summary, 0, "reconstructed", 190);
 }
 
 #[test]
