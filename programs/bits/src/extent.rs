@@ -380,11 +380,14 @@ impl Search<'_> {
                 applied(*operation, of, &inner)
             }
             Node::Choose([condition, then, otherwise]) => {
-                let is = facts.iter().find(|fact| fact.term == *condition);
-                match is.map(|fact| fact.low) {
-                    Some(0) => self.refined(*otherwise, facts, looks, depth + 1),
-                    Some(_) => self.refined(*then, facts, looks, depth + 1),
-                    None => {
+                // A fact such as `0 to 1`, which two BOOLs that are equal have, decides nothing.
+                let of_condition = facts.iter().filter(|fact| fact.term == *condition);
+                let is = of_condition
+                    .fold((0, 1), |(low, high), fact| (fact.low.max(low), fact.high.min(high)));
+                match is {
+                    (0, 0) => self.refined(*otherwise, facts, looks, depth + 1),
+                    (1, 1) => self.refined(*then, facts, looks, depth + 1),
+                    _ => {
                         let count = facts.len();
                         let sides = [(true, then), (false, otherwise)].map(|(is, side)| {
                             self.facts(*condition, is, facts, 0);

@@ -114,6 +114,51 @@ fn branches_of_every_number_are_followed() {
     }
 }
 
+/// A number that is chosen by two conditions of which one compares BOOLs: the circuit has both of its values.
+#[test]
+fn conditions_on_equal_bools_decide_nothing_of_them() {
+    let conditions =
+        ["x", "a", "b", "NOT x", "x = b", "x <> b", "x AND b", "x OR b", "x = (a <> b)"];
+    for outer in conditions {
+        for inner in conditions {
+            for body in [
+                format!("IF {outer} THEN IF {inner} THEN v := 0; END_IF; END_IF;"),
+                format!("IF {outer} THEN ; ELSIF {inner} THEN v := 0; END_IF;"),
+                format!(
+                    "IF {outer} THEN IF {inner} THEN v := v + 1; END_IF; ELSIF {inner} THEN v := 0; END_IF;"
+                ),
+            ] {
+                let text = format!(
+                    "PROGRAM p VAR_INPUT a, b : BOOL; END_VAR VAR_OUTPUT v : INT := 3; END_VAR VAR x : BOOL; END_VAR x := a AND NOT x; {body} END_PROGRAM"
+                );
+                let typed = typed(&text, &parse(&text).0).expect("a sound program");
+                let circuit = understudy_bits::exact(&typed).expect("a circuit");
+                check_bits(&text, &circuit, &typed, 3);
+            }
+        }
+    }
+}
+
+/// Timers of each kind with presets from 0 on, whatever else the program has.
+#[test]
+fn timers_of_every_preset_are_followed() {
+    for kind in ["TON", "TOF", "TP"] {
+        for preset in [0, 50, 100, 150, 200, 300] {
+            for (more, body) in [("", ""), ("o : TON;", "o(IN := b, PT := T#200ms);")] {
+                let text = format!(
+                    "PROGRAM p VAR_INPUT a, b : BOOL; END_VAR VAR_OUTPUT q, r : BOOL; v : INT := 3; END_VAR VAR t : {kind}; {more} END_VAR
+                     {body} t(IN := a, PT := T#{preset}ms); q := t.Q; r := t.ET > T#0ms; IF t.Q AND b THEN v := 0; ELSIF b THEN v := 3; END_IF; END_PROGRAM"
+                );
+                let typed = typed(&text, &parse(&text).0).expect("a sound program");
+                for seed in 0..4 {
+                    let circuit = understudy_bits::exact(&typed).expect("a circuit");
+                    check_bits(&text, &circuit, &typed, seed);
+                }
+            }
+        }
+    }
+}
+
 /// An output that only an address names is driven as every other one, by the ladder and by the file as it is read.
 #[test]
 fn outputs_that_only_an_address_names_are_driven() {
