@@ -85,6 +85,7 @@ impl Module {
                 drives: true,
                 writes: Default::default(),
                 pulses: Default::default(),
+                unforced: None,
             }),
         });
         self.copies.sent(now, &frame, &self.agreement.schedule);

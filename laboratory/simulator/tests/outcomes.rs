@@ -98,5 +98,5 @@ fn faulty_runs_have_known_outcomes() {
 fn lossy_runs_have_known_outcomes() {
     let jitter = Duration::from_millis(2);
     check(3, Mode::Full, network(0.1, 0.1, jitter), &[], 0x1c8f_1597_bf5d_c863);
-    check(8, Mode::Full, network(0.05, 0.1, jitter), &faults(), 0x45cf_19a2_2036_b6b1);
+    check(8, Mode::Full, network(0.05, 0.1, jitter), &faults(), 0x4264_154b_fd9f_96bd);
 }

@@ -26,7 +26,7 @@ impl Replica {
         sample: &Sample,
         received: SamplesReceived,
     ) {
-        let Some(inputs) = sample.history.last() else {
+        let Some(inputs) = sample.without_forces() else {
             return;
         };
         if inputs.width() == program.executable.input_count() {

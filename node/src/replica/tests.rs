@@ -107,6 +107,7 @@ impl Truth {
                 drives: true,
                 writes: Default::default(),
                 pulses: Default::default(),
+                unforced: None,
             }),
         })
     }

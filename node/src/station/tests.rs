@@ -119,6 +119,7 @@ fn sent(what: Sent, cycle: u64, to: u8) -> Option<(Member, Body)> {
                 drives: true,
                 writes: Default::default(),
                 pulses: Default::default(),
+                unforced: None,
             };
             (Member::RemoteIo(ProgramId(program)), Body::Sample(sample))
         }

@@ -3,7 +3,7 @@
 //! ```text
 //! offset  size  what
 //!      0     4  magic "UNDR"
-//!      4     1  version of this layout, 7
+//!      4     1  version of this layout, 8
 //!      5     n  header and body, bincode 2 "standard": little-endian, integers as varints, enums by their index
 //!    5+n     4  CRC-32 (IEEE) of everything before it, little-endian
 //! ```
@@ -22,7 +22,7 @@ use crate::write::{MAXIMUM_PULSES, MAXIMUM_SESSIONS, Pulse, WriteId};
 pub const MAXIMUM_FRAME_BYTES: usize = 32 * 1024;
 
 const MAGIC: [u8; 4] = *b"UNDR";
-const VERSION: u8 = 7;
+const VERSION: u8 = 8;
 const PREFIX_BYTES: usize = 5;
 const CHECKSUM_BYTES: usize = 4;
 /// Maximum number of positions that a plant shows.
@@ -198,7 +198,7 @@ fn kept_sample(sample: &Sample) -> Result<(), FrameError> {
     kept_writes(&sample.writes)?;
     kept_pulses(&sample.pulses)?;
     let width = sample.history[0].width();
-    if sample.history.iter().all(|image| image.width() == width) {
+    if sample.history.iter().chain(&sample.unforced).all(|image| image.width() == width) {
         Ok(())
     } else {
         Err(FrameError::Promise("all samples of a program are of one width"))

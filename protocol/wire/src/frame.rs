@@ -96,6 +96,16 @@ pub struct Sample {
     pub writes: SmallVec<[WriteId; 1]>,
     /// Pulses that are not over after this sample, in the order of inputs.
     pub pulses: SmallVec<[Pulse; 1]>,
+    /// u(i)(t) as it would be without the forces of operators; `None` where no force changes it.
+    pub unforced: Option<Image>,
+}
+
+impl Sample {
+    /// u(i)(t) without the forces of operators: what a remote I/O that restarts goes on from, because a force ends with its process. `None`
+    /// without history.
+    pub fn without_forces(&self) -> Option<&Image> {
+        self.unforced.as_ref().or(self.history.last())
+    }
 }
 
 /// Source of an applied output.
@@ -223,7 +233,8 @@ pub struct Recalled {
     pub writes: SmallVec<[WriteId; 1]>,
     /// As in a [`Sample`].
     pub pulses: SmallVec<[Pulse; 1]>,
-    /// u(i), with the channels that were failed and the values that they kept, and the values that operators wrote.
+    /// u(i) without the forces of operators, with the channels that were failed and the values that they kept, and the values that operators
+    /// wrote.
     pub inputs: Image,
 }
 

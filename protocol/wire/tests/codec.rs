@@ -79,6 +79,7 @@ fn every_kind() -> Vec<(&'static str, Frame)> {
         drives: true,
         writes: smallvec![write(7, 1), write(9, 4)],
         pulses: smallvec![pulse(2, 41)],
+        unforced: Some(image(4, 0b1000)),
     };
     let relayed = Relayed { program: ProgramId(1), sample: sample.clone() };
     let turn = Turn {
@@ -199,6 +200,7 @@ fn a_frame_that_breaks_a_promise_never_leaves() {
         drives: true,
         writes: smallvec![],
         pulses: smallvec![],
+        unforced: None,
     };
     check_refused(remote_io, Body::Sample(empty.clone()));
     for writes in
@@ -214,6 +216,9 @@ fn a_frame_that_breaks_a_promise_never_leaves() {
         check_refused(remote_io, Body::Sample(sample));
     }
     let uneven = Sample { history: smallvec![image(1, 0), image(2, 0)], ..empty.clone() };
+    check_refused(remote_io, Body::Sample(uneven));
+    let history = smallvec![image(1, 0)];
+    let uneven = Sample { history, unforced: Some(image(2, 0)), ..empty.clone() };
     check_refused(remote_io, Body::Sample(uneven));
     let word = |members| Word { mask: ProgramSet::from_bits(members), sum: Image::default() };
     let turn = |members, programs: &[u8]| Turn {

@@ -65,20 +65,22 @@ impl RemoteIo {
         let is_lost =
             |id: WriteId| before.iter().any(|(it, place)| *it == id && !history.keeps(*place));
         let mut void_writes = self.writing.lose(operator_inputs, moment, is_lost);
-        let mut inputs = self.field.clone();
-        self.writing.put(operator_inputs, history.newest(), &mut inputs);
-        let validity = self.signals.put(&self.settings.signals, moment, &mut inputs);
-        let mut inputs = self.forcing.inputs(inputs);
+        let mut unforced = self.field.clone();
+        self.writing.put(operator_inputs, history.newest(), &mut unforced);
+        let validity = self.signals.put(&self.settings.signals, moment, &mut unforced);
+        let mut inputs = self.forcing.inputs(unforced.clone());
         if let Some(stop) = self.settings.stop
             && self.program == Execution::Restarting
         {
             inputs.set(stop.reset, true);
+            unforced.set(stop.reset, true);
             self.program = Execution::Stopped;
         }
         history.push(&inputs);
         run.sampled = true;
         let forced = |input| self.forcing.refuses_write(input, now);
         void_writes.extend(self.writing.sampled(operator_inputs, moment, history, &forced));
+        self.writing.put_forced(operator_inputs, &forced, &mut unforced);
         let base = history.base();
         let (born, before) = (history.born(), history.before());
         let body = Body::Sample(Sample {
@@ -95,6 +97,7 @@ impl RemoteIo {
                 && self.program == Execution::Running,
             writes: self.writing.ids(),
             pulses: self.writing.pulses(operator_inputs),
+            unforced: (unforced != inputs).then_some(unforced),
         });
         if void > 0 {
             self.report(Event::Voided { moment, samples: void, lineage: base });

@@ -151,6 +151,19 @@ impl Writing {
         }
     }
 
+    /// Puts the values that forced inputs have without their forces into u(i), which was sampled: writes that the forces kept out have no effect.
+    pub(super) fn put_forced(
+        &self,
+        inputs: &[OperatorInput],
+        forced: Forced<'_>,
+        image: &mut Image,
+    ) {
+        let values = inputs.iter().zip(&self.values);
+        for (input, written) in values.filter(|(input, _)| input.forced(forced).is_some()) {
+            input.place.set(image, written.stored);
+        }
+    }
+
     /// The newest writes that a sample carries, one for each session. In place of a pulse that waits it carries the write before it.
     pub(super) fn ids(&self) -> SmallVec<[WriteId; 1]> {
         let waits = |id| self.values.iter().any(|written| !written.is_sampled && written.by == id);

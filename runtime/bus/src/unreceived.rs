@@ -94,6 +94,7 @@ mod tests {
                 drives: true,
                 writes: smallvec![],
                 pulses: smallvec![],
+                unforced: None,
             }),
         }
     }

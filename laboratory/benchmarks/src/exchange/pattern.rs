@@ -178,6 +178,7 @@ fn sample() -> Body {
         drives: true,
         writes: Default::default(),
         pulses: Default::default(),
+        unforced: None,
     })
 }
 

@@ -28,9 +28,11 @@ fn image_bytes(bits: usize) -> usize {
     (bits.div_ceil(64) + 2) * INTEGER_BYTES + SET_BYTES
 }
 
-/// A sample: the inputs of each cycle of its history.
+/// A sample: the inputs of each cycle of its history, and those of the last one without forces.
 fn sample_bytes(inputs: usize, history: usize, has_operator_inputs: bool) -> usize {
-    FRAME_BYTES + history * image_bytes(inputs) + usize::from(has_operator_inputs) * WRITES_BYTES
+    FRAME_BYTES
+        + (history + 1) * image_bytes(inputs)
+        + usize::from(has_operator_inputs) * WRITES_BYTES
 }
 
 /// The turn of an understudy: a word for each program that is silent, one for the rest, all that it holds, and the last inputs of
@@ -170,6 +172,7 @@ mod tests {
                     drives: true,
                     writes: all_writes(),
                     pulses: all_pulses(),
+                    unforced: Some(ones(bits)),
                 };
                 let bound = sample_bytes(bits, history, true);
                 check_body(Member::RemoteIo(ProgramId(63)), Body::Sample(sample), bound);

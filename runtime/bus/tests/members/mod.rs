@@ -125,6 +125,7 @@ fn sample() -> Sample {
         drives: true,
         writes: Default::default(),
         pulses: Default::default(),
+        unforced: None,
     }
 }
 

@@ -1,31 +1,22 @@
 //! Writes of inputs that are forced: every order of forces, writes, ends of forces, and cycles with and without proved outputs.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
-use std::time::Duration;
 
-use understudy_cycle::{Agreement, Input, Machine, Mode, Output, RemoteIoInput, Schedule};
+use understudy_cycle::{Output, RemoteIoInput};
 use understudy_remote_io::{
-    Event, OperatorInput, OperatorInputKind, PointPlace, Release, RemoteIo, Settings, StaleState,
-    ValueFault,
+    Event, OperatorInput, OperatorInputKind, PointPlace, RemoteIo, Settings,
 };
 use understudy_typed::Elementary;
 use understudy_wire::{
-    Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Force, Frame, Header, Holding,
-    Image, Join, Lineage, Member, Moment, PointValue, ProgramHash, ProgramId, ProgramSet, Role,
-    Sample, SignalPlace, StateChoice, StationId, StationSet, Time, Turn, Word, Write, WriteAnswer,
-    WriteId, WriteOutcome, WriteRefusal,
+    Body, Force, Holding, Image, Lineage, Moment, PointValue, Recalled, Role, Sample, SignalPlace,
+    StateChoice, Write, WriteAnswer, WriteId, WriteOutcome, WriteRefusal,
 };
 
-const PERIOD: Duration = Duration::from_millis(10);
-const PROGRAM: ProgramId = ProgramId(0);
-const INITIAL: u64 = 7;
-/// Samples of a history.
-const HISTORY: usize = 3;
+use crate::bench::{
+    Bench, HISTORY, Said, held_after, join, recalled_of, sample_of, settings, turn,
+};
 
-fn moment(cycle: u64) -> Moment {
-    Moment { epoch: Epoch(1), cycle: Cycle(cycle) }
-}
+const INITIAL: u64 = 7;
 
 /// One step of a sequence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,11 +37,16 @@ enum Step {
     Void,
     /// The stations come back with another state, and the operator accepts it.
     Replaced,
+    /// The remote I/O starts again, and callers without an answer ask again.
+    Restart,
 }
 
 use Step::*;
 
-const STEPS: [Step; 8] = [ForceOff, ForceOn, Unforce, Write, Proved, Unfollowed, Void, Replaced];
+const IN_ONE_LIFE: [Step; 8] =
+    [ForceOff, ForceOn, Unforce, Write, Proved, Unfollowed, Void, Replaced];
+
+const WITH_RESTARTS: [Step; 7] = [ForceOff, ForceOn, Unforce, Write, Proved, Unfollowed, Restart];
 
 /// What the stations hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,12 +65,15 @@ struct Sampled {
     void: bool,
 }
 
+/// A remote I/O with one operator input.
 #[derive(Clone)]
-struct Bench {
-    remote_io: RemoteIo,
+struct Operated {
+    bench: Bench,
+    settings: Settings,
     kind: OperatorInputKind,
-    cycle: u64,
     sample: Option<Sample>,
+    /// What the stations recall of the newest sample that they received.
+    recalled: Option<Recalled>,
     /// The newest state that the stations have proved.
     held: Option<Holding>,
     applied: Moment,
@@ -94,46 +93,24 @@ fn place(kind: OperatorInputKind) -> PointPlace {
     PointPlace { bit: 16, of }
 }
 
-impl Bench {
+impl Operated {
     fn new(kind: OperatorInputKind) -> Self {
         let place = place(kind);
-        let agreement = Agreement {
-            cluster: ClusterHash(1),
-            configuration: ConfigurationHash(2),
-            schedule: Schedule::new(PERIOD, 1, 1, 1).expect("within the bounds"),
-            mode: Mode::Full,
-            history: HISTORY,
-            flag_after: 3,
-            shadow_cycles: 1,
-            listen_cycles: 2,
-        };
         let initial = if place.of == Elementary::Bool { 0 } else { INITIAL };
         let settings = Settings {
-            program: PROGRAM,
-            agreement: Arc::new(agreement),
-            hash: ProgramHash(1),
             undriven: Image::zero(32),
             input_points: vec![place],
-            output_points: PointPlace::booleans(1),
             operator_inputs: vec![OperatorInput { place, kind, initial, role: Role::Operator }],
-            signals: Vec::new(),
-            signal_sources: Vec::new(),
-            channels: Vec::new(),
-            stop: None,
-            diagnosis: None,
             // Writes are taken while outputs are held.
             hold_cycles: 1000,
-            fail_safe: Image::zero(1),
-            ramps: Vec::new(),
-            release: Release::Automatic,
-            value_fault: ValueFault::Hold,
-            stale_state: StaleState::Operator,
+            ..settings(1)
         };
         let mut bench = Self {
-            remote_io: RemoteIo::new(Time(0), settings),
+            bench: Bench::new(settings.clone(), 101),
+            settings,
             kind,
-            cycle: 100,
             sample: None,
+            recalled: None,
             held: None,
             applied: Moment::default(),
             forced: false,
@@ -149,20 +126,13 @@ impl Bench {
         bench
     }
 
-    fn now(&self) -> Time {
-        Time(0) + PERIOD * self.cycle as u32
-    }
-
-    fn give(&mut self, now: Time, input: Input<'_>) {
-        self.remote_io.handle_input(now, input);
+    fn hear(&mut self, said: Said) {
+        if let Some(sample) = sample_of(&said) {
+            self.sample = Some(sample.clone());
+        }
         let mut answers = Vec::new();
-        while let Some(output) = self.remote_io.poll_output() {
+        for output in said {
             match output {
-                Output::Send(frame) => {
-                    if let Body::Sample(sample) = &frame.body {
-                        self.sample = Some(sample.clone());
-                    }
-                }
                 Output::Report(event) => self.observe(&event),
                 Output::Answer(answer) => answers.push(answer),
                 _ => {}
@@ -183,7 +153,7 @@ impl Bench {
                 newer.for_each(|sampled| sampled.void = true);
                 if let OperatorInputKind::Pulse(_) = self.kind {
                     // The other state may have seen the button pressed.
-                    let moment = moment(self.cycle);
+                    let moment = self.bench.moment();
                     self.trace.push(Sampled { moment, value: 1, forced: true, void: false });
                 }
             }
@@ -217,44 +187,37 @@ impl Bench {
     }
 
     fn pass(&mut self, stations: Stations) {
-        self.cycle += 1;
-        let (start, deadline) = (self.now(), self.now() + PERIOD * 65 / 100);
+        self.bench.cycle += 1;
         self.sample = None;
-        self.receive(start, 0, Body::Sync);
+        self.receive(0, Body::Sync);
         let sample = self.sample.clone();
         if let (Stations::Follow, Some(sample)) = (stations, &sample) {
-            self.held = Some(Holding {
-                program: PROGRAM,
-                born: sample.born,
-                lineage: sample.after,
-                stepped: moment(self.cycle),
-                digest: Digest(0),
-            });
+            self.held = Some(held_after(sample, self.bench.moment()));
+            self.recalled = Some(recalled_of(sample, self.bench.moment()));
         }
         for rank in [0, 1] {
             let body = match (stations, sample.is_some(), self.held) {
                 (Stations::Follow, true, Some(held)) => turn(held),
-                (Stations::Hold(lineage), _, Some(held)) => join(Some(Holding { lineage, ..held })),
-                (_, _, held) => join(held),
+                (Stations::Hold(lineage), _, Some(held)) => {
+                    join(Some(Holding { lineage, ..held }), None)
+                }
+                (_, true, held) => join(held, None),
+                (_, false, held) => join(held, self.recalled.clone()),
             };
-            self.receive(start, rank, body);
+            self.receive(rank, body);
         }
-        self.give(deadline, Input::Wakeup);
+        let said = self.bench.decide();
+        self.hear(said);
     }
 
-    fn receive(&mut self, now: Time, rank: u8, body: Body) {
-        let header = Header {
-            cluster: ClusterHash(1),
-            configuration: ConfigurationHash(2),
-            moment: moment(self.cycle),
-            sender: Member::Station(StationId(rank)),
-            alone: false,
-        };
-        self.give(now, Input::Frame(&Arc::new(Frame { header, body })));
+    fn receive(&mut self, rank: u8, body: Body) {
+        let said = self.bench.receive(self.bench.start(), rank, false, body);
+        self.hear(said);
     }
 
     fn order(&mut self, input: RemoteIoInput<'_>) {
-        self.give(self.now() + PERIOD * 9 / 10, Input::RemoteIo(input));
+        let said = self.bench.tell(input);
+        self.hear(said);
     }
 
     fn value(&self, stored: u64) -> PointValue {
@@ -285,10 +248,15 @@ impl Bench {
             _ => 1,
         };
         self.writes.push(stored);
+        self.ask(session);
+    }
+
+    /// The caller of a session asks for its write, once more or for the first time.
+    fn ask(&mut self, session: u64) {
         let write = Write {
             id: WriteId { session, number: 1 },
             input: place(self.kind).bit,
-            value: self.value(stored),
+            value: self.value(self.writes[session as usize]),
             role: Role::Operator,
             owner: "anna".to_owned(),
             reason: "a test".to_owned(),
@@ -307,8 +275,8 @@ impl Bench {
             Unfollowed => self.pass(Stations::StayBehind),
             Void => (0..=HISTORY).for_each(|_| self.pass(Stations::StayBehind)),
             Replaced => {
-                let other = Stations::Hold(Lineage(self.cycle));
-                while !self.remote_io.asks_operator() {
+                let other = Stations::Hold(Lineage(self.bench.cycle));
+                while !self.bench.remote_io.asks_operator() {
                     self.pass(other);
                 }
                 self.order(RemoteIoInput::Choose(StateChoice::Newest { cycle: None }));
@@ -316,6 +284,18 @@ impl Bench {
                     let Stations::Hold(lineage) = other else { return };
                     held.lineage = lineage;
                 }
+            }
+            Restart => {
+                self.bench.remote_io = RemoteIo::new(self.bench.start(), self.settings.clone());
+                self.forced = false;
+                let before = self.trace.len();
+                while self.trace[before..].iter().all(|sampled| sampled.forced) {
+                    self.pass(Stations::Follow);
+                }
+                let sessions = 0..self.writes.len() as u64;
+                let open: Vec<u64> =
+                    sessions.filter(|session| !self.outcomes.contains_key(session)).collect();
+                open.into_iter().for_each(|session| self.ask(session));
             }
         }
     }
@@ -374,31 +354,8 @@ struct Outcomes {
     refused: u32,
 }
 
-fn turn(holding: Holding) -> Body {
-    Body::Turn(Turn {
-        heard: StationSet::EMPTY,
-        holdings: [holding].into_iter().collect(),
-        words: [Word { mask: ProgramSet::only(PROGRAM), sum: Image::zero(1) }]
-            .into_iter()
-            .collect(),
-        recalled: Vec::new(),
-        lacks: ProgramSet::EMPTY,
-        relayed: Vec::new(),
-    })
-}
-
-fn join(holding: Option<Holding>) -> Body {
-    Body::Join(Join {
-        wants: ProgramSet::EMPTY,
-        holdings: holding.into_iter().collect(),
-        recalled: Vec::new(),
-        lacks: ProgramSet::EMPTY,
-        partial: Vec::new(),
-    })
-}
-
-/// All sequences of steps that continue one, each to its end.
-fn explore(bench: &Bench, steps: u32, total: &mut Outcomes) {
+/// All sequences of these steps that continue one, each to its end.
+fn explore(bench: &Operated, alphabet: &[Step], steps: u32, total: &mut Outcomes) {
     if steps == 0 {
         let outcomes = bench.clone().settle();
         total.in_effect += outcomes.in_effect;
@@ -413,10 +370,10 @@ fn explore(bench: &Bench, steps: u32, total: &mut Outcomes) {
         Unforce => bench.forced,
         _ => true,
     };
-    for step in STEPS.into_iter().filter(changes) {
+    for step in alphabet.iter().copied().filter(changes) {
         let mut next = bench.clone();
         next.step(step);
-        explore(&next, steps - 1, total);
+        explore(&next, alphabet, steps - 1, total);
     }
 }
 
@@ -429,8 +386,22 @@ fn every_write_of_an_input_that_is_forced_has_a_true_answer() {
         (OperatorInputKind::Setpoint { low: 0, high: 80 }, 5),
     ] {
         let mut total = Outcomes::default();
-        explore(&Bench::new(kind), steps, &mut total);
+        explore(&Operated::new(kind), &IN_ONE_LIFE, steps, &mut total);
         let Outcomes { in_effect, forced, refused } = total;
         assert!(in_effect > 1000 && forced > 1000 && refused > 100, "{kind:?}: {total:?}");
+    }
+}
+
+/// A force ends with the process of its remote I/O: what was written before it holds again, and nothing of the force.
+#[test]
+fn no_forced_value_is_left_after_a_restart() {
+    for kind in [
+        OperatorInputKind::Level,
+        OperatorInputKind::Pulse(2),
+        OperatorInputKind::Setpoint { low: 0, high: 80 },
+    ] {
+        let mut total = Outcomes::default();
+        explore(&Operated::new(kind), &WITH_RESTARTS, 5, &mut total);
+        assert!(total.in_effect > 1000 && total.forced > 100, "{kind:?}: {total:?}");
     }
 }

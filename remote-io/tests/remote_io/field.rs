@@ -1,57 +1,27 @@
 //! What the plant shows and what a remote I/O makes of it: sensors that cannot be seen, and signals that the operator forces.
 
-use std::sync::Arc;
-use std::time::Duration;
-
-use understudy_cycle::{Agreement, Input, Machine, Mode, Output, RemoteIoInput, Schedule};
+use understudy_cycle::{Input, Machine, Output, RemoteIoInput};
 use understudy_remote_io::{
-    Event, Missing, OperatorInput, OperatorInputKind, PointPlace, Release, RemoteIo, Settings,
-    StaleState, ValueFault,
+    Event, Missing, OperatorInput, OperatorInputKind, PointPlace, Settings,
 };
 use understudy_typed::Elementary;
 use understudy_wire::{
-    Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Force, Frame, Header, Image, Join, Lineage,
-    Member, Moment, OrderRefusal, PointValue, ProgramHash, ProgramId, ProgramSet, Role,
-    SignalPlace, Source, StateChoice, StationId, Time, Write, WriteAnswer, WriteId, WriteOutcome,
-    WriteRefusal,
+    Body, Cycle, Force, Image, Lineage, OrderRefusal, PointValue, Role, SignalPlace, Source,
+    StateChoice, Time, Write, WriteAnswer, WriteId, WriteOutcome, WriteRefusal,
 };
 
-const PERIOD: Duration = Duration::from_millis(10);
+use crate::bench::{Bench, PERIOD, Said, join, sample_of, settings};
 
-fn agreement() -> Arc<Agreement> {
-    Arc::new(Agreement {
-        cluster: ClusterHash(7),
-        configuration: ConfigurationHash(8),
-        schedule: Schedule::new(PERIOD, 1, 1, 1).expect("within the bounds"),
-        mode: Mode::Full,
-        history: 4,
-        flag_after: 3,
-        shadow_cycles: 1,
-        listen_cycles: 10,
-    })
-}
-
-/// A remote I/O and the cycle that it is in.
-struct Bench {
-    remote_io: RemoteIo,
-    cycle: u32,
+/// A remote I/O that starts in the first cycle.
+fn bench(settings: Settings) -> Bench {
+    Bench::new(settings, 1)
 }
 
 impl Bench {
-    fn start(&self) -> Time {
-        Time::default() + PERIOD * self.cycle
-    }
-
     /// One cycle from its Sync to its deadline: the base of what was sampled, what was driven, and why it was not true.
     fn cycle(&mut self) -> (Option<Lineage>, Source, Option<Missing>) {
         let said = self.said();
-        let sampled = said.iter().find_map(|output| match output {
-            Output::Send(frame) => match &frame.body {
-                Body::Sample(sample) => Some(sample.base),
-                _ => None,
-            },
-            _ => None,
-        });
+        let sampled = sample_of(&said).map(|sample| sample.base);
         let applied = said.iter().rev().find_map(|output| match output {
             Output::Report(Event::Applied { source, missing, .. }) => Some((*source, *missing)),
             _ => None,
@@ -61,77 +31,25 @@ impl Bench {
     }
 
     /// All that it says in one cycle.
-    fn said(&mut self) -> Vec<Output<Event>> {
+    fn said(&mut self) -> Said {
         self.cycle += 1;
-        self.sync(self.start());
-        let mut said: Vec<Output<Event>> = self.drain();
-        let deadline = self.start() + agreement().schedule.deadline();
-        self.remote_io.handle_input(deadline, Input::Wakeup);
-        said.extend(self.drain());
+        let mut said = self.sync(self.start());
+        said.extend(self.decide());
         said
     }
 
-    /// The frames of a station in this cycle, which arrive at `now`.
-    fn sync(&mut self, now: Time) {
-        let agreement = agreement();
-        let header = Header {
-            cluster: agreement.cluster,
-            configuration: agreement.configuration,
-            moment: Moment { epoch: Epoch(1), cycle: Cycle(u64::from(self.cycle)) },
-            sender: Member::Station(StationId(0)),
-            alone: false,
-        };
-        let join = Join {
-            wants: ProgramSet::first(1),
-            holdings: Default::default(),
-            recalled: Vec::new(),
-            lacks: ProgramSet::EMPTY,
-            partial: Vec::new(),
-        };
-        for body in [Body::Sync, Body::Join(join)] {
-            let frame = Arc::new(Frame { header, body });
-            self.remote_io.handle_input(now, Input::Frame(&frame));
-        }
-    }
-
-    fn drain(&mut self) -> Vec<Output<Event>> {
-        std::iter::from_fn(|| self.remote_io.poll_output()).collect()
-    }
-
-    /// Something after the deadline of a cycle.
-    fn tell(&mut self, input: Input<'_>) {
-        let now = self.start() + PERIOD * 9 / 10;
-        self.remote_io.handle_input(now, input);
-    }
-}
-
-fn settings() -> Settings {
-    Settings {
-        program: ProgramId(0),
-        agreement: agreement(),
-        hash: ProgramHash(9),
-        undriven: Image::zero(2),
-        input_points: PointPlace::booleans(2),
-        output_points: PointPlace::booleans(1),
-        operator_inputs: Vec::new(),
-        signals: Vec::new(),
-        signal_sources: Vec::new(),
-        channels: Vec::new(),
-        stop: None,
-        diagnosis: None,
-        hold_cycles: 2,
-        fail_safe: Image::zero(1),
-        ramps: Vec::new(),
-        release: Release::Automatic,
-        value_fault: ValueFault::default(),
-        stale_state: StaleState::Operator,
+    /// The frames of the controller in this cycle, which arrive at `now`.
+    fn sync(&mut self, now: Time) -> Said {
+        let mut said = self.receive(now, 0, false, Body::Sync);
+        said.extend(self.receive(now, 0, false, join(None, None)));
+        said
     }
 }
 
 #[test]
 fn a_forced_signal_is_sampled_and_driven_so_until_its_time_is_over() {
-    let mut bench = Bench { remote_io: RemoteIo::new(Time::default(), settings()), cycle: 0 };
-    bench.tell(Input::RemoteIo(RemoteIoInput::Field(&Image::from_bits([true, false]))));
+    let mut bench = bench(settings(1));
+    bench.tell(RemoteIoInput::Field(&Image::from_bits([true, false])));
     let started = (0..60).find_map(|_| bench.cycle().0);
     assert!(started.is_some(), "it starts cold where no station holds a state");
     let force = |signal, value: bool, seconds| Force {
@@ -142,13 +60,12 @@ fn a_forced_signal_is_sampled_and_driven_so_until_its_time_is_over() {
         reason: "a test".to_owned(),
     };
     let (input, output) = (SignalPlace::Input(1), SignalPlace::Output(0));
-    bench.tell(Input::RemoteIo(RemoteIoInput::Force(&force(input, true, 1))));
-    bench.tell(Input::RemoteIo(RemoteIoInput::Force(&force(output, true, 1))));
+    let mut said = bench.tell(RemoteIoInput::Force(&force(input, true, 1)));
+    said.extend(bench.tell(RemoteIoInput::Force(&force(output, true, 1))));
     // None of these is a force.
-    bench.tell(Input::RemoteIo(RemoteIoInput::Force(&force(SignalPlace::Input(2), true, 1))));
-    bench.tell(Input::RemoteIo(RemoteIoInput::Force(&force(SignalPlace::Output(1), true, 1))));
-    bench.tell(Input::RemoteIo(RemoteIoInput::Force(&force(SignalPlace::Input(0), false, 0))));
-    let said = bench.drain();
+    said.extend(bench.tell(RemoteIoInput::Force(&force(SignalPlace::Input(2), true, 1))));
+    said.extend(bench.tell(RemoteIoInput::Force(&force(SignalPlace::Output(1), true, 1))));
+    said.extend(bench.tell(RemoteIoInput::Force(&force(SignalPlace::Input(0), false, 0))));
     assert_eq!(forced_and_ended(&said), (2, 0), "{said:?}");
     let frames = |bench: &mut Bench| {
         let said = bench.said();
@@ -171,9 +88,9 @@ fn a_forced_signal_is_sampled_and_driven_so_until_its_time_is_over() {
     let (fail_safe, forced) = (image(&[false]), image(&[true]));
     let both = (image(&[true, true]), forced.clone(), fail_safe.clone(), 0);
     assert_eq!(frames(&mut bench), both);
-    bench.tell(Input::RemoteIo(RemoteIoInput::Unforce(output)));
-    bench.tell(Input::RemoteIo(RemoteIoInput::Unforce(output)));
-    assert_eq!(forced_and_ended(&bench.drain()), (0, 1), "taken back once");
+    let mut said = bench.tell(RemoteIoInput::Unforce(output));
+    said.extend(bench.tell(RemoteIoInput::Unforce(output)));
+    assert_eq!(forced_and_ended(&said), (0, 1), "taken back once");
     let one = (image(&[true, true]), fail_safe.clone(), fail_safe.clone(), 0);
     assert_eq!(frames(&mut bench), one);
     // A second later.
@@ -206,9 +123,9 @@ fn a_force_is_of_a_whole_signal_and_of_a_value_that_it_can_have() {
         input_points: points.clone(),
         output_points: points.clone(),
         fail_safe: Image::zero(128),
-        ..settings()
+        ..settings(1)
     };
-    let mut bench = Bench { remote_io: RemoteIo::new(Time::default(), settings), cycle: 0 };
+    let mut bench = bench(settings);
     let values = [0, 1, 0x7f80_0000, 0x7fc0_0000, 0x4148_0000, 0x7ff8_0000_0000_0000, u64::MAX];
     let mut taken = 0;
     for bit in 0..130 {
@@ -227,8 +144,7 @@ fn a_force_is_of_a_whole_signal_and_of_a_value_that_it_can_have() {
                 let point = points.iter().find(|point| point.bit == bit);
                 let is_whole = point.is_some_and(|point| point.of.bits() == width);
                 let expected = force.check().is_ok() && is_whole && is_number;
-                bench.tell(Input::RemoteIo(RemoteIoInput::Force(&force)));
-                let said = bench.drain();
+                let said = bench.tell(RemoteIoInput::Force(&force));
                 let outcomes = obeyed(&said);
                 assert_eq!(
                     (outcomes.len(), outcomes[0].is_ok()),
@@ -257,8 +173,8 @@ fn a_write_is_refused_while_no_station_computes_the_program() {
         initial: 0,
         role: Role::Operator,
     };
-    let settings = Settings { operator_inputs: vec![level], ..settings() };
-    let mut bench = Bench { remote_io: RemoteIo::new(Time::default(), settings), cycle: 0 };
+    let settings = Settings { operator_inputs: vec![level], ..settings(1) };
+    let mut bench = bench(settings);
     let started = (0..60).find_map(|_| bench.cycle().0);
     assert!(started.is_some(), "it starts cold where no station holds a state");
     assert_eq!(bench.cycle().1, Source::FailSafe);
@@ -270,8 +186,7 @@ fn a_write_is_refused_while_no_station_computes_the_program() {
         owner: "anna".to_owned(),
         reason: "a test".to_owned(),
     };
-    bench.tell(Input::RemoteIo(RemoteIoInput::Write(&write)));
-    let said = bench.drain();
+    let said = bench.tell(RemoteIoInput::Write(&write));
     let refused = WriteOutcome::Refused { refusal: WriteRefusal::NotRunning };
     assert!(
         matches!(&said[..], [
@@ -284,7 +199,7 @@ fn a_write_is_refused_while_no_station_computes_the_program() {
 
 #[test]
 fn an_order_that_changes_nothing_is_refused() {
-    let mut bench = Bench { remote_io: RemoteIo::new(Time::default(), settings()), cycle: 0 };
+    let mut bench = bench(settings(1));
     let output = SignalPlace::Output(0);
     let no_choice = Err(OrderRefusal::NoChoice);
     for (input, expected) in [
@@ -293,8 +208,7 @@ fn an_order_that_changes_nothing_is_refused() {
         (RemoteIoInput::Choose(StateChoice::Newest { cycle: Some(Cycle(5)) }), no_choice),
         (RemoteIoInput::Release, Ok(())),
     ] {
-        bench.tell(Input::RemoteIo(input));
-        assert_eq!(obeyed(&bench.drain()), [expected], "{input:?}");
+        assert_eq!(obeyed(&bench.tell(input)), [expected], "{input:?}");
     }
 }
 
@@ -302,23 +216,22 @@ fn an_order_that_changes_nothing_is_refused() {
 #[test]
 fn a_deadline_that_was_slept_through_is_neither_driven_nor_recorded() {
     for (asleep, at_once) in (0..40).flat_map(|asleep| [false, true].map(|once| (asleep, once))) {
-        let mut bench = Bench { remote_io: RemoteIo::new(Time::default(), settings()), cycle: 0 };
+        let mut bench = bench(settings(1));
         for _ in 0..60 {
             bench.said();
         }
         let first = bench.cycle + 1;
-        let now = Time::default() + PERIOD * (first + asleep) + PERIOD / 3;
+        let begins = |cycle: u64| Time(0) + PERIOD * cycle as u32;
+        let now = begins(first + asleep) + PERIOD / 3;
         let mut said = Vec::new();
         for cycle in first..=first + asleep {
             // In the first of them the sync may have come before the host suspended it.
-            let at = if cycle == first && at_once { Time::default() + PERIOD * first } else { now };
+            let at = if cycle == first && at_once { begins(first) } else { now };
             bench.cycle = cycle;
-            bench.sync(at);
-            said.extend(bench.drain());
+            said.extend(bench.sync(at));
         }
         let late = bench.remote_io.wakeup().max(now);
-        bench.remote_io.handle_input(late, Input::Wakeup);
-        said.extend(bench.drain());
+        said.extend(bench.give(late, Input::Wakeup));
         let driven = said.iter().filter(|it| matches!(it, Output::Drive(_))).count();
         let applied: Vec<u64> = said
             .iter()
@@ -328,8 +241,7 @@ fn a_deadline_that_was_slept_through_is_neither_driven_nor_recorded() {
             })
             .collect();
         // The cycle in which it was suspended, late, and the present one.
-        let (first, last) = (u64::from(first), u64::from(first + asleep));
-        let mut expected = vec![last];
+        let mut expected = vec![first + asleep];
         if at_once && asleep > 0 {
             expected.insert(0, first);
         }
@@ -355,20 +267,20 @@ fn forced_and_ended(said: &[Output<Event>]) -> (usize, usize) {
 
 #[test]
 fn without_sensors_nothing_is_sampled_and_the_program_stands_still() {
-    let mut bench = Bench { remote_io: RemoteIo::new(Time::default(), settings()), cycle: 0 };
+    let mut bench = bench(settings(1));
     let sensors = Image::from_bits([true, false]);
-    bench.tell(Input::RemoteIo(RemoteIoInput::Field(&sensors)));
+    bench.tell(RemoteIoInput::Field(&sensors));
     // It listens first whether somebody holds a state.
     let started = (0..60).find_map(|_| bench.cycle().0);
     let genesis = started.expect("it starts cold where no station holds a state");
-    bench.tell(Input::RemoteIo(RemoteIoInput::FieldLost));
+    bench.tell(RemoteIoInput::FieldLost);
     for _ in 0..5 {
         let (sampled, source, missing) = bench.cycle();
         assert_eq!(sampled, None);
         assert_eq!(source, Source::FailSafe, "nothing was true before");
         assert_eq!(missing, Some(Missing::BadQuality));
     }
-    bench.tell(Input::RemoteIo(RemoteIoInput::Field(&sensors)));
+    bench.tell(RemoteIoInput::Field(&sensors));
     let (sampled, _, missing) = bench.cycle();
     assert_eq!(sampled, Some(genesis), "the history goes on where it was");
     assert_ne!(missing, Some(Missing::BadQuality));

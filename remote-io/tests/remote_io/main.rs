@@ -1,0 +1,6 @@
+//! A remote I/O among the frames of its stations, without a network.
+
+mod bench;
+mod field;
+mod forced_writes;
+mod restart;
