@@ -32,9 +32,9 @@ struct Holder {
     silent: u32,
     /// Cycles since any frame of it came, one that was too late for its cycle too; `u32::MAX` for never.
     unheard: u32,
-    /// Cycles since a frame of it came in time or with a state, or a turn that names it among those that published; `u32::MAX` for never. A
-    /// station that is cut off from this remote I/O follows the samples that others relay; a second process with its keys, to which no
-    /// sample goes, holds no state.
+    /// Cycles since a frame of it came with a state, or in time from a station that receives others, or a turn that names it among those that
+    /// published; `u32::MAX` for never. A station that is cut off from this remote I/O follows the samples that others relay; a second process with
+    /// its keys, to which no frame goes, holds no state and is alone, also where this remote I/O follows its cycles.
     absent: u32,
 }
 
@@ -67,20 +67,24 @@ impl Holders {
         }
     }
 
-    /// Takes the state that a station holds of this program, and what it recalls of the last sample.
+    /// Takes the state that a station holds of this program, what it recalls of the last sample, and whether it is alone: it receives no other
+    /// member.
     pub(crate) fn note(
         &mut self,
         station: StationId,
         holding: Option<&Holding>,
         recalled: Option<&Recalled>,
+        alone: bool,
     ) {
         if let Some(entry) = self.entries.iter_mut().find(|entry| entry.station == station) {
             entry.holding = holding.copied();
             // A station that has restarted recalls nothing of its earlier life.
             entry.recalled = recalled.cloned();
             entry.silent = 0;
-            entry.absent = 0;
-            self.recalled_gone.remove(station);
+            if holding.is_some() || !alone {
+                entry.absent = 0;
+                self.recalled_gone.remove(station);
+            }
         }
     }
 

@@ -251,11 +251,13 @@ impl RemoteIo {
         self.holders.hear(station, None);
         match &frame.body {
             Body::Turn(turn) if self.member.attendance.receive_turn(station) => {
-                self.note(station, &turn.holdings, &turn.recalled);
+                self.note(station, &turn.holdings, &turn.recalled, frame.header.alone);
                 self.holders.hear_of(turn.heard);
                 self.turns[station.index()] = Some(Arc::clone(frame));
             }
-            Body::Join(join) => self.note(station, &join.holdings, &join.recalled),
+            Body::Join(join) => {
+                self.note(station, &join.holdings, &join.recalled, frame.header.alone);
+            }
             _ => {}
         }
     }
@@ -297,13 +299,19 @@ impl RemoteIo {
         self.obeyed(Ok(()));
     }
 
-    fn note(&mut self, station: StationId, holdings: &[Holding], recalled: &[Recalled]) {
+    fn note(
+        &mut self,
+        station: StationId,
+        holdings: &[Holding],
+        recalled: &[Recalled],
+        alone: bool,
+    ) {
         let program = self.settings.program;
         let own = Holding::of(holdings, program);
         let recalled = recalled.iter().find(|recalled| {
             recalled.program == program && recalled.inputs.width() == self.settings.undriven.width()
         });
-        self.holders.note(station, own, recalled);
+        self.holders.note(station, own, recalled, alone);
         if let (Some(run), Some(holding)) = (self.knowledge.run_mut(), own)
             && let Some(place) = run.history.place(holding.lineage)
         {

@@ -3,4 +3,5 @@
 mod bench;
 mod field;
 mod forced_writes;
+mod gone;
 mod restart;
