@@ -74,11 +74,10 @@ impl History {
         (0..=self.samples.len()).rev().find(|&place| self.lineage_after(place) == lineage)
     }
 
-    /// Whether the state at `place`, where it was before [`Self::make_room`], is part of the history after the next sample. A void sample that is
-    /// made again with equal inputs has the same lineage, and is another sample.
+    /// Whether the samples up to `place`, where that was before [`Self::make_room`], are not void after it. One that leaves the window is part of
+    /// every later state. A void sample that is made again with equal inputs has the same lineage, and is another sample.
     pub(crate) fn keeps(&self, place: usize) -> bool {
-        let slides = usize::from(self.samples.len() == self.capacity);
-        (slides..=self.samples.len()).contains(&place)
+        place <= self.samples.len()
     }
 
     /// A station holds the state at `place`.

@@ -35,6 +35,8 @@ enum Step {
     Unfollowed,
     /// Cycles that no station follows, until their samples become void.
     Void,
+    /// Cycles that the stations follow without a proof of an output, until their samples leave the history.
+    Unproved,
     /// The stations come back with another state, and the operator accepts it.
     Replaced,
     /// The remote I/O starts again, and callers without an answer ask again.
@@ -48,10 +50,13 @@ const IN_ONE_LIFE: [Step; 8] =
 
 const WITH_RESTARTS: [Step; 7] = [ForceOff, ForceOn, Unforce, Write, Proved, Unfollowed, Restart];
 
+const WITHOUT_PROOFS: [Step; 7] = [ForceOff, Unforce, Write, Proved, Unfollowed, Void, Unproved];
+
 /// What the stations hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stations {
     Follow,
+    FollowLate,
     StayBehind,
     Hold(Lineage),
 }
@@ -191,7 +196,7 @@ impl Operated {
         self.sample = None;
         self.receive(0, Body::Sync);
         let sample = self.sample.clone();
-        if let (Stations::Follow, Some(sample)) = (stations, &sample) {
+        if let (Stations::Follow | Stations::FollowLate, Some(sample)) = (stations, &sample) {
             self.held = Some(held_after(sample, self.bench.moment()));
             self.recalled = Some(recalled_of(sample, self.bench.moment()));
         }
@@ -273,6 +278,7 @@ impl Operated {
             Write => self.write(),
             Proved => self.pass(Stations::Follow),
             Unfollowed => self.pass(Stations::StayBehind),
+            Unproved => (0..=HISTORY).for_each(|_| self.pass(Stations::FollowLate)),
             Void => (0..=HISTORY).for_each(|_| self.pass(Stations::StayBehind)),
             Replaced => {
                 let other = Stations::Hold(Lineage(self.bench.cycle));
@@ -389,6 +395,21 @@ fn every_write_of_an_input_that_is_forced_has_a_true_answer() {
         explore(&Operated::new(kind), &IN_ONE_LIFE, steps, &mut total);
         let Outcomes { in_effect, forced, refused } = total;
         assert!(in_effect > 1000 && forced > 1000 && refused > 100, "{kind:?}: {total:?}");
+    }
+}
+
+/// A sample that has left the history is part of every state: a write in it is not lost, and takes effect once.
+#[test]
+fn a_write_takes_effect_once_where_no_output_is_proved_for_long() {
+    for kind in [
+        OperatorInputKind::Level,
+        OperatorInputKind::Pulse(2),
+        OperatorInputKind::Pulse(6),
+        OperatorInputKind::Setpoint { low: 0, high: 80 },
+    ] {
+        let mut total = Outcomes::default();
+        explore(&Operated::new(kind), &WITHOUT_PROOFS, 5, &mut total);
+        assert!(total.in_effect > 1000 && total.refused > 100, "{kind:?}: {total:?}");
     }
 }
 
