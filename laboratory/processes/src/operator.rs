@@ -35,7 +35,7 @@ impl Laboratory<'_> {
         }
         // The outcome comes with the journal of the remote I/O.
         if is_sent {
-            return self.orders.add(commanded);
+            return self.orders.add(commanded, self.name(member));
         }
         commanded.answer(done);
     }

@@ -1,6 +1,7 @@
 //! Orders that were sent to a remote I/O over a way without an answer, until its journal has their outcome.
 
 use understudy_remote_io::Event as RemoteIoEvent;
+use understudy_simulator::Action;
 use understudy_wire::{Member, OrderRefusal, StateChoice, WriteAnswer, WriteOutcome, WriteRefusal};
 
 use super::{Command, Commanded, Done, OperatorAction, Refusal};
@@ -8,27 +9,41 @@ use crate::record::{Happening, Record, RunEvent};
 
 /// Orders that were sent to their remote I/Os, until their outcomes are in the journal.
 #[derive(Debug, Default)]
-pub struct PendingOrders(Vec<Commanded>);
+pub struct PendingOrders(Vec<Pending>);
+
+#[derive(Debug)]
+struct Pending {
+    commanded: Commanded,
+    /// Name of the remote I/O.
+    name: String,
+}
 
 impl PendingOrders {
-    /// Waits for the outcome of an order.
-    pub fn add(&mut self, commanded: Commanded) {
+    /// Waits for the outcome of an order to the remote I/O `name`.
+    pub fn add(&mut self, commanded: Commanded, name: String) {
         // Callers that have given up do not come back, and their writes are in the journal.
-        self.0.retain(|waiting| !waiting.answer.is_closed() || !waiting.is_write());
-        self.0.push(commanded);
+        self.0.retain(|Pending { commanded, .. }| {
+            !commanded.answer.is_closed() || !commanded.is_write()
+        });
+        self.0.push(Pending { commanded, name });
     }
 
-    /// The orders that are decided by a record, with their outcomes. Of equal orders the oldest is meant: a remote I/O takes them in their order.
+    /// The orders that are decided by a record, with their outcomes. Of equal orders the oldest is meant: a remote I/O takes them in their order,
+    /// and one that has ended decides none of those before, which are refused.
     pub fn observe(&mut self, record: &Record) -> Vec<DecidedOrder> {
         let mut decided = Vec::new();
         if self.0.is_empty() {
             return decided;
         }
         let mut is_taken = false;
-        for commanded in std::mem::take(&mut self.0) {
-            let outcome = match &commanded.action {
+        for pending in std::mem::take(&mut self.0) {
+            let outcome = match &pending.commanded.action {
                 OperatorAction::Command { member, command, .. } => {
-                    outcome(*member, command, record, is_taken)
+                    if ends_life(record, *member) && !pending.commanded.is_write() {
+                        Some(Err(Refusal::Down(pending.name.clone())))
+                    } else {
+                        outcome(*member, command, record, is_taken)
+                    }
                 }
                 _ => None,
             };
@@ -36,9 +51,9 @@ impl PendingOrders {
                 Some(done) => {
                     // Every attempt at a write is answered, and one of other orders.
                     is_taken = true;
-                    decided.push(DecidedOrder { commanded, done });
+                    decided.push(DecidedOrder { commanded: pending.commanded, done });
                 }
-                None => self.0.push(commanded),
+                None => self.0.push(pending),
             }
         }
         decided
@@ -67,6 +82,18 @@ impl DecidedOrder {
     }
 }
 
+/// Whether the process of a member has ended by a record: it was killed, or ended by itself, or another one has its place.
+fn ends_life(record: &Record, of: Member) -> bool {
+    match &record.event {
+        Happening::Run(
+            RunEvent::Ended { member, .. }
+            | RunEvent::Started { member }
+            | RunEvent::Fault { action: Action::Crash, member, .. },
+        ) => *member == of,
+        _ => false,
+    }
+}
+
 /// What a record says of an order to a member; a record that was `taken` by another order says nothing of a further one, unless it is of a write.
 fn outcome(
     member: Member,
@@ -74,13 +101,8 @@ fn outcome(
     record: &Record,
     taken: bool,
 ) -> Option<Result<Done, Refusal>> {
-    let event = match &record.event {
-        Happening::Run(RunEvent::Ended { member: ended, .. }) if *ended == member => {
-            return (!matches!(command, Command::Write(_)))
-                .then(|| Err(Refusal::Down(record.name.clone())));
-        }
-        Happening::RemoteIo(event) => event,
-        _ => return None,
+    let Happening::RemoteIo(event) = &record.event else {
+        return None;
     };
     if let Command::Write(write) = command {
         let answer = write_answer(record).filter(|answer| answer.id == write.id)?;
@@ -144,9 +166,13 @@ mod tests {
     use super::*;
 
     const MEMBER: Member = Member::RemoteIo(ProgramId(0));
+    const NAME: &str = "robot-io";
+
+    /// What a caller waits for.
+    type Answer = tokio::sync::oneshot::Receiver<Result<Done, Refusal>>;
 
     /// The order of a caller who still waits, or has gone.
-    fn commanded(command: Command, is_gone: bool) -> (Commanded, impl Sized) {
+    fn commanded(command: Command, is_gone: bool) -> (Commanded, Option<Answer>) {
         let (answer, waits) = tokio::sync::oneshot::channel();
         let (owner, reason) = ("anna".to_owned(), "a test".to_owned());
         let action = OperatorAction::Command { member: MEMBER, command, owner, reason };
@@ -154,7 +180,7 @@ mod tests {
     }
 
     fn record(event: RemoteIoEvent) -> Record {
-        let name = "robot-io".to_owned();
+        let name = NAME.to_owned();
         Record { at_ns: 1, name, member: Some(MEMBER), event: Happening::RemoteIo(event) }
     }
 
@@ -195,8 +221,8 @@ mod tests {
                 let (first, _waits) = commanded(command.clone(), is_gone);
                 let (other, _other) =
                     commanded(Command::Unforce { signal: SignalPlace::Output(9) }, false);
-                orders.add(first);
-                orders.add(other);
+                orders.add(first, NAME.to_owned());
+                orders.add(other, NAME.to_owned());
                 let decided = orders.observe(&record(event));
                 let records: Vec<Option<RunEvent>> =
                     decided.iter().map(DecidedOrder::record).collect();
@@ -205,6 +231,46 @@ mod tests {
                 };
                 assert_eq!((of, refused.is_some()), (&command, is_refused));
             }
+        }
+    }
+
+    /// The caller of an order that no process can decide any more is told so, and an equal order to the next process gets its own outcome.
+    #[test]
+    fn an_order_ends_with_the_process_that_it_was_sent_to() {
+        let other = Member::RemoteIo(ProgramId(1));
+        let ends = |member| {
+            [
+                RunEvent::Ended { member, how: "signal: 9 (SIGKILL)".to_owned(), said: Vec::new() },
+                RunEvent::Fault { action: Action::Crash, member, asked: 7 },
+                RunEvent::Started { member },
+            ]
+        };
+        let signal = SignalPlace::Input(0);
+        let unforce = || Command::Unforce { signal };
+        let moment = Moment::default();
+        for end in ends(MEMBER) {
+            let mut orders = PendingOrders::default();
+            let send = |orders: &mut PendingOrders| {
+                let (order, answer) = commanded(unforce(), false);
+                orders.add(order, NAME.to_owned());
+                answer.expect("its caller waits")
+            };
+            let observe = |orders: &mut PendingOrders, record: &Record| {
+                let decided = orders.observe(record);
+                let count = decided.len();
+                decided.into_iter().for_each(DecidedOrder::answer);
+                count
+            };
+            let mut before = send(&mut orders);
+            for elsewhere in ends(other) {
+                assert_eq!(observe(&mut orders, &Record::of_run(1, elsewhere)), 0);
+            }
+            assert_eq!(observe(&mut orders, &Record::of_run(1, end.clone())), 1, "{end:?}");
+            assert_eq!(before.try_recv(), Ok(Err(Refusal::Down(NAME.to_owned()))), "{end:?}");
+            let mut after = send(&mut orders);
+            let unforced = RemoteIoEvent::Unforced { moment, signal, expired: false };
+            assert_eq!(observe(&mut orders, &record(unforced)), 1);
+            assert_eq!(after.try_recv(), Ok(Ok(Done::default())));
         }
     }
 }
