@@ -134,7 +134,8 @@ impl Page {
     ) -> Commanding {
         let takes = self.may_command() || self.stays;
         let forbidden = (!takes).then_some("the page was started without --allow-commands");
-        Commanding { commander, forbidden: forbidden.map(str::to_owned), impossible }
+        let forbidden = forbidden.map(str::to_owned);
+        Commanding { commander, forbidden, impossible, person: None }
     }
 
     fn serve(
@@ -232,9 +233,12 @@ fn watch_elsewhere(
     console: &mut Console,
 ) -> Result<Answer, Answer> {
     let (target, run) = (&arguments.target, &arguments.run);
-    let (directory, attached, _) =
+    let (directory, attached, person) =
         arguments.elsewhere.attach(target, cluster, &run.out, run.journal_limit, console)?;
-    let commanding = page.commanding(attached.commander(), understudy_attach::impossible());
+    let commanding = Commanding {
+        person: Some(person),
+        ..page.commanding(attached.commander(), understudy_attach::impossible())
+    };
     serve_until_asked_to_end(directory.path(), page, commanding, console)
 }
 

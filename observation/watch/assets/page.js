@@ -122,7 +122,7 @@ async function begin() {
   setText(document.getElementById("title"), run.title || run.cluster);
   document.title = `${run.cluster} · Understudy`;
   const logOut = document.getElementById("log-out");
-  logOut.hidden = !run.person;
+  logOut.hidden = !run.logged_in;
   logOut.addEventListener("click", () =>
     act(async () => {
       await tell("/api/logout", {});

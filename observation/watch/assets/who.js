@@ -1,4 +1,5 @@
-// The person who gives a command, and the reason: both are asked for, and never filled in. A name stays until the page is loaded again.
+// The person who gives a command, and the reason. Where the person is not known by a login or keys, both are asked for and never filled in. A typed
+// name stays until the page is loaded again.
 
 import { el } from "/element.js";
 

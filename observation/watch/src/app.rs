@@ -28,6 +28,8 @@ pub struct Commanding {
     pub forbidden: Option<String>,
     /// Commands that are impossible in this run, each with the reason.
     pub impossible: Vec<(&'static str, String)>,
+    /// Person in whose name a page without logins commands: the one of the keys that it uses. `None`: the name that is entered.
+    pub person: Option<String>,
 }
 
 impl Commanding {

@@ -35,7 +35,7 @@ const FAILURE_PAUSE: Duration = Duration::from_millis(300);
 
 const COOKIE_NAME: &str = "understudy_session";
 
-/// A person who is logged in.
+/// A person who is logged in, or whose keys the page uses; without a name where neither is so.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Person {
     pub(crate) name: String,

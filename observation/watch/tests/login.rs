@@ -6,11 +6,12 @@ use std::net::{SocketAddr, TcpStream};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::thread::spawn;
 use std::time::Duration;
 
 use rustls::pki_types::ServerName;
 use rustls::{ClientConfig, ClientConnection, RootCertStore, StreamOwned};
-use understudy_journal::Commander;
+use understudy_journal::{Commander, Done, OperatorAction};
 use understudy_watch::{Certificate, Commanding, Logins, Served, Settings, WatchError, serve};
 
 const OPERATOR: &str = "0123456789abcdef0123456789abcdef";
@@ -25,6 +26,7 @@ fn commanding() -> Commanding {
         commander: Commander::of_run("nothing".into()),
         forbidden: None,
         impossible: Vec::new(),
+        person: None,
     }
 }
 
@@ -179,6 +181,61 @@ fn a_role_limits_writes_and_commands() {
     let short = r#"{"member":"left-io","command":{"command":"write","input":"start"},"owner":"anna","reason":"a test"}"#;
     let answer = page.ask("POST", "/api/command", &session, short);
     is(answer, "400", "U0682", "value");
+}
+
+/// The person in the journal is the one that is known; a name in a request counts where none is.
+#[test]
+fn a_name_in_a_request_counts_only_where_neither_keys_nor_logins_say_one() {
+    let folder = empty_folder("persons");
+    for (of_keys, is_logged_in, expected) in
+        [(None, false, "bob"), (Some("eve"), false, "eve"), (Some("eve"), true, "anna")]
+    {
+        let (commander, mut commands) = understudy_journal::commands();
+        let person = of_keys.map(str::to_owned);
+        let commanding = Commanding { commander, person, ..commanding() };
+        let order = r#"{"member":"nobody","command":{"command":"write","input":"start","value":"true"},"owner":"bob","reason":"a test"}"#;
+        let asking = if is_logged_in {
+            let page = Page::with(&folder, commanding);
+            spawn(move || {
+                let session = cookie(&page.log_in(OPERATOR));
+                page.ask("POST", "/api/command", &session, order)
+            })
+        } else {
+            let settings = Settings {
+                run: folder.join("nothing"),
+                address: "127.0.0.1:0".parse().expect("an address"),
+                commanding,
+                logins: None,
+                certificate: None,
+                names: Vec::new(),
+            };
+            let served = serve(settings).expect("served");
+            spawn(move || {
+                let url = served.url();
+                let host = url.trim_start_matches("http://").trim_end_matches('/');
+                let request = format!(
+                    "POST /api/command HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\nContent-Type: application/json\r\nContent-Length: {}\r\nConnection: close\r\n\r\n{order}",
+                    order.len()
+                );
+                let mut stream = TcpStream::connect(host).expect("it listens");
+                stream.set_read_timeout(Some(Duration::from_secs(60))).expect("a timeout");
+                stream.write_all(request.as_bytes()).expect("sent");
+                let mut answer = String::new();
+                stream.read_to_string(&mut answer).expect("text");
+                answer
+            })
+        };
+        // The member does not exist, so the order is recorded as refused.
+        let runtime = tokio::runtime::Builder::new_current_thread().build().expect("a runtime");
+        let commanded = runtime.block_on(commands.next());
+        let OperatorAction::Refused(refused) = &commanded.action else {
+            panic!("{commanded:?}");
+        };
+        assert_eq!(refused.owner, expected, "{of_keys:?}, {is_logged_in}");
+        commanded.answer(Ok(Done::default()));
+        let answer = asking.join().expect("an answer");
+        assert!(answer.contains("404") && answer.contains("U0681"), "{answer}");
+    }
 }
 
 #[test]

@@ -240,7 +240,7 @@ impl AskedCommand {
     }
 }
 
-/// The person who is logged in; otherwise the name in the request.
+/// The person who is logged in, or whose keys the page uses; otherwise the name in the request.
 pub(super) fn named(person: &Person, said: String) -> Answered<String> {
     if person.name.is_empty() {
         readable(said, MAXIMUM_OWNER_LENGTH, "the name of the operator")

@@ -34,8 +34,10 @@ pub(super) struct RunFacts {
     stations: Vec<StationFacts>,
     programs: Vec<ProgramFacts>,
     commands: CommandFacts,
-    /// Name of the person who is logged in.
+    /// Name of the person who is logged in, or whose keys the page uses.
     person: Option<String>,
+    /// Whether that person has logged in, and can log out.
+    logged_in: bool,
     /// Other runs of the same directory.
     others: Vec<String>,
 }
@@ -139,6 +141,7 @@ pub(super) async fn run(
             impossible: app.commanding.impossible.iter().cloned().collect(),
         },
         person: Some(person.name).filter(|name| !name.is_empty()),
+        logged_in: app.logins.is_some(),
         others: others(&app.run),
     }))
 }
