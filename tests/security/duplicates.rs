@@ -1,5 +1,6 @@
 //! Two processes that run as one member, as an old disk image starts them, and two remote I/Os on one device.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::net::SocketAddr;
 use std::path::Path;
@@ -8,7 +9,9 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread::spawn;
 
-use serde_json::json;
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+use serde_json::{Value, json};
 use understudy_bus::free_addresses;
 
 use super::crowd::{Device, cluster, count, until};
@@ -20,7 +23,8 @@ struct Plant {
     cluster: String,
     addresses: Vec<SocketAddr>,
     device: Arc<Device>,
-    _members: [Running; 3],
+    /// The controller, the understudy, and the remote I/O.
+    members: [Running; 3],
 }
 
 impl Plant {
@@ -45,7 +49,15 @@ impl Plant {
         let members =
             [start("node", "valve"), start("node", "understudy"), start("remote-io", "valve-io")];
         device.wait_for_answers(20);
-        Self { folder, cluster, addresses, device, _members: members }
+        Self { folder, cluster, addresses, device, members }
+    }
+
+    /// To both stations.
+    fn signal_stations(&self, signal: Signal) {
+        for station in &self.members[..2] {
+            let id = i32::try_from(station.0.id()).expect("a process id");
+            kill(Pid::from_raw(id), signal).expect("it lives");
+        }
     }
 
     fn journal(&self, name: &str) -> std::path::PathBuf {
@@ -120,14 +132,24 @@ fn an_old_image_of_another_configuration_shuts_nobody_out() {
     drop(image);
 }
 
-#[test]
-fn two_processes_of_one_controller_are_named_and_the_controller_is_heard_again() {
+/// The epochs in which a remote I/O has sampled.
+fn epochs(journal: &Path) -> BTreeSet<u64> {
+    let text = fs::read_to_string(journal).unwrap_or_default();
+    let records = text.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
+    let events = records.map(|mut record| record["event"].take());
+    let sampled = events.filter(|event| event["event"] == "sampled");
+    sampled.filter_map(|event| event["moment"]["epoch"].as_u64()).collect()
+}
+
+/// Two processes have the keys of the controller until the first of them is heard again; `disturb` does something meanwhile.
+fn check_duplicate(name: &str, disturb: impl Fn(&Plant, &Path)) {
     let _one = some_at_a_time();
-    let plant = Plant::start("duplicate");
+    let plant = Plant::start(name);
     let image = plant.copy_of_the_controller(["", ""]);
     let remote_io = plant.journal("valve-io");
     until("the alarm", || count(&remote_io, "duplicate-found") > 0);
     assert!(is_said(&remote_io, "\"member\":{\"station\":0}"));
+    disturb(&plant, &remote_io);
     let controller = plant.journal("valve");
     until("a new life", || count(&controller, "new-life") > 0);
     plant.device.wait_for_answers(20);
@@ -135,6 +157,21 @@ fn two_processes_of_one_controller_are_named_and_the_controller_is_heard_again()
     until("the end of the alarm", || count(&remote_io, "duplicate-gone") > 0);
     plant.device.wait_for_answers(20);
     assert_eq!(count(&remote_io, "state-lost"), 0);
+}
+
+#[test]
+fn two_processes_of_one_controller_are_named_and_the_controller_is_heard_again() {
+    check_duplicate("duplicate", |_, _| {});
+}
+
+/// A remote I/O that hears nothing else for some cycles follows the cycles of the second process.
+#[test]
+fn a_controller_is_heard_again_where_the_cycles_of_the_second_process_count() {
+    check_duplicate("followed", |plant, remote_io| {
+        plant.signal_stations(Signal::SIGSTOP);
+        until("cycles of the second process", || epochs(remote_io).len() > 1);
+        plant.signal_stations(Signal::SIGCONT);
+    });
 }
 
 #[test]
