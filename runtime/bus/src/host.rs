@@ -109,6 +109,8 @@ struct Round {
     unsendable: Unsendable,
     /// What the member says of the order that it was given last.
     obeyed: Obeyed,
+    /// When the field was looked at last.
+    looked_at: Time,
     reported: Time,
     summary: Summary,
 }
@@ -226,8 +228,17 @@ impl<M: Machine> Host<'_, M> {
         false
     }
 
+    /// Looks at the field where that was longer ago than a breath: a member that was suspended while it took its frames would sample the field of
+    /// before.
+    fn look_again(&mut self, round: &mut Round) {
+        if self.clock.now().since(round.looked_at) > BREATH {
+            self.look(round);
+        }
+    }
+
     /// Tells the member what its field shows, where that comes by another way than the link.
     fn look(&mut self, round: &mut Round) {
+        round.looked_at = self.clock.now();
         if let Some(contested) = self.field.contested() {
             let event =
                 if contested { HostEvent::FieldContested } else { HostEvent::FieldUncontested };
@@ -269,6 +280,7 @@ impl<M: Machine> Host<'_, M> {
             if !self.link.receive(&mut round.received) {
                 return taken;
             }
+            self.look_again(round);
             let now = self.clock.now();
             match self.guard.open(&mut round.received) {
                 // In order, and for another station.
