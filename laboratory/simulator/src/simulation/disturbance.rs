@@ -102,6 +102,9 @@ impl Simulation {
                     settings.generated = None;
                 }
                 self.unannounced.insert(station);
+                if self.stations[station.index()].running().is_some() {
+                    self.note_crash(station);
+                }
                 let slot = &mut self.stations[station.index()];
                 slot.restart(Station::new(self.now, settings));
                 self.wakeups.set(member, slot.due());
