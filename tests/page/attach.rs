@@ -155,8 +155,9 @@ fn members_elsewhere_are_looked_at_with_an_operators_keys() {
     let force =
         json!({ "command": "force", "signal": { "output": 0 }, "value": true, "seconds": 3600 });
     assert_eq!(give(&elsewhere, "robot-io", &force), (200, String::new()));
-    elsewhere
-        .wait_for("a forced output", |state| state["programs"][0]["forced"][0]["owner"] == "anna");
+    elsewhere.wait_for("a forced output", |state| {
+        state["programs"][0]["forced"][0]["owner"] == "engineer"
+    });
     let unforce = json!({ "command": "unforce", "signal": { "output": 0 } });
     assert_eq!(give(&elsewhere, "robot-io", &unforce), (200, String::new()));
     elsewhere.wait_for("a free output", |state| state["programs"][0]["forced"] == json!([]));

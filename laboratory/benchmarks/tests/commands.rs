@@ -100,7 +100,7 @@ fn the_log_costs_every_station_something() {
 #[test]
 fn each_carrier_completes_its_exchanges() {
     let (_, document) = answer(&["exchange", "--cycles", "20", "--no-real-time"]);
-    let carriers = document["result"].as_array().expect("carriers");
+    let carriers = document["result"].as_array().unwrap_or_else(|| panic!("{document:#}"));
     assert_eq!(carriers.len(), 3, "{document:#}");
     for carrier in carriers {
         assert!(carrier["p50_us"].as_f64() > Some(0.0), "{document:#}");
