@@ -39,8 +39,6 @@ pub struct Reading {
     pub diagnostics: Vec<Diagnostic>,
     /// What was kept and what was not, where the form has more than programs here have.
     pub fidelity: Fidelity,
-    /// The program was drawn as rungs or networks; statements that are rungs are not.
-    pub is_drawn: bool,
 }
 
 /// The endings of files that hold programs. XML has several forms, which its root tells apart.
@@ -149,7 +147,6 @@ fn read_form(
             Reading {
                 program: is_right.then_some(parsed.program),
                 diagnostics: parsed.diagnostics,
-                is_drawn: true,
                 ..Reading::default()
             }
         }
@@ -163,26 +160,19 @@ fn read_form(
                     period: read.period,
                     diagnostics: read.diagnostics,
                     fidelity: read.fidelity,
-                    is_drawn: read.is_drawn,
                 }
             }
         },
         Format::Digraph => {
             let read = digraph::read(text);
-            Reading {
-                program: read.program,
-                diagnostics: read.diagnostics,
-                is_drawn: true,
-                ..Reading::default()
-            }
+            Reading { program: read.program, diagnostics: read.diagnostics, ..Reading::default() }
         }
         Format::LdMicro => whole(text, ldmicro::read(stem(name), text), unit, None).reading(text),
         Format::StructuredText => written::read(text, unit),
     };
-    // Who writes a ladder sees what it has; from another form, it may have been lost on the way.
+    // Who writes a ladder sees what it has; from a digraph, it may have been lost on the way.
     if let Some(program) = &reading.program
-        && format != Format::Ladder
-        && reading.is_drawn
+        && format == Format::Digraph
         && program.rungs.is_empty()
     {
         let message = format!("the program `{}` has no rungs: it does nothing", program.name);

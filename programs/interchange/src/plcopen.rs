@@ -1,12 +1,11 @@
 //! PLCopen TC6 XML 2.01 and 2.0: ladders of OpenPLC Editor, Beremiz, CODESYS and others.
 //!
 //! [`read`] works in stages, each of which reports everything that it finds: a well-formed and bounded file (`xml`), its content
-//! (`document`), connections and execution order (`plan`), and rungs (`ladder`). [`write()`] makes a file that is valid under
+//! (`document`), connections and execution order (`plan`), and bodies as statements (`typed`). [`write()`] makes a file that is valid under
 //! the schema and reads back as the same circuit.
 
 mod document;
 mod fidelity;
-mod ladder;
 pub(crate) mod literal;
 mod plan;
 mod power;
@@ -21,7 +20,7 @@ use std::collections::HashSet;
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_ladder::{Program, check};
+use understudy_ladder::Program;
 use understudy_structured_text::syntax::UnitKind;
 use understudy_text::{Diagnostic, Severity, has_errors};
 
@@ -32,8 +31,7 @@ pub use write::{TypedDocument, write, write_typed};
 pub use xml::{MAXIMUM_BYTES, MAXIMUM_DEPTH, MAXIMUM_NODES};
 
 use crate::text::whole;
-use crate::written::USUAL_PERIOD;
-use document::{ActionContent, Body, Condition, Instance, Kind, Language, Pou, PouKind, Project};
+use document::{ActionContent, Body, Condition, Instance, Kind, Pou, PouKind, Project};
 
 /// The namespaces of 2.01 and 2.0.
 const NAMESPACES: [&str; 2] =
@@ -50,8 +48,6 @@ pub struct Reading {
     pub diagnostics: Vec<Diagnostic>,
     /// What was kept, and what was not.
     pub fidelity: Fidelity,
-    /// The program is a drawing: rungs, or networks of bits and standard blocks.
-    pub(crate) is_drawn: bool,
     /// All that the tasks run, where this is more than the program that was read, which is the first: names with their places.
     pub(crate) runs: Vec<(String, Range<usize>)>,
 }
@@ -247,7 +243,7 @@ fn unnamed_parts(pou: &Pou, diagnostics: &mut Vec<Diagnostic>) {
     }
 }
 
-/// A ladder of bits and standard blocks stays the ladder that it is; all else goes by way of Structured Text.
+/// Brings the unit and what it uses to rungs.
 fn translate(text: &str, project: &Project, pou: &Pou, reading: &mut Reading) {
     let runs = project
         .instances
@@ -259,34 +255,6 @@ fn translate(text: &str, project: &Project, pou: &Pou, reading: &mut Reading) {
         unnamed_parts(used, &mut reading.diagnostics);
     }
     let has_event = runs.is_some_and(|instance| instance.has_event);
-    if let Some(Body::Graph(graph)) = &pou.body
-        && graph.language != Language::Sequence
-        && !has_event
-    {
-        let mut found = Vec::new();
-        let period = reading.period.unwrap_or(USUAL_PERIOD);
-        let is_block = |name: &str| units::is_block(project, name);
-        let plan = plan::plan(graph, &is_block, &units::places(project, pou), &mut found);
-        let drawn = ladder::draw(project, pou, &plan, period);
-        let is_wrong = has_errors(&found) || has_errors(&drawn.diagnostics);
-        if drawn.general.is_empty() || is_wrong {
-            for general in drawn.general {
-                let message = format!("{} is not read because of these errors", general.what);
-                found.push(Diagnostic::warning("U1022", message, general.span));
-            }
-            reading.diagnostics.extend(found);
-            reading.diagnostics.extend(drawn.diagnostics);
-            reading.fidelity.plan(plan.notes);
-            reading.fidelity.ignored(drawn.ignored);
-            if !is_wrong {
-                reading.diagnostics.extend(check(&drawn.program));
-            }
-            reading.fidelity.count(project, pou, &drawn.program);
-            reading.program = Some(drawn.program);
-            reading.is_drawn = true;
-            return;
-        }
-    }
     let used = units::used(project, pou);
     let used = used.iter().map(|unit| unit.name.to_uppercase()).collect();
     let typed::ReadFile { mut file, diagnostics: found, notes } =
@@ -301,7 +269,9 @@ fn translate(text: &str, project: &Project, pou: &Pou, reading: &mut Reading) {
             unit.kind = UnitKind::Program;
         }
     }
-    let found = whole(text, (file, found), Some(&pou.name), reading.period).reading(text);
+    let mut found = whole(text, (file, found), Some(&pou.name), reading.period);
+    found.remark_on_rungs(text);
+    let found = found.reading(text);
     reading.diagnostics.extend(found.diagnostics);
     let mut seen = Vec::new();
     reading.diagnostics.retain(|found| {
@@ -312,9 +282,6 @@ fn translate(text: &str, project: &Project, pou: &Pou, reading: &mut Reading) {
     reading.fidelity.ignored(units::lost(project, pou));
     if let Some(mut program) = found.program {
         program.description.clone_from(&pou.documentation);
-        let found = check(&program).into_iter();
-        let errors = found.filter(|found| found.severity == Severity::Error);
-        reading.diagnostics.extend(errors);
         reading.fidelity.count(project, pou, &program);
         reading.program = Some(program);
     }

@@ -11,6 +11,7 @@
 //! but counters compared with a constant, loops, CASE, and calls of blocks under a condition.
 
 mod blocks;
+mod drawn;
 mod lost;
 mod network;
 mod signals;
@@ -18,8 +19,8 @@ mod signals;
 use std::collections::{HashMap, HashSet};
 
 use understudy_ladder::{
-    Coil, CoilKind, Contact, ContactKind, Element, MAXIMUM_RUNGS, Name, Namer, Program, Rung,
-    Series, check,
+    Coil, CoilKind, Contact, ContactKind, Element, MAXIMUM_RUNGS, Name, Namer, Program, Series,
+    check,
 };
 use understudy_structured_text::lower::event;
 use understudy_structured_text::syntax::{
@@ -29,6 +30,7 @@ use understudy_structured_text::syntax::{
 use understudy_text::{Diagnostic, Severity};
 use understudy_typed::Program as Typed;
 
+use self::drawn::Uses;
 use self::lost::Lost;
 use self::network::Power;
 use self::signals::{Known, Points};
@@ -39,15 +41,26 @@ const MAXIMUM_BEFORE: usize = 4;
 /// What is said of one program that no rungs hold, at most.
 const MAXIMUM_REFUSED: usize = 20;
 
-/// A program of one task as rungs, with what of its text they do not keep; nothing where no rungs hold it, with the reasons.
-pub(crate) fn rungs(text: &str, file: &File, typed: &Typed) -> (Option<Program>, Vec<Diagnostic>) {
+/// A program of one task as rungs.
+#[derive(Debug, Default)]
+pub(crate) struct Rungs {
+    /// Nothing where no rungs hold it.
+    pub(crate) program: Option<Program>,
+    /// What rungs do not keep of its text, or why they do not hold it.
+    pub(crate) diagnostics: Vec<Diagnostic>,
+    /// What a person should know of the rungs, if they are drawn.
+    pub(crate) remarks: Vec<Diagnostic>,
+}
+
+/// Brings a program of one task to rungs.
+pub(crate) fn rungs(text: &str, file: &File, typed: &Typed) -> Rungs {
     let mut programs = file.units.iter().filter(|unit| unit.kind == UnitKind::Program);
     let Some(unit) = programs.find(|unit| unit.name.is(&typed.name)) else {
-        return (None, Vec::new());
+        return Rungs::default();
     };
     let refused = |what: &str| {
         let refused = Refused { what: what.to_owned(), span: unit.name.span() };
-        (None, vec![refusal(unit, refused)])
+        Rungs { diagnostics: vec![refusal(unit, refused)], ..Rungs::default() }
     };
     let Body::Statements(statements) = &unit.body else {
         return refused("its body is no list of statements");
@@ -65,8 +78,11 @@ pub(crate) fn rungs(text: &str, file: &File, typed: &Typed) -> (Option<Program>,
     let mut writer = Writer::new(file, unit, typed);
     writer.statements(statements, None);
     match writer.finish() {
-        Ok((program, lost)) => (Some(program), lost::lost(text, file, unit, &lost)),
-        Err(found) => (None, found),
+        Ok((program, lost, remarks)) => {
+            let diagnostics = lost::lost(text, file, unit, &lost);
+            Rungs { program: Some(program), diagnostics, remarks }
+        }
+        Err(diagnostics) => Rungs { diagnostics, ..Rungs::default() },
     }
 }
 
@@ -104,6 +120,12 @@ struct Writer<'f> {
     lost: Lost<'f>,
     /// For the next rung.
     comments: Vec<String>,
+    /// Of the statement that is written.
+    place: Span,
+    /// How the statements use the variables.
+    uses: Uses,
+    /// Bits of powers that several coils of a rung share.
+    shared: HashSet<String>,
     refused: Vec<Refused>,
 }
 
@@ -112,6 +134,7 @@ impl<'f> Writer<'f> {
     fn statements(&mut self, statements: &'f [Statement], guard: Option<&str>) {
         for statement in statements {
             self.comments.extend(statement.comments.iter().cloned());
+            self.place = statement.span.clone();
             if let Err(found) = self.statement(statement, guard) {
                 self.refused.push(found);
             }
@@ -123,6 +146,9 @@ impl<'f> Writer<'f> {
         let word = match &statement.kind {
             StatementKind::Assign(target, value) => return self.assign(target, value, guard),
             StatementKind::Call(path, arguments) => {
+                if self.edge_called(path, arguments)? {
+                    return Ok(());
+                }
                 if guard.is_some() {
                     return refused("it calls a block under a condition", span);
                 }
@@ -146,6 +172,13 @@ impl<'f> Writer<'f> {
 
     fn assign(&mut self, target: &Path, value: &Expression, guard: Option<&str>) -> Found<()> {
         let target = self.target(target)?;
+        if guard.is_none()
+            && let Some((is_rising, network)) = self.taken_edge(value)
+        {
+            let kind = if is_rising { CoilKind::Rising } else { CoilKind::Falling };
+            self.push(network, vec![coil(kind, &target)]);
+            return Ok(());
+        }
         let power = self.power(value, false, 0)?;
         let Some(guard) = guard else {
             let (network, kind) = match power {
@@ -243,13 +276,8 @@ impl<'f> Writer<'f> {
         Ok(Some(coils))
     }
 
-    fn push(&mut self, network: Series, coils: Vec<Coil>) {
-        let comments = std::mem::take(&mut self.comments);
-        self.ladder.rungs.push(Rung { network, coils, comments, ..Rung::default() });
-    }
-
-    /// The program, and what of its text it does not keep.
-    fn finish(mut self) -> Result<(Program, Lost<'f>), Vec<Diagnostic>> {
+    /// The program, what of its text it does not keep, and what a person should know of it.
+    fn finish(mut self) -> Result<(Program, Lost<'f>, Vec<Diagnostic>), Vec<Diagnostic>> {
         for (block, span) in std::mem::take(&mut self.read) {
             if !self.called.contains(&block) {
                 let what = format!("`{block}` is read and never called");
@@ -260,12 +288,16 @@ impl<'f> Writer<'f> {
         let is_other = |known: &Known| match known {
             Known::Other(_) => true,
             Known::Block { name, .. } => !self.called.contains(name),
-            Known::Bit { .. } => false,
+            Known::Bit { .. } | Known::Edge { .. } => false,
         };
-        let is_left_out = |name: &SourceName| self.known.get(&name.key()).is_some_and(is_other);
+        let is_left_out = |name: &SourceName| {
+            let key = name.key();
+            self.known.get(&key).is_some_and(is_other) && !self.uses.reads(&key)
+        };
         self.lost.unused = declared.map(|it| &it.name).filter(|name| is_left_out(name)).collect();
         self.points_are_signals();
         self.drop_unused_globals();
+        self.drop_shared_powers();
         if self.ladder.rungs.len() > MAXIMUM_RUNGS {
             let what = format!("it has more than {MAXIMUM_RUNGS} rungs");
             let error = Refused { what, span: self.unit.name.span() };
@@ -282,11 +314,15 @@ impl<'f> Writer<'f> {
             }
             return Err(self.refused.into_iter().map(|found| refusal(unit, found)).collect());
         }
+        let is_error = |found: &Diagnostic| found.severity == Severity::Error;
+        let (errors, remarks): (Vec<_>, Vec<_>) =
+            check(&self.ladder).into_iter().partition(is_error);
+        if !errors.is_empty() {
+            return Err(errors);
+        }
         self.states();
         self.ladder.footer.append(&mut self.comments);
-        let found = check(&self.ladder).into_iter();
-        let errors: Vec<Diagnostic> = found.filter(|it| it.severity == Severity::Error).collect();
-        if errors.is_empty() { Ok((self.ladder, self.lost)) } else { Err(errors) }
+        Ok((self.ladder, self.lost, remarks))
     }
 }
 

@@ -5,10 +5,9 @@ use std::time::Duration;
 
 use understudy_ladder::Program as Ladder;
 use understudy_structured_text::lower::another_interval;
-use understudy_text::{Diagnostic, Severity};
-use understudy_typed::{Elementary, Program as Typed};
+use understudy_text::Diagnostic;
+use understudy_typed::Program as Typed;
 
-use crate::apart::NOT_EXECUTED;
 use crate::format::{Format, Reading, read, unknown_form};
 use crate::plcopen;
 use crate::text::{Whole, whole};
@@ -52,51 +51,20 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
         return SourceFile { diagnostics: vec![unknown_form(text)], ..SourceFile::default() };
     };
     let statements = match format {
-        Format::PlcOpen => twincat::read(text),
+        Format::PlcOpen => Some(twincat::read(text).unwrap_or_else(|| plcopen::read_typed(text))),
         _ => parsed(name, text),
     };
     if let Some(parsed) = statements {
-        return source(whole(text, parsed, wanted.program, wanted.period));
+        let mut read = whole(text, parsed, wanted.program, wanted.period);
+        if format == Format::PlcOpen {
+            read.remark_on_rungs(text);
+        }
+        return source(read);
     }
-    let Reading { program, period, mut diagnostics, is_drawn, .. } =
-        read(format, name, text, wanted.program);
-    let ladder = program.as_ref().filter(|_| is_drawn);
-    diagnostics.extend(ladder.and_then(|it| another_period(it, period, wanted.period)));
-    let ladder = program.filter(|_| is_drawn).map(Source::Ladder);
-    let ladder = SourceFile { source: ladder, period, diagnostics };
-    if format != Format::PlcOpen {
-        return ladder;
-    }
-    let is_ladder = ladder.source.is_some();
-    // What is not drawn as a ladder is a program of statements, or a library.
-    let parsed = plcopen::read_typed(text);
-    let read = whole(text, parsed, wanted.program, wanted.period);
-    let missing = read.diagnostics.iter().filter(|found| found.code == NOT_EXECUTED);
-    let missing: Vec<Diagnostic> = missing.cloned().collect();
-    // A ladder has neither an interval nor a number that it declares and leaves alone.
-    let is_all = |typed: &Typed| {
-        let mut points = typed.inputs.iter().chain(&typed.outputs);
-        let is_every_scan = matches!(typed.tasks.as_slice(), [task] if task.every == 1);
-        is_every_scan && points.all(|point| point.of == Elementary::Bool)
-    };
-    if is_ladder && read.typed.as_ref().is_none_or(is_all) {
-        let diagnostics = [ladder.diagnostics, missing].concat();
-        return SourceFile { diagnostics, ..ladder };
-    }
-    let mut found = source(read);
-    // Of two readings of a document that both have errors, the one with fewer is nearer to what was meant; a ladder has
-    // no circles, no library and no document of the first edition.
-    let errors = |found: &[Diagnostic]| {
-        let errors = found.iter();
-        errors.filter(|it| it.severity == Severity::Error).count()
-    };
-    let is_other = |found: &Diagnostic| ["U1001", "U1006", "U1013"].contains(&found.code);
-    let may_be_ladder = is_drawn && !ladder.diagnostics.iter().any(is_other);
-    let has_fewer = errors(&ladder.diagnostics) <= errors(&found.diagnostics);
-    if found.source.is_none() && !is_ladder && may_be_ladder && has_fewer {
-        found.diagnostics = ladder.diagnostics;
-    }
-    found
+    let Reading { program, period, mut diagnostics, .. } = read(format, name, text, wanted.program);
+    let other = program.as_ref().and_then(|it| another_period(it, period, wanted.period));
+    diagnostics.extend(other);
+    SourceFile { source: program.map(Source::Ladder), period, diagnostics }
 }
 
 /// The warning on a ladder whose file states another interval than the period at which it runs: it runs in every scan.

@@ -10,6 +10,7 @@ use understudy_text::{Diagnostic, has_errors};
 use understudy_typed::{Cost, Program as Typed};
 
 use crate::format::Reading;
+use crate::plcopen::drawn_units;
 use crate::rungs::rungs;
 use crate::source::no_program;
 
@@ -165,10 +166,23 @@ pub(crate) fn several<'a>(
 }
 
 impl Whole {
+    /// Adds what a person should know of a program that is drawn, and that rungs hold.
+    pub(crate) fn remark_on_rungs(&mut self, text: &str) {
+        let Some(typed) = self.typed.as_ref().filter(|typed| typed.tasks.len() == 1) else {
+            return;
+        };
+        if drawn_units(text).contains_key(&typed.name.to_uppercase()) {
+            self.diagnostics.extend(rungs(text, &self.file, typed).remarks);
+        }
+    }
+
     /// The ladder, or why it is none.
     pub(crate) fn reading(self, text: &str) -> Reading {
         let (ladder, reasons) = match &self.typed {
-            Some(typed) if typed.tasks.len() == 1 => rungs(text, &self.file, typed),
+            Some(typed) if typed.tasks.len() == 1 => {
+                let found = rungs(text, &self.file, typed);
+                (found.program, found.diagnostics)
+            }
             Some(typed) => {
                 let programs = self.file.units.iter().filter(|unit| unit.kind == UnitKind::Program);
                 let names = programs.map(|unit| unit.name.as_str());

@@ -60,8 +60,6 @@ pub(crate) struct Pou {
     pub(crate) kind: PouKind,
     pub(crate) documentation: Option<String>,
     pub(crate) variables: Vec<Variable>,
-    /// What a function answers.
-    pub(crate) result: Option<VariableType>,
     pub(crate) body: Option<Body>,
     pub(crate) actions: Vec<Part>,
     pub(crate) transitions: Vec<Part>,
@@ -74,57 +72,22 @@ pub(crate) struct Part {
     pub(crate) body: Option<Body>,
 }
 
-/// Of which list a variable is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Section {
-    Input,
-    Output,
-    InOut,
-    Local,
-    Temporary,
-    External,
-    Global,
-}
-
-/// A declared variable.
+/// A declared variable, as far as what is lost of a file depends on it.
 #[derive(Debug, Clone)]
 pub(crate) struct Variable {
     pub(crate) name: Name,
-    pub(crate) section: Section,
+    pub(crate) is_external: bool,
     pub(crate) retain: bool,
     pub(crate) kind: VariableType,
-    /// As written, with its `%`.
-    pub(crate) address: Option<Name>,
-    pub(crate) initial: Option<Name>,
-    pub(crate) documentation: Option<String>,
 }
 
 /// A type as it is named.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum VariableType {
-    /// One of the elementary types, in capitals.
-    Elementary(String),
-    /// A subrange of an elementary type.
-    Range(String, i64, i64),
+    Bool,
     /// A function block, or a type of the file.
     Derived(Name),
-    /// A type that no program here can hold, in words.
-    Foreign(String),
-}
-
-impl VariableType {
-    /// As it is written in Structured Text.
-    pub(crate) fn text(&self) -> String {
-        match self {
-            Self::Elementary(name) | Self::Foreign(name) => name.clone(),
-            Self::Range(name, lower, upper) => format!("{name} ({lower}..{upper})"),
-            Self::Derived(name) => name.to_string(),
-        }
-    }
-
-    pub(crate) fn is_bool(&self) -> bool {
-        matches!(self, Self::Elementary(name) if name == "BOOL")
-    }
+    Other,
 }
 
 /// What a unit does.
@@ -141,6 +104,13 @@ pub(crate) enum Body {
 pub(crate) struct Graph {
     pub(crate) language: Language,
     pub(crate) objects: Vec<Object>,
+}
+
+impl Graph {
+    /// Whether a tool has written it as rungs, which are not of the schema.
+    pub(crate) fn has_rungs(&self) -> bool {
+        self.objects.iter().any(|object| object.id >= rungs::FIRST_ID)
+    }
 }
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

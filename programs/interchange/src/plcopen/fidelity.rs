@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use understudy_ladder::{Element, Program, visit};
 
-use super::document::{ActionContent, Body, Condition, Ignored, Kind, Pou, Project, Section};
+use super::document::{ActionContent, Body, Condition, Ignored, Kind, Pou, Project, VariableType};
 use super::units::used;
 use super::within;
 
@@ -79,7 +79,7 @@ impl Fidelity {
         self.counts = vec![
             count(
                 "BOOL variables",
-                pou.variables.iter().filter(|variable| variable.kind.is_bool()).count(),
+                pou.variables.iter().filter(|variable| variable.kind == VariableType::Bool).count(),
                 signals,
             ),
             count("contacts", in_file(&|kind| matches!(kind, Kind::Contact(..))), contacts),
@@ -103,8 +103,7 @@ impl Fidelity {
         let used = used(project, pou);
         for global in &project.globals {
             let is_used = used.iter().flat_map(|pou| &pou.variables).any(|variable| {
-                variable.section == Section::External
-                    && variable.name.eq_ignore_ascii_case(&global.name)
+                variable.is_external && variable.name.eq_ignore_ascii_case(&global.name)
             });
             if !is_used {
                 let message = format!(

@@ -1,44 +1,10 @@
-//! Literals of IEC 61131-3: truth values, whole numbers, times.
+//! Literals of IEC 61131-3 that are times.
 
 use std::ops::Range;
 use std::time::Duration;
 
 use understudy_ladder::PERIODS;
 use understudy_text::{Diagnostic, duration};
-
-/// `TRUE`, `FALSE`, `1`, `0`, `BOOL#1`, in any case.
-pub(crate) fn boolean(text: &str) -> Option<bool> {
-    let bare = strip_prefix(text.trim(), "BOOL#");
-    match bare.to_ascii_uppercase().as_str() {
-        "TRUE" | "1" => Some(true),
-        "FALSE" | "0" => Some(false),
-        _ => None,
-    }
-}
-
-/// A whole number: `5`, `INT#5`, `16#1F`, `2#1010`, `1_000`.
-pub(crate) fn integer(text: &str) -> Option<i64> {
-    const TYPES: [&str; 8] = ["SINT", "INT", "DINT", "LINT", "USINT", "UINT", "UDINT", "ULINT"];
-    let text = text.trim();
-    let bare = match text.split_once('#') {
-        Some((name, rest)) if TYPES.contains(&name.to_ascii_uppercase().as_str()) => rest,
-        _ => text,
-    };
-    let (negative, bare) = match bare.strip_prefix('-') {
-        Some(rest) => (true, rest),
-        None => (false, bare.strip_prefix('+').unwrap_or(bare)),
-    };
-    let (base, digits) = match bare.split_once('#') {
-        Some((base @ ("2" | "8" | "16"), digits)) => (base.parse().ok()?, digits),
-        Some(_) => return None,
-        None => (10, bare),
-    };
-    if digits.starts_with(['+', '-', '_']) {
-        return None;
-    }
-    let value = i64::from_str_radix(&digits.replace('_', ""), base).ok()?;
-    Some(if negative { -value } else { value })
-}
 
 /// `T#1m30s`, `TIME#1.5s`, `t#250ms`: at most the longest preset.
 pub(crate) fn time(text: &str) -> Option<Duration> {
@@ -130,22 +96,5 @@ mod tests {
         for (text, microseconds) in times {
             assert_eq!(time(text), microseconds.map(Duration::from_micros), "{text}");
         }
-        let integers = [
-            ("5", Some(5)),
-            ("-7", Some(-7)),
-            ("INT#16#1F", Some(31)),
-            ("2#1010", Some(10)),
-            ("1_000", Some(1000)),
-            ("1.5", None),
-            ("", None),
-            ("3#1", None),
-            ("--1", None),
-        ];
-        for (text, value) in integers {
-            assert_eq!(integer(text), value, "{text}");
-        }
-        assert_eq!(boolean("bool#true"), Some(true));
-        assert_eq!(boolean("0"), Some(false));
-        assert_eq!(boolean("a"), None);
     }
 }

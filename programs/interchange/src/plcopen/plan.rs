@@ -5,7 +5,6 @@
 //! it is first asked for, and stays so: what an object has let through is not asked again when a coil has changed the
 //! variable meanwhile. Where that matters, the power is *kept* in a bit of its own.
 
-mod jumps;
 mod links;
 mod places;
 mod rings;
@@ -84,8 +83,6 @@ pub(crate) struct Call {
     pub(crate) inputs: Vec<Input>,
     /// The power at EN; without it the block does not act.
     pub(crate) enable: Option<Power>,
-    /// Only one object asks for the block's first output, and at once: it may stand in that wire.
-    pub(crate) in_wire: bool,
 }
 
 /// What a call gives to one input.
@@ -112,41 +109,12 @@ impl Action {
     }
 }
 
-/// Plans a graph of LD or FBD; `is_block` tells instances' types from functions, `places` has the addresses of variables.
+/// Plans a graph of LD or FBD; `is_block` tells instances' types from functions, `places` has the addresses of variables. What goes round in a circle
+/// is what it was in the last scan.
 pub(crate) fn plan(
     graph: &Graph,
     is_block: &dyn Fn(&str) -> bool,
     places: &Places,
-    diagnostics: &mut Vec<Diagnostic>,
-) -> Plan {
-    let plan = walked(graph, is_block, places, Rules::Bits, diagnostics);
-    jumps::check(graph, &plan, diagnostics);
-    plan
-}
-
-/// Plans a graph whose values may be numbers: what goes round in a circle is what it was in the last scan, and jumps go
-/// anywhere.
-pub(crate) fn plan_numbers(
-    graph: &Graph,
-    is_block: &dyn Fn(&str) -> bool,
-    places: &Places,
-    diagnostics: &mut Vec<Diagnostic>,
-) -> Plan {
-    walked(graph, is_block, places, Rules::Numbers, diagnostics)
-}
-
-/// What a graph may hold.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Rules {
-    Bits,
-    Numbers,
-}
-
-fn walked(
-    graph: &Graph,
-    is_block: &dyn Fn(&str) -> bool,
-    places: &Places,
-    rules: Rules,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Plan {
     let links = Links::new(graph, is_block, diagnostics);
@@ -154,7 +122,7 @@ fn walked(
     let mut reread: HashSet<usize> = HashSet::new();
     let mut plan = loop {
         let mut found = Vec::new();
-        let (plan, trace) = Walk::new(graph, &links, &keep, rules).run(&mut found);
+        let (plan, trace) = Walk::new(graph, &links, &keep).run(&mut found);
         let stale = stale(graph, &links, (&plan, &trace), places, &keep);
         let known = keep.len();
         keep.extend(&trace.fed_back);

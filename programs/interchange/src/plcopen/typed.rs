@@ -232,6 +232,8 @@ impl Typed {
             }
         };
         let made = std::mem::take(&mut network.made);
+        let kept = declarations.iter().filter(|known| !network.is_unread(&known.name.key()));
+        let kept = kept.cloned().collect();
         self.notes.append(&mut network.notes);
         if !is_chart {
             for part in pou.actions.iter().chain(&pou.transitions) {
@@ -239,6 +241,7 @@ impl Typed {
             }
         }
         let unit = &mut self.file.units[at];
+        unit.declarations = kept;
         unit.declarations.extend(made);
         unit.body = body;
         unit.methods = methods;

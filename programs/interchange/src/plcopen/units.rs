@@ -1,11 +1,6 @@
 //! The units of a file that a program uses.
 
-use understudy_ladder::Name;
-use understudy_text::Diagnostic;
-
-use super::document::{Body, Ignored, Pou, PouKind, Project, Section, VariableType};
-use super::plan::{Named, Places};
-use super::standard::StandardBlock;
+use super::document::{Body, Ignored, Pou, PouKind, Project, VariableType};
 
 /// The unit and all units that it uses, itself first.
 pub(crate) fn used<'a>(project: &'a Project, pou: &'a Pou) -> Vec<&'a Pou> {
@@ -40,38 +35,6 @@ fn mentions(pou: &Pou, name: &str) -> bool {
 
 fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split(|letter: char| !letter.is_alphanumeric() && letter != '_')
-}
-
-/// Where the variables of a unit are.
-pub(crate) fn places(project: &Project, pou: &Pou) -> Places {
-    let variables = pou.variables.iter().chain(&project.globals);
-    Places::of_unit(variables.map(|known| Named {
-        name: &known.name,
-        address: known.address.as_deref(),
-        is_in_out: known.section == Section::InOut,
-        is_external: known.section == Section::External,
-    }))
-}
-
-/// Whether a block of that type keeps something from scan to scan.
-pub(crate) fn is_block(project: &Project, name: &str) -> bool {
-    StandardBlock::of(name).is_some()
-        || project
-            .pous
-            .iter()
-            .any(|pou| pou.kind == PouKind::FunctionBlock && pou.name.eq_ignore_ascii_case(name))
-}
-
-/// The finding on an instance of a block that no variable declares.
-pub(crate) fn undeclared(project: &Project, instance: &Name, kind: &str) -> Diagnostic {
-    let message = format!("the block `{instance}` is not declared");
-    let (found, help) = if project.lacks_instances {
-        let message = format!("{message}; it is read as a separate {kind}");
-        (Diagnostic::warning("U1012", message, instance.span()), "")
-    } else {
-        (Diagnostic::error("U1012", message, instance.span()), ", or leave the name out")
-    };
-    found.with_help(format!("declare the variable `{instance}` of type {kind}{help}"))
 }
 
 /// What of a unit and of those that it uses a ladder does not keep.

@@ -7,7 +7,7 @@ use understudy_ladder::{
     Series,
 };
 use understudy_structured_text::syntax::{
-    Argument, Expression, ExpressionKind, Initializer, Literal, Path,
+    Argument, Class, Declaration, Expression, ExpressionKind, Initializer, Literal, Path,
 };
 
 use super::network::Power;
@@ -67,7 +67,7 @@ impl<'f> Writer<'f> {
                 wire = Some(match power {
                     Power::On => Vec::new(),
                     Power::Through(series) => series,
-                    Power::Off => return refused(format!("`{pin}` is FALSE"), &value.span),
+                    Power::Off => vec![contact(&self.memory("never"), false)],
                 });
                 continue;
             }
@@ -141,17 +141,23 @@ impl<'f> Writer<'f> {
         })
     }
 
-    /// The literal that a constant stands for.
+    /// The literal that a constant stands for, or a variable that nothing writes.
     pub(super) fn constant(&self, path: &Path) -> Option<&'f Literal> {
         let mut all = self.unit.declarations.iter().chain(&self.file.globals);
         let found = all.find(|found| found.name == path.root)?;
         match found.initial.as_ref()? {
             Initializer::Value(Expression { kind: ExpressionKind::Literal(literal), .. })
-                if found.constant =>
+                if found.constant || self.is_never_written(found) =>
             {
                 Some(literal)
             }
             _ => None,
         }
+    }
+
+    fn is_never_written(&self, declaration: &Declaration) -> bool {
+        let key = declaration.name.key();
+        let is_own = matches!(declaration.class, Class::Local | Class::Global);
+        is_own && declaration.address.is_none() && !self.uses.writes(&key)
     }
 }

@@ -1,13 +1,15 @@
 //! Expressions of BOOLs as networks of contacts.
 
 use understudy_ladder::{
-    CoilKind, Comparison, Element, MAXIMUM_NESTING, MAXIMUM_PRESET_VALUE, Name, Relation, Series,
+    CoilKind, Comparison, ContactKind, Element, MAXIMUM_NESTING, MAXIMUM_PRESET_VALUE, Name,
+    Relation, Series,
 };
 use understudy_structured_text::syntax::{
-    Expression, ExpressionKind, Literal, Operator, Path, Step,
+    Argument, Expression, ExpressionKind, Literal, Operator, Path, Span, Step,
 };
 use understudy_typed::Comparison as Compared;
 
+use super::drawn::is_made;
 use super::signals::Known;
 use super::{Found, Refused, Writer, coil, contact, refused};
 
@@ -49,6 +51,12 @@ impl Writer<'_> {
             ExpressionKind::Variable(path) => self.read(path, negated),
             ExpressionKind::Not(inner) => self.power(inner, !negated, depth),
             ExpressionKind::Chain(first, rest) => self.chain(first, rest, negated, depth),
+            ExpressionKind::Call(name, arguments)
+                if name.root.is("SEL")
+                    && self.file.units.iter().all(|unit| !unit.name.is("SEL")) =>
+            {
+                self.selected(arguments, negated, depth, &expression.span)
+            }
             _ => refused("it computes more than BOOLs", &expression.span),
         }
     }
@@ -56,6 +64,8 @@ impl Writer<'_> {
     fn read(&mut self, path: &Path, negated: bool) -> Found<Power> {
         let operand = match (self.known(path)?, path.steps.as_slice()) {
             (Known::Bit { name, .. }, []) => name,
+            // The output of a trigger that a reader made.
+            (Known::Bit { name, .. }, [Step::Field(_)]) if is_made(&path.root) => name,
             (Known::Block { name, kind, .. }, [Step::Field(pin)]) => {
                 let outputs = kind.outputs().iter();
                 let mut outputs = outputs.filter(|output| pin.is(output));
@@ -65,6 +75,9 @@ impl Writer<'_> {
                 let operand = format!("{name}.{output}");
                 self.read.push((name, path.span.clone()));
                 operand
+            }
+            (Known::Edge { is_rising, power }, [Step::Field(_)]) => {
+                return Ok(Power::Through(vec![self.edge(is_rising, power, negated)]));
             }
             _ => return refused("it reads a part of a variable", &path.span),
         };
@@ -84,12 +97,13 @@ impl Writer<'_> {
                 self.compared(first, *relation, second, negated, depth)
             }
             [(Operator::Xor, _), ..] => {
-                let mut left = self.power(first, negated, depth + 1)?;
-                for (operator, right) in rest {
+                let mut left = self.power(first, false, depth + 1)?;
+                for (place, (operator, right)) in rest.iter().enumerate() {
                     if *operator != Operator::Xor {
                         return refused("it computes more than BOOLs", &right.span);
                     }
-                    left = self.different(left, right, depth + 1)?;
+                    let is_last = place + 1 == rest.len();
+                    left = self.different(left, right, negated && is_last, depth + 1)?;
                 }
                 Ok(left)
             }
@@ -136,27 +150,66 @@ impl Writer<'_> {
         Ok(power)
     }
 
-    /// Exclusive or.
-    fn different(&mut self, left: Power, right: &Expression, depth: usize) -> Found<Power> {
+    /// Exclusive or; equal, where it is negated.
+    fn different(
+        &mut self,
+        left: Power,
+        right: &Expression,
+        negated: bool,
+        depth: usize,
+    ) -> Found<Power> {
         let left = match left {
-            Power::Off => return self.power(right, false, depth),
-            Power::On => return self.power(right, true, depth),
+            Power::Off => return self.power(right, negated, depth),
+            Power::On => return self.power(right, !negated, depth),
             left => self.held(left),
         };
         let right = match self.power(right, false, depth)? {
-            Power::Off => return Ok(Power::Through(vec![contact(&left, false)])),
-            Power::On => return Ok(Power::Through(vec![contact(&left, true)])),
+            Power::Off => return Ok(Power::Through(vec![contact(&left, negated)])),
+            Power::On => return Ok(Power::Through(vec![contact(&left, !negated)])),
             right => self.held(right),
         };
-        let branches = [false, true].map(|one| vec![contact(&left, one), contact(&right, !one)]);
+        let pair = |one: bool| vec![contact(&left, one), contact(&right, one == negated)];
+        let branches = [false, true].map(pair);
         Ok(Power::Through(vec![Element::Branches(branches.to_vec())]))
+    }
+
+    /// `SEL(G, IN0, IN1)` of BOOLs.
+    fn selected(
+        &mut self,
+        arguments: &[Argument],
+        negated: bool,
+        depth: usize,
+        span: &Span,
+    ) -> Found<Power> {
+        let value = |at: usize, pin: &str| {
+            arguments.iter().enumerate().find_map(|(place, argument)| match argument {
+                Argument::Placed(value) => (place == at).then_some(value),
+                Argument::Given(given, value) => given.is(pin).then_some(value),
+                Argument::Taken { .. } => None,
+            })
+        };
+        let values = (value(0, "G"), value(1, "IN0"), value(2, "IN1"));
+        let (Some(which), Some(first), Some(second)) = values else {
+            return refused("it computes more than BOOLs", span);
+        };
+        let which = match self.power(which, false, depth + 1)? {
+            Power::Off => return self.power(first, negated, depth),
+            Power::On => return self.power(second, negated, depth),
+            which => self.held(which),
+        };
+        let mut branches = Vec::new();
+        for (value, is_closed) in [(first, true), (second, false)] {
+            let power = self.power(value, negated, depth + 1)?;
+            branches.push(series(vec![Power::Through(vec![contact(&which, is_closed)]), power]));
+        }
+        self.branches(branches, depth)
     }
 
     /// A bit that has the power: that of its one contact, or a memory bit in a rung before.
     fn held(&mut self, power: Power) -> String {
         if let Power::Through(series) = &power
             && let [Element::Contact(only)] = series.as_slice()
-            && only.kind == understudy_ladder::ContactKind::NormallyOpen
+            && only.kind == ContactKind::NormallyOpen
         {
             return only.operand.to_string();
         }
@@ -215,8 +268,8 @@ impl Writer<'_> {
             Compared::NotEqual => false,
             _ => return refused("it compares numbers", &first.span),
         };
-        let left = self.power(first, is_equal, depth + 1)?;
-        self.different(left, second, depth + 1)
+        let left = self.power(first, false, depth + 1)?;
+        self.different(left, second, is_equal, depth + 1)
     }
 
     /// The counter whose value an expression is.

@@ -3,13 +3,14 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use understudy_ladder::{
-    BlockKind, Element, Language, Name, Namer, Program, Signal, parse_address, visit,
+    BlockKind, Element, Language, Name, Namer, Program, Series, Signal, parse_address, visit,
 };
 use understudy_structured_text::syntax::{
-    Class, Declaration, File, Initializer, Path, Span, TypeKind, Unit,
+    Class, Declaration, File, Initializer, Name as SourceName, Path, Span, TypeKind, Unit,
 };
 use understudy_typed::{Elementary, Interpreter, Program as Typed};
 
+use super::drawn::{Uses, is_made};
 use super::lost::Lost;
 use super::network::constant;
 use super::{Found, Refused, Writer, refused};
@@ -30,6 +31,13 @@ pub(super) enum Known {
         name: String,
         /// Which block.
         kind: BlockKind,
+    },
+    /// The edge of a contact or coil that a drawing has, where its trigger was called.
+    Edge {
+        /// `R_TRIG` or `F_TRIG`.
+        is_rising: bool,
+        /// What it looks at.
+        power: Series,
     },
     /// Something else, with its type.
     Other(String),
@@ -69,6 +77,9 @@ impl<'f> Writer<'f> {
             points: Points::of(typed),
             lost: Lost::default(),
             comments: Vec::new(),
+            place: 0..0,
+            uses: Uses::of(unit),
+            shared: HashSet::new(),
             refused: Vec::new(),
         };
         let state = Interpreter::new(typed).initial().to_vec();
@@ -107,6 +118,13 @@ impl<'f> Writer<'f> {
             TypeKind::Named(of) if of.is("BOOL") => match (initial.get(&key), &declaration.initial)
             {
                 (Some(value), _) if is_kept => self.signal(declaration, *value),
+                (None, None) if is_made(&declaration.name) => {
+                    let known = self.signal(declaration, false);
+                    if let Known::Bit { name, .. } = &known {
+                        self.shared.insert(name.clone());
+                    }
+                    known
+                }
                 (None, _) if self.at_address(declaration).is_some() => {
                     self.signal(declaration, false)
                 }
@@ -119,7 +137,7 @@ impl<'f> Writer<'f> {
             },
             TypeKind::Named(of) => match self.block(&of.key(), declaration) {
                 Some(kind) if is_kept => {
-                    Known::Block { name: self.namer.name(declaration.name.as_str()), kind }
+                    Known::Block { name: self.namer.name(&wanted(&declaration.name)), kind }
                 }
                 _ if BlockKind::of_word(&of.key()).is_some() => {
                     Known::Other(format!("{}, with initial values or a body of its own", of.key()))
@@ -156,8 +174,8 @@ impl<'f> Writer<'f> {
         }
         let address = declaration.address.as_ref();
         let initial = Some(initial).filter(|value| *value || declaration.initial.is_some());
-        let name = self.namer.name(declaration.name.as_str());
-        if name != declaration.name.as_str() {
+        let name = self.namer.name(&wanted(&declaration.name));
+        if name != declaration.name.as_str() && !is_made(&declaration.name) {
             self.lost.renamed.push((&declaration.name, name.clone()));
         }
         let located = address.and_then(|it| parse_address(it.as_str().trim_start_matches('%')));
@@ -309,6 +327,11 @@ impl<'f> Writer<'f> {
             }
         }
     }
+}
+
+/// The name that a declaration should have in the ladder.
+fn wanted(name: &SourceName) -> String {
+    if is_made(name) { name.as_str().replace('.', "_") } else { name.as_str().to_owned() }
 }
 
 /// A bit's address with its X, which may be left out.

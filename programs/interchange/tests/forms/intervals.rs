@@ -384,14 +384,13 @@ fn a_cycle_time_that_is_none_is_an_error() {
     }
 }
 
-/// Statements are the program that was written, whatever their points are; where a ladder is asked for, each of them has one.
+/// A program is the one that was written, whatever its points are; where a ladder is asked for, each of them has one.
 #[test]
-fn only_what_is_drawn_is_a_ladder() {
+fn every_language_is_a_typed_program_and_has_a_ladder() {
     for language in LANGUAGES {
         let (name, text) = file(language, &[Every(20)]).expect("a file");
         let source = read_source(&name, &text, Wanted::default()).source;
-        let is_ladder = matches!(source, Some(Source::Ladder(_)));
-        assert_eq!(is_ladder, language == Language::Ladder, "{language:?}");
+        assert!(matches!(source, Some(Source::Typed(_))), "{language:?}");
         let read = read_ladder(&name, &text, None);
         assert!(read.program.is_some(), "{language:?}: {:?}", read.diagnostics);
     }

@@ -43,7 +43,13 @@ fn check(original: &Program, seed: u64) {
         }
         counts
     };
-    assert_eq!(blocks(original), blocks(&third), "seed {seed}");
+    assert_eq!(
+        blocks(original),
+        blocks(&third),
+        "seed {seed}\n{}\n{}",
+        understudy_ladder::print(original),
+        understudy_ladder::print(&again)
+    );
 }
 
 #[test]

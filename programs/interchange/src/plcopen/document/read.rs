@@ -1,26 +1,18 @@
 //! From elements to a [`Project`]: projects, units, variables, types.
 
-use std::collections::HashMap;
-
 use roxmltree::Node;
 use understudy_ladder::Name;
 use understudy_text::Diagnostic;
 
 use super::objects::graph;
 use super::{
-    Body, Ignored, Instance, Language, Part, Pou, PouKind, Project, Section, Variable, VariableType,
+    Body, Ignored, Instance, Language, Part, Pou, PouKind, Project, Variable, VariableType,
 };
 use crate::plcopen::literal::{interval, no_interval};
 use crate::plcopen::xml::{
     applications, attribute, child, children, elements, parts_of_tools, program_type, start_tag,
     text, word,
 };
-
-/// The elementary types whose elements stand for themselves.
-const ELEMENTARY: [&str; 18] = [
-    "BOOL", "BYTE", "WORD", "DWORD", "LWORD", "SINT", "INT", "DINT", "LINT", "USINT", "UINT",
-    "UDINT", "ULINT", "REAL", "LREAL", "TIME", "DATE", "TOD",
-];
 
 /// Reads a project as far as it can be understood, and says what cannot.
 pub(crate) fn read(root: Node<'_, '_>) -> (Project, Vec<Diagnostic>) {
@@ -75,7 +67,6 @@ fn read_parts(root: Node<'_, '_>, has_variables: bool) -> (Project, Vec<Diagnost
             }
         }
     }
-    reader.unique(&reader.project.globals.clone());
     (reader.project, reader.diagnostics)
 }
 
@@ -147,7 +138,6 @@ impl Reader {
             kind,
             documentation: documentation(pou),
             variables: Vec::new(),
-            result: None,
             body: None,
             actions: Vec::new(),
             transitions: Vec::new(),
@@ -166,28 +156,7 @@ impl Reader {
                 _ => {}
             }
         }
-        self.unique(&unit.variables);
         unit
-    }
-
-    /// Reports variables of one scope whose names are the same but for their case.
-    fn unique(&mut self, variables: &[Variable]) {
-        let mut known: HashMap<String, &Name> = HashMap::new();
-        for variable in variables {
-            let name = &variable.name;
-            if let Some(first) = known.insert(name.to_uppercase(), name) {
-                let error = Diagnostic::error(
-                    "U1003",
-                    format!("the variables `{first}` and `{name}` have one name"),
-                    name.span(),
-                );
-                self.diagnostics.push(
-                    error.with_related(first.span(), "the first is here").with_help(
-                        "names of IEC 61131-3 do not distinguish case; rename one of the two",
-                    ),
-                );
-            }
-        }
     }
 
     fn parts(&mut self, list: Node<'_, '_>, element: &str) -> Vec<Part> {
@@ -228,107 +197,54 @@ impl Reader {
 
     fn interface(&mut self, interface: Node<'_, '_>, unit: &mut Pou) {
         for list in elements(interface) {
-            let section = match list.tag_name().name() {
-                "inputVars" => Section::Input,
-                "outputVars" => Section::Output,
-                "inOutVars" => Section::InOut,
-                "localVars" => Section::Local,
-                "tempVars" => Section::Temporary,
-                "externalVars" => Section::External,
-                "globalVars" => Section::Global,
-                "returnType" => {
-                    unit.result = self.data_type(list);
-                    continue;
-                }
-                "accessVars" => {
-                    self.ignore("access paths", list);
-                    continue;
-                }
-                "addData" => {
-                    self.ignore("additional data of a tool", list);
-                    continue;
-                }
-                _ => continue,
-            };
-            self.variables(list, section, &mut unit.variables);
+            match list.tag_name().name() {
+                "returnType" => {}
+                "accessVars" => self.ignore("access paths", list),
+                "addData" => self.ignore("additional data of a tool", list),
+                _ => self.variables(list, &mut unit.variables),
+            }
         }
     }
 
-    fn variables(&mut self, list: Node<'_, '_>, section: Section, into: &mut Vec<Variable>) {
+    fn variables(&mut self, list: Node<'_, '_>, into: &mut Vec<Variable>) {
         let flag = |name: &str| {
             attribute(list, name).is_some_and(|value| matches!(value.as_str(), "true" | "1"))
         };
         for node in children(list, "variable") {
-            let Some(name) = self.needed(node, "name") else {
+            let Some(name) = attribute(node, "name") else {
                 continue;
             };
-            let Some(kind) = child(node, "type").and_then(|kind| self.data_type(kind)) else {
-                let message = format!("the variable `{name}` has no type");
-                self.error("U1002", message, node);
-                continue;
-            };
-            let initial = child(node, "initialValue").and_then(|value| {
-                let simple =
-                    child(value, "simpleValue").and_then(|simple| attribute(simple, "value"));
-                if simple.is_none() {
-                    let message = format!("the initial value of `{name}` is not a single one");
-                    self.error("U1010", message, value);
-                }
-                simple
-            });
             for part in elements(node).filter(|part| part.tag_name().name() == "addData") {
                 self.ignore(format!("additional data of a tool on `{name}`"), part);
             }
             into.push(Variable {
                 name,
-                section,
+                is_external: list.tag_name().name() == "externalVars",
                 retain: flag("retain") || flag("persistent"),
-                kind,
-                address: attribute(node, "address").filter(|address| !address.is_empty()),
-                initial,
-                documentation: documentation(node),
+                kind: self.data_type(node),
             });
         }
     }
 
-    fn data_type(&mut self, node: Node<'_, '_>) -> Option<VariableType> {
-        let kind = elements(node).next()?;
-        let name = kind.tag_name().name();
-        Some(match name {
-            "derived" => {
-                let name = self.needed(kind, "name")?;
-                match panel_type(&name) {
-                    Some(usual) => {
-                        self.ignore("what a panel shows of a variable", kind);
-                        VariableType::Elementary(usual.to_owned())
-                    }
-                    None => VariableType::Derived(name),
+    fn data_type(&mut self, variable: Node<'_, '_>) -> VariableType {
+        let kind = child(variable, "type").and_then(|kind| elements(kind).next());
+        let Some(kind) = kind else {
+            return VariableType::Other;
+        };
+        match kind.tag_name().name() {
+            "BOOL" => VariableType::Bool,
+            "derived" => match attribute(kind, "name") {
+                // What the types of variables are that Beremiz shows on a panel.
+                Some(name) if ["HMI_BOOL", "HMI_INT"].contains(&name.as_str()) => {
+                    self.ignore("what a panel shows of a variable", kind);
+                    let is_bool = name.as_str() == "HMI_BOOL";
+                    if is_bool { VariableType::Bool } else { VariableType::Other }
                 }
-            }
-            "subrangeSigned" | "subrangeUnsigned" => {
-                let range = child(kind, "range");
-                let bound = |which| {
-                    let text = attribute(range?, which)?;
-                    text.parse::<i64>().ok()
-                };
-                let base = child(kind, "baseType").and_then(|base| elements(base).next());
-                match (base, bound("lower"), bound("upper")) {
-                    (Some(base), Some(lower), Some(upper)) => {
-                        VariableType::Range(base.tag_name().name().to_owned(), lower, upper)
-                    }
-                    _ => {
-                        self.error(
-                            "U1002",
-                            "a subrange has two whole numbers as its bounds".into(),
-                            kind,
-                        );
-                        return None;
-                    }
-                }
-            }
-            _ if ELEMENTARY.contains(&name) => VariableType::Elementary(name.to_owned()),
-            _ => VariableType::Foreign(name.to_owned()),
-        })
+                Some(name) => VariableType::Derived(name),
+                None => VariableType::Other,
+            },
+            _ => VariableType::Other,
+        }
     }
 
     fn instances(&mut self, part: Node<'_, '_>) {
@@ -336,7 +252,7 @@ impl Reader {
             match node.tag_name().name() {
                 "globalVars" => {
                     let mut globals = Vec::new();
-                    self.variables(node, Section::Global, &mut globals);
+                    self.variables(node, &mut globals);
                     self.project.globals.extend(globals);
                 }
                 "pouInstance" => {
@@ -370,13 +286,4 @@ fn documentation(node: Node<'_, '_>) -> Option<String> {
     let text = word(child(node, "documentation")?);
     let words: Vec<&str> = text.split_whitespace().collect();
     (!words.is_empty()).then(|| words.join(" "))
-}
-
-/// What the types of variables are that Beremiz shows on a panel.
-fn panel_type(name: &str) -> Option<&'static str> {
-    match name {
-        "HMI_BOOL" => Some("BOOL"),
-        "HMI_INT" => Some("INT"),
-        _ => None,
-    }
 }

@@ -11,7 +11,7 @@ use crate::plcopen::standard::StandardBlock;
 use crate::plcopen::xml::{attribute, children, elements, start_tag, word};
 
 /// Objects of rungs are numbered from here, above what people number.
-const FIRST_ID: u64 = 1 << 62;
+pub(crate) const FIRST_ID: u64 = 1 << 62;
 
 /// Reads one rung, the `number`-th of its body, into the objects of the body.
 pub(super) fn rung(

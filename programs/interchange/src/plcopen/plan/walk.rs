@@ -7,8 +7,8 @@ use std::collections::{HashMap, HashSet};
 use understudy_ladder::Name;
 use understudy_text::Diagnostic;
 
+use super::Plan;
 use super::links::{Links, Source, is_eno};
-use super::{Plan, Rules};
 use finish::read;
 
 use crate::plcopen::document::{Condition, Graph, Kind, Language, Object, Pin};
@@ -47,7 +47,6 @@ pub(super) struct Walk<'a> {
     links: &'a Links,
     /// Objects whose power is kept.
     keep: &'a HashSet<usize>,
-    rules: Rules,
     states: Vec<State>,
     /// What each object lets through; for a block, of which there are several outputs, unused.
     powers: Vec<Option<Power>>,
@@ -62,17 +61,11 @@ pub(super) struct Walk<'a> {
 }
 
 impl<'a> Walk<'a> {
-    pub(super) fn new(
-        graph: &'a Graph,
-        links: &'a Links,
-        keep: &'a HashSet<usize>,
-        rules: Rules,
-    ) -> Self {
+    pub(super) fn new(graph: &'a Graph, links: &'a Links, keep: &'a HashSet<usize>) -> Self {
         Self {
             graph,
             links,
             keep,
-            rules,
             states: vec![State::New; graph.objects.len()],
             powers: vec![None; graph.objects.len()],
             enables: HashMap::new(),
@@ -226,7 +219,7 @@ impl<'a> Walk<'a> {
             match self.states[next] {
                 State::Done => {}
                 State::New if is_later && self.links.ring[next] == self.links.ring[asker] => {
-                    self.goes_back(next, place, &open, diagnostics);
+                    self.goes_back(next);
                 }
                 State::New => {
                     if is_later {
@@ -235,7 +228,7 @@ impl<'a> Walk<'a> {
                     let entered = self.enter(next, asker);
                     open.push(entered);
                 }
-                State::Open => self.goes_back(next, place, &open, diagnostics),
+                State::Open => self.goes_back(next),
             }
         }
     }
@@ -267,13 +260,7 @@ impl<'a> Walk<'a> {
     }
 
     /// An object feeds itself: what is asked of it is what it was in the last scan.
-    fn goes_back(
-        &mut self,
-        next: usize,
-        place: usize,
-        open: &[Open],
-        diagnostics: &mut Vec<Diagnostic>,
-    ) {
+    fn goes_back(&mut self, next: usize) {
         if self.links.takes_eno[next] && self.enable_input(next).is_some() {
             self.trace.fed_back.insert(self.links.enable(next));
         }
@@ -282,12 +269,8 @@ impl<'a> Walk<'a> {
                 "its output goes back to its own inputs: they see what it was in the last scan";
             let span = self.graph.objects[next].span.clone();
             self.plan.notes.push((message.to_owned(), span));
-        } else if self.rules == Rules::Numbers {
-            self.feed_back(next);
         } else {
-            let ring: Vec<usize> = open.iter().map(|open| open.place).collect();
-            diagnostics.push(self.cycle(next, place, &ring));
-            self.powers[next].get_or_insert(Power::Constant(false));
+            self.feed_back(next);
         }
     }
 
@@ -316,23 +299,6 @@ impl<'a> Walk<'a> {
         waiting.reverse();
         let asker = if self.rank[place].is_some() { place } else { asker };
         Open { place, asker, waiting }
-    }
-
-    fn cycle(&self, first: usize, last: usize, open: &[usize]) -> Diagnostic {
-        let start = open.iter().position(|place| *place == first).unwrap_or(0);
-        let ring: Vec<String> = open[start..]
-            .iter()
-            .rev()
-            .take(8)
-            .map(|place| self.graph.objects[*place].id.to_string())
-            .collect();
-        let more = if open.len() - start > 8 { ", …" } else { "" };
-        let message =
-            format!("the connections of objects {}{more} go round in a circle", ring.join(", "));
-        let objects = &self.graph.objects;
-        Diagnostic::error("U1006", message, objects[last].span.clone())
-            .with_related(objects[first].span.clone(), "which feeds this, and so itself")
-            .with_help("power flows from the left rail to the right; a value of the last scan goes through a variable")
     }
 
     fn object(&self, place: usize) -> &'a Object {
@@ -390,13 +356,9 @@ impl<'a> Walk<'a> {
     /// The instance of a block, or a name for it where the file gives none.
     fn instance(&self, object: &Object) -> Name {
         // With a dot it is no name that a person can write.
-        let joint = match self.rules {
-            Rules::Bits => '_',
-            Rules::Numbers => '.',
-        };
         match &object.kind {
             Kind::Block(block) => block.instance.clone().unwrap_or_else(|| {
-                let name = format!("{}{joint}{}", block.type_name, object.id);
+                let name = format!("{}.{}", block.type_name, object.id);
                 Name::at(name, object.span.clone())
             }),
             _ => Name::default(),

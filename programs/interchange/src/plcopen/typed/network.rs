@@ -1,5 +1,6 @@
 //! A network as statements, in the order of its plan.
 
+mod scans;
 mod steps;
 
 use std::collections::HashMap;
@@ -18,7 +19,7 @@ use understudy_typed::Comparison;
 use super::make;
 use super::values::{Values, unit};
 use crate::plcopen::document::{Edge, Graph};
-use crate::plcopen::plan::{Action, Named, Places, Plan, plan_numbers};
+use crate::plcopen::plan::{Action, Named, Places, Plan, plan};
 use crate::plcopen::power::{Power, Read};
 use crate::plcopen::standard::StandardBlock;
 
@@ -31,6 +32,8 @@ pub(super) struct Network<'a> {
     pub(super) made: Vec<Declaration>,
     /// Written by a tool that declares no instances of blocks.
     pub(super) lacks_instances: bool,
+    /// Of rungs that are not of the schema.
+    numbers: scans::Numbers,
     pub(super) diagnostics: &'a mut Vec<Diagnostic>,
     /// What an object of the graph has kept.
     kept: HashMap<usize, String>,
@@ -65,6 +68,7 @@ impl<'a> Network<'a> {
             declarations,
             made: Vec::new(),
             lacks_instances,
+            numbers: scans::Numbers::default(),
             diagnostics,
             kept: HashMap::new(),
             triggers: HashMap::new(),
@@ -81,13 +85,20 @@ impl<'a> Network<'a> {
     /// The statements of a graph of LD or FBD.
     pub(super) fn statements(&mut self, graph: &Graph) -> Vec<Statement> {
         let plan = self.plan(graph);
-        self.planned(&plan)
+        self.find_numbers(graph, &plan);
+        let mut statements = self.planned(&plan);
+        if !plan.footer.is_empty() {
+            let end = statements.last().map_or(0, |last| last.span.end);
+            let nothing = make::statement(StatementKind::Nothing, &(end..end));
+            statements.push(Statement { comments: plan.footer, ..nothing });
+        }
+        statements
     }
 
     pub(super) fn plan(&mut self, graph: &Graph) -> Plan {
         let file = self.file;
         let is_call = |name: &str| is_call(file, name);
-        let mut plan = plan_numbers(graph, &is_call, &self.places, self.diagnostics);
+        let mut plan = plan(graph, &is_call, &self.places, self.diagnostics);
         self.notes.append(&mut plan.notes);
         plan
     }
@@ -159,6 +170,10 @@ impl<'a> Network<'a> {
     pub(super) fn parsed(&mut self, written: &Written) -> Expression {
         if let Some(renamed) = self.renamed.get(&written.to_uppercase()) {
             return make::variable(renamed, &written.span());
+        }
+        if written.is_empty() {
+            // It is missing, which was found where it should stand.
+            return Expression { kind: ExpressionKind::Faulty, span: written.span() };
         }
         let start = written.span().start;
         let (value, found) =

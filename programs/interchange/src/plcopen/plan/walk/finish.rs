@@ -217,7 +217,6 @@ impl Walk<'_> {
             is_named: block.instance.is_some(),
             inputs: self.inputs(place).into_iter().map(|(_, input)| input).collect(),
             enable,
-            in_wire: self.links.fan_out[place] == 1,
         };
         self.step(place, Action::Call(call));
     }

@@ -199,9 +199,9 @@ impl Network<'_> {
         span: &Range<usize>,
     ) {
         let mut value = self.prepared(power, span);
-        // All coils take the power from before the first of them.
+        // All coils take the power from before the first of them, and an edge is asked for once.
         let is_changed = |(target, _): &(Written, Modifier)| match power {
-            Power::Read(read) => read.edge.is_none() && self.places.overlap(&read.text, target),
+            Power::Read(read) => read.edge.is_some() || self.places.overlap(&read.text, target),
             _ => false,
         };
         let is_shared = power.measure().0 > 1 || targets.iter().rev().skip(1).any(is_changed);
@@ -211,6 +211,9 @@ impl Network<'_> {
             value = make::variable(&shared, span);
         }
         for (written, modifier) in targets {
+            if self.is_unread(&written.to_uppercase()) {
+                continue;
+            }
             let value = self.changed(value.clone(), modifier.negated, modifier.edge, span);
             let Some(target) = self.target(written) else {
                 continue;
@@ -229,7 +232,10 @@ impl Network<'_> {
     fn call(&mut self, call: &Call, span: &Range<usize>) {
         let mut inputs: Vec<(Written, Expression)> = Vec::new();
         for input in &call.inputs {
-            let value = self.prepared(&input.power, span);
+            let value = match self.preset_in_scans(call, &input.pin, &input.power) {
+                Some(preset) => preset,
+                None => self.prepared(&input.power, span),
+            };
             let value = self.changed(value, input.modifier.negated, input.modifier.edge, span);
             let known = unit(self.file, &call.type_name);
             let pin = StandardBlock::of(&call.type_name)
