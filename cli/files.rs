@@ -150,7 +150,7 @@ impl ProgramText {
     /// It with what was found in it.
     pub(crate) fn found(self, diagnostics: Vec<Diagnostic>) -> ProgramFile {
         let Self { name, text, joined } = self;
-        ProgramFile { report: Report { name, text, diagnostics }, joined }
+        ProgramFile { report: Report { name, text, diagnostics }, rungs: None, joined }
     }
 
     /// What was found, file by file.
@@ -162,6 +162,8 @@ impl ProgramText {
 /// A program that was read, as one text, with what was found in it.
 pub(crate) struct ProgramFile {
     pub(crate) report: Report,
+    /// The rungs that it is drawn as.
+    pub(crate) rungs: Option<Program>,
     joined: Option<Joined>,
 }
 
@@ -260,7 +262,7 @@ pub(crate) fn program(
     let file = ProgramText::expected(path)?;
     let period = |found: Option<Duration>| wanted.period.or(found).unwrap_or(USUAL_PERIOD);
     let read = read_source(&file.name, &file.text, wanted);
-    let file = file.found(read.diagnostics);
+    let file = ProgramFile { rungs: read.rungs, ..file.found(read.diagnostics) };
     match read.source {
         Some(source) if !file.report.has_errors() => Ok((source, file, period(read.period))),
         _ => Err(Answer::bad_files(file.reports())),

@@ -226,14 +226,18 @@ impl Found<'_> {
         program: Option<&str>,
         looking: &Looking,
     ) -> (Option<Source>, Option<Duration>, Vec<Diagnostic>) {
-        let SourceFile { source, period, mut diagnostics } =
+        let SourceFile { source, rungs, period, mut diagnostics } =
             read_source(name, text, Wanted { program, period: None });
         let every = period.unwrap_or(USUAL_PERIOD);
         let shown = shown.to_owned();
+        let ladder = match &source {
+            Some(Source::Ladder(program)) => Some(program),
+            _ => rungs.as_ref(),
+        };
+        if ladder.is_some_and(|ladder| looking.at_rungs(ladder, every, &mut diagnostics)) {
+            self.cut_short.push(shown.clone());
+        }
         match &source {
-            Some(Source::Ladder(program)) if looking.at_rungs(program, every, &mut diagnostics) => {
-                self.cut_short.push(shown);
-            }
             Some(Source::Typed(program)) => self.sizes.push((shown, Size::of(program))),
             Some(Source::Library(units)) => self.libraries.push((shown, units.clone())),
             Some(Source::Ladder(_)) | None => {}

@@ -52,11 +52,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let path = arguments.file.as_path();
     let wanted = Wanted { program: arguments.program.as_deref(), period: None };
     let (source, mut file, _) = files::program(path, wanted)?;
-    let (text, is_ladder) = match (source, arguments.form) {
-        (Source::Ladder(program), Form::Text) => (draw_text(&program), true),
-        (Source::Ladder(program), Form::Svg) => (draw_svg(&program), true),
-        (Source::Ladder(program), Form::Digraph) => (digraph::draw_svg(&program), true),
-        (_, Form::Digraph) => (digraph::draw_svg(&files::ladder(path)?.0), false),
+    let ladder = match source {
+        Source::Ladder(program) => Some(program),
+        _ => file.rungs.take(),
+    };
+    let (text, is_ladder) = match (ladder, arguments.form) {
+        (Some(program), Form::Text) => (draw_text(&program), true),
+        (Some(program), Form::Svg) => (draw_svg(&program), true),
+        (Some(program), Form::Digraph) => (digraph::draw_svg(&program), true),
+        (None, Form::Digraph) => (digraph::draw_svg(&files::ladder(path)?.0), false),
         (_, form) => match typed(path, &mut file.report, wanted, form) {
             Ok(text) => (text, false),
             Err(answer) => return Err(answer.with_reports(file.reports())),

@@ -113,9 +113,10 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         return Err(Answer::bad_files(file.reports()));
     }
     let (program, mut file, period) = match (source, file, period) {
-        (Source::Typed(program), file, _) => {
-            return numbers::of_program(arguments, &program, file, &patience);
-        }
+        (Source::Typed(program), mut file, period) => match file.rungs.take() {
+            Some(rungs) => (rungs, file, period),
+            None => return numbers::of_program(arguments, &program, file, &patience),
+        },
         (Source::Ladder(program), file, period) => (program, file, period),
         (Source::Library(_), _, _) => {
             let message = "the file has no PROGRAM: properties are of programs";

@@ -78,7 +78,7 @@ pub fn read_apart(name: &str, text: &str, copies: Copies) -> (Vec<Apart>, Vec<Di
     }
     for unit in &units {
         let wanted = Wanted { program: Some(unit), period: None };
-        let SourceFile { source, period, diagnostics: found } = read_source(name, text, wanted);
+        let SourceFile { source, period, diagnostics: found, .. } = read_source(name, text, wanted);
         for finding in found {
             if !diagnostics.contains(&finding) {
                 diagnostics.push(finding);
@@ -160,7 +160,7 @@ impl Text<'_> {
 
     /// One controller for all that the file runs.
     fn together(&self, whole: SourceFile, copies: Copies) -> (Vec<Apart>, Vec<Diagnostic>) {
-        let SourceFile { source, period, mut diagnostics } = whole;
+        let SourceFile { source, period, mut diagnostics, .. } = whole;
         let is_program = matches!(source, Some(Source::Ladder(_) | Source::Typed(_)));
         if !is_program && !has_errors(&diagnostics) {
             diagnostics.push(no_program());

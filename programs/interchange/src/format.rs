@@ -192,7 +192,7 @@ pub(crate) fn stem(name: &str) -> &str {
 /// not drawn is that of its statements where its points are BOOLs and rungs hold them, else that of its circuit, where its values are finite; see
 /// [`exact`]. It is all that the file runs.
 pub fn read_ladder(name: &str, text: &str, period: Option<Duration>) -> Reading {
-    let SourceFile { source, period: stated, mut diagnostics } =
+    let SourceFile { source, period: stated, mut diagnostics, .. } =
         read_source(name, text, Wanted { program: None, period });
     let program = match source {
         Some(Source::Ladder(ladder)) => Some(ladder),

@@ -39,6 +39,8 @@ pub struct Wanted<'a> {
 pub struct SourceFile {
     /// What it holds; nothing where there are errors.
     pub source: Option<Source>,
+    /// The rungs that the program is drawn as, where it is drawn as a ladder and has no more than rungs hold.
+    pub rungs: Option<Ladder>,
     /// The period of the intervals that the file states.
     pub period: Option<Duration>,
     /// Everything that is wrong or odd, with its place.
@@ -56,15 +58,13 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
     };
     if let Some(parsed) = statements {
         let mut read = whole(text, parsed, wanted.program, wanted.period);
-        if format == Format::PlcOpen {
-            read.remark_on_rungs(text);
-        }
-        return source(read);
+        let rungs = if format == Format::PlcOpen { read.remark_on_rungs(text) } else { None };
+        return SourceFile { rungs, ..source(read) };
     }
     let Reading { program, period, mut diagnostics, .. } = read(format, name, text, wanted.program);
     let other = program.as_ref().and_then(|it| another_period(it, period, wanted.period));
     diagnostics.extend(other);
-    SourceFile { source: program.map(Source::Ladder), period, diagnostics }
+    SourceFile { source: program.map(Source::Ladder), rungs: None, period, diagnostics }
 }
 
 /// The warning on a ladder whose file states another interval than the period at which it runs: it runs in every scan.
@@ -86,7 +86,7 @@ fn source(whole: Whole) -> SourceFile {
     diagnostics.extend(whole.not_kept);
     diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
     let source = whole.typed.map(|typed| Source::Typed(Arc::new(typed))).or(library);
-    SourceFile { source, period: whole.period, diagnostics }
+    SourceFile { source, rungs: None, period: whole.period, diagnostics }
 }
 
 /// The error of a file that a program is wanted of, and that has none.

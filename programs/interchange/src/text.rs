@@ -3,12 +3,13 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use understudy_ladder::PERIODS;
+use understudy_ladder::{PERIODS, Program as Ladder};
 use understudy_structured_text::syntax::{Body, File, Statement, StatementKind, Unit, UnitKind};
 use understudy_structured_text::{Lowered, Options, lower, parse};
 use understudy_text::{Diagnostic, has_errors};
 use understudy_typed::{Cost, Program as Typed};
 
+use crate::diagrams::Style;
 use crate::format::Reading;
 use crate::plcopen::drawn_units;
 use crate::rungs::rungs;
@@ -166,14 +167,13 @@ pub(crate) fn several<'a>(
 }
 
 impl Whole {
-    /// Adds what a person should know of a program that is drawn, and that rungs hold.
-    pub(crate) fn remark_on_rungs(&mut self, text: &str) {
-        let Some(typed) = self.typed.as_ref().filter(|typed| typed.tasks.len() == 1) else {
-            return;
-        };
-        if drawn_units(text).contains_key(&typed.name.to_uppercase()) {
-            self.diagnostics.extend(rungs(text, &self.file, typed).remarks);
-        }
+    /// The rungs of a program that is drawn as a ladder. What a person should know of a drawing with rungs is added.
+    pub(crate) fn remark_on_rungs(&mut self, text: &str) -> Option<Ladder> {
+        let typed = self.typed.as_ref().filter(|typed| typed.tasks.len() == 1)?;
+        let style = drawn_units(text).remove(&typed.name.to_uppercase())?;
+        let found = rungs(text, &self.file, typed);
+        self.diagnostics.extend(found.remarks);
+        found.program.filter(|_| style == Style::Ladder)
     }
 
     /// The ladder, or why it is none.

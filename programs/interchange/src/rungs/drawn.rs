@@ -9,10 +9,11 @@
 use std::collections::{HashMap, HashSet};
 
 use understudy_ladder::{
-    Block, BlockKind, Coil, CoilKind, Contact, ContactKind, Element, Rung, Series, visit,
+    Block, BlockKind, Coil, CoilKind, Contact, ContactKind, Element, Name as Written, Rung, Series,
+    visit,
 };
 use understudy_structured_text::syntax::{
-    Argument, Body, Expression, ExpressionKind, Name, Path, Statement, StatementKind, Unit,
+    Argument, Body, Expression, ExpressionKind, Name, Path, Span, Statement, StatementKind, Unit,
 };
 
 use super::network::Power;
@@ -168,8 +169,9 @@ impl<'f> Writer<'f> {
     /// Adds a rung, or completes the one before: with what a block in its wire lets through, or with a further coil of its power.
     pub(super) fn push(&mut self, mut network: Series, mut coils: Vec<Coil>) {
         for coil in &mut coils {
-            coil.target = understudy_ladder::Name::at(coil.target.as_str(), self.place.clone());
+            stands_at(&mut coil.target, &self.place);
         }
+        place_all(&mut network, &self.place);
         let comments = std::mem::take(&mut self.comments);
         if comments.is_empty()
             && let Some(last) = self.ladder.rungs.last_mut()
@@ -219,6 +221,29 @@ impl<'f> Writer<'f> {
             rung.coils.retain(|coil| !is_unread(&coil.target));
         }
         self.ladder.memory.retain(|signal| !is_unread(&signal.name));
+    }
+}
+
+/// Gives what a network reads the place of its statement.
+fn place_all(network: &mut Series, place: &Span) {
+    for element in network {
+        match element {
+            Element::Contact(contact) => stands_at(&mut contact.operand, place),
+            Element::Comparison(comparison) => stands_at(&mut comparison.counter, place),
+            Element::Branches(branches) => {
+                branches.iter_mut().for_each(|branch| place_all(branch, place));
+            }
+            Element::Block(block) => {
+                stands_at(&mut block.name, place);
+                block.pins.iter_mut().for_each(|feed| place_all(&mut feed.network, place));
+            }
+        }
+    }
+}
+
+fn stands_at(name: &mut Written, place: &Span) {
+    if name.span().is_empty() {
+        *name = Written::at(name.as_str(), place.clone());
     }
 }
 

@@ -287,7 +287,7 @@ fn a_program_alone_keeps_its_interval() {
                             )
                         }
                     };
-                    for SourceFile { source, period, diagnostics } in [chosen, alone] {
+                    for SourceFile { source, period, diagnostics, .. } in [chosen, alone] {
                         assert!(!has_errors(&diagnostics), "{about}: {diagnostics:#?}");
                         assert_eq!(told(&diagnostics), !is_kept, "{about}: {diagnostics:?}");
                         assert_eq!(period, common.and_then(milliseconds), "{about}");

@@ -21,7 +21,7 @@ fn name(format: Format) -> &'static str {
 
 /// What a reading is, but for the places in the file.
 pub(crate) fn reading(format: Format, text: &str) -> String {
-    let SourceFile { source, period, diagnostics } = source(format, text);
+    let SourceFile { source, period, diagnostics, .. } = source(format, text);
     let program = match source {
         Some(Source::Ladder(ladder)) => print(&ladder),
         Some(Source::Typed(program)) => {

@@ -204,6 +204,8 @@ impl Resolver<'_> {
             let source = match &object.kind {
                 Kind::LeftRail => Source::Rail,
                 Kind::Continuation(_) => continue,
+                // That is reported by the check.
+                _ if wire.pin.as_ref().is_some_and(|name| !self.has_pin(place, name)) => continue,
                 _ => Source::Output(place, wire.pin.clone()),
             };
             if !found.contains(&source) {
@@ -255,22 +257,29 @@ impl Resolver<'_> {
     /// A named output of a block must be one that the block has.
     fn check_pin(&self, from: usize, name: &Name, wire: &Wire, diagnostics: &mut Vec<Diagnostic>) {
         let object = &self.graph.objects[from];
-        let Kind::Block(block) = &object.kind else {
-            return;
-        };
-        let declared = object.outputs.iter().any(|output| output.name.eq_ignore_ascii_case(name));
-        let standard = StandardBlock::of(&block.type_name);
-        let known = match standard {
-            Some(standard) => standard.has_output(name) || name.eq_ignore_ascii_case("ENO"),
-            // What a unit of the file has is checked where it is called.
-            None => declared || object.outputs.is_empty() || self.is_block[from],
-        };
-        if !known {
+        if let (Kind::Block(block), false) = (&object.kind, self.has_pin(from, name)) {
             let message = format!("{} has no output `{name}`", block.type_name);
             diagnostics.push(
                 Diagnostic::error("U1008", message, wire.span.clone())
                     .with_related(object.span.clone(), "this block"),
             );
+        }
+    }
+
+    fn has_pin(&self, from: usize, name: &Name) -> bool {
+        let object = &self.graph.objects[from];
+        let Kind::Block(block) = &object.kind else {
+            return true;
+        };
+        let mut outputs = object.outputs.iter();
+        match StandardBlock::of(&block.type_name) {
+            Some(standard) => standard.has_output(name) || name.eq_ignore_ascii_case("ENO"),
+            // What a unit of the file has is checked where it is called.
+            None => {
+                object.outputs.is_empty()
+                    || self.is_block[from]
+                    || outputs.any(|output| output.name.eq_ignore_ascii_case(name))
+            }
         }
     }
 }

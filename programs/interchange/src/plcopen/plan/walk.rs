@@ -219,7 +219,7 @@ impl<'a> Walk<'a> {
             match self.states[next] {
                 State::Done => {}
                 State::New if is_later && self.links.ring[next] == self.links.ring[asker] => {
-                    self.goes_back(next);
+                    self.goes_back(next, &open, diagnostics);
                 }
                 State::New => {
                     if is_later {
@@ -228,7 +228,7 @@ impl<'a> Walk<'a> {
                     let entered = self.enter(next, asker);
                     open.push(entered);
                 }
-                State::Open => self.goes_back(next),
+                State::Open => self.goes_back(next, &open, diagnostics),
             }
         }
     }
@@ -259,8 +259,16 @@ impl<'a> Walk<'a> {
             .with_help("number what feeds an object before the object; a value of the last scan goes through a variable")
     }
 
-    /// An object feeds itself: what is asked of it is what it was in the last scan.
-    fn goes_back(&mut self, next: usize) {
+    /// An object feeds itself: what is asked of it is what it was in the last scan. Contacts alone have nothing that could keep it.
+    fn goes_back(&mut self, next: usize, open: &[Open], diagnostics: &mut Vec<Diagnostic>) {
+        let ring = open.iter().rev().map(|open| open.place);
+        let ring: Vec<usize> = ring.take_while(|place| *place != next).chain([next]).collect();
+        let is_contact = |place: &usize| matches!(self.object(*place).kind, Kind::Contact(..));
+        if ring.iter().all(is_contact) {
+            diagnostics.push(self.circle(&ring));
+            self.powers[next].get_or_insert(Power::Constant(false));
+            return;
+        }
         if self.links.takes_eno[next] && self.enable_input(next).is_some() {
             self.trace.fed_back.insert(self.links.enable(next));
         }
@@ -272,6 +280,19 @@ impl<'a> Walk<'a> {
         } else {
             self.feed_back(next);
         }
+    }
+
+    /// The finding on contacts that feed each other, the last one of them first.
+    fn circle(&self, ring: &[usize]) -> Diagnostic {
+        let ids: Vec<String> =
+            ring.iter().take(8).map(|place| self.object(*place).id.to_string()).collect();
+        let more = if ring.len() > 8 { ", …" } else { "" };
+        let message =
+            format!("the connections of objects {}{more} go round in a circle", ids.join(", "));
+        let (last, first) = (self.object(ring[0]), self.object(ring[ring.len() - 1]));
+        Diagnostic::error("U1006", message, last.span.clone())
+            .with_related(first.span.clone(), "which feeds this, and so itself")
+            .with_help("power flows from the left rail to the right; a value of the last scan goes through a variable")
     }
 
     /// What is asked of an object while what feeds it is still looked for.
