@@ -172,8 +172,9 @@ impl Whole {
         let typed = self.typed.as_ref().filter(|typed| typed.tasks.len() == 1)?;
         let style = drawn_units(text).remove(&typed.name.to_uppercase())?;
         let found = rungs(text, &self.file, typed);
+        let is_every_scan = typed.tasks.iter().all(|task| task.every == 1);
         self.diagnostics.extend(found.remarks);
-        found.program.filter(|_| style == Style::Ladder)
+        found.program.filter(|_| style == Style::Ladder && is_every_scan)
     }
 
     /// The ladder, or why it is none.

@@ -13,7 +13,6 @@ use understudy_structured_text::syntax::{
 use super::network::Power;
 use super::signals::Known;
 use super::{Found, Writer, coil, contact, refused};
-use crate::plcopen::standard::StandardBlock;
 
 impl<'f> Writer<'f> {
     /// `pause(IN := a, PT := T#3s, Q => y);`
@@ -36,12 +35,11 @@ impl<'f> Writer<'f> {
             let (pin, value) = match argument {
                 Argument::Given(pin, value) => (pin.key(), value),
                 Argument::Placed(value) => {
-                    let input = StandardBlock::of(kind.word()).and_then(|it| it.inputs.get(place));
-                    let Some(pin) = input else {
+                    let Some(pin) = kind.inputs().nth(place) else {
                         return refused("it gives a block more than it has inputs", span);
                     };
                     place += 1;
-                    ((*pin).to_owned(), value)
+                    (pin.to_owned(), value)
                 }
                 Argument::Taken { from, to, negated } => {
                     let Some(from) = kind.outputs().iter().find(|output| from.is(output)) else {

@@ -138,6 +138,26 @@ impl BlockKind {
         }
     }
 
+    /// All inputs in the order of the standard, the one that the wire enters first.
+    pub fn inputs(self) -> impl Iterator<Item = &'static str> {
+        let preset = match (self.preset_time(), self.preset_value()) {
+            (Some(_), _) => Some("PT"),
+            (_, Some(_)) => Some("PV"),
+            (None, None) => None,
+        };
+        let side = self.side_inputs().iter().map(|(pin, _)| *pin);
+        [self.wire_input()].into_iter().chain(side).chain(preset)
+    }
+
+    /// The output that shows a time or a count.
+    pub fn value_output(self) -> Option<&'static str> {
+        match (self.preset_time(), self.preset_value()) {
+            (Some(_), _) => Some("ET"),
+            (_, Some(_)) => Some("CV"),
+            (None, None) => None,
+        }
+    }
+
     /// The preset time of a timer.
     pub fn preset_time(self) -> Option<Duration> {
         match self {

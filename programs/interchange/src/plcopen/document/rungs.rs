@@ -2,12 +2,12 @@
 //! and blocks whose pins name variables. Each becomes the objects that it means.
 
 use roxmltree::Node;
-use understudy_ladder::Name;
+use understudy_ladder::{BlockKind, Name};
 
 use super::objects::{modifier, read_modifier};
 use super::read::Reader;
 use super::{Block, Kind, Modifier, Object, Pin, Wire};
-use crate::plcopen::standard::StandardBlock;
+use crate::plcopen::standard;
 use crate::plcopen::xml::{attribute, children, elements, start_tag, word};
 
 /// Objects of rungs are numbered from here, above what people number.
@@ -57,7 +57,7 @@ pub(super) fn rung(
                 let Some(type_name) = reader.needed(part, "typeName") else {
                     continue;
                 };
-                let Some(standard) = StandardBlock::of(&type_name) else {
+                let Some(kind) = BlockKind::of_word(&type_name) else {
                     // Nothing says which of its variables it writes.
                     let message = format!(
                         "the block {type_name} in a rung is not supported: only the standard function blocks are"
@@ -65,7 +65,7 @@ pub(super) fn rung(
                     reader.error("U1010", message, part);
                     continue;
                 };
-                power = rung.block(part, type_name, standard, &power);
+                power = rung.block(part, type_name, kind, &power);
             }
             "addData" => reader.ignore("additional data of a tool", part),
             other => reader.error("U1010", format!("`{other}` in a rung is not known"), part),
@@ -100,7 +100,7 @@ impl Rung<'_> {
         &mut self,
         node: Node<'_, '_>,
         type_name: Name,
-        standard: StandardBlock,
+        kind: BlockKind,
         power: &Wire,
     ) -> Wire {
         let mut inputs = Vec::new();
@@ -108,7 +108,7 @@ impl Rung<'_> {
         let mut taken = Vec::new();
         for pin in children(node, "variable") {
             let name = attribute(pin, "formalParameter").unwrap_or_default();
-            if standard.has_output(&name) {
+            if standard::output(kind, &name).is_some() {
                 outputs.push(Pin { name: name.clone(), ..Pin::default() });
                 taken.push((name, word(pin), pin));
             } else {
@@ -122,7 +122,7 @@ impl Rung<'_> {
             .objects
             .iter()
             .any(|object| object.id == power.from && !matches!(object.kind, Kind::LeftRail));
-        let first = standard.wire_input();
+        let first = kind.wire_input();
         if fed && !inputs.iter().any(|pin| pin.name.as_str() == first) {
             let name = Name::at(first, start_tag(node));
             inputs.push(Pin { name, wires: vec![power.clone()], ..Pin::default() });
@@ -142,7 +142,7 @@ impl Rung<'_> {
         }
         Wire {
             from: id,
-            pin: Some(Name::at(standard.wire_output(), start_tag(node))),
+            pin: Some(Name::at(kind.outputs()[0], start_tag(node))),
             span: start_tag(node),
         }
     }

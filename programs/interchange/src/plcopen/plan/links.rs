@@ -3,13 +3,13 @@
 use std::cell::Cell;
 use std::collections::{HashMap, HashSet};
 
-use understudy_ladder::Name;
+use understudy_ladder::{BlockKind, Name};
 use understudy_text::Diagnostic;
 
 use super::is_ladder;
 use super::rings::rings;
 use crate::plcopen::document::{CONDITION, Graph, Kind, Object, Pin, Wire};
-use crate::plcopen::standard::StandardBlock;
+use crate::plcopen::standard;
 
 /// The most connections of one input.
 const MAXIMUM_WIRES: usize = 1000;
@@ -272,8 +272,10 @@ impl Resolver<'_> {
             return true;
         };
         let mut outputs = object.outputs.iter();
-        match StandardBlock::of(&block.type_name) {
-            Some(standard) => standard.has_output(name) || name.eq_ignore_ascii_case("ENO"),
+        match BlockKind::of_word(&block.type_name) {
+            Some(kind) => {
+                standard::output(kind, name).is_some() || name.eq_ignore_ascii_case("ENO")
+            }
             // What a unit of the file has is checked where it is called.
             None => {
                 object.outputs.is_empty()

@@ -3,12 +3,13 @@
 
 use std::collections::{HashMap, HashSet};
 
+use understudy_ladder::BlockKind;
+
 use super::links::{Links, Source, is_eno};
 use super::places::{Place, Places, is_anywhere, names};
 use super::walk::Trace;
 use super::{Action, Plan};
 use crate::plcopen::document::{Graph, Kind, Object};
-use crate::plcopen::standard::StandardBlock;
 
 /// The steps that write, by what they write.
 #[derive(Default)]
@@ -34,7 +35,7 @@ impl Writes {
                 Action::Call(call) => {
                     writes.write(&call.instance, step, places);
                     // A unit of the file may write global variables, and those at its in-out pins.
-                    if StandardBlock::of(&call.type_name).is_none() {
+                    if BlockKind::of_word(&call.type_name).is_none() {
                         writes.anywhere.push(step);
                     }
                 }

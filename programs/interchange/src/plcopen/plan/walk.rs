@@ -4,7 +4,7 @@ mod finish;
 
 use std::collections::{HashMap, HashSet};
 
-use understudy_ladder::Name;
+use understudy_ladder::{BlockKind, Name};
 use understudy_text::Diagnostic;
 
 use super::Plan;
@@ -13,7 +13,7 @@ use finish::read;
 
 use crate::plcopen::document::{Condition, Graph, Kind, Language, Object, Pin};
 use crate::plcopen::power::Power;
-use crate::plcopen::standard::StandardBlock;
+use crate::plcopen::standard;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
@@ -358,13 +358,12 @@ impl<'a> Walk<'a> {
             self.enabled(place)
         } else if self.links.is_block[place] {
             let instance = self.instance(object);
-            let standard = StandardBlock::of(&block.type_name);
-            let pin = match (standard, pin) {
-                (Some(standard), Some(pin)) => {
-                    let name = standard.output(&pin).unwrap_or(pin.as_str()).to_owned();
+            let pin = match (BlockKind::of_word(&block.type_name), pin) {
+                (Some(kind), Some(pin)) => {
+                    let name = standard::output(kind, &pin).unwrap_or(pin.as_str()).to_owned();
                     Name::at(name, pin.span())
                 }
-                (Some(standard), None) => Name::at(standard.wire_output(), object.span.clone()),
+                (Some(kind), None) => Name::at(kind.outputs()[0], object.span.clone()),
                 (None, pin) => pin.unwrap_or_default(),
             };
             Power::Output(instance, pin)

@@ -6,7 +6,7 @@ mod steps;
 use std::collections::HashMap;
 use std::ops::Range;
 
-use understudy_ladder::Name as Written;
+use understudy_ladder::{BlockKind, Name as Written};
 use understudy_structured_text::in_parts;
 use understudy_structured_text::parser::parse_expression_at;
 use understudy_structured_text::syntax::{
@@ -21,7 +21,6 @@ use super::values::{Values, unit};
 use crate::plcopen::document::{Edge, Graph};
 use crate::plcopen::plan::{Action, Named, Places, Plan, plan};
 use crate::plcopen::power::{Power, Read};
-use crate::plcopen::standard::StandardBlock;
 
 /// What is written for one unit: its networks share their names.
 pub(super) struct Network<'a> {
@@ -391,7 +390,7 @@ pub(super) fn is_call(file: &File, name: &str) -> bool {
         };
         return found.kind != UnitKind::Function || found.declarations.iter().any(does_more);
     }
-    StandardBlock::of(name).is_some()
+    BlockKind::of_word(name).is_some()
 }
 
 /// What a function is given: by the place where the names say no more than that.

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use understudy_ladder::Name as Written;
+use understudy_ladder::{BlockKind, Name as Written};
 use understudy_structured_text::syntax::{
     Argument, Class, Declaration, Expression, Name, Statement, StatementKind, TypeKind, TypeName,
     Unit, UnitKind,
@@ -14,7 +14,7 @@ use super::{NEXT, Network, arguments};
 use crate::plcopen::document::{Modifier, Storage};
 use crate::plcopen::plan::{Action, Call, Plan, Step};
 use crate::plcopen::power::Power;
-use crate::plcopen::standard::StandardBlock;
+use crate::plcopen::standard;
 use crate::plcopen::typed::make;
 use crate::plcopen::typed::values::unit;
 
@@ -238,8 +238,8 @@ impl Network<'_> {
             };
             let value = self.changed(value, input.modifier.negated, input.modifier.edge, span);
             let known = unit(self.file, &call.type_name);
-            let pin = StandardBlock::of(&call.type_name)
-                .and_then(|block| block.input(&input.pin))
+            let pin = BlockKind::of_word(&call.type_name)
+                .and_then(|kind| standard::input(kind, &input.pin))
                 .filter(|_| !known.is_some_and(|known| has(known, &input.pin)));
             let pin = match pin {
                 Some(pin) => Written::at(pin, input.pin.span()),
