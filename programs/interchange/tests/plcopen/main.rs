@@ -16,4 +16,5 @@ mod public_ladders;
 #[path = "../shared/reading.rs"]
 mod reading;
 mod round_trip;
+mod rungs;
 mod support;

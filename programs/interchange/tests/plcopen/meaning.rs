@@ -7,7 +7,7 @@ use understudy_interchange::plcopen::read;
 use understudy_ladder::print;
 
 use crate::numbers::{Scans, typed};
-use crate::support::{PERIOD, circuit, data, findings};
+use crate::support::{PERIOD, circuit, data, findings, program};
 use understudy_logic::Running;
 use understudy_testing::random::Dice;
 
@@ -179,8 +179,11 @@ fn random_graphs_mean_what_a_naive_walk_finds() {
         let mut dice = Dice::new(seed);
         let cells = random_cells(&mut dice);
         let objects: String = cells.iter().map(element).collect();
-        let circuit = circuit(&file(&declared, &format!("{RAIL}{objects}")));
+        let text = file(&declared, &format!("{RAIL}{objects}"));
+        let circuit = circuit(&text);
         let mut run = Running::new(&circuit);
+        let rungs = program(&text).lower(PERIOD).expect("sound rungs");
+        let mut rungs = Running::new(&rungs);
         // With a number among its points the file is a program with numbers.
         let numbers = declared.clone() + &variables(&[("output", "n", "<INT/>")]);
         let numbers = typed(&file(&numbers, &format!("{RAIL}{objects}")), PERIOD);
@@ -205,6 +208,7 @@ fn random_graphs_mean_what_a_naive_walk_finds() {
             let expected: Vec<bool> =
                 ["q0", "q1", "m0"].iter().map(|name| naive.values[*name]).collect();
             assert_eq!(run.step(&inputs), expected, "seed {seed}, scan {scan}\n{objects}");
+            assert_eq!(rungs.step(&inputs), expected, "rungs: {seed}, scan {scan}\n{objects}");
             let given: Vec<u64> = inputs.iter().map(|bit| u64::from(*bit)).collect();
             let mut shown = scans.scan(&given);
             assert_eq!(shown.pop(), Some(0));
