@@ -217,10 +217,13 @@ impl<'f> Writer<'f> {
             });
         }
         let is_unread = |name: &str| self.shared.contains(name) && !read.contains(name);
-        for rung in &mut self.ladder.rungs {
-            rung.coils.retain(|coil| !is_unread(&coil.target));
+        let mut dropped: HashSet<String> = HashSet::new();
+        // A rung keeps a coil.
+        for rung in self.ladder.rungs.iter_mut().filter(|rung| rung.coils.len() > 1) {
+            let unread = rung.coils.extract_if(.., |coil| is_unread(&coil.target));
+            dropped.extend(unread.map(|coil| coil.target.to_string()));
         }
-        self.ladder.memory.retain(|signal| !is_unread(&signal.name));
+        self.ladder.memory.retain(|signal| !dropped.contains(signal.name.as_str()));
     }
 }
 
