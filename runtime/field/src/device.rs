@@ -194,11 +194,12 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn see(&self, look: Look) {
+    /// Takes what was seen at a time: this process may have been suspended since.
+    fn see(&self, look: Look, at: Instant) {
         let mut state = self.lock();
         state.number += 1;
         state.seen = look;
-        state.seen_at = Instant::now();
+        state.seen_at = at;
     }
 }
 
@@ -308,19 +309,20 @@ impl Worker {
             let driven = outputs.as_ref().map(|outputs| (&self.outputs, outputs));
             device.ends_at(begun + patience);
             let exchanged = timeout(patience, exchange(&mut device, driven, &self.inputs)).await;
+            let answered_at = Instant::now();
             if ending {
                 return was_of_use;
             }
             match exchanged {
                 // What was answered in time and is read late is as old as the time since.
-                Ok(Ok(_)) if begun.elapsed() > patience => {
+                Ok(Ok(_)) if answered_at.duration_since(begun) > patience => {
                     self.lose_unanswered();
                     return was_of_use;
                 }
                 Ok(Ok(sensors)) => {
                     was_of_use = true;
                     written = outputs;
-                    self.shared.see(Look::Sensors(sensors));
+                    self.shared.see(Look::Sensors(sensors), answered_at);
                 }
                 Ok(Err(trouble)) => {
                     // Where only the values of the answer are wrong, the outputs were written.
@@ -352,7 +354,7 @@ impl Worker {
     }
 
     fn lose(&self, reason: String) {
-        self.shared.see(Look::Lost(reason));
+        self.shared.see(Look::Lost(reason), Instant::now());
     }
 }
 

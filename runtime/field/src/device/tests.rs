@@ -216,3 +216,35 @@ fn a_device_that_ends_new_connections_unanswered_is_lost_and_not_besieged() {
     let connections = held.connections.load(Ordering::SeqCst) - before;
     assert!(u128::from(connections) <= most, "{connections} connections in {:?}", begun.elapsed());
 }
+
+/// A process that is suspended behind the arrival of an answer takes it up later: the answer is as old as its arrival.
+#[test]
+fn an_answer_that_is_taken_up_late_is_old() {
+    let stale_after = Duration::from_secs(5);
+    for (age, is_lost) in [(Duration::ZERO, false), (2 * stale_after, true)] {
+        let Some(arrived) = Instant::now().checked_sub(age) else {
+            // A machine that has not run for so long has no such time.
+            continue;
+        };
+        let state = State {
+            number: 1,
+            seen: Look::Lost("no answer yet".into()),
+            seen_at: arrived,
+            outputs: None,
+            contested: false,
+            ending: false,
+        };
+        let shared = Arc::new(Shared { state: Mutex::new(state), changed: Notify::new() });
+        let seen = Arc::clone(&shared);
+        let mut device = Device {
+            shared,
+            stale_after,
+            looked_at: 1,
+            stale: false,
+            contested: false,
+            thread: None,
+        };
+        seen.see(Look::Sensors(Image::zero(1)), arrived);
+        assert_eq!(matches!(device.look(), Some(Look::Lost(_))), is_lost, "{age:?}");
+    }
+}
