@@ -15,7 +15,9 @@ use understudy_ladder::Program;
 use understudy_text::duration::parse_positive;
 use understudy_text::{Diagnostic, Report, Severity, has_errors};
 use understudy_verification::program::{Bounds, Remarks, Subject};
-use understudy_verification::property::{Properties, Property, not_of_one_scan, read, read_one};
+use understudy_verification::property::{
+    Named, Properties, Property, compared, not_of_one_scan, read, read_one,
+};
 use understudy_verification::symbolic::Resolved;
 use understudy_verification::{GoOn, Refutation, draw_runs, prove_parity_while, smv};
 
@@ -115,7 +117,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     let (program, mut file, period) = match (source, file, period) {
         (Source::Typed(program), mut file, period) => match file.rungs.take() {
             Some(rungs) => (rungs, file, period),
-            None => return numbers::of_program(arguments, &program, file, &patience),
+            None => return numbers::of_program(arguments, (&program, period), file, &patience),
         },
         (Source::Ladder(program), file, period) => (program, file, period),
         (Source::Library(_), _, _) => {
@@ -123,8 +125,9 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
             return Err(Answer::failed(Status::BadInput, "U0436", message));
         }
     };
-    let subject = Subject::new(&program, period).map_err(not_lowered)?;
-    let asked = match asked(arguments, &|property| subject.resolve(property)) {
+    let texts = Texts::read(arguments, period)?;
+    let subject = Subject::new(&program, period, &texts.compared()).map_err(not_lowered)?;
+    let asked = match texts.resolved(&|property| subject.resolve(property)) {
         Ok(asked) => asked,
         Err(mut answer) => {
             answer.reports.splice(0..0, file.reports());
@@ -171,51 +174,62 @@ struct Asked {
 /// The formula of a property over the signals of what is verified.
 type Resolve<'a> = &'a dyn Fn(&Property) -> Result<Resolved, Vec<Diagnostic>>;
 
-fn asked(arguments: &Arguments, resolve: Resolve<'_>) -> Result<Asked, Answer> {
-    let mut asked = Asked::default();
-    let mut reports = Vec::new();
-    if let Some(path) = &arguments.properties {
-        let text = files::text(path)?;
-        let found = read(&text);
-        reports.push((path.display().to_string(), text, found));
-    }
-    for (text, fair) in arguments
-        .property
-        .iter()
-        .map(|text| (text, false))
-        .chain(arguments.fair.iter().map(|text| (text, true)))
-    {
-        let name = if fair { "--fair" } else { "--property" };
-        let mut found = Properties::default();
-        match read_one(text) {
-            Ok(property) if fair => found.fair.push(property),
-            Ok(property) => found.properties.push(property),
-            Err(wrong) => found.diagnostics = wrong,
+/// Properties as they were read, each with its file or option.
+struct Texts(Vec<(String, String, Properties)>);
+
+impl Texts {
+    /// Reads the file of properties and the options; what cannot be read is told with what has no meaning.
+    fn read(arguments: &Arguments, period: Duration) -> Result<Self, Answer> {
+        let mut texts = Vec::new();
+        if let Some(path) = &arguments.properties {
+            let text = files::text(path)?;
+            let found = read(&text, period);
+            texts.push((path.display().to_string(), text, found));
         }
-        reports.push((name.to_owned(), text.clone(), found));
+        let properties = arguments.property.iter().map(|text| ("--property", text));
+        for (option, text) in properties.chain(arguments.fair.iter().map(|text| ("--fair", text))) {
+            let mut found = Properties::default();
+            match read_one(text, period) {
+                Ok(property) if option == "--fair" => found.fair.push(property),
+                Ok(property) => found.properties.push(property),
+                Err(wrong) => found.diagnostics = wrong,
+            }
+            texts.push((option.to_owned(), text.clone(), found));
+        }
+        Ok(Self(texts))
     }
-    let mut wrong = Vec::new();
-    for (name, text, found) in reports {
-        let mut diagnostics = found.diagnostics;
-        for property in found.properties {
-            match resolve(&property) {
-                Ok(formula) => asked.properties.push((property, formula)),
-                Err(unknown) => diagnostics.extend(unknown),
+
+    /// The comparisons of numbers in them.
+    fn compared(&self) -> Vec<&Named> {
+        compared(self.0.iter().flat_map(|(_, _, found)| found.formulas()))
+    }
+
+    /// Their formulas over the signals of what is verified.
+    fn resolved(self, resolve: Resolve<'_>) -> Result<Asked, Answer> {
+        let mut asked = Asked::default();
+        let mut wrong = Vec::new();
+        for (name, text, found) in self.0 {
+            let mut diagnostics = found.diagnostics;
+            for property in found.properties {
+                match resolve(&property) {
+                    Ok(formula) => asked.properties.push((property, formula)),
+                    Err(unknown) => diagnostics.extend(unknown),
+                }
+            }
+            for condition in found.fair {
+                match resolve(&condition) {
+                    Ok(formula) if formula.is_of_one_scan() => asked.fair.push(formula),
+                    Ok(_) => diagnostics.push(not_of_one_scan(0..text.len())),
+                    Err(unknown) => diagnostics.extend(unknown),
+                }
+            }
+            if has_errors(&diagnostics) {
+                diagnostics.sort_by_key(|found| found.span.start);
+                wrong.push(Report { name, text, diagnostics });
             }
         }
-        for condition in found.fair {
-            match resolve(&condition) {
-                Ok(formula) if formula.is_of_one_scan() => asked.fair.push(formula),
-                Ok(_) => diagnostics.push(not_of_one_scan(0..text.len())),
-                Err(unknown) => diagnostics.extend(unknown),
-            }
-        }
-        if has_errors(&diagnostics) {
-            diagnostics.sort_by_key(|found| found.span.start);
-            wrong.push(Report { name, text, diagnostics });
-        }
+        if wrong.is_empty() { Ok(asked) } else { Err(Answer::bad_files(wrong)) }
     }
-    if wrong.is_empty() { Ok(asked) } else { Err(Answer::bad_files(wrong)) }
 }
 
 fn text_for_nusmv(form: Smv, program: &Program, subject: &Subject, asked: &Asked) -> String {
@@ -293,7 +307,7 @@ fn cluster(arguments: &Arguments, patience: &Patience<'_>) -> Result<Answer, Ans
         let period = cluster.agreement().schedule.period();
         match (controller.ladder(), controller.code.typed()) {
             (Some(ladder), _) => {
-                let subject = Subject::new(ladder, period).map_err(not_lowered)?;
+                let subject = Subject::new(ladder, period, &[]).map_err(not_lowered)?;
                 let remarks = subject.remarks(ladder, period, bounds).map_err(not_lowered)?;
                 programs.push(ProgramAnswer::of(&subject, bounds, &remarks));
             }

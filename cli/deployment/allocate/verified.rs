@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::time::Duration;
 
 use understudy_allocation::{Group as Wanted, Member, Resources, Verification};
 use understudy_ladder::from_circuit;
@@ -11,7 +12,7 @@ use understudy_parity::generate;
 use understudy_text::{Report, has_errors};
 use understudy_verification::numbers::Model;
 use understudy_verification::program::{Bounds, Conclusion, Subject};
-use understudy_verification::property::{Properties, not_of_one_scan, read};
+use understudy_verification::property::{Properties, compared, not_of_one_scan, read};
 use understudy_verification::prove_parity_while;
 
 use super::programs::{Group, Programs};
@@ -24,19 +25,19 @@ pub(super) type Asked = BTreeMap<String, Vec<(Report, Properties)>>;
 
 /// Reads property files.
 pub(super) fn asked(files: &[(String, PathBuf)], programs: &Programs) -> Result<Asked, Answer> {
-    let names: Vec<String> = programs
-        .groups
-        .iter()
-        .flat_map(|group| group.members.iter().map(|member| group.name(&member.name)))
+    let groups = programs.groups.iter();
+    let periods: BTreeMap<String, Duration> = groups
+        .flat_map(|group| group.members.iter().map(|it| (group.name(&it.name), group.period)))
         .collect();
     let mut asked = Asked::new();
     for (name, path) in files {
-        if !names.contains(name) {
+        let Some(&period) = periods.get(name) else {
+            let names: Vec<&str> = periods.keys().map(String::as_str).collect();
             let message = format!("there is no program `{name}`; there are {}", names.join(", "));
             return Err(Answer::failed(Status::BadInput, "U1134", message));
-        }
+        };
         let text = files::text(path)?;
-        let found = read(&text);
+        let found = read(&text, period);
         let report = Report {
             name: path.display().to_string(),
             text,
@@ -57,16 +58,19 @@ pub(super) fn members(
     patience: &Patience<'_>,
 ) -> Result<Vec<Member>, Answer> {
     let members = group.members.iter().enumerate().map(|(place, member)| {
+        let name = group.name(&member.name);
+        let properties = asked.get(&name).map_or(&[][..], Vec::as_slice);
+        let formulas = properties.iter().flat_map(|(_, found)| found.formulas());
+        let compared = compared(formulas);
         let subject = match &member.typed {
-            None => Subject::new(&member.ladder, group.period).map_err(|error| error.to_string()),
-            Some(typed) => Model::of_program(typed)
+            None => Subject::new(&member.ladder, group.period, &compared)
+                .map_err(|error| error.to_string()),
+            Some(typed) => Model::of_program(typed, &compared)
                 .map_err(|error| error.to_string())
                 .and_then(|model| model.exact().map_err(|error| error.to_string())),
         };
         let subject = subject.map_err(|error| Answer::failed(Status::BadInput, "U0436", error))?;
-        let name = group.name(&member.name);
         patience.turn_to(format!("`{name}`"));
-        let properties = asked.get(&name).map_or(&[][..], Vec::as_slice);
         let remote_io = match &group.cluster {
             Some(cluster) => group.name(&cluster.remote_ios()[place].name),
             None => format!("{name}-io"),

@@ -75,7 +75,7 @@ impl Looking {
         }
         let bounds = Bounds { states: STATES, go_on: &go_on, ..Bounds::default() };
         // A check without a period ignores programs that cannot be lowered with the default one.
-        let remarks = Subject::new(program, period)
+        let remarks = Subject::new(program, period, &[])
             .and_then(|subject| subject.remarks(program, period, bounds));
         let Ok(remarks) = remarks else {
             return false;

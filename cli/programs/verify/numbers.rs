@@ -1,5 +1,7 @@
 //! Proofs about programs with numbers, and about the programs of a cluster together.
 
+use std::time::Duration;
+
 use serde_json::json;
 use understudy_bits::{Code, Member, Source, Unsupported};
 use understudy_cluster::{Cluster, InputSourceKind, RemoteIo};
@@ -11,7 +13,7 @@ use understudy_verification::smv;
 use understudy_verification::symbolic::{Resolved, Signal};
 
 use super::answer::{self, Finding, ProgramAnswer};
-use super::{Arguments, Asked, Smv, asked, bounds, used};
+use super::{Arguments, Asked, Smv, Texts, bounds, used};
 use crate::answer::{Answer, Status};
 use crate::files::{self, ProgramFile};
 use crate::patience::Patience;
@@ -22,7 +24,7 @@ const STANDARD: &str = "never program.fault";
 /// Proves the properties of one program.
 pub(super) fn of_program(
     arguments: &Arguments,
-    program: &Program,
+    (program, period): (&Program, Duration),
     file: ProgramFile,
     patience: &Patience<'_>,
 ) -> Result<Answer, Answer> {
@@ -32,8 +34,10 @@ pub(super) fn of_program(
         return Err(Answer::failed(Status::BadInput, "U0438", message));
     }
     patience.turn_to("the statements of the program".to_owned());
-    let model = Model::of_program(program).map_err(|error| unsupported(&error))?;
-    let mut asked = match asked(arguments, &|property| model.resolve(property)) {
+    let texts = Texts::read(arguments, period)?;
+    let model =
+        Model::of_program(program, &texts.compared()).map_err(|error| unsupported(&error))?;
+    let mut asked = match texts.resolved(&|property| model.resolve(property)) {
         Ok(asked) => asked,
         Err(mut answer) => {
             answer.reports.splice(0..0, file.reports());
@@ -68,7 +72,7 @@ pub(super) fn of_program(
 
 /// Proves the standard properties of a program of a cluster.
 pub(super) fn standard(program: &Program, bounds: Bounds<'_>) -> Result<ProgramAnswer, Answer> {
-    let model = Model::of_program(program).map_err(|error| unsupported(&error))?;
+    let model = Model::of_program(program, &[]).map_err(|error| unsupported(&error))?;
     let mut proved = ProgramAnswer::of_numbers(&program.name, &model);
     let switches = switches(&model, program, bounds);
     proved.switched(model.circuit(), &switches);
@@ -91,8 +95,10 @@ pub(super) fn of_cluster(
 ) -> Result<ProgramAnswer, Answer> {
     patience.turn_to("the programs together".to_owned());
     let members = members(cluster);
-    let model = Model::of_cluster(cluster.name(), &members).map_err(|error| unsupported(&error))?;
-    let asked = asked(arguments, &|property| model.resolve(property))?;
+    let texts = Texts::read(arguments, cluster.agreement().schedule.period())?;
+    let model = Model::of_cluster(cluster.name(), &members, &texts.compared())
+        .map_err(|error| unsupported(&error))?;
+    let asked = texts.resolved(&|property| model.resolve(property))?;
     let name = "all programs together";
     Ok(prove(&model, name, asked, bounds, patience))
 }
@@ -140,7 +146,7 @@ fn standard_property(
     if !is_alone && program.outputs.find(Program::FAULT).is_none() {
         return None;
     }
-    let property = read_one(STANDARD).ok()?;
+    let property = read_one(STANDARD, Duration::ZERO).ok()?;
     let formula = model.resolve(&property).ok()?;
     Some((property, formula))
 }

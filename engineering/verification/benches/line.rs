@@ -65,8 +65,8 @@ fn painting() {
     let properties = include_str!("../../../examples/painting-system/painting-system.properties");
     let program = parse(ladder).program;
     let begin = Instant::now();
-    let subject = Subject::new(&program, Duration::from_millis(10)).expect("a right program");
-    let found = read(properties);
+    let subject = Subject::new(&program, Duration::from_millis(10), &[]).expect("a right program");
+    let found = read(properties, Duration::from_millis(10));
     let formulas = found.properties.iter();
     let formulas: Vec<_> =
         formulas.map(|property| subject.resolve(property).expect("known signals")).collect();
@@ -85,8 +85,9 @@ fn main() {
     println!("stations  state bits  properties  proved       time   NuSMV 2.6");
     for (stations, peer_seconds) in LINES {
         let program = parse(&line(stations)).program;
-        let subject = Subject::new(&program, Duration::from_millis(10)).expect("a right program");
-        let found = read(&properties(stations));
+        let subject =
+            Subject::new(&program, Duration::from_millis(10), &[]).expect("a right program");
+        let found = read(&properties(stations), Duration::from_millis(10));
         let formulas = found.properties.iter();
         let formulas: Vec<_> =
             formulas.map(|property| subject.resolve(property).expect("known signals")).collect();

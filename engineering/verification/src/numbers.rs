@@ -8,6 +8,7 @@
 //! the property depends on no free value     what is true of the circuit is true of the system
 //! ```
 
+mod compared;
 mod replay;
 #[cfg(test)]
 mod tests;
@@ -20,8 +21,9 @@ use understudy_text::Diagnostic;
 use understudy_typed::Program;
 
 use crate::program::{Answer as CircuitAnswer, Bounds, OutputFinding, Subject};
-use crate::property::{Formula, Path, Property};
-use crate::symbolic::{Cone, Resolved, Signal, Trace};
+use crate::property::{Formula, Named, Path, Property};
+use crate::symbolic::{Cone, Resolved, Signal, Trace, resolve};
+use compared::Refused;
 use replay::Replay;
 pub use replay::Row;
 
@@ -50,35 +52,43 @@ pub struct Model {
     system: System,
     derivation: Derivation,
     subject: Subject,
+    refused: Refused,
 }
 
 impl Model {
-    /// One program, whose inputs are within their subranges. Its properties name its BOOL points and variables.
+    /// One program, whose inputs are within their subranges. Its properties name its BOOL points and variables, and the comparisons of
+    /// numbers that are `compared`.
     ///
     /// # Errors
     /// What of the program cannot be followed.
-    pub fn of_program(program: &Program) -> Result<Self, Unsupported> {
-        let system = System::within_subranges(program)?;
+    pub fn of_program(program: &Program, compared: &[&Named]) -> Result<Self, Unsupported> {
+        let system = System::within_subranges(program, compared::names(compared))?;
         let own = program.outputs.iter().filter(|point| point.name != Program::FAULT);
         let own: HashSet<&str> = own.map(|point| point.name.as_str()).collect();
         let outputs = system.observed.iter().take_while(|(name, _)| own.contains(name.as_str()));
         let outputs = outputs.count();
-        Self::of(system, outputs)
+        Self::of(system, outputs, compared)
     }
 
     /// All programs of a cluster; their signals stand behind the names of their controllers and a dot.
     ///
     /// # Errors
     /// What of a program cannot be followed.
-    pub fn of_cluster(name: &str, members: &[Member<'_>]) -> Result<Self, Unsupported> {
-        Self::of(System::of_cluster(name, members)?, 0)
+    pub fn of_cluster(
+        name: &str,
+        members: &[Member<'_>],
+        compared: &[&Named],
+    ) -> Result<Self, Unsupported> {
+        let system = System::of_cluster(name, members, compared::names(compared))?;
+        Self::of(system, 0, compared)
     }
 
     /// The first BOOLs that can be named are the outputs of a program.
-    fn of(system: System, outputs: usize) -> Result<Self, Unsupported> {
+    fn of(mut system: System, outputs: usize, compared: &[&Named]) -> Result<Self, Unsupported> {
+        let refused = compared::add(&mut system, compared);
         let derivation = Derivation::new(&system)?;
         let subject = Subject::of(derivation.circuit.clone(), outputs);
-        Ok(Self { system, derivation, subject })
+        Ok(Self { system, derivation, subject, refused })
     }
 
     /// The circuit, where it does what the programs do and nothing else.
@@ -121,9 +131,16 @@ impl Model {
     /// The formula of `property` over the signals of the circuit.
     ///
     /// # Errors
-    /// Every name that is no BOOL of the programs (U0435).
+    /// Every name that is no BOOL of the programs, and every comparison that is none (U0435).
     pub fn resolve(&self, property: &Property) -> Result<Resolved, Vec<Diagnostic>> {
-        self.subject.resolve(property)
+        resolve(&property.formula, self.circuit()).map_err(|unknown| {
+            let refused = |named: &Named| self.refused.get(&named.to_string());
+            let told = unknown.into_iter().map(|named| match refused(named) {
+                Some(why) => compared::diagnostic(named, why),
+                None => self.subject.unknown(named),
+            });
+            told.collect()
+        })
     }
 
     /// Decides `properties`; `fair` restricts the runs considered. Each property is reported when it is decided.

@@ -9,9 +9,10 @@ mod stages;
 mod unasked;
 
 use std::cell::OnceCell;
+use std::collections::BTreeMap;
 use std::time::Duration;
 
-use understudy_ladder::{LowerError, Program};
+use understudy_ladder::{Block, Comparison, LowerError, Program, Relation};
 use understudy_logic::Circuit;
 use understudy_logic::bdd::Diagrams;
 use understudy_text::Diagnostic;
@@ -48,6 +49,19 @@ impl Default for Bounds<'_> {
     }
 }
 
+/// The comparison of a count, under the name that properties give it.
+fn counted(program: &Program, named: &Named) -> Option<(String, Comparison)> {
+    let compared = named.compared.as_ref()?;
+    let counter = named.name.strip_suffix(".CV")?;
+    let mut blocks = program.blocks().into_iter();
+    let is_counter =
+        |block: &&Block| block.name.as_str() == counter && block.kind.preset_value().is_some();
+    let counter = blocks.find(is_counter)?.name.clone();
+    let relation = Relation::of(compared.comparison.sign())?;
+    let value = compared.with.parse().ok()?;
+    Some((named.to_string(), Comparison { counter, relation, value }))
+}
+
 /// What came of one property.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Answer {
@@ -69,13 +83,20 @@ pub struct Subject {
 }
 
 impl Subject {
-    /// `program`, one scan a `period`; memory bits and pins of blocks (`pause.Q`) can be named in properties too.
+    /// `program`, one scan a `period`; memory bits and pins of blocks (`pause.Q`) can be named in properties too, and the comparisons of counts
+    /// (`parts.CV >= 3`) that are `compared`.
     ///
     /// # Errors
     /// The program has errors, or the period is out of bounds.
-    pub fn new(program: &Program, period: Duration) -> Result<Self, LowerError> {
+    pub fn new(
+        program: &Program,
+        period: Duration,
+        compared: &[&Named],
+    ) -> Result<Self, LowerError> {
+        let counted = compared.iter().filter_map(|named| counted(program, named));
+        let counted: BTreeMap<String, Comparison> = counted.collect();
         Ok(Self {
-            circuit: program.lower_observed(period)?,
+            circuit: program.lower_comparing(period, &counted)?,
             outputs: program.outputs.len(),
             listed: OnceCell::new(),
         })
@@ -105,7 +126,14 @@ impl Subject {
             .map_err(|unknown| unknown.into_iter().map(|named| self.unknown(named)).collect())
     }
 
-    fn unknown(&self, named: &Named) -> Diagnostic {
+    pub(crate) fn unknown(&self, named: &Named) -> Diagnostic {
+        if named.compared.is_some() {
+            let program = self.circuit.name();
+            let message = format!("`{named}` is no comparison of a number of `{program}`");
+            let help =
+                "the numbers of a ladder are its counts, from 0 to 65535, such as `parts.CV >= 3`";
+            return Diagnostic::error("U0435", message, named.span.clone()).with_help(help);
+        }
         let outputs = self.circuit.outputs().iter().map(|output| &output.name);
         let names = outputs.chain(self.circuit.inputs()).map(String::as_str);
         let help = suggestion(&named.name, names);

@@ -17,6 +17,8 @@ mod sentence;
 use std::fmt;
 use std::ops::Range;
 
+use understudy_typed::Comparison;
+
 pub use parse::{Properties, not_of_one_scan, read, read_one};
 
 /// Scans that a bounded property may look ahead.
@@ -189,24 +191,54 @@ struct Operand<'a, S>(&'a Formula<S>);
 
 impl<S: fmt::Display> fmt::Display for Operand<'_, S> {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let single = matches!(self.0, Formula::Constant(_) | Formula::Signal(_) | Formula::Not(_));
-        if single { write!(formatter, "{}", self.0) } else { write!(formatter, "({})", self.0) }
+        match self.0 {
+            Formula::Constant(_) | Formula::Not(_) => write!(formatter, "{}", self.0),
+            // A comparison has signs in it.
+            Formula::Signal(signal) => match signal.to_string() {
+                compared if compared.contains(' ') => write!(formatter, "({compared})"),
+                name => formatter.write_str(&name),
+            },
+            _ => write!(formatter, "({})", self.0),
+        }
     }
 }
 
-/// A name with its position.
+/// What a formula asks of one scan: the value of a BOOL, or the comparison of a number.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Named {
-    /// The name.
+    /// The name of the signal.
     pub name: String,
+    /// With what it is compared, where it is a number.
+    pub compared: Option<Compared>,
     /// Position in the text.
     pub span: Range<usize>,
 }
 
+/// With what a number is compared.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Compared {
+    /// How.
+    pub comparison: Comparison,
+    /// A value as a person writes it, or the name of another number.
+    pub with: String,
+}
+
 impl fmt::Display for Named {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(&self.name)
+        formatter.write_str(&self.name)?;
+        match &self.compared {
+            Some(Compared { comparison, with }) => {
+                write!(formatter, " {} {with}", comparison.sign())
+            }
+            None => Ok(()),
+        }
     }
+}
+
+/// The comparisons of numbers in formulas.
+pub fn compared<'f>(formulas: impl IntoIterator<Item = &'f Formula<Named>>) -> Vec<&'f Named> {
+    let named = formulas.into_iter().flat_map(Formula::signals);
+    named.filter(|named| named.compared.is_some()).collect()
 }
 
 /// One property.

@@ -47,10 +47,10 @@ pub fn resolve<'f>(
     formula: &'f Formula<Named>,
     circuit: &Circuit,
 ) -> Result<Resolved, Vec<&'f Named>> {
-    let resolved = formula.map(&|named: &Named| signal(&named.name, circuit));
+    let resolved = formula.map(&|named: &Named| signal(&named.to_string(), circuit));
     resolved.ok_or_else(|| {
         let names = formula.signals().into_iter();
-        names.filter(|named| signal(&named.name, circuit).is_none()).collect()
+        names.filter(|named| signal(&named.to_string(), circuit).is_none()).collect()
     })
 }
 

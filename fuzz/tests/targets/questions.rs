@@ -1,10 +1,15 @@
 //! What a person asks: properties to prove, nets, and words of a command line.
 
+use std::time::Duration;
+
 use understudy_allocation::Requirement;
 use understudy_supervisor::petri::{read_net, write_net};
 use understudy_verification::property::{read, read_one};
 
 use crate::attack::attack;
+
+/// From one scan to the next.
+const PERIOD: Duration = Duration::from_millis(10);
 
 fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
@@ -16,13 +21,13 @@ fn properties() {
         ["examples/vents/vents.properties", "examples/painting-system/painting-system.properties"];
     attack("properties", &seeds, |bytes| {
         let text = text(bytes);
-        let found = read(&text);
+        let found = read(&text, PERIOD);
         for diagnostic in &found.diagnostics {
             assert!(diagnostic.span.end <= text.len(), "{diagnostic:?}");
         }
         // What was read as a part of a file can be asked alone.
         for property in &found.properties {
-            assert!(read_one(&property.text).is_ok(), "{}", property.text);
+            assert!(read_one(&property.text, PERIOD).is_ok(), "{}", property.text);
         }
     });
 }

@@ -10,7 +10,7 @@
 mod moments;
 mod scan;
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use understudy_logic::{Circuit, Operation as Gate, Variable as Bit};
 use understudy_typed::{Comparison, Elementary, Operation, Point, Points, Program};
@@ -52,19 +52,26 @@ impl System {
     /// # Errors
     /// What of the program cannot be followed.
     pub fn of_program(program: &Program) -> Result<Self, Unsupported> {
-        Self::alone(program, |_| Source::Any(None))
+        Self::alone(program, |_| Source::Any(None), BTreeSet::new())
     }
 
-    /// One program, whose inputs are within their subranges; see [`Source::declared`].
+    /// One program, whose inputs are within their subranges; see [`Source::declared`]. Its properties compare the numbers `compared` too.
     ///
     /// # Errors
     /// What of the program cannot be followed.
-    pub fn within_subranges(program: &Program) -> Result<Self, Unsupported> {
-        Self::alone(program, Source::declared)
+    pub fn within_subranges(
+        program: &Program,
+        compared: BTreeSet<String>,
+    ) -> Result<Self, Unsupported> {
+        Self::alone(program, Source::declared, compared)
     }
 
-    fn alone(program: &Program, source: fn(&Point) -> Source) -> Result<Self, Unsupported> {
-        let mut system = System::new(&program.name);
+    fn alone(
+        program: &Program,
+        source: fn(&Point) -> Source,
+        compared: BTreeSet<String>,
+    ) -> Result<Self, Unsupported> {
+        let mut system = Self { wanted: compared, ..System::new(&program.name) };
         let points = program.inputs.iter().filter(|point| point.slot != 0);
         let sources: Vec<Source> = points.map(source).collect();
         let runs = system.terms.boolean(true);
@@ -73,12 +80,16 @@ impl System {
         Ok(system)
     }
 
-    /// All programs of a cluster; their signals stand behind the names of their controllers and a dot.
+    /// All programs of a cluster; their signals stand behind the names of their controllers and a dot. Properties compare the numbers `compared` too.
     ///
     /// # Errors
     /// What of a program cannot be followed.
-    pub fn of_cluster(name: &str, members: &[Member<'_>]) -> Result<Self, Unsupported> {
-        let mut system = System::new(name);
+    pub fn of_cluster(
+        name: &str,
+        members: &[Member<'_>],
+        compared: BTreeSet<String>,
+    ) -> Result<Self, Unsupported> {
+        let mut system = Self { wanted: compared, ..System::new(name) };
         // Outputs in the cycle before are cells, so that the order of the programs does not matter.
         let mut before = Vec::with_capacity(members.len());
         for member in members {
@@ -454,6 +465,7 @@ impl System {
         if program.outputs.find(Program::FAULT).is_none() {
             self.observed.push((format!("{prefix}{}", Program::FAULT), faulted));
         }
+        self.name_numbers(prefix, program, after);
         let mut rest: Vec<(u64, Term)> = after.iter().map(|(&at, &term)| (at, term)).collect();
         rest.sort_unstable();
         let is_point = |address: u64| {

@@ -1,8 +1,9 @@
 //! Programs on terms: the value of each cell of memory after a scan, over the values before it and the inputs.
 
+use std::collections::{BTreeSet, HashMap};
 use std::ops::RangeInclusive;
 
-use understudy_typed::{Elementary, Point};
+use understudy_typed::{Comparison, Elementary, Part, Point, Program, Type};
 
 use crate::circuit::boundaries::position;
 use crate::term::{Term, Terms, Variable};
@@ -49,6 +50,20 @@ pub struct System {
     pub observed: Vec<(String, Term)>,
     /// Values that a run shows beside them.
     pub shown: Vec<(String, Term)>,
+    /// Names of numbers that properties compare.
+    pub(crate) wanted: BTreeSet<String>,
+    pub(crate) numbers: Vec<NamedNumber>,
+}
+
+/// A number that properties compare.
+#[derive(Debug, Clone)]
+pub struct NamedNumber {
+    /// Its name.
+    pub name: String,
+    /// Its value after the scan; of an input, in the scan.
+    pub term: Term,
+    /// The names of its values, of an enumeration.
+    pub values: Vec<(String, i64)>,
 }
 
 /// An input of a program in a system.
@@ -91,7 +106,37 @@ impl System {
             cells: Vec::new(),
             observed: Vec::new(),
             shown: Vec::new(),
+            wanted: BTreeSet::new(),
+            numbers: Vec::new(),
         }
+    }
+
+    /// The name of the program, or of the cluster.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// A number of those that the system was made with, by its name.
+    pub fn number(&self, name: &str) -> Option<&NamedNumber> {
+        self.numbers.iter().find(|number| number.name == name)
+    }
+
+    /// Adds a comparison with a stored value to the BOOLs that properties can name.
+    pub fn compare_with_value(
+        &mut self,
+        name: &str,
+        left: Term,
+        comparison: Comparison,
+        stored: u64,
+    ) {
+        let right = self.terms.constant(self.terms.of(left), stored);
+        self.compare(name, left, comparison, right);
+    }
+
+    /// Adds a comparison of two numbers of one type to the BOOLs that properties can name.
+    pub fn compare(&mut self, name: &str, left: Term, comparison: Comparison, right: Term) {
+        let holds = self.terms.compare(comparison, left, right);
+        self.observed.push((name.to_owned(), holds));
     }
 
     pub(crate) fn input(
@@ -123,6 +168,35 @@ impl System {
         let term = self.terms.variable(of, Variable::Cell(number));
         self.cells.push(Cell { name, of, initial: initial & of.mask(), term, next: term });
         number
+    }
+
+    /// Finds the numbers of a program that properties compare.
+    pub(crate) fn name_numbers(
+        &mut self,
+        prefix: &str,
+        program: &Program,
+        after: &HashMap<u64, Term>,
+    ) {
+        for name in self.wanted.clone() {
+            let Some(own) = name.strip_prefix(prefix) else { continue };
+            let input = self.inputs.iter().find(|input| input.name == name);
+            let signal = || self.shown.iter().find(|(known, _)| *known == name);
+            let given = input.map(|input| input.term).or_else(|| Some(signal()?.1));
+            let part = program.part(own);
+            let kept = || after.get(&part.as_ref()?.address).copied();
+            let Some(term) = given.or_else(kept) else { continue };
+            let is_text = |part: &Part| part.of.elementary().is_none();
+            if part.as_ref().is_some_and(is_text) {
+                continue;
+            }
+            let values = match part.as_ref().map(|part| &part.of) {
+                Some(Type::Enumeration(id, _)) => {
+                    program.enumerations.get(id.0 as usize).map(|found| found.values.clone())
+                }
+                _ => None,
+            };
+            self.numbers.push(NamedNumber { name, term, values: values.unwrap_or_default() });
+        }
     }
 
     fn name_of(&self, variable: Variable) -> String {

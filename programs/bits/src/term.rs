@@ -428,19 +428,7 @@ fn sign(operation: Operation) -> Option<&'static str> {
         Operation::And(_) => "AND",
         Operation::Or(_) => "OR",
         Operation::Xor(_) => "XOR",
-        Operation::Compare(comparison, _) => comparison_sign(comparison),
+        Operation::Compare(comparison, _) => comparison.sign(),
         _ => return None,
     })
-}
-
-/// As Structured Text writes it.
-pub(crate) fn comparison_sign(comparison: Comparison) -> &'static str {
-    match comparison {
-        Comparison::Equal => "=",
-        Comparison::NotEqual => "<>",
-        Comparison::Less => "<",
-        Comparison::LessOrEqual => "<=",
-        Comparison::Greater => ">",
-        Comparison::GreaterOrEqual => ">=",
-    }
 }

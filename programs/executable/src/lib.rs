@@ -1,12 +1,14 @@
 //! A program as a station executes it, whatever it was written in: a circuit of bits, or a typed program.
 
 mod digest;
+mod value;
 
 use understudy_logic::{Circuit, Scan};
 
 use understudy_typed::{Elementary, Machine, Point, Points, Program};
 
 pub use self::digest::{Digest, digest};
+pub use self::value::{stored_value, typed_value, value_text, whole_number};
 
 /// A compiled program; cheap to share, it holds no state.
 #[derive(Debug, Clone)]

@@ -13,7 +13,7 @@ mod number;
 mod observer;
 mod writes;
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
@@ -25,7 +25,7 @@ pub use self::observer::Observer;
 use self::observer::{Tapped, Wires};
 pub use self::writes::Write;
 use crate::check::check;
-use crate::program::{CoilKind, Contact, ContactKind, Element, Program, Rung, Series};
+use crate::program::{CoilKind, Comparison, Contact, ContactKind, Element, Program, Rung, Series};
 
 /// Periods from one scan to the next that make sense.
 pub const PERIODS: RangeInclusive<Duration> = Duration::from_nanos(1)..=Duration::from_secs(3600);
@@ -83,7 +83,7 @@ impl Program {
     /// [`Program::preset_warnings`].
     pub fn lower(&self, period: Duration) -> Result<Circuit, LowerError> {
         let outputs = self.outputs.iter().map(|signal| signal.name.to_string());
-        self.lower_showing(period, outputs.collect())
+        self.lower_showing(period, outputs.collect(), &BTreeMap::new())
     }
 
     /// [`Self::lower`], with every memory bit and every output pin of a block (`pause.Q`) as an output behind those of the program, each
@@ -92,6 +92,18 @@ impl Program {
     /// # Errors
     /// As [`Self::lower`].
     pub fn lower_observed(&self, period: Duration) -> Result<Circuit, LowerError> {
+        self.lower_comparing(period, &BTreeMap::new())
+    }
+
+    /// [`Self::lower_observed`], with comparisons of counters of the program as further outputs, each under its name and as it is after the scan.
+    ///
+    /// # Errors
+    /// As [`Self::lower`].
+    pub fn lower_comparing(
+        &self,
+        period: Duration,
+        compared: &BTreeMap<String, Comparison>,
+    ) -> Result<Circuit, LowerError> {
         let blocks = self.blocks();
         let pins = blocks.iter().flat_map(|block| {
             let pins = block.kind.outputs().iter();
@@ -102,11 +114,16 @@ impl Program {
         let mut shown: Vec<String> = outputs.collect();
         let outputs: HashSet<String> = shown.iter().cloned().collect();
         shown.extend(signals.filter(|name| !outputs.contains(name)).chain(pins));
-        self.lower_showing(period, shown)
+        self.lower_showing(period, shown, compared)
     }
 
     /// `shown` are signals that the program writes, or pins of its blocks.
-    fn lower_showing(&self, period: Duration, shown: Vec<String>) -> Result<Circuit, LowerError> {
+    fn lower_showing(
+        &self,
+        period: Duration,
+        shown: Vec<String>,
+        compared: &BTreeMap<String, Comparison>,
+    ) -> Result<Circuit, LowerError> {
         validate(self, period)?;
         let mut lowering = Lowering::new(self, period);
         for rung in &self.rungs {
@@ -116,7 +133,10 @@ impl Program {
             let value = lowering.read(lowering.places[name.as_str()]);
             (name, value)
         });
-        let shown = shown.collect();
+        let mut shown: Vec<(String, Expression)> = shown.collect();
+        for (name, comparison) in compared {
+            shown.push((name.clone(), lowering.compared(comparison)));
+        }
         Ok(lowering.finish(self, shown))
     }
 
@@ -273,8 +293,7 @@ impl<'a> Lowering<'a> {
                 }
                 Element::Comparison(comparison) => {
                     let number = self.number(&comparison.counter);
-                    let value = u64::from(comparison.value);
-                    let holds = number.compare(&mut self.graph, comparison.relation, value);
+                    let holds = self.compared(comparison);
                     let leaves = self.graph.and(enters, holds);
                     let wires = Wires::Number(number.0.len());
                     self.tap_element([enters, holds, leaves], wires, &number.0);
@@ -364,6 +383,11 @@ impl<'a> Lowering<'a> {
     fn falling(&mut self, last: usize, clock: Expression) -> Expression {
         let low = self.graph.not(clock);
         self.rising(last, low)
+    }
+
+    fn compared(&mut self, comparison: &Comparison) -> Expression {
+        let number = self.number(&comparison.counter);
+        number.compare(&mut self.graph, comparison.relation, u64::from(comparison.value))
     }
 
     fn number(&mut self, block: &str) -> Number {

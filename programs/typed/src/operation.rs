@@ -145,6 +145,40 @@ pub enum Comparison {
 }
 
 impl Comparison {
+    /// Each with its sign in Structured Text and the name of its function and instruction.
+    const WRITTEN: [(Self, &str, &str); 6] = [
+        (Self::Equal, "=", "EQ"),
+        (Self::NotEqual, "<>", "NE"),
+        (Self::Less, "<", "LT"),
+        (Self::LessOrEqual, "<=", "LE"),
+        (Self::Greater, ">", "GT"),
+        (Self::GreaterOrEqual, ">=", "GE"),
+    ];
+
+    fn written(self) -> (Self, &'static str, &'static str) {
+        Self::WRITTEN.into_iter().find(|(of, _, _)| *of == self).expect("each is written")
+    }
+
+    /// As Structured Text writes it: `>=`.
+    pub fn sign(self) -> &'static str {
+        self.written().1
+    }
+
+    /// The name of its function and instruction: `GE`.
+    pub fn word(self) -> &'static str {
+        self.written().2
+    }
+
+    /// That of a sign of Structured Text.
+    pub fn of_sign(sign: &str) -> Option<Self> {
+        Self::WRITTEN.into_iter().find(|(_, known, _)| *known == sign).map(|(of, _, _)| of)
+    }
+
+    /// That of a function or instruction, in capitals.
+    pub fn of_word(word: &str) -> Option<Self> {
+        Self::WRITTEN.into_iter().find(|(_, _, known)| *known == word).map(|(of, _, _)| of)
+    }
+
     /// The one that holds where this one does not; of reals only where neither is NaN.
     #[must_use]
     pub fn opposite(self) -> Self {

@@ -17,9 +17,9 @@ use understudy_wire::MAXIMUM_STATE_BITS;
 use crate::address::MAXIMUM_NAME_LENGTH;
 use crate::format::{LONGEST_PERIOD, SHORTEST_PERIOD};
 use crate::read::MARK;
-use crate::value::value_text;
 use signals::{Signal, Signals};
 use stub::Stub;
+use understudy_executable::value_text;
 
 /// The name of the drafted understudy.
 const UNDERSTUDY: &str = "understudy";

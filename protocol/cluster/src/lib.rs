@@ -41,4 +41,4 @@ pub use source::{
     GroupSignal, InputSource, InputSourceKind, OperatorDeclaration, SignalDeclaration,
 };
 pub use template::{TemplateFile, minimal, modbus_cell, press_cell, read_with_files, template};
-pub use value::{stored_value, typed_value, value_text};
+pub use understudy_executable::{stored_value, typed_value, value_text};

@@ -3,14 +3,21 @@
 use std::ops::Range;
 
 use understudy_text::Diagnostic;
+use understudy_typed::Comparison;
 
 /// What a [`Token`] is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Sign {
     /// A name or a word.
     Word,
-    /// A number.
+    /// A number, with or without a fraction, or a duration.
     Number,
+    /// `=`, `<=` and their like.
+    Compared(Comparison),
+    /// `-`
+    Minus,
+    /// `:`
+    Colon,
     /// `!`
     Not,
     /// `&`
@@ -41,7 +48,7 @@ pub(super) struct Token<'t> {
     pub(super) span: Range<usize>,
 }
 
-const SIGNS: [(&str, Sign); 11] = [
+const SIGNS: [(&str, Sign); 19] = [
     ("<->", Sign::Same),
     ("->", Sign::Implies),
     ("..", Sign::Range),
@@ -54,6 +61,14 @@ const SIGNS: [(&str, Sign); 11] = [
     ("]", Sign::CloseSquare),
     // As before a contact in the text of a ladder.
     ("/", Sign::Not),
+    ("<>", Sign::Compared(Comparison::NotEqual)),
+    ("<=", Sign::Compared(Comparison::LessOrEqual)),
+    (">=", Sign::Compared(Comparison::GreaterOrEqual)),
+    ("<", Sign::Compared(Comparison::Less)),
+    (">", Sign::Compared(Comparison::Greater)),
+    ("=", Sign::Compared(Comparison::Equal)),
+    ("-", Sign::Minus),
+    (":", Sign::Colon),
 ];
 
 /// Tokens of `text`, at `offset` in its file.
@@ -79,8 +94,7 @@ pub(super) fn tokens<'t>(
         } else if let Some((sign, kind)) = SIGNS.iter().find(|(sign, _)| rest.starts_with(sign)) {
             push(*kind, sign.len())
         } else if first.is_ascii_digit() {
-            let end = rest.find(|next: char| !next.is_ascii_digit());
-            push(Sign::Number, end.unwrap_or(rest.len()))
+            push(Sign::Number, number_length(rest))
         } else if first.is_alphabetic() || matches!(first, '_' | '%') {
             push(Sign::Word, word_length(rest))
         } else {
@@ -88,12 +102,32 @@ pub(super) fn tokens<'t>(
             let message = format!("{first:?} is not allowed in a property");
             diagnostics.push(
                 Diagnostic::error("U0430", message, place)
-                    .with_help("the signs are ! & | -> <-> ( ) [ ] and .."),
+                    .with_help("the signs are ! & | -> <-> = <> < <= > >= ( ) [ ] : and .."),
             );
             first.len_utf8()
         };
     }
     tokens
+}
+
+/// The length of a number or a duration: `12`, `12.5`, `1.5e-3`, `16#FF`, `1m30s`, `2.5s`.
+fn number_length(text: &str) -> usize {
+    let bytes = text.as_bytes();
+    let is_digit = |at: usize| bytes.get(at).is_some_and(u8::is_ascii_digit);
+    let mut at = 0;
+    while let Some(&byte) = bytes.get(at) {
+        let is_exponent = |at: usize| at > 0 && matches!(bytes[at - 1], b'e' | b'E');
+        let is_part = match byte {
+            b'.' => is_digit(at + 1),
+            b'+' | b'-' => is_exponent(at) && is_digit(at - 2) && is_digit(at + 1),
+            _ => byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'#'),
+        };
+        if !is_part {
+            break;
+        }
+        at += 1;
+    }
+    at
 }
 
 /// A name: letters, digits and underscores, a dot that stands before another such character (`pause.Q`), the index of an element (`step[3].done`), and
@@ -105,6 +139,8 @@ fn word_length(text: &str) -> usize {
         let mut characters = text[at..].chars();
         at += match characters.next() {
             Some(character) if part(character) => character.len_utf8(),
+            // A value with its type in front: `T#1s`.
+            Some('#') if characters.next().is_some_and(part) => 1,
             Some('.') if characters.next().is_some_and(part) => 1,
             Some('[') => match index_length(&text[at..]) {
                 0 => return at,

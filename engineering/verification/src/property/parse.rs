@@ -5,15 +5,21 @@
 //! sum         = product { "|" product }
 //! product     = unary { "&" unary }
 //! unary       = "!" unary | "AX" unary | .. | "EG" unary | ( "ABF" | "EBF" ) "0" ".." number unary
-//!             | ( "A" | "E" ) "[" formula "U" formula "]" | "(" formula ")" | "TRUE" | "FALSE" | name
+//!             | ( "A" | "E" ) "[" formula "U" formula "]" | "(" formula ")" | "TRUE" | "FALSE" | name | comparison
+//! comparison  = ( name | value ) ( "=" | "<>" | "<" | "<=" | ">" | ">=" ) ( name | value )      one of them is a name
+//! value       = [ "-" ] ( "12" | "12.5" | "16#FF" | "1m30s" | "T#2s" | .. )
 //! ```
 //!
 //! A line that cannot be read is reported and left out; the lines behind it are read all the same.
 
-use understudy_text::Diagnostic;
+use std::ops::Range;
+use std::time::Duration;
+
+use understudy_text::{Diagnostic, duration};
+use understudy_typed::Comparison;
 
 use super::lexer::{Sign, Token, tokens};
-use super::{Formula, MAXIMUM_NESTING, MAXIMUM_SCANS, Named, Path, Property};
+use super::{Compared, Formula, MAXIMUM_NESTING, MAXIMUM_SCANS, Named, Path, Property};
 
 /// What was read from a file of properties.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -26,22 +32,33 @@ pub struct Properties {
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// Reads a property file: one property per line, `#` begins a comment, `name:` names a property, `fair:` marks a fairness condition.
-pub fn read(text: &str) -> Properties {
+impl Properties {
+    /// All formulas, those of the fairness conditions too.
+    pub fn formulas(&self) -> impl Iterator<Item = &Formula<Named>> {
+        self.properties.iter().chain(&self.fair).map(|property| &property.formula)
+    }
+}
+
+/// Reads a property file: one property per line, `#` begins a comment, `name:` names a property, `fair:` marks a fairness condition. A duration is as
+/// many scans of `period` as are whole in it.
+pub fn read(text: &str, period: Duration) -> Properties {
     let mut found = Properties::default();
     let mut offset = 0;
     for line in text.split_inclusive('\n') {
         let written = line.split('#').next().unwrap_or_default();
         let (name, body) = match written.split_once(':') {
-            Some((name, body)) => (Some(name.trim()), body),
-            None => (None, written),
+            // `within 2s of p: q` has the sign in the middle.
+            Some((name, body)) if !name.trim_start().starts_with("within ") => {
+                (Some(name.trim()), body)
+            }
+            _ => (None, written),
         };
         let start = offset + written.len() - body.len();
         offset += line.len();
         if name.is_none() && body.trim().is_empty() {
             continue;
         }
-        let Some(mut property) = read_at(body, start, &mut found.diagnostics) else {
+        let Some(mut property) = read_at(body, start, period, &mut found.diagnostics) else {
             continue;
         };
         if name != Some("fair") {
@@ -58,26 +75,31 @@ pub fn read(text: &str) -> Properties {
 }
 
 /// A condition of fairness that looks at other scans.
-pub fn not_of_one_scan(span: std::ops::Range<usize>) -> Diagnostic {
+pub fn not_of_one_scan(span: Range<usize>) -> Diagnostic {
     let message = "a fairness condition refers to one scan only";
     Diagnostic::error("U0434", message, span).with_help(
         "leave out AG, EF and the like: a condition p means that p comes again and again",
     )
 }
 
-/// Reads one property; what is wrong comes with places in `text`.
+/// Reads one property as [`read`] does; what is wrong comes with places in `text`.
 ///
 /// # Errors
 /// Everything that is wrong with it (U0430 to U0433).
-pub fn read_one(text: &str) -> Result<Property, Vec<Diagnostic>> {
+pub fn read_one(text: &str, period: Duration) -> Result<Property, Vec<Diagnostic>> {
     let mut diagnostics = Vec::new();
-    match read_at(text, 0, &mut diagnostics) {
+    match read_at(text, 0, period, &mut diagnostics) {
         Some(property) if diagnostics.is_empty() => Ok(property),
         _ => Err(diagnostics),
     }
 }
 
-fn read_at(text: &str, offset: usize, diagnostics: &mut Vec<Diagnostic>) -> Option<Property> {
+fn read_at(
+    text: &str,
+    offset: usize,
+    period: Duration,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Option<Property> {
     let before = diagnostics.len();
     let tokens = tokens(text, offset, diagnostics);
     let mut parser = Parser {
@@ -85,6 +107,7 @@ fn read_at(text: &str, offset: usize, diagnostics: &mut Vec<Diagnostic>) -> Opti
         at: 0,
         depth: 0,
         end: offset + text.trim_end().len(),
+        period,
         diagnostics,
     };
     let formula = parser.property()?;
@@ -103,6 +126,7 @@ pub(super) struct Parser<'p, 't> {
     at: usize,
     depth: usize,
     end: usize,
+    period: Duration,
     diagnostics: &'p mut Vec<Diagnostic>,
 }
 
@@ -175,7 +199,9 @@ impl<'t> Parser<'_, 't> {
         }
         let word = self.peek().filter(|token| token.sign == Sign::Word);
         let Some(token) = word.cloned() else {
-            return self.wrong("a signal, `!` or `(`");
+            let is_value =
+                self.peek().is_some_and(|it| matches!(it.sign, Sign::Number | Sign::Minus));
+            return if is_value { self.value_first() } else { self.wrong("a signal, `!` or `(`") };
         };
         self.at += 1;
         let path = match token.text.as_bytes()[0] {
@@ -201,8 +227,56 @@ impl<'t> Parser<'_, 't> {
                 let until = Formula::Until(path, left, right);
                 self.takes(Sign::CloseSquare).then_some(until).or_else(|| self.wrong("`]`"))
             }
-            name => Some(Formula::Signal(Named { name: name.to_owned(), span: token.span })),
+            name => self.signal(name, token.span),
         }
+    }
+
+    /// A BOOL, or the number at the left of a comparison.
+    fn signal(&mut self, name: &str, mut span: Range<usize>) -> Option<Read> {
+        let mut compared = None;
+        if let Some(comparison) = self.takes_comparison() {
+            let (with, end) = self.compared_with()?;
+            span.end = end;
+            compared = Some(Compared { comparison, with });
+        }
+        Some(Formula::Signal(Named { name: name.to_owned(), compared, span }))
+    }
+
+    /// A comparison whose value stands at the left.
+    fn value_first(&mut self) -> Option<Read> {
+        let start = self.span().start;
+        let (with, _) = self.compared_with()?;
+        let Some(comparison) = self.takes_comparison() else {
+            return self.wrong("a comparison, such as `<=`");
+        };
+        let word = self.peek().filter(|token| token.sign == Sign::Word).cloned();
+        let Some(Token { text, span, .. }) = word else {
+            return self.wrong("the name of a number");
+        };
+        self.at += 1;
+        let compared = Some(Compared { comparison: comparison.mirrored(), with });
+        Some(Formula::Signal(Named { name: text.to_owned(), compared, span: start..span.end }))
+    }
+
+    fn takes_comparison(&mut self) -> Option<Comparison> {
+        let Sign::Compared(comparison) = self.peek()?.sign else {
+            return None;
+        };
+        self.at += 1;
+        Some(comparison)
+    }
+
+    /// A value or a name, and where it ends.
+    fn compared_with(&mut self) -> Option<(String, usize)> {
+        let sign = if self.takes(Sign::Minus) { "-" } else { "" };
+        let is_value = |token: &&Token<'_>| {
+            token.sign == Sign::Number || (sign.is_empty() && token.sign == Sign::Word)
+        };
+        let Some(token) = self.peek().filter(is_value).cloned() else {
+            return self.wrong("a value or the name of a number");
+        };
+        self.at += 1;
+        Some((format!("{sign}{}", token.text), token.span.end))
     }
 
     fn range(&mut self) -> Option<u32> {
@@ -213,26 +287,51 @@ impl<'t> Parser<'_, 't> {
         self.number()
     }
 
+    /// `5 scans`, or a duration: the whole scans in it.
+    pub(super) fn scans(&mut self) -> Option<u32> {
+        let is_number = |token: &&Token<'_>| token.sign == Sign::Number;
+        let token = self.peek().filter(is_number).cloned();
+        let time = token.as_ref().and_then(|token| duration::parse(token.text).ok());
+        if let (Some(Token { text, span, .. }), Some(time)) = (token, time) {
+            self.at += 1;
+            let scans = time.as_nanos() / self.period.as_nanos().max(1);
+            let few = u32::try_from(scans).ok().filter(|&scans| scans <= MAXIMUM_SCANS);
+            return few.or_else(|| {
+                let each = duration::text(self.period);
+                self.too_many(&format!("{text}, {scans} scans of {each},"), span)
+            });
+        }
+        let scans = self.number()?;
+        match self.takes_word("scans") || self.takes_word("scan") {
+            true => Some(scans),
+            false => self.wrong("`scans`, or a duration such as 2s in place of the number"),
+        }
+    }
+
     /// A number of scans.
-    pub(super) fn number(&mut self) -> Option<u32> {
-        let Some(token) = self.peek().filter(|token| token.sign == Sign::Number) else {
+    fn number(&mut self) -> Option<u32> {
+        let is_whole = |token: &&Token<'_>| {
+            token.sign == Sign::Number && token.text.bytes().all(|digit| digit.is_ascii_digit())
+        };
+        let Some(Token { text, span, .. }) = self.peek().filter(is_whole).cloned() else {
             return self.wrong("a number of scans");
         };
-        let number = token.text.parse().ok().filter(|&scans| scans <= MAXIMUM_SCANS);
-        if number.is_none() {
-            let message = format!("{} scans are more than {MAXIMUM_SCANS}", token.text);
-            let span = token.span.clone();
-            self.diagnostics.push(Diagnostic::error("U0433", message, span));
-        }
         self.at += 1;
-        number
+        let number = text.parse().ok().filter(|&scans| scans <= MAXIMUM_SCANS);
+        number.or_else(|| self.too_many(&format!("{text} scans"), span))
+    }
+
+    fn too_many<T>(&mut self, what: &str, span: Range<usize>) -> Option<T> {
+        let message = format!("{what} are more than {MAXIMUM_SCANS}");
+        self.diagnostics.push(Diagnostic::error("U0433", message, span));
+        None
     }
 
     fn peek(&self) -> Option<&Token<'t>> {
         self.tokens.get(self.at)
     }
 
-    fn takes(&mut self, sign: Sign) -> bool {
+    pub(super) fn takes(&mut self, sign: Sign) -> bool {
         let taken = self.peek().is_some_and(|token| token.sign == sign);
         self.at += usize::from(taken);
         taken
@@ -264,7 +363,7 @@ impl<'t> Parser<'_, 't> {
         })
     }
 
-    fn span(&self) -> std::ops::Range<usize> {
+    fn span(&self) -> Range<usize> {
         self.peek().map_or(self.end..self.end, |token| token.span.clone())
     }
 

@@ -7,12 +7,14 @@
 //! | `p only while q` | `AG (p -> q)` |
 //! | `p is followed by q` | `AG (p -> AF q)` |
 //! | `p is followed by q within 5 scans` | `AG (p -> ABF 0..5 q)` |
+//! | `within 2s of p: q` | `AG (p -> ABF 0..n q)`, with the whole scans in 2 s |
 //! | `p stays until q` | `AG (p -> !E[!q U (!p & !q)])` |
 //! | `p can be reached` | `EF p` |
 //! | `p can always be reached` | `AG EF p` |
 //!
 //! p and q are signals or formulas of one scan, such as `a & !b`.
 
+use super::lexer::Sign;
 use super::parse::{Parser, Read};
 use super::{Formula, Path};
 
@@ -24,6 +26,9 @@ impl Parser<'_, '_> {
         }
         if self.takes_word("always") {
             return Some(self.formula().map(Formula::always));
+        }
+        if self.takes_word("within") {
+            return Some(self.within());
         }
         let words = [
             "is followed by",
@@ -42,6 +47,19 @@ impl Parser<'_, '_> {
         }
         self.takes_word("together");
         Some(all.negated().always())
+    }
+
+    fn within(&mut self) -> Option<Read> {
+        let scans = self.scans()?;
+        if !self.takes_word("of") {
+            return self.wrong("`of`");
+        }
+        let first = self.formula()?;
+        if !self.takes(Sign::Colon) {
+            return self.wrong("`:`");
+        }
+        let answer = Box::new(self.formula()?);
+        Some(first.implies(Formula::Within(Path::All, scans, answer)).always())
     }
 
     fn relation(&mut self) -> Option<Read> {
@@ -69,11 +87,7 @@ impl Parser<'_, '_> {
         }
         let answer = Box::new(self.formula()?);
         let answered = if self.takes_word("within") {
-            let scans = self.number()?;
-            if !self.takes_word("scans") && !self.takes_word("scan") {
-                return self.wrong("`scans`");
-            }
-            Formula::Within(Path::All, scans, answer)
+            Formula::Within(Path::All, self.scans()?, answer)
         } else {
             Formula::Eventually(Path::All, answer)
         };

@@ -13,6 +13,9 @@ use understudy_verification::{Stopped, Work, smv};
 
 use crate::replay::replays;
 
+/// From one scan to the next.
+const PERIOD: Duration = Duration::from_millis(10);
+
 const SEAL_IN: &str = "\
 program pump
 input start
@@ -40,7 +43,7 @@ fn circuit() -> Circuit {
 fn check(property: &str, fair: &[&str]) -> (bool, Option<Vec<String>>) {
     let circuit = circuit();
     let formula = |text: &str| {
-        let property = read_one(text).expect("right");
+        let property = read_one(text, PERIOD).expect("right");
         resolve(&property.formula, &circuit).expect("known signals")
     };
     let fair = fair.iter().map(|text| formula(text)).collect();
@@ -94,7 +97,7 @@ fn every_output_is_asked_whether_it_can_be_switched() {
     let check = |rung: &str, expected: OutputFinding| {
         let text = format!("program p\ninput a\noutput y\nrung\n    {rung}\n");
         let program = parse(&text).program;
-        let subject = Subject::new(&program, Duration::from_millis(10)).expect("right");
+        let subject = Subject::new(&program, Duration::from_millis(10), &[]).expect("right");
         let found = subject.switches(Bounds::default());
         let found = found.into_iter().map(|(_, finding)| match finding {
             // Which scans show it is not the matter here.
@@ -124,7 +127,7 @@ fn the_texts_for_nusmv() {
     let program = parse(SEAL_IN).program;
     let circuit = circuit();
     let properties = ["never motor and stop", "lamp can always be reached"].map(|text| {
-        let property = read_one(text).expect("right");
+        let property = read_one(text, PERIOD).expect("right");
         resolve(&property.formula, &circuit).expect("known signals")
     });
     insta::assert_snapshot!("of_circuit", smv::of_circuit(&circuit, &properties, &[]));
@@ -133,7 +136,7 @@ fn the_texts_for_nusmv() {
 
 #[test]
 fn an_unknown_signal_is_named() {
-    let property = read_one("AG (motor -> lmap & oops)").expect("right");
+    let property = read_one("AG (motor -> lmap & oops)", PERIOD).expect("right");
     let circuit = circuit();
     let unknown = resolve(&property.formula, &circuit).expect_err("two are unknown");
     let names: Vec<&str> = unknown.iter().map(|named| named.name.as_str()).collect();
@@ -166,7 +169,7 @@ fn listed_states_of_many_inputs_and_registers() {
     let listed = Explicit::new(&circuit, 100_000).expect("few states");
     assert_eq!(listed.count(), 71);
     let formulas = ["AG !y", "AG EF y", "never i0 and y", "EF (y & m3)"].map(|text| {
-        let property = read_one(text).expect("right");
+        let property = read_one(text, PERIOD).expect("right");
         resolve(&property.formula, &circuit).expect("known signals")
     });
     let found = listed.check(&formulas);
@@ -196,7 +199,7 @@ fn an_order_that_is_bad_is_changed_by_need() {
     let circuit =
         parse(&text).program.lower_observed(Duration::from_millis(10)).expect("a right program");
     let verdict = |property: &str, nodes: usize, fixed: bool| {
-        let property = read_one(property).expect("right");
+        let property = read_one(property, PERIOD).expect("right");
         let formula = resolve(&property.formula, &circuit).expect("known signals");
         let checker = Checker::new(&circuit, Vec::new(), nodes);
         let mut checker = if fixed { checker.in_fixed_order() } else { checker };
@@ -227,14 +230,14 @@ fn a_large_supervisor_is_decided() {
     let text = include_str!("../../../../examples/boiler/complete.ladder");
     let program = parse(text).program;
     let period = Duration::from_secs(5);
-    let subject = Subject::new(&program, period).expect("a right program");
+    let subject = Subject::new(&program, period, &[]).expect("a right program");
     let bounds = Bounds { nodes: 1 << 14, ..Bounds::default() };
     for (signal, finding) in subject.switches(bounds) {
         let name = signal.name(subject.circuit());
         assert_eq!(finding, OutputFinding::Free, "{name}");
     }
     let decide = |property: &str| {
-        let property = read_one(property).expect("right");
+        let property = read_one(property, PERIOD).expect("right");
         let formula = subject.resolve(&property).expect("known signals");
         let answers = subject.check(&[formula], Vec::new(), bounds, &mut |_, _| {});
         match &answers[0] {
@@ -258,14 +261,14 @@ fn a_large_supervisor_is_decided() {
 fn a_proof_ends_when_nobody_waits() {
     let text = include_str!("../../../../examples/boiler/complete.ladder");
     let program = parse(text).program;
-    let subject = Subject::new(&program, Duration::from_millis(10)).expect("a right program");
+    let subject = Subject::new(&program, Duration::from_millis(10), &[]).expect("a right program");
     let asked = Cell::new(0);
     let go_on = |_: Work| {
         asked.set(asked.get() + 1);
         asked.get() < 40
     };
     let bounds = Bounds { go_on: &go_on, ..Bounds::default() };
-    let property = read_one("AG EF gas_valve_high").expect("right");
+    let property = read_one("AG EF gas_valve_high", PERIOD).expect("right");
     let formula = subject.resolve(&property).expect("known signals");
     let mut told = 0;
     let answers = subject.check(&[formula], Vec::new(), bounds, &mut |_, _| told += 1);

@@ -1,12 +1,17 @@
 //! What is written, and what it means.
 
+use std::time::Duration;
+
 use understudy_verification::property::{read, read_one};
 
+/// From one scan to the next.
+const PERIOD: Duration = Duration::from_millis(10);
+
 fn check(text: &str, meaning: &str) {
-    let property = read_one(text).unwrap_or_else(|wrong| panic!("{text}: {wrong:?}"));
+    let property = read_one(text, PERIOD).unwrap_or_else(|wrong| panic!("{text}: {wrong:?}"));
     assert_eq!(property.formula.to_string(), meaning, "{text}");
     // What is printed means the same again.
-    let again = read_one(meaning).unwrap_or_else(|wrong| panic!("{meaning}: {wrong:?}"));
+    let again = read_one(meaning, PERIOD).unwrap_or_else(|wrong| panic!("{meaning}: {wrong:?}"));
     assert_eq!(again.formula.to_string(), meaning);
 }
 
@@ -47,7 +52,7 @@ E[a b]
 a is followed by b within 123456 scans
 right: AG a
 ";
-    let found = read(text);
+    let found = read(text, PERIOD);
     assert_eq!(found.properties.len(), 1);
     assert_eq!(found.properties[0].name.as_deref(), Some("right"));
     let lines: Vec<String> = found
@@ -65,7 +70,7 @@ right: AG a
 #[test]
 fn deep_nesting_is_an_error_and_no_crash() {
     for text in ["(".repeat(100_000), "!".repeat(100_000), "AG ".repeat(100_000)] {
-        let wrong = read_one(&text).expect_err("too deep");
+        let wrong = read_one(&text, PERIOD).expect_err("too deep");
         assert_eq!(wrong[0].code, "U0432");
     }
 }

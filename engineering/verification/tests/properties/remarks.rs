@@ -14,7 +14,7 @@ use understudy_verification::{Shown, draw_runs};
 const PERIOD: Duration = Duration::from_millis(100);
 
 fn remarks(program: &Program) -> (Subject, Remarks) {
-    let subject = Subject::new(program, PERIOD).expect("a right program");
+    let subject = Subject::new(program, PERIOD, &[]).expect("a right program");
     let remarks = subject.remarks(program, PERIOD, Bounds::default()).expect("a right program");
     (subject, remarks)
 }

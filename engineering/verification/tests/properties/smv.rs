@@ -12,6 +12,9 @@ use understudy_verification::symbolic::resolve;
 
 use understudy_testing::random::random_program;
 
+/// From one scan to the next.
+const PERIOD: Duration = Duration::from_millis(10);
+
 /// Words that no signal may have, of those that a ladder's names could be.
 const RESERVED: [&str; 24] = [
     "MODULE", "VAR", "ASSIGN", "DEFINE", "CTLSPEC", "SPEC", "FAIRNESS", "next", "init", "boolean",
@@ -174,7 +177,7 @@ proptest! {
         let program = random_program(seed, 3);
         let circuit = program.lower_observed(Duration::from_millis(100)).expect("a right program");
         let written = circuit.outputs()[0].name.clone();
-        let property = read_one(&format!("AG EF {written}")).expect("a formula");
+        let property = read_one(&format!("AG EF {written}"), PERIOD).expect("a formula");
         let formula = resolve(&property.formula, &circuit).expect("a signal");
         let module = read(&smv::of_circuit(&circuit, &[formula], &[]));
         prop_assert_eq!(module.specifications.len(), 1);

@@ -37,7 +37,8 @@ fn circuit(rungs: &[(u8, u8, u8, u8)], presets: [u32; 2]) -> Circuit {
         );
     }
     let parsed = parse(&text);
-    let subject = Subject::new(&parsed.program, Duration::from_millis(1)).expect("a right program");
+    let subject =
+        Subject::new(&parsed.program, Duration::from_millis(1), &[]).expect("a right program");
     subject.circuit().clone()
 }
 

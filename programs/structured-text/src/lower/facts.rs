@@ -109,10 +109,10 @@ impl Facts {
                 parts.iter().for_each(|part| self.refine(part, false));
             }
             (Operation::Compare(comparison, of), [left, right]) if is_whole(*of) => {
-                let comparison = if holds { *comparison } else { opposite(*comparison) };
+                let comparison = if holds { *comparison } else { comparison.opposite() };
                 let (low, high) = (ranges(left, Some(self)), ranges(right, Some(self)));
                 self.narrow(left, comparison, high.possible);
-                self.narrow(right, mirrored(comparison), low.possible);
+                self.narrow(right, comparison.mirrored(), low.possible);
             }
             _ => {}
         }
@@ -168,27 +168,6 @@ fn variable(value: &Expression) -> &Expression {
             }
         }
         _ => value,
-    }
-}
-
-fn opposite(comparison: Comparison) -> Comparison {
-    match comparison {
-        Comparison::Equal => Comparison::NotEqual,
-        Comparison::NotEqual => Comparison::Equal,
-        Comparison::Less => Comparison::GreaterOrEqual,
-        Comparison::LessOrEqual => Comparison::Greater,
-        Comparison::Greater => Comparison::LessOrEqual,
-        Comparison::GreaterOrEqual => Comparison::Less,
-    }
-}
-
-fn mirrored(comparison: Comparison) -> Comparison {
-    match comparison {
-        Comparison::Less => Comparison::Greater,
-        Comparison::LessOrEqual => Comparison::GreaterOrEqual,
-        Comparison::Greater => Comparison::Less,
-        Comparison::GreaterOrEqual => Comparison::LessOrEqual,
-        same => same,
     }
 }
 

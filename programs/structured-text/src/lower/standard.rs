@@ -169,18 +169,6 @@ fn operator(key: &str) -> Option<(Operator, bool)> {
     })
 }
 
-fn comparison(key: &str) -> Option<Comparison> {
-    Some(match key {
-        "GT" => Comparison::Greater,
-        "GE" => Comparison::GreaterOrEqual,
-        "EQ" => Comparison::Equal,
-        "LE" => Comparison::LessOrEqual,
-        "LT" => Comparison::Less,
-        "NE" => Comparison::NotEqual,
-        _ => return None,
-    })
-}
-
 impl Lowering<'_> {
     /// A call of a standard function.
     pub(super) fn standard(
@@ -220,7 +208,7 @@ impl Lowering<'_> {
         if let Some((operator, _)) = operator(key) {
             return self.operator_call(operator, values, hint);
         }
-        let found = if let Some(comparison) = comparison(key) {
+        let found = if let Some(comparison) = Comparison::of_word(key) {
             self.comparison_call(comparison, values)
         } else if let Some(function) = real_function(key) {
             self.real_call(function, values[0], hint)

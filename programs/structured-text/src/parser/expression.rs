@@ -35,21 +35,8 @@ impl Parser<'_> {
                     _ => return None,
                 }
             }
-            Lexeme::Sign(sign) => match *sign {
-                "=" => Operator::Compare(Comparison::Equal),
-                "<>" => Operator::Compare(Comparison::NotEqual),
-                "<" => Operator::Compare(Comparison::Less),
-                "<=" => Operator::Compare(Comparison::LessOrEqual),
-                ">" => Operator::Compare(Comparison::Greater),
-                ">=" => Operator::Compare(Comparison::GreaterOrEqual),
-                "+" => Operator::Add,
-                "-" => Operator::Subtract,
-                "*" => Operator::Multiply,
-                "/" => Operator::Divide,
-                "**" => Operator::Power,
-                "&" => Operator::And,
-                _ => return None,
-            },
+            Lexeme::Sign("&") => Operator::And,
+            Lexeme::Sign(sign) => return Operator::of_sign(sign),
             _ => return None,
         })
     }

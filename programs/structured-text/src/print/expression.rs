@@ -24,7 +24,7 @@ pub fn expression(of: &Expression) -> String {
             let rank = rest.first().map_or(0, |(operator, _)| operator.rank());
             let mut text = operand(first, rank, true);
             for (operator, right) in rest {
-                let _ = write!(text, " {} {}", sign(*operator), operand(right, rank, false));
+                let _ = write!(text, " {} {}", operator.sign(), operand(right, rank, false));
             }
             text
         }
@@ -57,29 +57,6 @@ fn operand(of: &Expression, rank: u8, is_first: bool) -> String {
     match is_bare {
         true => expression(of),
         false => format!("({})", expression(of)),
-    }
-}
-
-/// An operator as it is written.
-fn sign(operator: Operator) -> &'static str {
-    match operator {
-        Operator::Or => "OR",
-        Operator::Xor => "XOR",
-        Operator::And => "AND",
-        Operator::OrElse => "OR_ELSE",
-        Operator::AndThen => "AND_THEN",
-        Operator::Compare(Comparison::Equal) => "=",
-        Operator::Compare(Comparison::NotEqual) => "<>",
-        Operator::Compare(Comparison::Less) => "<",
-        Operator::Compare(Comparison::LessOrEqual) => "<=",
-        Operator::Compare(Comparison::Greater) => ">",
-        Operator::Compare(Comparison::GreaterOrEqual) => ">=",
-        Operator::Add => "+",
-        Operator::Subtract => "-",
-        Operator::Multiply => "*",
-        Operator::Divide => "/",
-        Operator::Modulo => "MOD",
-        Operator::Power => "**",
     }
 }
 

@@ -214,6 +214,51 @@ pub enum Operator {
 }
 
 impl Operator {
+    /// Each but comparisons with its sign in Structured Text and the name of its function and instruction; OR_ELSE and AND_THEN, which do not look at
+    /// all of their operands, have none.
+    const WRITTEN: [(Self, &str, Option<&str>); 11] = [
+        (Self::Or, "OR", Some("OR")),
+        (Self::Xor, "XOR", Some("XOR")),
+        (Self::And, "AND", Some("AND")),
+        (Self::OrElse, "OR_ELSE", None),
+        (Self::AndThen, "AND_THEN", None),
+        (Self::Add, "+", Some("ADD")),
+        (Self::Subtract, "-", Some("SUB")),
+        (Self::Multiply, "*", Some("MUL")),
+        (Self::Divide, "/", Some("DIV")),
+        (Self::Modulo, "MOD", Some("MOD")),
+        (Self::Power, "**", Some("EXPT")),
+    ];
+
+    /// As Structured Text writes it.
+    pub fn sign(self) -> &'static str {
+        if let Self::Compare(comparison) = self {
+            return comparison.sign();
+        }
+        let found = Self::WRITTEN.iter().find(|(of, _, _)| *of == self);
+        found.map_or("", |(_, sign, _)| sign)
+    }
+
+    /// The function and instruction that it is: `ADD`, `GE`.
+    pub fn word(self) -> Option<&'static str> {
+        if let Self::Compare(comparison) = self {
+            return Some(comparison.word());
+        }
+        Self::WRITTEN.iter().find(|(of, _, _)| *of == self)?.2
+    }
+
+    /// That of a sign of Structured Text; words such as `AND` are among them, in capitals.
+    pub fn of_sign(sign: &str) -> Option<Self> {
+        let other = || Some(Self::WRITTEN.iter().find(|(_, known, _)| *known == sign)?.0);
+        Comparison::of_sign(sign).map(Self::Compare).or_else(other)
+    }
+
+    /// That of a function or instruction, in capitals.
+    pub fn of_word(word: &str) -> Option<Self> {
+        let other = || Some(Self::WRITTEN.iter().find(|(_, _, known)| *known == Some(word))?.0);
+        Comparison::of_word(word).map(Self::Compare).or_else(other)
+    }
+
     /// How tightly it binds; more is tighter.
     pub fn rank(self) -> u8 {
         match self {

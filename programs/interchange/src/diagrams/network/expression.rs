@@ -5,7 +5,6 @@ use understudy_structured_text::syntax::{
     Argument, Class, Expression, ExpressionKind, Operator, Path, Step, UnitKind,
 };
 use understudy_structured_text::{input_names, print};
-use understudy_typed::Comparison;
 
 use super::{
     Maker, Source, Value, feeds_a_block, function, is_free, of_class, output, pin, print_path,
@@ -43,7 +42,7 @@ impl Maker<'_> {
             }
             ExpressionKind::Call(..) if self.is_narrower(value, None) => written(value, network),
             ExpressionKind::Chain(first, rest)
-                if rest.iter().all(|(operator, _)| word(*operator).is_some()) =>
+                if rest.iter().all(|(operator, _)| operator.word().is_some()) =>
             {
                 self.chain(first, rest, network)
             }
@@ -92,7 +91,7 @@ impl Maker<'_> {
             for (_, operand) in &rest[at..at + count] {
                 values.push(self.source(operand, network));
             }
-            let from = function(word(*operator).unwrap_or_default(), &values, network);
+            let from = function(operator.word().unwrap_or_default(), &values, network);
             value = made(from);
             at += count;
         }
@@ -184,26 +183,4 @@ fn made(from: Source) -> Value {
 /// An expression as it is written.
 pub(super) fn written(value: &Expression, network: &mut Network) -> Value {
     plain((network.value(print::expression(value)), 0))
-}
-
-/// The function that an operator is; nothing for those that do not look at all of their operands.
-fn word(operator: Operator) -> Option<&'static str> {
-    Some(match operator {
-        Operator::Or => "OR",
-        Operator::Xor => "XOR",
-        Operator::And => "AND",
-        Operator::OrElse | Operator::AndThen => return None,
-        Operator::Compare(Comparison::Equal) => "EQ",
-        Operator::Compare(Comparison::NotEqual) => "NE",
-        Operator::Compare(Comparison::Less) => "LT",
-        Operator::Compare(Comparison::LessOrEqual) => "LE",
-        Operator::Compare(Comparison::Greater) => "GT",
-        Operator::Compare(Comparison::GreaterOrEqual) => "GE",
-        Operator::Add => "ADD",
-        Operator::Subtract => "SUB",
-        Operator::Multiply => "MUL",
-        Operator::Divide => "DIV",
-        Operator::Modulo => "MOD",
-        Operator::Power => "EXPT",
-    })
 }

@@ -14,7 +14,6 @@ use understudy_structured_text::syntax::{
     Statement, StatementKind, TypeKind, UnitKind,
 };
 use understudy_text::Diagnostic;
-use understudy_typed::Comparison;
 
 use super::make;
 use super::values::{Values, unit};
@@ -414,22 +413,8 @@ fn is_arithmetic(operator: Operator) -> bool {
     matches!(operator, Add | Subtract | Multiply | Divide | Modulo)
 }
 
+/// The operator of a box; EXPT is a function.
 fn operator(name: &str) -> Option<Operator> {
-    Some(match name.to_ascii_uppercase().as_str() {
-        "AND" => Operator::And,
-        "OR" => Operator::Or,
-        "XOR" => Operator::Xor,
-        "ADD" => Operator::Add,
-        "SUB" => Operator::Subtract,
-        "MUL" => Operator::Multiply,
-        "DIV" => Operator::Divide,
-        "MOD" => Operator::Modulo,
-        "EQ" => Operator::Compare(Comparison::Equal),
-        "NE" => Operator::Compare(Comparison::NotEqual),
-        "LT" => Operator::Compare(Comparison::Less),
-        "LE" => Operator::Compare(Comparison::LessOrEqual),
-        "GT" => Operator::Compare(Comparison::Greater),
-        "GE" => Operator::Compare(Comparison::GreaterOrEqual),
-        _ => return None,
-    })
+    let found = Operator::of_word(&name.to_ascii_uppercase());
+    found.filter(|operator| *operator != Operator::Power)
 }

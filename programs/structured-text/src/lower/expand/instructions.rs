@@ -16,7 +16,7 @@ mod carried;
 use std::collections::HashMap;
 
 use understudy_text::Diagnostic;
-use understudy_typed::{Comparison, Elementary};
+use understudy_typed::Elementary;
 
 use crate::syntax::{
     Argument, Class, Declaration, Expression, ExpressionKind, Instruction, Name, Operator, Path,
@@ -118,24 +118,10 @@ pub(super) fn statements(
     writer.finish()
 }
 
+/// The operator of an instruction; EXPT is a function.
 fn operator(word: &str) -> Option<Operator> {
-    Some(match word {
-        "AND" | "&" => Operator::And,
-        "OR" => Operator::Or,
-        "XOR" => Operator::Xor,
-        "ADD" => Operator::Add,
-        "SUB" => Operator::Subtract,
-        "MUL" => Operator::Multiply,
-        "DIV" => Operator::Divide,
-        "MOD" => Operator::Modulo,
-        "GT" => Operator::Compare(Comparison::Greater),
-        "GE" => Operator::Compare(Comparison::GreaterOrEqual),
-        "EQ" => Operator::Compare(Comparison::Equal),
-        "NE" => Operator::Compare(Comparison::NotEqual),
-        "LE" => Operator::Compare(Comparison::LessOrEqual),
-        "LT" => Operator::Compare(Comparison::Less),
-        _ => return None,
-    })
+    let word = if word == "&" { "AND" } else { word };
+    Operator::of_word(word).filter(|operator| *operator != Operator::Power)
 }
 
 /// An operator with its negation and its bracket.

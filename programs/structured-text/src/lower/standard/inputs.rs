@@ -1,6 +1,8 @@
 //! The inputs of standard functions, by place and by name.
 
-use super::{comparison, operator, pointed_inputs};
+use understudy_typed::Comparison;
+
+use super::{operator, pointed_inputs};
 use crate::lower::Lowering;
 use crate::syntax::{self, Argument, Span};
 
@@ -99,7 +101,7 @@ fn inputs(key: &str) -> (&'static [&'static str], usize, bool) {
         _ if operator(key).is_some_and(|(_, extensible)| extensible) => (&["IN1", "IN2"], 1, true),
         _ if operator(key).is_some() => (&["IN1", "IN2"], 2, false),
         "NE" => (&["IN1", "IN2"], 2, false),
-        _ if comparison(key).is_some() => (&["IN1", "IN2"], 2, true),
+        _ if Comparison::of_word(key).is_some() => (&["IN1", "IN2"], 2, true),
         "MAX" | "MIN" => (&["IN1", "IN2"], 1, true),
         "CONCAT" => (&["IN1", "IN2"], 1, true),
         "SHL" | "SHR" | "ROL" | "ROR" => (&["IN", "N"], 2, false),

@@ -1,0 +1,101 @@
+//! Comparisons of numbers, as BOOLs that properties name.
+
+use std::collections::{BTreeSet, HashMap};
+
+use understudy_bits::{NamedNumber, System, Term};
+use understudy_executable::typed_value;
+use understudy_text::Diagnostic;
+use understudy_text::spelling::suggestion;
+use understudy_typed::Elementary;
+
+use crate::property::{Compared, Named};
+
+/// Comparisons that are none, by what is written of them: why, and what is written instead.
+pub(super) type Refused = HashMap<String, (String, String)>;
+
+/// The names of numbers in comparisons.
+pub(super) fn names(compared: &[&Named]) -> BTreeSet<String> {
+    let mut names = BTreeSet::new();
+    for named in compared {
+        names.insert(named.name.clone());
+        names.extend(named.compared.iter().map(|it| it.with.clone()));
+    }
+    names
+}
+
+/// Adds comparisons to the BOOLs of a system that was made with their [`names`].
+pub(super) fn add(system: &mut System, compared: &[&Named]) -> Refused {
+    let mut refused = Refused::new();
+    for named in compared {
+        let text = named.to_string();
+        if let Some(with) = &named.compared
+            && system.observed.iter().all(|(known, _)| *known != text)
+            && let Err(why) = add_one(system, &text, named, with)
+        {
+            refused.insert(text, why);
+        }
+    }
+    refused
+}
+
+/// What a refused comparison is told.
+pub(super) fn diagnostic(named: &Named, (message, help): &(String, String)) -> Diagnostic {
+    Diagnostic::error("U0435", message.clone(), named.span.clone()).with_help(help.clone())
+}
+
+fn add_one(
+    system: &mut System,
+    text: &str,
+    named: &Named,
+    compared: &Compared,
+) -> Result<(), (String, String)> {
+    let NamedNumber { term: left, values, .. } = number(system, &named.name)?;
+    let Compared { comparison, with } = compared;
+    let of = system.terms.of(left);
+    if let Some(right) = system.number(with).cloned() {
+        let other = system.terms.of(right.term);
+        if other != of {
+            let message =
+                format!("`{}` is {of} and `{with}` is {other}: they are not compared", named.name);
+            return Err((message, "compare numbers of one type".to_owned()));
+        }
+        system.compare(text, left, *comparison, right.term);
+        return Ok(());
+    }
+    let stored = value(of, &values, with).map_err(|help| {
+        (format!("`{with}` is neither a value of `{}` : {of} nor a number", named.name), help)
+    })?;
+    system.compare_with_value(text, left, *comparison, stored);
+    Ok(())
+}
+
+/// The number of this name, or what is there instead.
+fn number(system: &System, name: &str) -> Result<NamedNumber, (String, String)> {
+    let found = system.number(name).cloned();
+    let is_bool = |term: Term| system.terms.of(term) == Elementary::Bool;
+    if found.as_ref().is_some_and(|found| is_bool(found.term)) {
+        let help = format!("write `{name}`, `!{name}` or `{name} <-> other`");
+        return Err((format!("`{name}` is a BOOL, and numbers are compared"), help));
+    }
+    found.ok_or_else(|| {
+        let inputs = system.inputs.iter().filter(|input| input.of != Elementary::Bool);
+        let inputs = inputs.map(|input| input.name.as_str());
+        let known = inputs.chain(system.shown.iter().map(|(name, _)| name.as_str()));
+        (format!("`{name}` is not a number of `{}`", system.name()), suggestion(name, known))
+    })
+}
+
+/// The stored value of what is written, or what is written instead.
+fn value(of: Elementary, values: &[(String, i64)], text: &str) -> Result<u64, String> {
+    let name = text.rsplit('#').next().unwrap_or(text);
+    if let Some((_, value)) = values.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)) {
+        return Ok(*value as u64 & of.mask());
+    }
+    typed_value(text, of).map_err(|help| match values.is_empty() {
+        true => help,
+        false => {
+            let names: Vec<&str> = values.iter().take(8).map(|(name, _)| name.as_str()).collect();
+            format!("its values are {}", names.join(", "))
+        }
+    })
+}
