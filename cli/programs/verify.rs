@@ -16,7 +16,7 @@ use understudy_text::duration::parse_positive;
 use understudy_text::{Diagnostic, Report, Severity, has_errors};
 use understudy_verification::program::{Bounds, Remarks, Subject};
 use understudy_verification::property::{
-    Named, Properties, Property, compared, not_of_one_scan, read, read_one,
+    Asked, Properties, Property, not_of_one_scan, read, read_one,
 };
 use understudy_verification::symbolic::Resolved;
 use understudy_verification::{GoOn, Refutation, draw_runs, prove_parity_while, smv};
@@ -65,6 +65,9 @@ pub(crate) struct Arguments {
     /// Fairness condition, true infinitely often in every run considered; repeatable
     #[arg(long, value_name = "TEXT")]
     fair: Vec<String>,
+    /// Assumption about inputs, true in every scan of the runs considered, such as "level <= 4095"; repeatable
+    #[arg(long, value_name = "TEXT")]
+    assume: Vec<String>,
     /// Scan period; determines the length of timers in scans. Default: that of the file, else 10ms
     #[arg(long, value_name = "TIME", value_parser = parse_positive)]
     period: Option<Duration>,
@@ -126,8 +129,9 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         }
     };
     let texts = Texts::read(arguments, period)?;
-    let subject = Subject::new(&program, period, &texts.compared()).map_err(not_lowered)?;
-    let asked = match texts.resolved(&|property| subject.resolve(property)) {
+    let subject = Subject::new(&program, period, &texts.asked()).map_err(not_lowered)?;
+    let wrong = |assumed: &Property| subject.wrong_assumption(assumed);
+    let asked = match texts.resolved(&|property| subject.resolve(property), &wrong) {
         Ok(asked) => asked,
         Err(mut answer) => {
             answer.reports.splice(0..0, file.reports());
@@ -166,7 +170,7 @@ fn bounds<'a>(arguments: &Arguments, go_on: GoOn<'a>) -> Bounds<'a> {
 
 /// The requested properties and fairness conditions over the signals of the program.
 #[derive(Default)]
-struct Asked {
+struct ToProve {
     properties: Vec<(Property, Resolved)>,
     fair: Vec<Resolved>,
 }
@@ -186,12 +190,22 @@ impl Texts {
             let found = read(&text, period);
             texts.push((path.display().to_string(), text, found));
         }
-        let properties = arguments.property.iter().map(|text| ("--property", text));
-        for (option, text) in properties.chain(arguments.fair.iter().map(|text| ("--fair", text))) {
+        let options = [
+            ("--property", &arguments.property),
+            ("--fair", &arguments.fair),
+            ("--assume", &arguments.assume),
+        ];
+        for (option, text) in
+            options.iter().flat_map(|(option, all)| all.iter().map(|text| (*option, text)))
+        {
             let mut found = Properties::default();
+            let kind = match option {
+                "--fair" => &mut found.fair,
+                "--assume" => &mut found.assumed,
+                _ => &mut found.properties,
+            };
             match read_one(text, period) {
-                Ok(property) if option == "--fair" => found.fair.push(property),
-                Ok(property) => found.properties.push(property),
+                Ok(property) => kind.push(property),
                 Err(wrong) => found.diagnostics = wrong,
             }
             texts.push((option.to_owned(), text.clone(), found));
@@ -199,14 +213,18 @@ impl Texts {
         Ok(Self(texts))
     }
 
-    /// The comparisons of numbers in them.
-    fn compared(&self) -> Vec<&Named> {
-        compared(self.0.iter().flat_map(|(_, _, found)| found.formulas()))
+    /// What they ask of a program before it is made ready for them.
+    fn asked(&self) -> Asked<'_> {
+        Asked::of(self.0.iter().map(|(_, _, found)| found))
     }
 
-    /// Their formulas over the signals of what is verified.
-    fn resolved(self, resolve: Resolve<'_>) -> Result<Asked, Answer> {
-        let mut asked = Asked::default();
+    /// Their formulas over the signals of what is verified; `wrong_assumption` says what keeps a property from being one.
+    fn resolved(
+        self,
+        resolve: Resolve<'_>,
+        wrong_assumption: &dyn Fn(&Property) -> Vec<Diagnostic>,
+    ) -> Result<ToProve, Answer> {
+        let mut asked = ToProve::default();
         let mut wrong = Vec::new();
         for (name, text, found) in self.0 {
             let mut diagnostics = found.diagnostics;
@@ -219,10 +237,13 @@ impl Texts {
             for condition in found.fair {
                 match resolve(&condition) {
                     Ok(formula) if formula.is_of_one_scan() => asked.fair.push(formula),
-                    Ok(_) => diagnostics.push(not_of_one_scan(0..text.len())),
+                    Ok(_) => {
+                        diagnostics.push(not_of_one_scan("a fairness condition", 0..text.len()));
+                    }
                     Err(unknown) => diagnostics.extend(unknown),
                 }
             }
+            diagnostics.extend(found.assumed.iter().flat_map(wrong_assumption));
             if has_errors(&diagnostics) {
                 diagnostics.sort_by_key(|found| found.span.start);
                 wrong.push(Report { name, text, diagnostics });
@@ -232,11 +253,11 @@ impl Texts {
     }
 }
 
-fn text_for_nusmv(form: Smv, program: &Program, subject: &Subject, asked: &Asked) -> String {
+fn text_for_nusmv(form: Smv, program: &Program, subject: &Subject, asked: &ToProve) -> String {
     let formulas: Vec<Resolved> =
         asked.properties.iter().map(|(_, formula)| formula.clone()).collect();
     match form {
-        Smv::Scan => smv::of_circuit(subject.circuit(), &formulas, &asked.fair),
+        Smv::Scan => smv::of_circuit(subject.circuit(), &subject.assuming(&formulas), &asked.fair),
         Smv::Rungs => smv::of_rungs(program),
     }
 }
@@ -246,7 +267,7 @@ fn proved(
     (ladder, period): (&Program, Duration),
     subject: &Subject,
     remarks: &Remarks,
-    asked: &Asked,
+    asked: &ToProve,
     patience: &Patience<'_>,
     bounds: Bounds<'_>,
 ) -> Result<Answer, Answer> {
@@ -262,7 +283,8 @@ fn proved(
         patience.turn_to(about(answered));
     });
     for ((property, formula), proof) in asked.properties.iter().zip(answers) {
-        program.properties.push(Finding::new(subject.circuit(), property, formula, proof));
+        let finding = Finding::new(subject.circuit(), property, formula, proof);
+        program.properties.push(finding.of_inputs(subject.is_of_inputs(property)));
     }
     let page = arguments.draw.as_deref();
     let page = page.map(|path| draw(path, period, ladder, subject, &program));
@@ -307,7 +329,8 @@ fn cluster(arguments: &Arguments, patience: &Patience<'_>) -> Result<Answer, Ans
         let period = cluster.agreement().schedule.period();
         match (controller.ladder(), controller.code.typed()) {
             (Some(ladder), _) => {
-                let subject = Subject::new(ladder, period, &[]).map_err(not_lowered)?;
+                let subject =
+                    Subject::new(ladder, period, &Asked::default()).map_err(not_lowered)?;
                 let remarks = subject.remarks(ladder, period, bounds).map_err(not_lowered)?;
                 programs.push(ProgramAnswer::of(&subject, bounds, &remarks));
             }

@@ -166,7 +166,10 @@ fn each_press_counts_once_while_every_member_is_killed() {
         })
         .collect();
     assert_eq!(counted, effects, "the program, and the answers");
-    assert!(effects.iter().all(|effects| *effects > 3), "{effects:?}");
+    // An answer that is lost with its remote I/O takes its writer 10 s; two presses were waited for after each return.
+    let waited = 2 * 2 * MEMBERS.len() as u32;
+    assert!(effects.iter().sum::<u32>() >= waited, "{effects:?}");
+    assert!(effects.iter().all(|effects| *effects > 0), "{effects:?}");
     let summary = fs::read_to_string(run.join("summary.json")).expect("a summary");
     let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
     assert_eq!(summary["violation_count"], 0, "{summary:#}");

@@ -1,6 +1,7 @@
 //! Proofs about programs before their allocation.
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -9,13 +10,13 @@ use understudy_ladder::from_circuit;
 use understudy_logic::Circuit;
 use understudy_logic::bdd::Diagrams;
 use understudy_parity::generate;
-use understudy_text::{Report, has_errors};
+use understudy_text::{Diagnostic, Report, has_errors};
 use understudy_verification::numbers::Model;
 use understudy_verification::program::{Bounds, Conclusion, Subject};
-use understudy_verification::property::{Properties, compared, not_of_one_scan, read};
+use understudy_verification::property::{self, Properties, Property, not_of_one_scan, read};
 use understudy_verification::prove_parity_while;
 
-use super::programs::{Group, Programs};
+use super::programs::{self, Group, Programs};
 use crate::answer::{Answer, Status};
 use crate::files;
 use crate::patience::Patience;
@@ -60,16 +61,7 @@ pub(super) fn members(
     let members = group.members.iter().enumerate().map(|(place, member)| {
         let name = group.name(&member.name);
         let properties = asked.get(&name).map_or(&[][..], Vec::as_slice);
-        let formulas = properties.iter().flat_map(|(_, found)| found.formulas());
-        let compared = compared(formulas);
-        let subject = match &member.typed {
-            None => Subject::new(&member.ladder, group.period, &compared)
-                .map_err(|error| error.to_string()),
-            Some(typed) => Model::of_program(typed, &compared)
-                .map_err(|error| error.to_string())
-                .and_then(|model| model.exact().map_err(|error| error.to_string())),
-        };
-        let subject = subject.map_err(|error| Answer::failed(Status::BadInput, "U0436", error))?;
+        let subject = subject(member, group.period, properties)?;
         patience.turn_to(format!("`{name}`"));
         let remote_io = match &group.cluster {
             Some(cluster) => group.name(&cluster.remote_ios()[place].name),
@@ -83,6 +75,37 @@ pub(super) fn members(
         })
     });
     members.collect()
+}
+
+/// A program ready for its properties.
+fn subject(
+    member: &programs::Member,
+    period: Duration,
+    properties: &[(Report, Properties)],
+) -> Result<Subject, Answer> {
+    let failed = |error: &dyn Display| Answer::failed(Status::BadInput, "U0436", error);
+    let asked = property::Asked::of(properties.iter().map(|(_, found)| found));
+    let right = |wrong: &dyn Fn(&Property) -> Vec<Diagnostic>| {
+        for (report, found) in properties {
+            let wrong: Vec<Diagnostic> = found.assumed.iter().flat_map(wrong).collect();
+            if !wrong.is_empty() {
+                return Err(Answer::bad_files(vec![Report {
+                    diagnostics: wrong,
+                    ..report.clone()
+                }]));
+            }
+        }
+        Ok(())
+    };
+    let Some(typed) = &member.typed else {
+        let subject =
+            Subject::new(&member.ladder, period, &asked).map_err(|error| failed(&error))?;
+        right(&|assumed| subject.wrong_assumption(assumed))?;
+        return Ok(subject);
+    };
+    let model = Model::of_program(typed, &asked).map_err(|error| failed(&error))?;
+    right(&|assumed| model.wrong_assumption(assumed))?;
+    model.exact().map_err(|error| failed(&error))
 }
 
 fn verification(
@@ -108,7 +131,7 @@ fn verification(
             let start = report.text.find(&properties.fair[place].text).unwrap_or(0);
             let mut report = report.clone();
             let span = start..start + properties.fair[place].text.len();
-            report.diagnostics = vec![not_of_one_scan(span)];
+            report.diagnostics = vec![not_of_one_scan("a fairness condition", span)];
             return Err(Answer::bad_files(vec![report]));
         }
         let answers = subject.check(&formulas?, fair, bounds, &mut |_, _| {});

@@ -10,6 +10,7 @@ use understudy_ladder::Program;
 use understudy_text::{Diagnostic, Report};
 use understudy_typed::Elementary;
 use understudy_verification::program::{Bounds, Subject};
+use understudy_verification::property::Asked;
 use understudy_verification::{Refutation, Work, prove_parity_while};
 
 use crate::files;
@@ -75,7 +76,7 @@ impl Looking {
         }
         let bounds = Bounds { states: STATES, go_on: &go_on, ..Bounds::default() };
         // A check without a period ignores programs that cannot be lowered with the default one.
-        let remarks = Subject::new(program, period, &[])
+        let remarks = Subject::new(program, period, &Asked::default())
             .and_then(|subject| subject.remarks(program, period, bounds));
         let Ok(remarks) = remarks else {
             return false;

@@ -105,7 +105,7 @@ pub(crate) struct Finding {
     formula: String,
     /// `holds`, `fails` or `undecided`.
     verdict: &'static str,
-    /// Reason why it is undecided.
+    /// Reason why it is undecided, or why no program can keep it.
     message: Option<String>,
     /// Counterexample or witness.
     scans: Option<Scans>,
@@ -322,6 +322,15 @@ impl Finding {
             NumbersProof::Undecided(reason) => ("undecided", None, Some(reason)),
         };
         Self::told(circuit, property, formula, verdict, message, scans)
+    }
+
+    /// Says of a property that fails that it speaks of inputs alone, where it does.
+    pub(super) fn of_inputs(mut self, is_of_inputs: bool) -> Self {
+        if is_of_inputs && self.verdict == "fails" {
+            let reason = "it speaks of inputs alone, and no program keeps it; --assume states what the field keeps";
+            self.message = Some(reason.to_owned());
+        }
+        self
     }
 
     fn told(

@@ -8,12 +8,12 @@ use understudy_cluster::{Cluster, InputSourceKind, RemoteIo};
 use understudy_typed::{Elementary, Point, Program};
 use understudy_verification::numbers::Model;
 use understudy_verification::program::{Bounds, OutputFinding};
-use understudy_verification::property::{Property, read_one};
+use understudy_verification::property::{Asked, Property, read_one};
 use understudy_verification::smv;
 use understudy_verification::symbolic::{Resolved, Signal};
 
 use super::answer::{self, Finding, ProgramAnswer};
-use super::{Arguments, Asked, Smv, Texts, bounds, used};
+use super::{Arguments, Smv, Texts, ToProve, bounds, used};
 use crate::answer::{Answer, Status};
 use crate::files::{self, ProgramFile};
 use crate::patience::Patience;
@@ -35,9 +35,9 @@ pub(super) fn of_program(
     }
     patience.turn_to("the statements of the program".to_owned());
     let texts = Texts::read(arguments, period)?;
-    let model =
-        Model::of_program(program, &texts.compared()).map_err(|error| unsupported(&error))?;
-    let mut asked = match texts.resolved(&|property| model.resolve(property)) {
+    let model = Model::of_program(program, &texts.asked()).map_err(|error| unsupported(&error))?;
+    let wrong = |assumed: &Property| model.wrong_assumption(assumed);
+    let mut asked = match texts.resolved(&|property| model.resolve(property), &wrong) {
         Ok(asked) => asked,
         Err(mut answer) => {
             answer.reports.splice(0..0, file.reports());
@@ -51,7 +51,7 @@ pub(super) fn of_program(
         })?;
         let formulas: Vec<Resolved> =
             asked.properties.iter().map(|(_, formula)| formula.clone()).collect();
-        let text = smv::of_circuit(circuit, &formulas, &asked.fair);
+        let text = smv::of_circuit(circuit, &model.assuming(&formulas), &asked.fair);
         let output = arguments.output.as_deref();
         let answer = files::deliver(output, &text, json!({ "text": text }))?;
         return Ok(answer.with_used(file.reports()));
@@ -72,7 +72,8 @@ pub(super) fn of_program(
 
 /// Proves the standard properties of a program of a cluster.
 pub(super) fn standard(program: &Program, bounds: Bounds<'_>) -> Result<ProgramAnswer, Answer> {
-    let model = Model::of_program(program, &[]).map_err(|error| unsupported(&error))?;
+    let model =
+        Model::of_program(program, &Asked::default()).map_err(|error| unsupported(&error))?;
     let mut proved = ProgramAnswer::of_numbers(&program.name, &model);
     let switches = switches(&model, program, bounds);
     proved.switched(model.circuit(), &switches);
@@ -96,9 +97,10 @@ pub(super) fn of_cluster(
     patience.turn_to("the programs together".to_owned());
     let members = members(cluster);
     let texts = Texts::read(arguments, cluster.agreement().schedule.period())?;
-    let model = Model::of_cluster(cluster.name(), &members, &texts.compared())
+    let model = Model::of_cluster(cluster.name(), &members, &texts.asked())
         .map_err(|error| unsupported(&error))?;
-    let asked = texts.resolved(&|property| model.resolve(property))?;
+    let wrong = |assumed: &Property| model.wrong_assumption(assumed);
+    let asked = texts.resolved(&|property| model.resolve(property), &wrong)?;
     let name = "all programs together";
     Ok(prove(&model, name, asked, bounds, patience))
 }
@@ -106,7 +108,7 @@ pub(super) fn of_cluster(
 fn prove(
     model: &Model,
     name: &str,
-    asked: Asked,
+    asked: ToProve,
     bounds: Bounds<'_>,
     patience: &Patience<'_>,
 ) -> ProgramAnswer {
@@ -123,7 +125,7 @@ fn prove(
     });
     for ((property, formula), proof) in properties.iter().zip(&formulas).zip(answers) {
         let finding = Finding::of_numbers(model.circuit(), property, formula, proof);
-        proved.properties.push(finding);
+        proved.properties.push(finding.of_inputs(model.is_of_inputs(property)));
     }
     proved
 }

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 use understudy_ladder::parse;
 use understudy_verification::program::{Answer, Bounds, Subject};
-use understudy_verification::property::read;
+use understudy_verification::property::{Asked, read};
 use understudy_verification::smv;
 
 /// Stations, and the seconds that NuSMV 2.6 took with dynamic ordering.
@@ -65,7 +65,8 @@ fn painting() {
     let properties = include_str!("../../../examples/painting-system/painting-system.properties");
     let program = parse(ladder).program;
     let begin = Instant::now();
-    let subject = Subject::new(&program, Duration::from_millis(10), &[]).expect("a right program");
+    let subject = Subject::new(&program, Duration::from_millis(10), &Asked::default())
+        .expect("a right program");
     let found = read(properties, Duration::from_millis(10));
     let formulas = found.properties.iter();
     let formulas: Vec<_> =
@@ -85,8 +86,8 @@ fn main() {
     println!("stations  state bits  properties  proved       time   NuSMV 2.6");
     for (stations, peer_seconds) in LINES {
         let program = parse(&line(stations)).program;
-        let subject =
-            Subject::new(&program, Duration::from_millis(10), &[]).expect("a right program");
+        let subject = Subject::new(&program, Duration::from_millis(10), &Asked::default())
+            .expect("a right program");
         let found = read(&properties(stations), Duration::from_millis(10));
         let formulas = found.properties.iter();
         let formulas: Vec<_> =

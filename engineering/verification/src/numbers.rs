@@ -21,7 +21,7 @@ use understudy_text::Diagnostic;
 use understudy_typed::Program;
 
 use crate::program::{Answer as CircuitAnswer, Bounds, OutputFinding, Subject};
-use crate::property::{Formula, Named, Path, Property};
+use crate::property::{Asked, Formula, Named, Path, Property};
 use crate::symbolic::{Cone, Resolved, Signal, Trace, resolve};
 use compared::Refused;
 use replay::Replay;
@@ -57,17 +57,18 @@ pub struct Model {
 
 impl Model {
     /// One program, whose inputs are within their subranges. Its properties name its BOOL points and variables, and the comparisons of
-    /// numbers that are `compared`.
+    /// numbers that are `asked`. An assumption that is [refused](Self::wrong_assumption) is left out.
     ///
     /// # Errors
     /// What of the program cannot be followed.
-    pub fn of_program(program: &Program, compared: &[&Named]) -> Result<Self, Unsupported> {
-        let system = System::within_subranges(program, compared::names(compared))?;
+    pub fn of_program(program: &Program, asked: &Asked<'_>) -> Result<Self, Unsupported> {
+        let names = compared::names(&asked.compared);
+        let system = System::within_subranges(program, names)?;
         let own = program.outputs.iter().filter(|point| point.name != Program::FAULT);
         let own: HashSet<&str> = own.map(|point| point.name.as_str()).collect();
         let outputs = system.observed.iter().take_while(|(name, _)| own.contains(name.as_str()));
         let outputs = outputs.count();
-        Self::of(system, outputs, compared)
+        Self::of(system, outputs, asked)
     }
 
     /// All programs of a cluster; their signals stand behind the names of their controllers and a dot.
@@ -77,17 +78,18 @@ impl Model {
     pub fn of_cluster(
         name: &str,
         members: &[Member<'_>],
-        compared: &[&Named],
+        asked: &Asked<'_>,
     ) -> Result<Self, Unsupported> {
-        let system = System::of_cluster(name, members, compared::names(compared))?;
-        Self::of(system, 0, compared)
+        let names = compared::names(&asked.compared);
+        Self::of(System::of_cluster(name, members, names)?, 0, asked)
     }
 
     /// The first BOOLs that can be named are the outputs of a program.
-    fn of(mut system: System, outputs: usize, compared: &[&Named]) -> Result<Self, Unsupported> {
-        let refused = compared::add(&mut system, compared);
+    fn of(mut system: System, outputs: usize, asked: &Asked<'_>) -> Result<Self, Unsupported> {
+        let refused = compared::add(&mut system, &asked.compared);
+        let assumed = compared::assume(&mut system, &asked.assumed);
         let derivation = Derivation::new(&system)?;
-        let subject = Subject::of(derivation.circuit.clone(), outputs);
+        let subject = Subject::of(derivation.circuit.clone(), outputs).with_assumed(assumed);
         Ok(Self { system, derivation, subject, refused })
     }
 
@@ -143,7 +145,26 @@ impl Model {
         })
     }
 
-    /// Decides `properties`; `fair` restricts the runs considered. Each property is reported when it is decided.
+    /// What `properties` say of the runs in which the assumptions hold, as formulas about all runs of the circuit.
+    pub fn assuming(&self, properties: &[Resolved]) -> Vec<Resolved> {
+        self.subject.assuming(properties)
+    }
+
+    /// Whether a property speaks of inputs alone: each takes every value, whatever the programs do.
+    pub fn is_of_inputs(&self, property: &Property) -> bool {
+        let names = property.formula.signals();
+        !names.is_empty() && names.iter().all(|named| compared::is_of_inputs(&self.system, named))
+    }
+
+    /// What keeps a property from being an assumption: it is about inputs in one scan (U0434, U0435).
+    pub fn wrong_assumption(&self, assumed: &Property) -> Vec<Diagnostic> {
+        match self.resolve(assumed) {
+            Ok(_) => compared::wrong_assumption(&self.system, assumed),
+            Err(unknown) => unknown,
+        }
+    }
+
+    /// Decides `properties`; `fair` and the assumptions restrict the runs considered. Each property is reported when it is decided.
     pub fn check(
         &self,
         properties: &[Resolved],
@@ -151,7 +172,9 @@ impl Model {
         bounds: Bounds<'_>,
         answered: &mut dyn FnMut(),
     ) -> Vec<Answer> {
-        let answers = self.subject.check(properties, fair.to_vec(), bounds, &mut |_, _| answered());
+        let properties = self.subject.assuming(properties);
+        let (properties, answered) = (&properties, &mut |_: usize, _: &_| answered());
+        let answers = self.subject.check_assuming(properties, fair.to_vec(), bounds, answered);
         let pairs = properties.iter().zip(answers);
         pairs.map(|(property, answer)| self.concrete(property, fair, answer, bounds)).collect()
     }

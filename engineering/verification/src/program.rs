@@ -18,9 +18,10 @@ use understudy_logic::bdd::Diagrams;
 use understudy_text::Diagnostic;
 use understudy_text::spelling::suggestion;
 
+use crate::assumed::{assuming, with_assumptions};
 use crate::effort::{ALWAYS, GoOn};
 use crate::explicit::Explicit;
-use crate::property::{Named, Property};
+use crate::property::{Asked, Formula, Named, Path, Property};
 use crate::symbolic::{Resolved, Signal, Trace, resolve};
 
 pub use conclusion::Conclusion;
@@ -78,33 +79,45 @@ pub enum Answer {
 pub struct Subject {
     circuit: Circuit,
     outputs: usize,
+    /// Whether the assumptions have held so far.
+    assumed: Option<Signal>,
     /// All reachable states, computed on first use.
     listed: OnceCell<Explicit>,
 }
 
 impl Subject {
     /// `program`, one scan a `period`; memory bits and pins of blocks (`pause.Q`) can be named in properties too, and the comparisons of counts
-    /// (`parts.CV >= 3`) that are `compared`.
+    /// (`parts.CV >= 3`) that are `asked`. An assumption that is [refused](Self::wrong_assumption) is left out.
     ///
     /// # Errors
     /// The program has errors, or the period is out of bounds.
-    pub fn new(
-        program: &Program,
-        period: Duration,
-        compared: &[&Named],
-    ) -> Result<Self, LowerError> {
-        let counted = compared.iter().filter_map(|named| counted(program, named));
+    pub fn new(program: &Program, period: Duration, asked: &Asked<'_>) -> Result<Self, LowerError> {
+        let counted = asked.compared.iter().filter_map(|named| counted(program, named));
         let counted: BTreeMap<String, Comparison> = counted.collect();
-        Ok(Self {
-            circuit: program.lower_comparing(period, &counted)?,
-            outputs: program.outputs.len(),
-            listed: OnceCell::new(),
-        })
+        let circuit = program.lower_comparing(period, &counted)?;
+        let mut subject = Self::of(circuit, program.outputs.len());
+        let right = asked.assumed.iter().filter(|it| subject.wrong_assumption(it).is_empty());
+        let assumed: Vec<Resolved> = right.filter_map(|it| subject.resolve(it).ok()).collect();
+        if !assumed.is_empty() {
+            subject.circuit = with_assumptions(&subject.circuit, &assumed);
+            subject.assumed = Some(Signal::Output(subject.circuit.outputs().len() - 1));
+        }
+        Ok(subject)
     }
 
     /// A circuit as it is, of which the first outputs are the program's own.
     pub(crate) fn of(circuit: Circuit, outputs: usize) -> Self {
-        Self { outputs, circuit, listed: OnceCell::new() }
+        Self { outputs, circuit, assumed: None, listed: OnceCell::new() }
+    }
+
+    /// The same where an output of the circuit says whether the assumptions have held so far.
+    pub(crate) fn with_assumed(self, assumed: Option<Signal>) -> Self {
+        Self { assumed, ..self }
+    }
+
+    /// What keeps a property from being an assumption: it is about inputs in one scan (U0434, U0435).
+    pub fn wrong_assumption(&self, assumed: &Property) -> Vec<Diagnostic> {
+        assumed.wrong_assumption(&|named| self.is_input(named))
     }
 
     /// What is proved about: the program's outputs come first, then its memory and pins.
@@ -141,7 +154,19 @@ impl Subject {
         Diagnostic::error("U0435", message, named.span.clone()).with_help(help)
     }
 
-    /// Decides `properties`; `fair` restricts the runs considered. Each result is reported immediately.
+    /// Whether a property speaks of inputs alone: each takes every value, whatever the program does.
+    pub fn is_of_inputs(&self, property: &Property) -> bool {
+        let names = property.formula.signals();
+        !names.is_empty() && names.iter().all(|named| self.is_input(named))
+    }
+
+    fn is_input(&self, named: &Named) -> bool {
+        let is = |name: &String| *name == named.name;
+        let written = self.circuit.outputs().iter().any(|output| is(&output.name));
+        named.compared.is_none() && !written && self.circuit.inputs().iter().any(is)
+    }
+
+    /// Decides `properties`; `fair` and the assumptions restrict the runs considered. Each result is reported immediately.
     pub fn check(
         &self,
         properties: &[Resolved],
@@ -149,6 +174,51 @@ impl Subject {
         bounds: Bounds<'_>,
         answered: &mut dyn FnMut(usize, &Answer),
     ) -> Vec<Answer> {
-        Stages::new(self, properties, fair, bounds, answered).run()
+        self.check_assuming(&self.assuming(properties), fair, bounds, answered)
+    }
+
+    /// What `properties` say of the runs in which the assumptions hold, as formulas about all runs.
+    pub fn assuming(&self, properties: &[Resolved]) -> Vec<Resolved> {
+        match self.assumed {
+            Some(ok) => properties.iter().map(|property| assuming(property, ok)).collect(),
+            None => properties.to_vec(),
+        }
+    }
+
+    /// As [`Self::check`], for properties of [`Self::assuming`].
+    pub(crate) fn check_assuming(
+        &self,
+        properties: &[Resolved],
+        fair: Vec<Resolved>,
+        bounds: Bounds<'_>,
+        answered: &mut dyn FnMut(usize, &Answer),
+    ) -> Vec<Answer> {
+        if let Some(ok) = self.assumed {
+            let never = [Formula::Signal(ok).negated().always()];
+            let excluded = Stages::new(self, &never, Vec::new(), bounds, &mut |_, _| {}).run();
+            if let [Answer::Holds(_)] = excluded.as_slice() {
+                let nothing = Undecided { why: None, unbroken: None, listed: None };
+                return vec![Answer::Undecided(nothing); properties.len()];
+            }
+        }
+        let answers = Stages::new(self, properties, fair, bounds, answered).run();
+        let shown = answers.into_iter().zip(properties).map(|(answer, property)| match answer {
+            Answer::Holds(_) if self.assumed.is_some() => {
+                Answer::Holds(self.reached(property, bounds))
+            }
+            answer => answer,
+        });
+        shown.collect()
+    }
+
+    /// A run to what can be reached while the assumptions hold.
+    fn reached(&self, property: &Resolved, bounds: Bounds<'_>) -> Option<Trace> {
+        let Formula::Implies(_, within) = property else { return None };
+        let Formula::Eventually(Path::Some, end) = within.as_ref() else { return None };
+        let never = [end.as_ref().clone().negated().always()];
+        match Stages::new(self, &never, Vec::new(), bounds, &mut |_, _| {}).run().pop()? {
+            Answer::Fails(trace) => trace,
+            Answer::Holds(_) | Answer::Undecided(_) => None,
+        }
     }
 }

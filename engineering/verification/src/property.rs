@@ -5,6 +5,7 @@
 //! ```text
 //! # the press
 //! fair: part_on_press                       in every run this comes again and again
+//! assume: level <= 4095                     in every scan this holds of the inputs
 //! exclusion: never ram_down and ram_up
 //! AG (start -> AF done)
 //! start is followed by done within 5 scans
@@ -17,6 +18,7 @@ mod sentence;
 use std::fmt;
 use std::ops::Range;
 
+use understudy_text::Diagnostic;
 use understudy_typed::Comparison;
 
 pub use parse::{Properties, not_of_one_scan, read, read_one};
@@ -235,10 +237,48 @@ impl fmt::Display for Named {
     }
 }
 
-/// The comparisons of numbers in formulas.
-pub fn compared<'f>(formulas: impl IntoIterator<Item = &'f Formula<Named>>) -> Vec<&'f Named> {
-    let named = formulas.into_iter().flat_map(Formula::signals);
-    named.filter(|named| named.compared.is_some()).collect()
+/// What properties and assumptions ask of a program, besides the signals that it has: known before it is made ready for questions.
+#[derive(Debug, Clone, Default)]
+pub struct Asked<'a> {
+    /// Comparisons of numbers.
+    pub(crate) compared: Vec<&'a Named>,
+    /// What is assumed of the inputs in every scan.
+    pub(crate) assumed: Vec<&'a Property>,
+}
+
+impl<'a> Asked<'a> {
+    /// What is asked by what was read.
+    pub fn of(read: impl IntoIterator<Item = &'a Properties>) -> Self {
+        let mut asked = Self::default();
+        for found in read {
+            let all = found.properties.iter().chain(&found.fair).chain(&found.assumed);
+            let named = all.flat_map(|property| property.formula.signals());
+            asked.compared.extend(named.filter(|named| named.compared.is_some()));
+            asked.assumed.extend(&found.assumed);
+        }
+        asked
+    }
+}
+
+impl Property {
+    /// What keeps it from being an assumption about inputs, in one scan.
+    pub(crate) fn wrong_assumption(&self, is_input: &dyn Fn(&Named) -> bool) -> Vec<Diagnostic> {
+        let names = self.formula.signals().into_iter().filter(|named| !is_input(named));
+        let mut wrong: Vec<Diagnostic> = names
+            .map(|named| {
+                let message = format!("`{named}` is not about inputs alone, and is assumed");
+                Diagnostic::error("U0435", message, named.span.clone()).with_help(
+                    "an assumption is about what the field does; what a program does is proved",
+                )
+            })
+            .collect();
+        let names = self.formula.signals().into_iter();
+        let place = names.map(|named| named.span.clone()).reduce(|all, next| all.start..next.end);
+        if !self.formula.is_of_one_scan() {
+            wrong.push(not_of_one_scan("an assumption", place.unwrap_or_default()));
+        }
+        wrong
+    }
 }
 
 /// One property.

@@ -199,6 +199,14 @@ impl System {
         }
     }
 
+    /// Adds to the BOOLs that properties can name whether `holds` has been TRUE in every scan so far.
+    pub fn keep_holding(&mut self, name: &str, holds: Term) {
+        let cell = self.cell(name.to_owned(), Elementary::Bool, 1) as usize;
+        let so_far = self.terms.and(self.cells[cell].term, holds);
+        self.cells[cell].next = so_far;
+        self.observed.push((name.to_owned(), so_far));
+    }
+
     fn name_of(&self, variable: Variable) -> String {
         match variable {
             Variable::Input(number) => self.inputs[number as usize].name.clone(),

@@ -129,7 +129,8 @@ impl Terms {
         self.intern(of, Node::Constant(stored & of.mask()))
     }
 
-    pub(crate) fn boolean(&mut self, value: bool) -> Term {
+    /// A constant BOOL.
+    pub fn boolean(&mut self, value: bool) -> Term {
         self.constant(Elementary::Bool, u64::from(value))
     }
 
@@ -148,16 +149,19 @@ impl Terms {
         self.value(term) == Some(u64::from(value))
     }
 
-    pub(crate) fn not(&mut self, term: Term) -> Term {
+    /// The negation of a BOOL.
+    pub fn not(&mut self, term: Term) -> Term {
         self.apply(Operation::Not(Elementary::Bool), Elementary::Bool, &[term])
     }
 
-    pub(crate) fn and(&mut self, left: Term, right: Term) -> Term {
+    /// Whether both BOOLs are TRUE.
+    pub fn and(&mut self, left: Term, right: Term) -> Term {
         let and = Operation::And(Elementary::Bool);
         self.apply(and, Elementary::Bool, &[left, right])
     }
 
-    pub(crate) fn or(&mut self, left: Term, right: Term) -> Term {
+    /// Whether one of two BOOLs is TRUE.
+    pub fn or(&mut self, left: Term, right: Term) -> Term {
         let or = Operation::Or(Elementary::Bool);
         self.apply(or, Elementary::Bool, &[left, right])
     }
@@ -306,7 +310,7 @@ impl Terms {
     }
 
     /// `then` where `condition` is TRUE, else `otherwise`.
-    pub(crate) fn choose(&mut self, condition: Term, then: Term, otherwise: Term) -> Term {
+    pub fn choose(&mut self, condition: Term, then: Term, otherwise: Term) -> Term {
         match self.value(condition) {
             Some(0) => return otherwise,
             Some(_) => return then,

@@ -125,7 +125,7 @@ fn compare_with(program: &Program, system: &System, seed: u64, scans: usize) -> 
     faulted
 }
 
-const PROGRAMS: [&str; 8] = [
+const PROGRAMS: [&str; 9] = [
     // Inputs with subranges, of all widths and signs; one is compared with what it never is.
     "PROGRAM p
        VAR_INPUT a : INT (10..100); b : SINT (-7..-2); c : LINT (-5..5000000000); d : USINT (3..3); e : WORD; END_VAR
@@ -217,6 +217,21 @@ const PROGRAMS: [&str; 8] = [
        r := SEL(s > 3, a, r);
        y5 := r > 10.0;
        m := MUX(s MOD 3, s, 7, s * 2) + LIMIT(2, s, 9);
+     END_PROGRAM",
+    // The least, the greatest and the amount of reals, NaN at each place.
+    "PROGRAM p
+       VAR_INPUT a : REAL; b : REAL; go : BOOL; END_VAR
+       VAR_OUTPUT y1 : BOOL; y2 : BOOL; y3 : BOOL; y4 : BOOL; y5 : BOOL; y6 : BOOL; m : REAL; END_VAR
+       VAR root : REAL; kept : LREAL; END_VAR
+       root := SQRT(a);
+       y1 := MIN(root, b) > 2.0 OR MAX(root, b) <= -1.5;
+       y2 := MIN(b, root, 7.0) = 2.0 OR MAX(b, root, -3.0) < 50.0;
+       y3 := LIMIT(-4.25, root, 50.0) >= 3.0;
+       y4 := ABS(a) <= 3.0 XOR ABS(b) > 4.25;
+       y5 := ABS(root) < 2.0 OR MIN(ABS(b), root) <> MAX(a, b);
+       IF go THEN kept := MAX(LREAL#0.0, REAL_TO_LREAL(root)); END_IF;
+       y6 := kept > 1.5 AND MIN(kept, LREAL#9.0) <= 2.0;
+       m := LIMIT(0.0, 2.0 * (60.0 - b), 40.0);
      END_PROGRAM",
     // A chart of steps in a number, an enumeration.
     include_str!("tests/chart.st"),

@@ -8,7 +8,9 @@ use understudy_text::Diagnostic;
 use understudy_text::spelling::suggestion;
 use understudy_typed::Elementary;
 
-use crate::property::{Compared, Named};
+use crate::assumed::SO_FAR;
+use crate::property::{Compared, Formula, Named, Property};
+use crate::symbolic::Signal;
 
 /// Comparisons that are none, by what is written of them: why, and what is written instead.
 pub(super) type Refused = HashMap<String, (String, String)>;
@@ -97,5 +99,71 @@ fn value(of: Elementary, values: &[(String, i64)], text: &str) -> Result<u64, St
             let names: Vec<&str> = values.iter().take(8).map(|(name, _)| name.as_str()).collect();
             format!("its values are {}", names.join(", "))
         }
+    })
+}
+
+/// Adds whether all assumptions have held so far to the BOOLs of a system; nothing where there are none. What is no assumption is left out.
+pub(super) fn assume(system: &mut System, assumed: &[&Property]) -> Option<Signal> {
+    let mut all = None;
+    for property in assumed {
+        if wrong_assumption(system, property).is_empty()
+            && let Some(holds) = term(system, &property.formula)
+        {
+            all = Some(match all {
+                Some(all) => system.terms.and(all, holds),
+                None => holds,
+            });
+        }
+    }
+    system.keep_holding(SO_FAR, all?);
+    Some(Signal::Output(system.observed.len() - 1))
+}
+
+/// What keeps a property from being an assumption.
+pub(super) fn wrong_assumption(system: &System, assumed: &Property) -> Vec<Diagnostic> {
+    assumed.wrong_assumption(&|named| is_of_inputs(system, named))
+}
+
+/// Whether what is named is an input, or compares inputs alone.
+pub(super) fn is_of_inputs(system: &System, named: &Named) -> bool {
+    let is_input = |name: &str| system.inputs.iter().any(|input| input.name == name);
+    let with = named.compared.as_ref().map(|compared| compared.with.as_str());
+    let other = with.filter(|with| system.number(with).is_some());
+    is_input(&named.name) && other.is_none_or(is_input)
+}
+
+/// A formula of one scan over inputs.
+fn term(system: &mut System, formula: &Formula<Named>) -> Option<Term> {
+    Some(match formula {
+        Formula::Constant(value) => system.terms.boolean(*value),
+        Formula::Signal(named) => {
+            let name = named.to_string();
+            let observed = system.observed.iter().find(|(known, _)| *known == name);
+            let input = || system.inputs.iter().find(|input| input.name == name);
+            observed.map(|(_, term)| *term).or_else(|| Some(input()?.term))?
+        }
+        Formula::Not(inner) => {
+            let inner = term(system, inner)?;
+            system.terms.not(inner)
+        }
+        Formula::And(left, right) => {
+            let (left, right) = (term(system, left)?, term(system, right)?);
+            system.terms.and(left, right)
+        }
+        Formula::Or(left, right) => {
+            let (left, right) = (term(system, left)?, term(system, right)?);
+            system.terms.or(left, right)
+        }
+        Formula::Implies(left, right) => {
+            let (left, right) = (term(system, left)?, term(system, right)?);
+            let not = system.terms.not(left);
+            system.terms.or(not, right)
+        }
+        Formula::Same(left, right) => {
+            let (left, right) = (term(system, left)?, term(system, right)?);
+            let not = system.terms.not(right);
+            system.terms.choose(left, right, not)
+        }
+        _ => return None,
     })
 }

@@ -7,7 +7,7 @@ use understudy_structured_text::{Options, lower};
 use understudy_typed::Program;
 
 use super::{Answer, Bounds, Member, Model};
-use crate::property::read_one;
+use crate::property::{Asked, read_one};
 
 /// From one scan to the next.
 const PERIOD: Duration = Duration::from_millis(10);
@@ -34,12 +34,12 @@ fn ask(model: &Model, property: &str) -> Answer {
 
 #[test]
 fn what_holds_for_all_numbers_is_proved() {
-    let model = Model::of_program(&lowered(CHART), &[]).expect("followed");
+    let model = Model::of_program(&lowered(CHART), &Asked::default()).expect("followed");
     assert_eq!(ask(&model, "never pump and program.fault"), Answer::Holds(None));
     assert!(matches!(ask(&model, "never done"), Answer::Fails(Some(_))));
     // Enumerations and step numbers are followed bit by bit, so that what can happen is known as well.
     assert!(matches!(ask(&model, "AG EF pump"), Answer::Holds(_)));
-    let model = Model::of_program(&lowered(BLOCKS), &[]).expect("followed");
+    let model = Model::of_program(&lowered(BLOCKS), &Asked::default()).expect("followed");
     assert_eq!(ask(&model, "AG (alarm -> AX (alarm | !alarm))"), Answer::Holds(None));
 }
 
@@ -55,7 +55,7 @@ fn the_order_of_comparisons_is_kept() {
            higher := t > 90.0;
          END_PROGRAM",
     );
-    let model = Model::of_program(&program, &[]).expect("followed");
+    let model = Model::of_program(&program, &Asked::default()).expect("followed");
     assert_eq!(ask(&model, "never higher and not high"), Answer::Holds(None));
     let Answer::Fails(Some(run)) = ask(&model, "never high and not higher") else {
         panic!("it fails");
@@ -78,7 +78,7 @@ fn what_no_number_does_is_undecided_with_the_comparison() {
            odd := a * a < 0.0;
          END_PROGRAM",
     );
-    let model = Model::of_program(&program, &[]).expect("followed");
+    let model = Model::of_program(&program, &Asked::default()).expect("followed");
     let Answer::Undecided(reason) = ask(&model, "never odd") else {
         panic!("no square is negative");
     };
@@ -97,13 +97,14 @@ fn inputs_keep_their_subranges() {
            high := x > 100;
          END_PROGRAM",
     );
-    let alone = Model::of_program(&program, &[]).expect("followed");
+    let alone = Model::of_program(&program, &Asked::default()).expect("followed");
     let member = |source| Member {
         name: "p".to_owned(),
         code: Code::Typed(&program),
         sources: vec![source],
     };
-    let of_cluster = |source| Model::of_cluster("cell", &[member(source)], &[]).expect("followed");
+    let of_cluster =
+        |source| Model::of_cluster("cell", &[member(source)], &Asked::default()).expect("followed");
     let x = program.inputs.find("x").expect("an input");
     // Whatever the source is: a scan makes values of the subrange of all others.
     let models = [
@@ -117,7 +118,7 @@ fn inputs_keep_their_subranges() {
         assert_eq!(never("high"), Answer::Holds(None));
         assert!(matches!(never("at_end"), Answer::Fails(Some(_))), "it is the greatest value");
     }
-    let model = Model::of_program(&program, &[]).expect("followed");
+    let model = Model::of_program(&program, &Asked::default()).expect("followed");
     for property in ["never at_end", "always at_end"] {
         let Answer::Fails(Some(run)) = ask(&model, property) else {
             panic!("{property} fails");
@@ -160,7 +161,7 @@ fn two_programs_keep_what_each_alone_does_not() {
                 sources: vec![Source::Any(None), signal(0, "grant", 0)],
             },
         ];
-        let model = Model::of_cluster("cell", &members, &[]).expect("followed");
+        let model = Model::of_cluster("cell", &members, &Asked::default()).expect("followed");
         ask(&model, "never left.inside and right.inside")
     };
     let careful = "PROGRAM right
@@ -198,7 +199,7 @@ fn a_run_that_breaks_an_invariant_soon_is_searched_first() {
            PROGRAM one WITH a : fast; PROGRAM two WITH b : mid; PROGRAM three WITH d : slow;
          END_RESOURCE END_CONFIGURATION",
     );
-    let model = Model::of_program(&program, &[]).expect("followed");
+    let model = Model::of_program(&program, &Asked::default()).expect("followed");
     let bounds = Bounds { nodes: 1_000, states: 10, scans: 1, ..Bounds::default() };
     let property = read_one("never one.f and two.g and three.h", PERIOD).expect("a property");
     let resolved = model.resolve(&property).expect("known names");

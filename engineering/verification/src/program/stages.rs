@@ -38,8 +38,8 @@ const FEW_STEPS: u64 = 200_000;
 /// Why a property was not decided, and what was proved of it all the same.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Undecided {
-    /// What was in the way of decision diagrams.
-    pub why: Stopped,
+    /// What was in the way of decision diagrams; nothing where no run keeps the assumptions.
+    pub why: Option<Stopped>,
     /// No run of up to this number of scans violates it.
     pub unbroken: Option<u32>,
     /// None of this number of states nearest to the start violates it.
@@ -48,7 +48,10 @@ pub struct Undecided {
 
 impl fmt::Display for Undecided {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(formatter, "{}", self.why)?;
+        match &self.why {
+            Some(why) => write!(formatter, "{why}")?,
+            None => write!(formatter, "the assumptions contradict each other: no run keeps them")?,
+        }
         match self.unbroken {
             Some(1) => write!(formatter, "; the first scan does not break it")?,
             Some(scans) => write!(formatter, "; no run of up to {scans} scans breaks it")?,
@@ -82,7 +85,7 @@ impl<'s, 'b> Stages<'s, 'b> {
         answered: &'s mut dyn FnMut(usize, &Answer),
     ) -> Self {
         let nothing = Undecided {
-            why: Stopped::Diagrams(BddError::TooManyNodes { limit: bounds.nodes }),
+            why: Some(Stopped::Diagrams(BddError::TooManyNodes { limit: bounds.nodes })),
             unbroken: None,
             listed: None,
         };
@@ -145,12 +148,12 @@ impl<'s, 'b> Stages<'s, 'b> {
                 Ok(Verdict::Holds(trace)) => self.answer(place, Answer::Holds(trace)),
                 Ok(Verdict::Fails(trace)) => self.answer(place, Answer::Fails(trace)),
                 Err(Stopped::Time) => {
-                    self.so_far[place].why = Stopped::Time;
+                    self.so_far[place].why = Some(Stopped::Time);
                     self.over = true;
                     return;
                 }
                 Err(stopped) => {
-                    self.so_far[place].why = stopped;
+                    self.so_far[place].why = Some(stopped);
                     failures += 1;
                     if failures >= REFUSED && nodes < self.bounds.nodes {
                         return;
@@ -195,7 +198,7 @@ impl<'s, 'b> Stages<'s, 'b> {
                 _ => {}
             }
             if !(depth.go_on)(Work::Scans(0)) {
-                self.so_far[place].why = Stopped::Time;
+                self.so_far[place].why = Some(Stopped::Time);
                 self.over = true;
                 return;
             }
@@ -221,7 +224,7 @@ impl<'s, 'b> Stages<'s, 'b> {
                 _ => {}
             }
             if !(depth.go_on)(Work::Scans(0)) {
-                self.so_far[place].why = Stopped::Time;
+                self.so_far[place].why = Some(Stopped::Time);
                 self.over = true;
                 return;
             }
@@ -285,7 +288,7 @@ impl<'s, 'b> Stages<'s, 'b> {
         for place in 0..self.answers.len() {
             if self.answers[place].is_none() {
                 if self.over {
-                    self.so_far[place].why = Stopped::Time;
+                    self.so_far[place].why = Some(Stopped::Time);
                 }
                 let answer = Answer::Undecided(self.so_far[place].clone());
                 self.answer(place, answer);

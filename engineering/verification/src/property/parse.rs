@@ -28,19 +28,14 @@ pub struct Properties {
     pub properties: Vec<Property>,
     /// Fairness conditions, true infinitely often in every run considered; each refers to one scan.
     pub fair: Vec<Property>,
+    /// What is assumed of the inputs in every scan of every run considered; each refers to one scan.
+    pub assumed: Vec<Property>,
     /// What is wrong, in the order of the places.
     pub diagnostics: Vec<Diagnostic>,
 }
 
-impl Properties {
-    /// All formulas, those of the fairness conditions too.
-    pub fn formulas(&self) -> impl Iterator<Item = &Formula<Named>> {
-        self.properties.iter().chain(&self.fair).map(|property| &property.formula)
-    }
-}
-
-/// Reads a property file: one property per line, `#` begins a comment, `name:` names a property, `fair:` marks a fairness condition. A duration is as
-/// many scans of `period` as are whole in it.
+/// Reads a property file: one property per line, `#` begins a comment, `name:` names a property, `fair:` marks a fairness condition, `assume:` an
+/// assumption about inputs. A duration is as many scans of `period` as are whole in it.
 pub fn read(text: &str, period: Duration) -> Properties {
     let mut found = Properties::default();
     let mut offset = 0;
@@ -61,24 +56,28 @@ pub fn read(text: &str, period: Duration) -> Properties {
         let Some(mut property) = read_at(body, start, period, &mut found.diagnostics) else {
             continue;
         };
-        if name != Some("fair") {
-            property.name = name.map(str::to_owned);
-            found.properties.push(property);
-        } else if property.formula.is_of_one_scan() {
-            found.fair.push(property);
-        } else {
-            let place = start + body.len() - body.trim_start().len();
-            found.diagnostics.push(not_of_one_scan(place..start + body.trim_end().len()));
+        let place = start + body.len() - body.trim_start().len();
+        let place = place..start + body.trim_end().len();
+        let is_of_one_scan = property.formula.is_of_one_scan();
+        match name {
+            Some("fair") if is_of_one_scan => found.fair.push(property),
+            Some("assume") if is_of_one_scan => found.assumed.push(property),
+            Some("fair") => found.diagnostics.push(not_of_one_scan("a fairness condition", place)),
+            Some("assume") => found.diagnostics.push(not_of_one_scan("an assumption", place)),
+            _ => {
+                property.name = name.map(str::to_owned);
+                found.properties.push(property);
+            }
         }
     }
     found
 }
 
-/// A condition of fairness that looks at other scans.
-pub fn not_of_one_scan(span: Range<usize>) -> Diagnostic {
-    let message = "a fairness condition refers to one scan only";
+/// A condition of fairness or an assumption that looks at other scans.
+pub fn not_of_one_scan(what: &str, span: Range<usize>) -> Diagnostic {
+    let message = format!("{what} refers to one scan only");
     Diagnostic::error("U0434", message, span).with_help(
-        "leave out AG, EF and the like: a condition p means that p comes again and again",
+        "leave out AG, EF and the like: a condition p comes again and again, an assumption p holds in every scan",
     )
 }
 

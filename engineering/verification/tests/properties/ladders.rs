@@ -7,6 +7,7 @@ use understudy_ladder::parse;
 use understudy_logic::Circuit;
 use understudy_logic::bdd::Diagrams;
 use understudy_verification::program::{Answer, Bounds, Lamp, OutputFinding, Subject};
+use understudy_verification::property::Asked;
 use understudy_verification::property::read_one;
 use understudy_verification::symbolic::{Checker, Trace, Verdict, resolve};
 use understudy_verification::{Stopped, Work, smv};
@@ -97,7 +98,8 @@ fn every_output_is_asked_whether_it_can_be_switched() {
     let check = |rung: &str, expected: OutputFinding| {
         let text = format!("program p\ninput a\noutput y\nrung\n    {rung}\n");
         let program = parse(&text).program;
-        let subject = Subject::new(&program, Duration::from_millis(10), &[]).expect("right");
+        let subject =
+            Subject::new(&program, Duration::from_millis(10), &Asked::default()).expect("right");
         let found = subject.switches(Bounds::default());
         let found = found.into_iter().map(|(_, finding)| match finding {
             // Which scans show it is not the matter here.
@@ -230,7 +232,7 @@ fn a_large_supervisor_is_decided() {
     let text = include_str!("../../../../examples/boiler/complete.ladder");
     let program = parse(text).program;
     let period = Duration::from_secs(5);
-    let subject = Subject::new(&program, period, &[]).expect("a right program");
+    let subject = Subject::new(&program, period, &Asked::default()).expect("a right program");
     let bounds = Bounds { nodes: 1 << 14, ..Bounds::default() };
     for (signal, finding) in subject.switches(bounds) {
         let name = signal.name(subject.circuit());
@@ -261,7 +263,8 @@ fn a_large_supervisor_is_decided() {
 fn a_proof_ends_when_nobody_waits() {
     let text = include_str!("../../../../examples/boiler/complete.ladder");
     let program = parse(text).program;
-    let subject = Subject::new(&program, Duration::from_millis(10), &[]).expect("a right program");
+    let subject = Subject::new(&program, Duration::from_millis(10), &Asked::default())
+        .expect("a right program");
     let asked = Cell::new(0);
     let go_on = |_: Work| {
         asked.set(asked.get() + 1);
@@ -275,5 +278,5 @@ fn a_proof_ends_when_nobody_waits() {
     let Answer::Undecided(undecided) = &answers[0] else {
         panic!("{answers:?}");
     };
-    assert_eq!((undecided.why, told), (Stopped::Time, 1));
+    assert_eq!((undecided.why, told), (Some(Stopped::Time), 1));
 }

@@ -7,6 +7,7 @@ use proptest::prelude::*;
 use understudy_ladder::{CoilKind, Element, Name, Program, Write, parse, print, visit};
 use understudy_logic::{Circuit, Scan, Scratch, bit};
 use understudy_verification::program::{Bounds, Remarks, Subject};
+use understudy_verification::property::Asked;
 
 use crate::replay::replays;
 use understudy_verification::{Shown, draw_runs};
@@ -14,7 +15,7 @@ use understudy_verification::{Shown, draw_runs};
 const PERIOD: Duration = Duration::from_millis(100);
 
 fn remarks(program: &Program) -> (Subject, Remarks) {
-    let subject = Subject::new(program, PERIOD, &[]).expect("a right program");
+    let subject = Subject::new(program, PERIOD, &Asked::default()).expect("a right program");
     let remarks = subject.remarks(program, PERIOD, Bounds::default()).expect("a right program");
     (subject, remarks)
 }

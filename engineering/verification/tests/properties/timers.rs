@@ -9,6 +9,7 @@ use understudy_logic::Circuit;
 use understudy_logic::bdd::Diagrams;
 use understudy_verification::explicit::Explicit;
 use understudy_verification::program::Subject;
+use understudy_verification::property::Asked;
 use understudy_verification::symbolic::{Checker, Resolved, Trace, Verdict};
 
 use crate::naive::Naive;
@@ -37,8 +38,8 @@ fn circuit(rungs: &[(u8, u8, u8, u8)], presets: [u32; 2]) -> Circuit {
         );
     }
     let parsed = parse(&text);
-    let subject =
-        Subject::new(&parsed.program, Duration::from_millis(1), &[]).expect("a right program");
+    let subject = Subject::new(&parsed.program, Duration::from_millis(1), &Asked::default())
+        .expect("a right program");
     subject.circuit().clone()
 }
 

@@ -140,6 +140,17 @@ impl Pass<'_> {
                 let out = graph.or(is, nan);
                 graph.not(out)
             }
+            Node::Apply(Operation::Absolute(of), operands) if of.is_real() => {
+                let up_to = self.at_most(operands[0], boundary);
+                let below = self.at_most(operands[0], 1 - boundary);
+                let graph = self.builder.graph();
+                let from = graph.not(below);
+                graph.and(up_to, from)
+            }
+            Node::Apply(
+                operation @ (Operation::Minimum(of) | Operation::Maximum(of)),
+                operands,
+            ) if of.is_real() => self.extreme_at_most(operation, &operands, boundary),
             _ => {
                 let (least, greatest) = self.limits(term, of);
                 if boundary < least || boundary >= greatest {
@@ -156,6 +167,32 @@ impl Pass<'_> {
                 self.builder.graph().and(is, number)
             }
         }
+    }
+
+    /// Whether the least or the greatest of some reals is at most at a boundary. The first is kept where it is NaN; a later NaN is passed over.
+    fn extreme_at_most(
+        &mut self,
+        operation: Operation,
+        operands: &[Term],
+        boundary: i128,
+    ) -> Expression {
+        let mut is = self.at_most(operands[0], boundary);
+        for &next in &operands[1..] {
+            let next_is = self.at_most(next, boundary);
+            let next_nan = self.nan(next);
+            let graph = self.builder.graph();
+            is = match operation {
+                Operation::Minimum(_) => graph.or(is, next_is),
+                _ => {
+                    let passed = graph.or(next_is, next_nan);
+                    graph.and(is, passed)
+                }
+            };
+        }
+        let nan = self.nan(operands[0]);
+        let graph = self.builder.graph();
+        let number = graph.not(nan);
+        graph.and(is, number)
     }
 
     /// The positions between which a number lies.
@@ -237,9 +274,14 @@ impl Pass<'_> {
                 self.builder.graph().if_then_else(condition, then, otherwise)
             }
             Node::Apply(Operation::Convert(from, _), _) if !from.is_real() => self.constant(false),
-            Node::Apply(Operation::Negate(_) | Operation::Absolute(_), operands) => {
-                self.nan(operands[0])
-            }
+            // The least and the greatest keep their first operand where it is NaN.
+            Node::Apply(
+                Operation::Negate(_)
+                | Operation::Absolute(_)
+                | Operation::Minimum(_)
+                | Operation::Maximum(_),
+                operands,
+            ) => self.nan(operands[0]),
             Node::Apply(..) | Node::Unknown(_) => {
                 let name = format!("{} is NaN", self.system.describe(term));
                 self.input(&name, Meaning::NotANumber(term))
