@@ -257,7 +257,10 @@ fn text_for_nusmv(form: Smv, program: &Program, subject: &Subject, asked: &ToPro
     let formulas: Vec<Resolved> =
         asked.properties.iter().map(|(_, formula)| formula.clone()).collect();
     match form {
-        Smv::Scan => smv::of_circuit(subject.circuit(), &subject.assuming(&formulas), &asked.fair),
+        Smv::Scan => {
+            let (formulas, fair) = subject.assuming(&formulas, &asked.fair);
+            smv::of_circuit(subject.circuit(), &formulas, &fair)
+        }
         Smv::Rungs => smv::of_rungs(program),
     }
 }

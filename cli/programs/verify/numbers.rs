@@ -51,7 +51,8 @@ pub(super) fn of_program(
         })?;
         let formulas: Vec<Resolved> =
             asked.properties.iter().map(|(_, formula)| formula.clone()).collect();
-        let text = smv::of_circuit(circuit, &model.assuming(&formulas), &asked.fair);
+        let (formulas, fair) = model.assuming(&formulas, &asked.fair);
+        let text = smv::of_circuit(circuit, &formulas, &fair);
         let output = arguments.output.as_deref();
         let answer = files::deliver(output, &text, json!({ "text": text }))?;
         return Ok(answer.with_used(file.reports()));

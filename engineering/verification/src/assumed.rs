@@ -8,7 +8,8 @@
 //! A[p U q]  A[p U (q | !ok)]      E[p U q]  E[p U (ok & q)]
 //! ```
 //!
-//! Assumptions are about inputs, which are free in every scan, so each such run goes on.
+//! Assumptions are about inputs, which are free in every scan, so each such run goes on. Where fairness is asked for, *ok* is a condition of it too: the
+//! way on that is fair may be another one.
 
 use understudy_logic::{Circuit, CircuitBuilder, Expression, Graph, Variable};
 
@@ -16,10 +17,10 @@ use crate::property::{Formula, Path};
 use crate::symbolic::{Resolved, Signal};
 
 /// The name of the output that says whether the assumptions have held so far.
-pub(crate) const SO_FAR: &str = "assumptions hold";
+pub const SO_FAR: &str = "assumptions hold";
 
 /// The circuit with one output more, its last: whether all of `assumed`, formulas of one scan, have held so far.
-pub(crate) fn with_assumptions(circuit: &Circuit, assumed: &[Resolved]) -> Circuit {
+pub fn with_assumptions(circuit: &Circuit, assumed: &[Resolved]) -> Circuit {
     let mut builder = CircuitBuilder::new(circuit.name());
     let inputs: Vec<Expression> = circuit.inputs().iter().map(|name| builder.input(name)).collect();
     let registers = circuit.registers().iter();
@@ -93,7 +94,7 @@ fn expression(
 }
 
 /// What `formula` says of the runs in which the assumptions hold; `ok` is the signal of [`with_assumptions`].
-pub(crate) fn assuming(formula: &Resolved, ok: Signal) -> Resolved {
+pub fn assuming(formula: &Resolved, ok: Signal) -> Resolved {
     let within = relative(formula, ok);
     match within {
         // It says nothing of a run that begins otherwise.

@@ -145,9 +145,13 @@ impl Model {
         })
     }
 
-    /// What `properties` say of the runs in which the assumptions hold, as formulas about all runs of the circuit.
-    pub fn assuming(&self, properties: &[Resolved]) -> Vec<Resolved> {
-        self.subject.assuming(properties)
+    /// As [`Subject::assuming`].
+    pub fn assuming(
+        &self,
+        properties: &[Resolved],
+        fair: &[Resolved],
+    ) -> (Vec<Resolved>, Vec<Resolved>) {
+        self.subject.assuming(properties, fair)
     }
 
     /// Whether a property speaks of inputs alone: each takes every value, whatever the programs do.
@@ -172,8 +176,8 @@ impl Model {
         bounds: Bounds<'_>,
         answered: &mut dyn FnMut(),
     ) -> Vec<Answer> {
-        let properties = self.subject.assuming(properties);
-        let (properties, answered) = (&properties, &mut |_: usize, _: &_| answered());
+        let (properties, fair) = &self.assuming(properties, fair);
+        let answered = &mut |_: usize, _: &_| answered();
         let answers = self.subject.check_assuming(properties, fair.to_vec(), bounds, answered);
         let pairs = properties.iter().zip(answers);
         pairs.map(|(property, answer)| self.concrete(property, fair, answer, bounds)).collect()

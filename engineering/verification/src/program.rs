@@ -174,15 +174,25 @@ impl Subject {
         bounds: Bounds<'_>,
         answered: &mut dyn FnMut(usize, &Answer),
     ) -> Vec<Answer> {
-        self.check_assuming(&self.assuming(properties), fair, bounds, answered)
+        let (properties, fair) = self.assuming(properties, &fair);
+        self.check_assuming(&properties, fair, bounds, answered)
     }
 
-    /// What `properties` say of the runs in which the assumptions hold, as formulas about all runs.
-    pub fn assuming(&self, properties: &[Resolved]) -> Vec<Resolved> {
-        match self.assumed {
-            Some(ok) => properties.iter().map(|property| assuming(property, ok)).collect(),
-            None => properties.to_vec(),
+    /// What properties say of the fair runs in which the assumptions hold, as formulas about all runs, and what is fair then.
+    pub fn assuming(
+        &self,
+        properties: &[Resolved],
+        fair: &[Resolved],
+    ) -> (Vec<Resolved>, Vec<Resolved>) {
+        let (properties, mut fair) = (properties.iter(), fair.to_vec());
+        let Some(ok) = self.assumed else {
+            return (properties.cloned().collect(), fair);
+        };
+        // Without conditions each run that keeps the assumptions goes on.
+        if !fair.is_empty() {
+            fair.push(Formula::Signal(ok));
         }
+        (properties.map(|property| assuming(property, ok)).collect(), fair)
     }
 
     /// As [`Self::check`], for properties of [`Self::assuming`].

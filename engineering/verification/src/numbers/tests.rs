@@ -1,5 +1,7 @@
 //! Properties of programs with numbers.
 
+mod compared;
+
 use std::time::Duration;
 
 use understudy_bits::{Code, Source};

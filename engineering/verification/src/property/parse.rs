@@ -34,13 +34,13 @@ pub struct Properties {
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// Reads a property file: one property per line, `#` begins a comment, `name:` names a property, `fair:` marks a fairness condition, `assume:` an
+/// Reads a property file: one property per line, `#` begins a comment where it does not stand in a value, `name:` names a property, `fair:` marks a fairness condition, `assume:` an
 /// assumption about inputs. A duration is as many scans of `period` as are whole in it.
 pub fn read(text: &str, period: Duration) -> Properties {
     let mut found = Properties::default();
     let mut offset = 0;
     for line in text.split_inclusive('\n') {
-        let written = line.split('#').next().unwrap_or_default();
+        let written = &line[..comment(line)];
         let (name, body) = match written.split_once(':') {
             // `within 2s of p: q` has the sign in the middle.
             Some((name, body)) if !name.trim_start().starts_with("within ") => {
@@ -71,6 +71,13 @@ pub fn read(text: &str, period: Duration) -> Properties {
         }
     }
     found
+}
+
+/// Where the comment of a line begins: at a `#` that does not stand in a value such as `T#2s`.
+fn comment(line: &str) -> usize {
+    let mut signs = line.match_indices('#').map(|(at, _)| at);
+    let begins = |at: &usize| !line[..*at].ends_with(|last: char| last.is_alphanumeric());
+    signs.find(begins).unwrap_or(line.len())
 }
 
 /// A condition of fairness or an assumption that looks at other scans.

@@ -14,16 +14,30 @@ pub(crate) struct Naive<'c> {
     /// Where each state's scan leads: the registers, with u = 0.
     next: Vec<usize>,
     fair: Vec<Vec<bool>>,
+    /// The states that there are: those that satisfy an assumption.
+    there: Vec<bool>,
 }
 
 impl<'c> Naive<'c> {
     pub(crate) fn new(circuit: &'c Circuit, fair: &[Resolved]) -> Self {
         let registers = circuit.registers().len();
         let states = 1 << (registers + circuit.inputs().len());
-        let mut naive = Self { circuit, states, registers, next: Vec::new(), fair: Vec::new() };
+        let mut naive = Self {
+            circuit,
+            states,
+            registers,
+            next: Vec::new(),
+            fair: Vec::new(),
+            there: vec![true; states],
+        };
         naive.next = (0..states).map(|state| naive.scan(state)).collect();
         naive.fair = fair.iter().map(|condition| naive.satisfying(condition)).collect();
         naive
+    }
+
+    /// The same with the states alone that satisfy `assumed`.
+    pub(crate) fn where_it_holds(self, assumed: &Resolved) -> Self {
+        Self { there: self.satisfying(assumed), ..self }
     }
 
     fn bit(&self, state: usize, variable: Variable) -> bool {
@@ -51,7 +65,7 @@ impl<'c> Naive<'c> {
     }
 
     fn before(&self, set: &[bool]) -> Vec<bool> {
-        let enters = |state| self.successors(state).any(|next| set[next]);
+        let enters = |state| self.successors(state).any(|next| set[next] && self.there[next]);
         (0..self.states).map(enters).collect()
     }
 
@@ -167,7 +181,8 @@ impl<'c> Naive<'c> {
         let initial: usize =
             registers.map(|(place, register)| usize::from(register.initial) << place).sum();
         (0..1_usize << self.circuit.inputs().len())
-            .all(|inputs| set[initial | inputs << self.registers])
+            .map(|inputs| initial | inputs << self.registers)
+            .all(|state| set[state] || !self.there[state])
     }
 
     /// Signals by their numbers, for reading traces.

@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 use understudy_logic::bdd::Diagrams;
 use understudy_logic::{Circuit, CircuitBuilder, Expression};
+use understudy_verification::assumed::{assuming, with_assumptions};
 use understudy_verification::explicit::Explicit;
 use understudy_verification::induction::{Depth, Induction, prove_always};
 use understudy_verification::property::{Formula, Path};
@@ -78,6 +79,22 @@ pub(crate) fn one_scan() -> BoxedStrategy<Resolved> {
     .boxed()
 }
 
+/// Formulas of one scan over inputs.
+fn of_inputs() -> BoxedStrategy<Resolved> {
+    let leaf = (0..INPUTS).prop_map(|input| Formula::Signal(Signal::Input(input)));
+    leaf.prop_recursive(2, 5, 2, |inner| {
+        let pair = || (inner.clone(), inner.clone()).prop_map(|(a, b)| (Box::new(a), Box::new(b)));
+        prop_oneof![
+            inner.clone().prop_map(Formula::negated),
+            pair().prop_map(|(a, b)| Formula::And(a, b)),
+            pair().prop_map(|(a, b)| Formula::Or(a, b)),
+            pair().prop_map(|(a, b)| Formula::Implies(a, b)),
+            pair().prop_map(|(a, b)| Formula::Same(a, b)),
+        ]
+    })
+    .boxed()
+}
+
 fn path() -> impl Strategy<Value = Path> {
     prop_oneof![Just(Path::All), Just(Path::Some)]
 }
@@ -124,6 +141,36 @@ proptest! {
         prop_assert_eq!(holds, naive.holds(&property), "{:?}", readable.map(|f| f.to_string()));
         if let Some(trace) = trace {
             prop_assert!(replays(&circuit, &trace));
+        }
+    }
+
+    /// Under an assumption about inputs the runs are those in which it holds in every scan, with fairness and without.
+    #[test]
+    fn assumptions_leave_runs_out(
+        recipe in prop::collection::vec(any::<(u8, u8, u8)>(), 6..16),
+        initial in any::<u8>(),
+        property in formula(),
+        assumed in of_inputs(),
+        fair in prop::collection::vec(one_scan(), 0..2),
+    ) {
+        let circuit = circuit(&recipe, initial);
+        let naive = Naive::new(&circuit, &fair).where_it_holds(&assumed);
+        let with = with_assumptions(&circuit, std::slice::from_ref(&assumed));
+        let ok = Signal::Output(OUTPUTS);
+        let mut checker = Checker::new(&with, fair.clone(), Diagrams::DEFAULT_LIMIT);
+        prop_assume!(!matches!(checker.check(&Formula::Signal(ok).negated().always()), Ok(Verdict::Holds(_))));
+        let mut fair = fair;
+        if !fair.is_empty() {
+            fair.push(Formula::Signal(ok));
+        }
+        let mut checker = Checker::new(&with, fair, Diagrams::DEFAULT_LIMIT);
+        let (holds, trace) = match checker.check(&assuming(&property, ok)).expect("small") {
+            Verdict::Holds(_) => (true, None),
+            Verdict::Fails(trace) => (false, trace),
+        };
+        prop_assert_eq!(holds, naive.holds(&property), "{:?} under {:?}", property, assumed);
+        if let Some(trace) = trace {
+            prop_assert!(replays(&with, &trace));
         }
     }
 

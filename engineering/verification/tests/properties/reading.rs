@@ -33,6 +33,16 @@ fn sentences_and_formulas_mean_the_same() {
     check("a <-> EX b", "a <-> (EX b)");
     check("A[a U E[b U c]]", "A[a U (E[b U c])]");
     check("AG true", "AG TRUE");
+    // Numbers are compared, from either side; a duration is the whole scans in it.
+    check("never t > 50.0", "AG !(t > 50.0)");
+    check("always -5 <= n & n<>16#FF", "AG ((n >= -5) & (n <> 16#FF))");
+    check("a.b[3].c = red | /on", "(a.b[3].c = red) | !on");
+    check("mode = Colour#red only while t >= T#1.5s", "AG ((mode = Colour#red) -> (t >= T#1.5s))");
+    check("1e-3 < x <-> x > y", "(x > 1e-3) <-> (x > y)");
+    check("a is followed by n = 3 within 25ms", "AG (a -> (ABF 0..2 (n = 3)))");
+    check("within 2s of a & b: c", "AG ((a & b) -> (ABF 0..200 c))");
+    check("within 3 scans of n >= 4: c", "AG ((n >= 4) -> (ABF 0..3 c))");
+    check("ABF 0..5 n=0", "ABF 0..5 (n = 0)");
     // Words of sentences are names elsewhere.
     check("AG (never -> until)", "AG (never -> until)");
 }
@@ -50,11 +60,23 @@ AG a b
 ABF 1..2 a
 E[a b]
 a is followed by b within 123456 scans
+a is followed by b within 2 hours
+a is followed by b within 200s
+never n >
+never 5
+never 5 > 6
+never -n > 5
+never a > 1 > 2
+assume: AG a
+within 2s a: b
 right: AG a
+assume: n < 5
+within 2s of a: b
 ";
     let found = read(text, PERIOD);
-    assert_eq!(found.properties.len(), 1);
-    assert_eq!(found.properties[0].name.as_deref(), Some("right"));
+    let names: Vec<_> = found.properties.iter().map(|read| read.name.as_deref()).collect();
+    assert_eq!(names, [Some("right"), None]);
+    assert_eq!(found.assumed.len(), 1);
     let lines: Vec<String> = found
         .diagnostics
         .iter()
