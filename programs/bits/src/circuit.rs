@@ -11,6 +11,7 @@
 
 mod bits;
 pub(super) mod boundaries;
+mod monotone;
 mod order;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
@@ -125,6 +126,7 @@ struct Pass<'s> {
     known: HashMap<Term, BTreeSet<i128>>,
     found: HashMap<Term, BTreeSet<i128>>,
     is_bits: HashMap<Term, bool>,
+    ends: HashMap<Term, bool>,
     numbers: HashMap<Term, Number>,
     lines: HashMap<Term, BTreeMap<i128, Expression>>,
     at_most: HashMap<(Term, i128), Expression>,
@@ -160,6 +162,7 @@ impl<'s> Pass<'s> {
             found: HashMap::new(),
             known,
             is_bits: HashMap::new(),
+            ends: HashMap::new(),
             numbers: HashMap::new(),
             lines: HashMap::new(),
             at_most: HashMap::new(),

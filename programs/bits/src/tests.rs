@@ -125,7 +125,7 @@ fn compare_with(program: &Program, system: &System, seed: u64, scans: usize) -> 
     faulted
 }
 
-const PROGRAMS: [&str; 9] = [
+const PROGRAMS: [&str; 10] = [
     // Inputs with subranges, of all widths and signs; one is compared with what it never is.
     "PROGRAM p
        VAR_INPUT a : INT (10..100); b : SINT (-7..-2); c : LINT (-5..5000000000); d : USINT (3..3); e : WORD; END_VAR
@@ -232,6 +232,25 @@ const PROGRAMS: [&str; 9] = [
        IF go THEN kept := MAX(LREAL#0.0, REAL_TO_LREAL(root)); END_IF;
        y6 := kept > 1.5 AND MIN(kept, LREAL#9.0) <= 2.0;
        m := LIMIT(0.0, 2.0 * (60.0 - b), 40.0);
+     END_PROGRAM",
+    // Scaled, shifted and converted numbers: their comparisons are those of their operand.
+    "PROGRAM p
+       VAR_INPUT a : REAL; b : LREAL; n : INT; d : LINT; u : UDINT; END_VAR
+       VAR_OUTPUT y1 : BOOL; y2 : BOOL; y3 : BOOL; y4 : BOOL; y5 : BOOL; y6 : BOOL; y7 : BOOL; y8 : BOOL; END_VAR
+       VAR sum : REAL; kept : REAL; wide : LREAL; root : REAL; END_VAR
+       y1 := 2.0 * (60.0 - a) <= 40.0 OR a * -0.1 > 3.3 OR a / 3.0 = 1.0;
+       y2 := INT_TO_REAL(n) * 0.1 <= 5.0 XOR INT_TO_REAL(n) / -7.0 + 1.5 >= 20.0;
+       y3 := LREAL_TO_REAL(b * 1.0E30) > 1.0E38 OR LREAL_TO_REAL(b) * 1.0E30 < -1.0E38;
+       y4 := REAL_TO_LREAL(a) + 0.1 <= 0.3 AND LINT_TO_LREAL(d) - 0.5 > -7.5;
+       y5 := UDINT_TO_REAL(u) > 4.0E9 OR LINT_TO_REAL(d) <= -1.0E15;
+       root := SQRT(a) * 2.0 - 1.0;
+       y6 := root > 3.0 OR MIN(root, 5.0 - LREAL_TO_REAL(b)) < 1.0;
+       sum := sum + 1.0;
+       IF sum > 100.0 THEN sum := -3.0; END_IF;
+       y7 := sum * 2.0 > 50.0 OR 0.0 - sum > 0.0;
+       kept := SEL(y1, a, kept);
+       wide := REAL_TO_LREAL(kept);
+       y8 := LREAL_TO_REAL(wide) >= 3.0 OR kept * 2.0 < 5.0;
      END_PROGRAM",
     // A chart of steps in a number, an enumeration.
     include_str!("tests/chart.st"),

@@ -124,6 +124,9 @@ impl Pass<'_> {
         if self.is_bits(term) {
             return self.number(term).is_at_most(self.builder.graph(), boundary);
         }
+        if let Some(monotone) = self.monotone(term) {
+            return self.result_at_most(&monotone, boundary);
+        }
         match self.system.terms.node(term).clone() {
             Node::Choose([condition, then, otherwise]) => {
                 let condition = self.truth(condition);
@@ -273,7 +276,10 @@ impl Pass<'_> {
                 let otherwise = self.nan(otherwise);
                 self.builder.graph().if_then_else(condition, then, otherwise)
             }
-            Node::Apply(Operation::Convert(from, _), _) if !from.is_real() => self.constant(false),
+            Node::Apply(Operation::Convert(from, _), operands) => match from.is_real() {
+                true => self.nan(operands[0]),
+                false => self.constant(false),
+            },
             // The least and the greatest keep their first operand where it is NaN.
             Node::Apply(
                 Operation::Negate(_)
@@ -283,6 +289,10 @@ impl Pass<'_> {
                 operands,
             ) => self.nan(operands[0]),
             Node::Apply(..) | Node::Unknown(_) => {
+                // A finite constant makes no NaN of a number.
+                if let Some(monotone) = self.monotone(term) {
+                    return self.nan(monotone.operand());
+                }
                 let name = format!("{} is NaN", self.system.describe(term));
                 self.input(&name, Meaning::NotANumber(term))
             }
