@@ -37,6 +37,7 @@ Example:
   understudy verify examples/press-cell/press.ladder --property \"never move_down and stop\" --draw runs.html
   understudy verify examples/press-cell/press.ladder --smv scan --output press.smv
   understudy verify examples/two-shuttles/left.st --property \"never program.fault\"
+  understudy verify examples/heated-tank/temperature.st --property \"never heater > 100.0\" --assume \"level <= 2.0\"
   understudy verify examples/press-cell/cluster.toml
   understudy verify examples/two-shuttles/cluster.toml --property \"never left.inside and right.inside\"
   understudy verify examples/boiler/complete.ladder --period 100ms --budget 60s

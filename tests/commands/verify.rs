@@ -279,3 +279,46 @@ PROGRAM b VAR_INPUT i : BOOL; END_VAR VAR_OUTPUT y : BOOL; END_VAR y := a.x; END
     let answer = understudy(&["convert", &file, "--unit", "b", "--to", "ladder"]);
     assert!(answer.errors.contains("U1085"), "{}", answer.shown());
 }
+
+#[test]
+fn numbers_are_compared_and_inputs_assumed() {
+    let folder = empty_folder("verify-numbers");
+    let program = folder.join("level.st");
+    let text = "\
+PROGRAM level
+  VAR_INPUT raw : INT; up : BOOL; down : BOOL; END_VAR
+  VAR_OUTPUT metres : REAL; valve : BOOL; END_VAR
+  VAR pause : TON; END_VAR
+  metres := INT_TO_REAL(raw) * 0.001 - 0.5;
+  pause(IN := metres > 2.0, PT := T#50ms);
+  valve := pause.Q AND NOT up;
+END_PROGRAM
+";
+    fs::write(&program, text).expect("written");
+    let properties = folder.join("level.properties");
+    let text = "\
+assume: raw >= 0        # what the card delivers
+assume: raw <= 4095
+full: never metres > 3.6
+slow: valve only while pause.ET >= T#50ms   # a comment
+within 60ms of valve: metres < 2.0
+never up & down
+";
+    fs::write(&properties, text).expect("written");
+    let program = program.display().to_string();
+    let asked = ["verify", &program, "--properties", &properties.display().to_string()];
+    let more = ["--property", "never metres > 3.5", "--assume", "!(up & down)"];
+    let answer = understudy(&[&asked[..], &more].concat());
+    assert_snapshot!(answer.shown());
+    let without = understudy(&["verify", &program, "--property", "never metres > 3.6"]);
+    assert_eq!(without.status, 1, "{}", without.shown());
+    let inputs = ["verify", &program, "--property", "never up & down", "--json"];
+    let message = &understudy(&inputs).json()["result"]["programs"][0]["properties"][0]["message"];
+    assert!(message.as_str().is_some_and(|told| told.contains("inputs alone")), "{message}");
+    // The text for NuSMV is about the same runs.
+    let scan = ["verify", "protocol/cluster/template/minimal/sump.ladder", "--smv", "scan"];
+    let asked = ["--property", "never level.CV > 8", "--assume", "!motor"];
+    let smv = understudy(&[&scan[..], &asked].concat());
+    assert_eq!(smv.status, 0, "{}", smv.shown());
+    assert_snapshot!(smv.output.lines().rev().take(3).collect::<Vec<&str>>().join("\n"));
+}
