@@ -21,8 +21,3 @@ pub use source::{Source, SourceFile, Wanted, no_program, read_source};
 pub use twincat::{Joined, files_of_project, is_part};
 pub use typed_text::{Bodies, typed_text};
 pub use written::{Compared, USUAL_PERIOD, WriteError, Written, write};
-
-/// The examples of the codes of this crate are run with its own.
-#[cfg(doctest)]
-#[doc = include_str!("../../../docs/errors/U10.md")]
-pub struct ErrorPages;
