@@ -16,8 +16,8 @@ use crate::files;
 #[command(after_help = "\
 Example:
   understudy draw examples/press-cell/robot.ladder
-  understudy draw examples/press-cell/robot.ladder --as svg --output robot.svg
-  understudy draw examples/plcopen/pump.xml --as svg --output pump.svg
+  understudy draw examples/press-cell/robot.ladder --output robot.svg
+  understudy draw examples/plcopen/pump.xml --output pump.svg
   understudy draw examples/heated-tank/level.st --as fbd --output level.svg
 
 A program with numbers is drawn in its own language: a ladder with its boxes, function blocks as networks, a sequence as a chart. Structured Text and instruction lists are listed; `--as fbd` draws statements as function blocks. As text, a program with numbers is Structured Text.")]
@@ -25,9 +25,9 @@ pub(crate) struct Arguments {
     /// Program
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// Output format
-    #[arg(long = "as", value_enum, default_value = "text")]
-    form: Form,
+    /// Output format; default: svg where the output file ends in .svg, else text
+    #[arg(long = "as", value_enum)]
+    form: Option<Form>,
     /// Program to draw, if the file contains several
     #[arg(long, value_name = "NAME")]
     program: Option<String>,
@@ -56,7 +56,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         Source::Ladder(program) => Some(program),
         _ => file.rungs.take(),
     };
-    let (text, is_ladder) = match (ladder, arguments.form) {
+    let is_picture = arguments.output.as_ref().and_then(|path| path.extension());
+    let is_picture = is_picture.is_some_and(|ending| ending.eq_ignore_ascii_case("svg"));
+    let form = arguments.form.unwrap_or(if is_picture { Form::Svg } else { Form::Text });
+    let (text, is_ladder) = match (ladder, form) {
         (Some(program), Form::Text) => (draw_text(&program), true),
         (Some(program), Form::Svg) => (draw_svg(&program), true),
         (Some(program), Form::Digraph) => (digraph::draw_svg(&program), true),

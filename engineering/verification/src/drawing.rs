@@ -63,8 +63,8 @@ pub fn draw_runs(
             }
             let scan = match *part {
                 Part::Scan(scan) => scan,
-                Part::Unchanged(from, to) => {
-                    let _ = writeln!(body, "<h3>scans {from} to {to}: as scan {}</h3>", from - 1);
+                Part::Again(..) => {
+                    let _ = writeln!(body, "<h3>{}</h3>", part.told().unwrap_or_default());
                     continue;
                 }
             };

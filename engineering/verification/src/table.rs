@@ -1,4 +1,5 @@
-//! Runs as a person reads them: a row a signal, a column a scan. Where nothing changes for many scans, as while a timer runs, one column stands for them.
+//! Runs as a person reads them: a row a signal, a column a scan. Where scans repeat those before them, as while a timer runs or a counter counts, one column
+//! stands for them.
 
 use std::fmt::Write as _;
 
@@ -9,41 +10,65 @@ use crate::symbolic::Trace;
 /// Number of columns.
 const WIDTH: usize = 30;
 
-/// So many scans without a change are folded, and more.
+/// So many scans that repeat what was before are folded, and more.
 const FOLDED: usize = 5;
+
+/// The most scans of what is repeated; it is told once, and folded where it comes twice more.
+const REPEATED: usize = 8;
 
 /// A part of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Part {
     /// One scan.
     Scan(usize),
-    /// From one scan to another, both included, in which the signals are as in the scan before.
-    Unchanged(usize, usize),
+    /// From one scan to another, both included, in which the signals are as in so many scans before, over and over.
+    Again(usize, usize, usize),
 }
 
-/// The run with its long unchanged parts folded.
+impl Part {
+    /// What stands for a part that is folded.
+    pub(crate) fn told(self) -> Option<String> {
+        match self {
+            Self::Scan(_) => None,
+            Self::Again(from, to, 1) => Some(format!("scans {from} to {to}: as scan {}", from - 1)),
+            Self::Again(from, to, scans) => Some(format!(
+                "scans {from} to {to}: as scans {} to {}, over and over",
+                from - scans,
+                from - 1
+            )),
+        }
+    }
+}
+
+/// The run with its long repeated parts folded.
 pub(crate) fn parts(trace: &Trace) -> Vec<Part> {
     let row = |scan: usize| -> Vec<bool> {
         let signals = trace.signals.iter();
         signals.map(|&signal| trace.value(signal, scan)).collect()
     };
-    let count = trace.scans.len();
+    let rows: Vec<Vec<bool>> = (0..trace.scans.len()).map(row).collect();
+    // What a run shows often happens in its last scan, which is always told.
+    let end = rows.len().saturating_sub(1);
+    // How many scans, in whole rounds, are as so many before them; none where they are few.
+    let repeated = |from: usize, scans: usize| {
+        let same = (from..end).take_while(|&next| rows[next] == rows[next - scans]).count();
+        let whole = same / scans * scans;
+        let least = if scans == 1 { FOLDED } else { FOLDED.max(2 * scans) };
+        Some(whole).filter(|&whole| whole >= least)
+    };
     let mut parts = Vec::new();
     let mut scan = 0;
-    while scan < count {
-        parts.push(Part::Scan(scan));
-        let first = row(scan);
-        let same = (scan + 1..count).take_while(|&next| row(next) == first);
-        let same = same.count();
-        // What a run shows often happens in its last scan, which is always told.
-        let folded = same - usize::from(scan + same + 1 == count && same > 0);
-        if folded >= FOLDED {
-            parts.push(Part::Unchanged(scan + 1, scan + folded));
-            scan += 1 + folded;
-        } else {
-            parts.extend((scan..=scan + same).skip(1).map(Part::Scan));
-            scan += 1 + same;
-        }
+    while scan < rows.len() {
+        let rounds = |scans: usize| Some((scans, repeated(scan + scans, scans)?));
+        let Some((scans, whole)) = (1..=REPEATED).find_map(rounds) else {
+            parts.push(Part::Scan(scan));
+            scan += 1;
+            continue;
+        };
+        let from = scan + scans;
+        parts.extend((scan..from).map(Part::Scan));
+        parts.push(Part::Again(from, from + whole - 1, scans));
+        scan = from + whole;
     }
     parts
 }
@@ -59,7 +84,7 @@ pub fn scan_table(circuit: &Circuit, trace: &Trace) -> String {
         for part in parts {
             let _ = match part {
                 Part::Scan(scan) => write!(line, "{scan:>column$}"),
-                Part::Unchanged(..) => write!(line, "{:>column$}", "~"),
+                Part::Again(..) => write!(line, "{:>column$}", "~"),
             };
         }
         let _ = writeln!(text, "{line}");
@@ -69,16 +94,14 @@ pub fn scan_table(circuit: &Circuit, trace: &Trace) -> String {
                 let mark = match *part {
                     Part::Scan(scan) if trace.value(signal, scan) => '1',
                     Part::Scan(_) => '.',
-                    Part::Unchanged(..) => '~',
+                    Part::Again(..) => '~',
                 };
                 let _ = write!(text, "{mark:>column$}");
             }
             text.push('\n');
         }
-        for part in parts {
-            if let Part::Unchanged(from, to) = part {
-                let _ = writeln!(text, "scans {from} to {to}: as scan {}", from - 1);
-            }
+        for told in parts.iter().filter_map(|part| part.told()) {
+            let _ = writeln!(text, "{told}");
         }
     }
     if let Some(again) = trace.again_from {
@@ -113,6 +136,16 @@ mod tests {
             table,
             "scan 0 1 2 3 4 5\na    . . . . . 1\nafter scan 5 the run repeats from scan 2 indefinitely\n"
         );
+    }
+
+    #[test]
+    fn what_repeats_is_told_once() {
+        let values: Vec<u8> = (0..200).map(|scan| u8::from(scan % 3 == 1)).collect();
+        assert_eq!(
+            check(&values, None),
+            "scan   0   1   2   ~ 198 199\na      .   1   .   ~   .   1\nscans 3 to 197: as scans 0 to 2, over and over\n"
+        );
+        assert_eq!(check(&[0, 1, 0, 1, 0, 1, 1], None), "scan 0 1 2 3 4 5 6\na    . 1 . 1 . 1 1\n");
     }
 
     #[test]
