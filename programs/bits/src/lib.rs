@@ -24,5 +24,5 @@ pub use circuit::{Derivation, Meaning};
 pub use exact::{Gap, Inexact, exact};
 pub use execute::Unsupported;
 pub use program::{Code, Member};
-pub use system::{Cell, Input, NamedNumber, Source, System};
+pub use system::{Cell, Input, Source, System};
 pub use term::{Node, Term, Terms, Variable};

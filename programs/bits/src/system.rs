@@ -52,18 +52,16 @@ pub struct System {
     pub shown: Vec<(String, Term)>,
     /// Names of numbers that properties compare.
     pub(crate) wanted: BTreeSet<String>,
-    pub(crate) numbers: Vec<NamedNumber>,
+    /// Numbers that properties compare: after the scan, an input in the scan.
+    pub numbers: Vec<(String, Term)>,
+    /// Names of the values of enumerations.
+    pub values: HashMap<String, Vec<(String, i64)>>,
 }
 
-/// A number that properties compare.
-#[derive(Debug, Clone)]
-pub struct NamedNumber {
-    /// Its name.
-    pub name: String,
-    /// Its value after the scan; of an input, in the scan.
-    pub term: Term,
-    /// The names of its values, of an enumeration.
-    pub values: Vec<(String, i64)>,
+/// The names and values of an enumeration.
+fn named_values(program: &Program, of: &Type) -> Option<Vec<(String, i64)>> {
+    let Type::Enumeration(id, _) = of else { return None };
+    program.enumerations.get(id.0 as usize).map(|found| found.values.clone())
 }
 
 /// An input of a program in a system.
@@ -108,6 +106,7 @@ impl System {
             shown: Vec::new(),
             wanted: BTreeSet::new(),
             numbers: Vec::new(),
+            values: HashMap::new(),
         }
     }
 
@@ -116,9 +115,9 @@ impl System {
         &self.name
     }
 
-    /// A number of those that the system was made with, by its name.
-    pub fn number(&self, name: &str) -> Option<&NamedNumber> {
-        self.numbers.iter().find(|number| number.name == name)
+    /// A number that properties compare, by its name.
+    pub fn number(&self, name: &str) -> Option<Term> {
+        self.numbers.iter().find(|(known, _)| known == name).map(|(_, term)| *term)
     }
 
     /// Adds a comparison with a stored value to the BOOLs that properties can name.
@@ -170,33 +169,43 @@ impl System {
         number
     }
 
-    /// Finds the numbers of a program that properties compare.
+    /// Finds the numbers of a program that properties compare, and the names of the values of its points.
     pub(crate) fn name_numbers(
         &mut self,
         prefix: &str,
         program: &Program,
         after: &HashMap<u64, Term>,
     ) {
+        for point in program.inputs.iter().chain(&program.outputs) {
+            let part = program.part(&point.name);
+            if let Some(values) = part.and_then(|part| named_values(program, &part.of)) {
+                self.values.insert(format!("{prefix}{}", point.name), values);
+            }
+        }
         for name in self.wanted.clone() {
             let Some(own) = name.strip_prefix(prefix) else { continue };
             let input = self.inputs.iter().find(|input| input.name == name);
             let signal = || self.shown.iter().find(|(known, _)| *known == name);
             let given = input.map(|input| input.term).or_else(|| Some(signal()?.1));
             let part = program.part(own);
-            let kept = || after.get(&part.as_ref()?.address).copied();
-            let Some(term) = given.or_else(kept) else { continue };
             let is_text = |part: &Part| part.of.elementary().is_none();
             if part.as_ref().is_some_and(is_text) {
                 continue;
             }
-            let values = match part.as_ref().map(|part| &part.of) {
-                Some(Type::Enumeration(id, _)) => {
-                    program.enumerations.get(id.0 as usize).map(|found| found.values.clone())
-                }
-                _ => None,
-            };
-            self.numbers.push(NamedNumber { name, term, values: values.unwrap_or_default() });
+            let kept = || after.get(&part.as_ref()?.address).copied();
+            let Some(term) = given.or_else(kept) else { continue };
+            if let Some(values) = part.and_then(|part| named_values(program, &part.of)) {
+                self.values.insert(name.clone(), values);
+            }
+            self.numbers.push((name, term));
         }
+    }
+
+    /// A stored value of what has this name, as a person reads it.
+    pub fn text(&self, name: &str, of: Elementary, stored: u64) -> String {
+        let values = self.values.get(name).into_iter().flatten();
+        let mut named = values.filter(|(_, value)| i128::from(*value) == of.signed(stored));
+        named.next().map_or_else(|| of.text(stored), |(value, _)| value.clone())
     }
 
     /// Adds to the BOOLs that properties can name whether `holds` has been TRUE in every scan so far.

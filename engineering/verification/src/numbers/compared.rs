@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use understudy_bits::{NamedNumber, System, Term};
+use understudy_bits::{System, Term};
 use understudy_executable::typed_value;
 use understudy_text::Diagnostic;
 use understudy_text::spelling::suggestion;
@@ -51,20 +51,21 @@ fn add_one(
     named: &Named,
     compared: &Compared,
 ) -> Result<(), (String, String)> {
-    let NamedNumber { term: left, values, .. } = number(system, &named.name)?;
+    let left = number(system, &named.name)?;
     let Compared { comparison, with } = compared;
     let of = system.terms.of(left);
-    if let Some(right) = system.number(with).cloned() {
-        let other = system.terms.of(right.term);
+    if let Some(right) = system.number(with) {
+        let other = system.terms.of(right);
         if other != of {
             let message =
                 format!("`{}` is {of} and `{with}` is {other}: they are not compared", named.name);
             return Err((message, "compare numbers of one type".to_owned()));
         }
-        system.compare(text, left, *comparison, right.term);
+        system.compare(text, left, *comparison, right);
         return Ok(());
     }
-    let stored = value(of, &values, with).map_err(|help| {
+    let values = system.values.get(&named.name).map_or(&[][..], Vec::as_slice);
+    let stored = value(of, values, with).map_err(|help| {
         (format!("`{with}` is neither a value of `{}` : {of} nor a number", named.name), help)
     })?;
     system.compare_with_value(text, left, *comparison, stored);
@@ -72,10 +73,10 @@ fn add_one(
 }
 
 /// The number of this name, or what is there instead.
-fn number(system: &System, name: &str) -> Result<NamedNumber, (String, String)> {
-    let found = system.number(name).cloned();
+fn number(system: &System, name: &str) -> Result<Term, (String, String)> {
+    let found = system.number(name);
     let is_bool = |term: Term| system.terms.of(term) == Elementary::Bool;
-    if found.as_ref().is_some_and(|found| is_bool(found.term)) {
+    if found.is_some_and(is_bool) {
         let help = format!("write `{name}`, `!{name}` or `{name} <-> other`");
         return Err((format!("`{name}` is a BOOL, and numbers are compared"), help));
     }

@@ -354,7 +354,7 @@ impl<'s> Replay<'s> {
         }
     }
 
-    /// Inputs that are numbers and that the run depends on, then outputs.
+    /// Numbers that are compared, inputs that are numbers and that the run depends on, then outputs.
     fn numbers(&self, trace: &Trace, scans: &[Scan]) -> Vec<Row> {
         let mut inputs = BTreeSet::new();
         let roots = trace.signals.iter().filter_map(|signal| match signal {
@@ -373,16 +373,25 @@ impl<'s> Replay<'s> {
             (input.of != Elementary::Bool).then_some((&input.name, input.term))
         });
         let shown = self.system.shown.iter().map(|(name, term)| (name, *term));
-        let rows = inputs.chain(shown).take(SHOWN);
-        rows.map(|(name, term)| {
-            let of = terms.of(term);
-            let values = scans.iter();
-            Row {
-                name: name.clone(),
-                values: values.map(|scan| of.text(scan.values[Terms::index(term)])).collect(),
-            }
-        })
-        .collect()
+        let rows: Vec<(&String, Term)> = inputs.chain(shown).collect();
+        let compared = self.system.numbers.iter().map(|(name, term)| (name, *term));
+        let is_new = |(name, _): &(&String, Term)| rows.iter().all(|(known, _)| known != name);
+        let compared: Vec<(&String, Term)> = compared.filter(is_new).collect();
+        compared
+            .into_iter()
+            .chain(rows)
+            .take(SHOWN)
+            .map(|(name, term)| {
+                let of = terms.of(term);
+                let values = scans.iter();
+                Row {
+                    name: name.clone(),
+                    values: values
+                        .map(|scan| self.system.text(name, of, scan.values[Terms::index(term)]))
+                        .collect(),
+                }
+            })
+            .collect()
     }
 }
 
