@@ -192,7 +192,8 @@ impl Model {
     ) -> Answer {
         let cone = Cone::of(self.circuit(), fair.iter().chain([property]));
         let is_exact = cone.variables.iter().all(|variable| self.is_exact(*variable));
-        let replay = Replay::new(&self.system, &self.derivation, bounds.go_on);
+        let assumed = self.subject.assumed();
+        let replay = Replay::new(&self.system, &self.derivation, assumed, bounds.go_on);
         match answer {
             CircuitAnswer::Holds(None) if is_exact || is_of_all_runs(property) => {
                 Answer::Holds(None)

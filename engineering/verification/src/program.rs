@@ -115,6 +115,11 @@ impl Subject {
         Self { assumed, ..self }
     }
 
+    /// The signal that says whether the assumptions have held so far.
+    pub(crate) fn assumed(&self) -> Option<Signal> {
+        self.assumed
+    }
+
     /// What keeps a property from being an assumption: it is about inputs in one scan (U0434, U0435).
     pub fn wrong_assumption(&self, assumed: &Property) -> Vec<Diagnostic> {
         assumed.wrong_assumption(&|named| self.is_input(named))

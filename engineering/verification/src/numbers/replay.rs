@@ -15,6 +15,8 @@ use crate::symbolic::{Resolved, ScanRow, Signal, Trace};
 const EVALUATIONS: usize = 40_000_000;
 /// Scans of a run of a search.
 const SCANS: usize = 60;
+/// Tries to find inputs that keep the assumptions.
+const TRIES: usize = 20;
 /// Numbers that a run shows.
 const SHOWN: usize = 12;
 
@@ -41,6 +43,8 @@ pub(super) struct Replay<'s> {
     system: &'s System,
     derivation: &'s Derivation,
     go_on: GoOn<'s>,
+    /// Whether the assumptions have held so far.
+    assumed: Option<Signal>,
 }
 
 /// One scan of a run with numbers.
@@ -50,8 +54,13 @@ struct Scan {
 }
 
 impl<'s> Replay<'s> {
-    pub(super) fn new(system: &'s System, derivation: &'s Derivation, go_on: GoOn<'s>) -> Self {
-        Self { system, derivation, go_on }
+    pub(super) fn new(
+        system: &'s System,
+        derivation: &'s Derivation,
+        assumed: Option<Signal>,
+        go_on: GoOn<'s>,
+    ) -> Self {
+        Self { system, derivation, go_on, assumed }
     }
 
     /// Repeats `trace`; it ends where one of `kept` is broken.
@@ -92,25 +101,31 @@ impl<'s> Replay<'s> {
         let pools: Vec<Vec<u64>> =
             (0..self.system.inputs.len()).map(|input| self.pool(input)).collect();
         let mut dice = Dice(1);
-        let runs = EVALUATIONS / SCANS / self.system.terms.len().max(1);
-        for _ in 0..runs.max(1) {
+        let mut left = (EVALUATIONS / self.system.terms.len().max(1)).max(SCANS);
+        while left > 0 {
             if !(self.go_on)(Work::Scans(0)) {
                 return None;
             }
             let mut cells = self.initial();
             let mut scans: Vec<Scan> = Vec::new();
             for _ in 0..SCANS {
-                let mut inputs = match scans.last() {
-                    Some(last) => last.inputs.clone(),
-                    None => vec![0; pools.len()],
-                };
-                for (value, pool) in inputs.iter_mut().zip(&pools) {
-                    if scans.is_empty() || dice.below(3) == 0 {
-                        *value = pool[dice.below(pool.len())];
-                    }
-                }
-                let scan = self.scan(inputs, &cells);
                 let row = ScanRow { inputs: Vec::new(), outputs: Vec::new() };
+                let mut any = || {
+                    left = left.saturating_sub(1);
+                    let mut inputs = match scans.last() {
+                        Some(last) => last.inputs.clone(),
+                        None => vec![0; pools.len()],
+                    };
+                    for (value, pool) in inputs.iter_mut().zip(&pools) {
+                        if scans.is_empty() || dice.below(3) == 0 {
+                            *value = pool[dice.below(pool.len())];
+                        }
+                    }
+                    self.scan(inputs, &cells)
+                };
+                let keeps = |scan: &Scan| self.assumed.is_none_or(|ok| self.value(ok, scan, &row));
+                let scan = (0..TRIES).map(|_| any()).find(keeps);
+                let Some(scan) = scan else { break };
                 let is_broken = !self.holds(kept, &scan, &row);
                 cells = self.after(&scan);
                 scans.push(scan);
