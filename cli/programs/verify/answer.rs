@@ -324,10 +324,10 @@ impl Finding {
         Self::told(circuit, property, formula, verdict, message, scans)
     }
 
-    /// Says of a property that fails that it speaks of inputs alone, where it does.
+    /// Says of a property that fails that it is about inputs alone, where it is.
     pub(super) fn of_inputs(mut self, is_of_inputs: bool) -> Self {
         if is_of_inputs && self.verdict == "fails" {
-            let reason = "it speaks of inputs alone, and no program keeps it; --assume states what the field keeps";
+            let reason = "it is about inputs alone, and no program keeps it; --assume states what the field keeps";
             self.message = Some(reason.to_owned());
         }
         self

@@ -20,8 +20,8 @@ use understudy_logic::Circuit;
 use understudy_text::Diagnostic;
 use understudy_typed::Program;
 
-use crate::program::{Answer as CircuitAnswer, Bounds, OutputFinding, Subject};
-use crate::property::{Asked, Formula, Named, Path, Property};
+use crate::program::{Answer as CircuitAnswer, Bounds, OutputFinding, Subject, of_some_run};
+use crate::property::{Asked, Formula, Path, Property};
 use crate::symbolic::{Cone, Resolved, Signal, Trace, resolve};
 use compared::Refused;
 use replay::Replay;
@@ -136,11 +136,12 @@ impl Model {
     /// Every name that is no BOOL of the programs, and every comparison that is none (U0435).
     pub fn resolve(&self, property: &Property) -> Result<Resolved, Vec<Diagnostic>> {
         resolve(&property.formula, self.circuit()).map_err(|unknown| {
-            let refused = |named: &Named| self.refused.get(&named.to_string());
-            let told = unknown.into_iter().map(|named| match refused(named) {
-                Some(why) => compared::diagnostic(named, why),
-                None => self.subject.unknown(named),
-            });
+            let told =
+                unknown.into_iter().map(|named| match self.refused.get(&named.to_string()) {
+                    Some(why) => compared::diagnostic(named, why),
+                    None => compared::number_alone(&self.system, named)
+                        .unwrap_or_else(|| self.subject.unknown(named)),
+                });
             told.collect()
         })
     }
@@ -154,7 +155,7 @@ impl Model {
         self.subject.assuming(properties, fair)
     }
 
-    /// Whether a property speaks of inputs alone: each takes every value, whatever the programs do.
+    /// Whether a property is about inputs alone: each takes every value, whatever the programs do.
     pub fn is_of_inputs(&self, property: &Property) -> bool {
         let names = property.formula.signals();
         !names.is_empty() && names.iter().all(|named| compared::is_of_inputs(&self.system, named))
@@ -176,11 +177,19 @@ impl Model {
         bounds: Bounds<'_>,
         answered: &mut dyn FnMut(),
     ) -> Vec<Answer> {
-        let (properties, fair) = &self.assuming(properties, fair);
+        let (questions, is_reached) = of_some_run(properties);
+        let (properties, fair) = &self.assuming(&questions, fair);
         let answered = &mut |_: usize, _: &_| answered();
         let answers = self.subject.check_assuming(properties, fair.to_vec(), bounds, answered);
-        let pairs = properties.iter().zip(answers);
-        pairs.map(|(property, answer)| self.concrete(property, fair, answer, bounds)).collect()
+        let pairs = properties.iter().zip(answers).zip(is_reached);
+        let concrete = pairs.map(|((property, answer), is_reached)| {
+            match (self.concrete(property, fair, answer, bounds), is_reached) {
+                (Answer::Holds(_), true) => Answer::Fails(None),
+                (Answer::Fails(run), true) => Answer::Holds(run),
+                (answer, _) => answer,
+            }
+        });
+        concrete.collect()
     }
 
     fn concrete(

@@ -50,17 +50,26 @@ impl Default for Bounds<'_> {
     }
 }
 
-/// The comparison of a count, under the name that properties give it.
-fn counted(program: &Program, named: &Named) -> Option<(String, Comparison)> {
+/// The comparisons of counts of a ladder whose names stand behind `prefix`, each as properties write it without that.
+pub fn compared_counts(
+    program: &Program,
+    prefix: &str,
+    asked: &Asked<'_>,
+) -> BTreeMap<String, Comparison> {
+    asked.compared.iter().filter_map(|named| counted(program, prefix, named)).collect()
+}
+
+fn counted(program: &Program, prefix: &str, named: &Named) -> Option<(String, Comparison)> {
     let compared = named.compared.as_ref()?;
-    let counter = named.name.strip_suffix(".CV")?;
+    let counter = named.name.strip_prefix(prefix)?.strip_suffix(".CV")?;
     let mut blocks = program.blocks().into_iter();
     let is_counter =
         |block: &&Block| block.name.as_str() == counter && block.kind.preset_value().is_some();
     let counter = blocks.find(is_counter)?.name.clone();
     let relation = Relation::of(compared.comparison.sign())?;
     let value = compared.with.parse().ok()?;
-    Some((named.to_string(), Comparison { counter, relation, value }))
+    let text = named.to_string().strip_prefix(prefix)?.to_owned();
+    Some((text, Comparison { counter, relation, value }))
 }
 
 /// What came of one property.
@@ -72,6 +81,26 @@ pub enum Answer {
     Fails(Option<Trace>),
     /// Neither was proved within the bounds.
     Undecided(Undecided),
+}
+
+impl Answer {
+    /// That of the negation.
+    fn turned(self) -> Self {
+        match self {
+            Self::Holds(_) => Self::Fails(None),
+            Self::Fails(trace) => Self::Holds(trace),
+            undecided @ Self::Undecided(_) => undecided,
+        }
+    }
+}
+
+/// `EF p` asks for one run to p, with any inputs in its first scan: the question whether `AG !p` fails, for each that is such a property.
+pub(crate) fn of_some_run(properties: &[Resolved]) -> (Vec<Resolved>, Vec<bool>) {
+    let asked = properties.iter().map(|property| match property {
+        Formula::Eventually(Path::Some, end) => (end.as_ref().clone().negated().always(), true),
+        other => (other.clone(), false),
+    });
+    asked.unzip()
 }
 
 /// A program as its properties see it.
@@ -92,9 +121,7 @@ impl Subject {
     /// # Errors
     /// The program has errors, or the period is out of bounds.
     pub fn new(program: &Program, period: Duration, asked: &Asked<'_>) -> Result<Self, LowerError> {
-        let counted = asked.compared.iter().filter_map(|named| counted(program, named));
-        let counted: BTreeMap<String, Comparison> = counted.collect();
-        let circuit = program.lower_comparing(period, &counted)?;
+        let circuit = program.lower_comparing(period, &compared_counts(program, "", asked))?;
         let mut subject = Self::of(circuit, program.outputs.len());
         let right = asked.assumed.iter().filter(|it| subject.wrong_assumption(it).is_empty());
         let assumed: Vec<Resolved> = right.filter_map(|it| subject.resolve(it).ok()).collect();
@@ -159,7 +186,7 @@ impl Subject {
         Diagnostic::error("U0435", message, named.span.clone()).with_help(help)
     }
 
-    /// Whether a property speaks of inputs alone: each takes every value, whatever the program does.
+    /// Whether a property is about inputs alone: each takes every value, whatever the program does.
     pub fn is_of_inputs(&self, property: &Property) -> bool {
         let names = property.formula.signals();
         !names.is_empty() && names.iter().all(|named| self.is_input(named))
@@ -179,8 +206,13 @@ impl Subject {
         bounds: Bounds<'_>,
         answered: &mut dyn FnMut(usize, &Answer),
     ) -> Vec<Answer> {
-        let (properties, fair) = self.assuming(properties, &fair);
-        self.check_assuming(&properties, fair, bounds, answered)
+        let (questions, is_reached) = of_some_run(properties);
+        let (questions, fair) = self.assuming(&questions, &fair);
+        let answers = self.check_assuming(&questions, fair, bounds, answered);
+        let answers = answers.into_iter().zip(is_reached);
+        answers
+            .map(|(answer, is_reached)| if is_reached { answer.turned() } else { answer })
+            .collect()
     }
 
     /// What properties say of the fair runs in which the assumptions hold, as formulas about all runs, and what is fair then.
@@ -208,32 +240,15 @@ impl Subject {
         bounds: Bounds<'_>,
         answered: &mut dyn FnMut(usize, &Answer),
     ) -> Vec<Answer> {
-        if let Some(ok) = self.assumed {
-            let never = [Formula::Signal(ok).negated().always()];
-            let excluded = Stages::new(self, &never, Vec::new(), bounds, &mut |_, _| {}).run();
+        if self.assumed.is_some() || !fair.is_empty() {
+            let there = self.assumed.map_or(Formula::Constant(true), Formula::Signal);
+            let never = [there.negated().always()];
+            let excluded = Stages::new(self, &never, fair.clone(), bounds, &mut |_, _| {}).run();
             if let [Answer::Holds(_)] = excluded.as_slice() {
                 let nothing = Undecided { why: None, unbroken: None, listed: None };
                 return vec![Answer::Undecided(nothing); properties.len()];
             }
         }
-        let answers = Stages::new(self, properties, fair, bounds, answered).run();
-        let shown = answers.into_iter().zip(properties).map(|(answer, property)| match answer {
-            Answer::Holds(_) if self.assumed.is_some() => {
-                Answer::Holds(self.reached(property, bounds))
-            }
-            answer => answer,
-        });
-        shown.collect()
-    }
-
-    /// A run to what can be reached while the assumptions hold.
-    fn reached(&self, property: &Resolved, bounds: Bounds<'_>) -> Option<Trace> {
-        let Formula::Implies(_, within) = property else { return None };
-        let Formula::Eventually(Path::Some, end) = within.as_ref() else { return None };
-        let never = [end.as_ref().clone().negated().always()];
-        match Stages::new(self, &never, Vec::new(), bounds, &mut |_, _| {}).run().pop()? {
-            Answer::Fails(trace) => trace,
-            Answer::Holds(_) | Answer::Undecided(_) => None,
-        }
+        Stages::new(self, properties, fair, bounds, answered).run()
     }
 }

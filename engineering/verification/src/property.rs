@@ -29,6 +29,9 @@ pub const MAXIMUM_SCANS: u32 = 10_000;
 /// Signs and brackets inside each other in one formula.
 pub const MAXIMUM_NESTING: usize = 200;
 
+/// Words and signs of one formula: one after the other they nest as deeply as brackets do.
+pub const MAXIMUM_WORDS: usize = 2_000;
+
 /// Over which ways on from a state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Path {

@@ -18,9 +18,20 @@ pub fn typed_value(text: &str, of: Elementary) -> Result<u64, String> {
     let literal = if of.is_time() { TIME_LITERAL } else { &[] };
     let literal = literal.iter().find_map(|sign| word.strip_prefix(sign));
     let text = literal.unwrap_or(text);
+    if !of.is_real()
+        && !of.is_time()
+        && let Some(number) = whole(&word)
+    {
+        let stored = number as u64 & of.mask();
+        return match of {
+            Elementary::Bool if number <= 1 => Ok(number as u64),
+            _ if of != Elementary::Bool && of.signed(stored) == number => Ok(stored),
+            _ => stored_value(&Constant::Text(text.to_owned()), of),
+        };
+    }
     let value = match (of, word.as_str()) {
-        (Elementary::Bool, "1" | "true") => Constant::Flag(true),
-        (Elementary::Bool, "0" | "false") => Constant::Flag(false),
+        (Elementary::Bool, "true") => Constant::Flag(true),
+        (Elementary::Bool, "false") => Constant::Flag(false),
         _ => match (text.parse(), text.parse()) {
             (Ok(whole), _) => Constant::Whole(whole),
             (_, Ok(number)) => Constant::Number(number),
@@ -28,6 +39,19 @@ pub fn typed_value(text: &str, of: Elementary) -> Result<u64, String> {
         },
     };
     stored_value(&value, of)
+}
+
+/// A whole number, in decimal digits or behind `16#`, `8#` or `2#`.
+fn whole(word: &str) -> Option<i128> {
+    let (base, digits) = match word.split_once('#') {
+        Some((base, digits)) => {
+            (base.parse().ok().filter(|base| [2, 8, 16].contains(base))?, digits)
+        }
+        None => (10, word),
+    };
+    i128::from_str_radix(digits, base)
+        .ok()
+        .filter(|_| base == 10 || !digits.starts_with(['-', '+']))
 }
 
 /// A stored value as a file writes it, the inverse of [`stored_value`].
@@ -92,6 +116,25 @@ pub fn whole_number((least, most): (i128, i128)) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn whole_numbers_have_all_values_of_their_type() {
+        for (text, of, stored) in [
+            ("18446744073709551615", Elementary::Ulint, Some(u64::MAX)),
+            ("-9223372036854775808", Elementary::Lint, Some(1 << 63)),
+            ("16#ff", Elementary::Word, Some(255)),
+            ("16#FFFF_FFFF", Elementary::Dword, None),
+            ("2#101", Elementary::Int, Some(5)),
+            ("16#-1", Elementary::Int, None),
+            ("3#1", Elementary::Int, None),
+            ("65536", Elementary::Word, None),
+            ("-1", Elementary::Uint, None),
+            ("1", Elementary::Bool, Some(1)),
+            ("2", Elementary::Bool, None),
+        ] {
+            assert_eq!(typed_value(text, of).ok(), stored, "{text}");
+        }
+    }
 
     /// What is shown of a duration is taken as it is shown, below 0 too.
     #[test]

@@ -45,6 +45,18 @@ pub(super) fn diagnostic(named: &Named, (message, help): &(String, String)) -> D
     Diagnostic::error("U0435", message.clone(), named.span.clone()).with_help(help.clone())
 }
 
+/// What is told of a number that stands where a BOOL does.
+pub(super) fn number_alone(system: &System, named: &Named) -> Option<Diagnostic> {
+    let inputs = system.inputs.iter().map(|input| (&input.name, input.of));
+    let shown = system.shown.iter().map(|(name, term)| (name, system.terms.of(*term)));
+    let (name, of) = inputs.chain(shown).find(|(name, of)| {
+        **name == named.name && *of != Elementary::Bool && named.compared.is_none()
+    })?;
+    let message = format!("`{name}` is {of}, and stands where a BOOL does");
+    let help = format!("compare it: `{name} > …`, `{name} = …`");
+    Some(Diagnostic::error("U0435", message, named.span.clone()).with_help(help))
+}
+
 fn add_one(
     system: &mut System,
     text: &str,
@@ -95,6 +107,7 @@ fn value(of: Elementary, values: &[(String, i64)], text: &str) -> Result<u64, St
         return Ok(*value as u64 & of.mask());
     }
     typed_value(text, of).map_err(|help| match values.is_empty() {
+        true if of == Elementary::Time => "write a duration, such as 1.5s".to_owned(),
         true => help,
         false => {
             let names: Vec<&str> = values.iter().take(8).map(|(name, _)| name.as_str()).collect();

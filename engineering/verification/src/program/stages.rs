@@ -38,7 +38,7 @@ const FEW_STEPS: u64 = 200_000;
 /// Why a property was not decided, and what was proved of it all the same.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Undecided {
-    /// What was in the way of decision diagrams; nothing where no run keeps the assumptions.
+    /// What was in the way of decision diagrams; nothing where no run keeps the assumptions and fairness conditions.
     pub why: Option<Stopped>,
     /// No run of up to this number of scans violates it.
     pub unbroken: Option<u32>,
@@ -50,7 +50,7 @@ impl fmt::Display for Undecided {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.why {
             Some(why) => write!(formatter, "{why}")?,
-            None => write!(formatter, "the assumptions contradict each other: no run keeps them")?,
+            None => write!(formatter, "no run keeps the assumptions and the fairness conditions")?,
         }
         match self.unbroken {
             Some(1) => write!(formatter, "; the first scan does not break it")?,

@@ -19,7 +19,9 @@ use understudy_text::{Diagnostic, duration};
 use understudy_typed::Comparison;
 
 use super::lexer::{Sign, Token, tokens};
-use super::{Compared, Formula, MAXIMUM_NESTING, MAXIMUM_SCANS, Named, Path, Property};
+use super::{
+    Compared, Formula, MAXIMUM_NESTING, MAXIMUM_SCANS, MAXIMUM_WORDS, Named, Path, Property,
+};
 
 /// What was read from a file of properties.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -108,6 +110,12 @@ fn read_at(
 ) -> Option<Property> {
     let before = diagnostics.len();
     let tokens = tokens(text, offset, diagnostics);
+    if let Some(beyond) = tokens.get(MAXIMUM_WORDS) {
+        let message = format!("more than {MAXIMUM_WORDS} words and signs in a property");
+        let error = Diagnostic::error("U0432", message, beyond.span.clone());
+        diagnostics.push(error.with_help("divide it: `never a & b` and `never a & c` are two"));
+        return None;
+    }
     let mut parser = Parser {
         tokens: &tokens,
         at: 0,

@@ -91,7 +91,9 @@ within 2s of a: b
 
 #[test]
 fn deep_nesting_is_an_error_and_no_crash() {
-    for text in ["(".repeat(100_000), "!".repeat(100_000), "AG ".repeat(100_000)] {
+    let long = |sign: &str| format!("never a{}", sign.repeat(100_000));
+    let deep = ["(".repeat(100_000), "!".repeat(100_000), "AG ".repeat(100_000)];
+    for text in deep.into_iter().chain([long(" & a"), long(" | a"), long(" and a")]) {
         let wrong = read_one(&text, PERIOD).expect_err("too deep");
         assert_eq!(wrong[0].code, "U0432");
     }
