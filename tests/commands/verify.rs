@@ -322,3 +322,61 @@ never up & down
     assert_eq!(smv.status, 0, "{}", smv.shown());
     assert_snapshot!(smv.output.lines().rev().take(3).collect::<Vec<&str>>().join("\n"));
 }
+
+/// The verdicts of all properties.
+fn verdicts(arguments: &[&str]) -> Vec<String> {
+    let answer = understudy(&[&["verify", "--json"], arguments].concat());
+    let json = answer.json();
+    let properties = json["result"]["programs"][0]["properties"].as_array();
+    let properties = properties.unwrap_or_else(|| panic!("{}", answer.shown()));
+    let verdict = |property: &serde_json::Value| property["verdict"].as_str().map(str::to_owned);
+    properties.iter().filter_map(verdict).collect()
+}
+
+#[test]
+fn conditions_that_no_run_keeps_prove_nothing() {
+    let asked = ["--property", "never move_down", "--property", "always move_down"];
+    for (option, condition) in
+        [("--fair", "stop & !stop"), ("--fair", "FALSE"), ("--assume", "stop & !stop")]
+    {
+        let more = [PRESS, option, condition];
+        assert_eq!(verdicts(&[&asked[..], &more].concat()), ["undecided"; 2], "{condition}");
+    }
+    let both = [PRESS, "--assume", "stop", "--fair", "!stop"];
+    assert_eq!(verdicts(&[&asked[..], &both].concat()), ["undecided"; 2]);
+}
+
+#[test]
+fn what_one_run_reaches_can_be_reached() {
+    let folder = empty_folder("verify-reached");
+    let program = folder.join("once.st");
+    let text = "\
+PROGRAM once
+  VAR_INPUT auto : BOOL; END_VAR
+  VAR_OUTPUT run : BOOL; END_VAR
+  VAR over : BOOL; END_VAR
+  run := auto AND NOT over;
+  over := TRUE;
+END_PROGRAM
+";
+    fs::write(&program, text).expect("written");
+    let program = program.display().to_string();
+    let asked = ["--property", "run can be reached", "--property", "never run"];
+    assert_eq!(verdicts(&[&asked[..], &[&program]].concat()), ["holds", "fails"]);
+    let without = [&program, "--assume", "!auto"];
+    assert_eq!(verdicts(&[&asked[..], &without].concat()), ["fails", "holds"]);
+}
+
+#[test]
+fn counts_and_blocks_of_ladders_in_a_cluster_have_names() {
+    let asked = [
+        "examples/assembly-cell/cluster.toml",
+        "--property",
+        "never packer.parts.CV > 4",
+        "--property",
+        "packer.parts.Q only while packer.parts.CV = 4",
+        "--property",
+        "packer.parts.CV = 2 can be reached",
+    ];
+    assert_eq!(verdicts(&asked), ["holds"; 3]);
+}
