@@ -173,3 +173,21 @@ fn too_many_wires_are_refused() {
     let found = objects(&coil(2, "y", 20, &many));
     assert!(found[0].contains("U1001"), "{found:?}");
 }
+
+/// The order of a scan depends on these numbers.
+#[test]
+fn an_order_and_a_place_that_are_no_numbers_are_told() {
+    let right = contact(2, "a", 10, &[1]) + &coil(3, "y", 20, &[2]);
+    assert_eq!(objects(&right), [""; 0]);
+    for (from, to) in [
+        ("localId=\"3\"", "localId=\"3\" executionOrderId=\"2x\""),
+        ("x=\"20\"", "x=\"-\""),
+        ("y=\"0\"", "y=\"1,5\""),
+    ] {
+        let found = objects(&right.replacen(from, to, 1));
+        // A place that is none can be told of the wires too.
+        assert!(found.first().is_some_and(|first| first.contains("U1002")), "{to}: {found:?}");
+    }
+    let empty = right.replace("localId=\"3\"", "localId=\"3\" executionOrderId=\"\"");
+    assert_eq!(objects(&empty), [""; 0]);
+}

@@ -1,6 +1,7 @@
 //! The objects of a graph and what they are connected to.
 
 use std::collections::HashMap;
+use std::str::FromStr;
 
 use roxmltree::Node;
 use understudy_ladder::Name;
@@ -182,10 +183,8 @@ fn object(reader: &mut Reader, node: Node<'_, '_>) -> Option<Object> {
     Some(Object {
         id,
         span: start_tag(node),
-        position: position(node),
-        order: attribute(node, "executionOrderId")
-            .and_then(|order| order.parse().ok())
-            .unwrap_or(0),
+        position: position(reader, node),
+        order: number(reader, node, "executionOrderId").unwrap_or(0),
         kind,
         inputs,
         outputs,
@@ -397,13 +396,25 @@ fn actions(reader: &mut Reader, node: Node<'_, '_>) -> Vec<Action> {
     actions
 }
 
+/// The number in an attribute; nothing where it is left out. The order of a scan depends on it, so what is none is an error.
+fn number<T: FromStr>(reader: &mut Reader, node: Node<'_, '_>, name: &str) -> Option<T> {
+    let written = attribute(node, name).filter(|written| !written.trim().is_empty())?;
+    let found = written.trim().parse().ok();
+    if found.is_none() {
+        let element = node.tag_name().name();
+        let message = format!("the `{name}` of `{element}` is no number: `{written}`");
+        reader.error("U1002", message, node);
+    }
+    found
+}
+
 /// The top left corner; nought where none is given.
-fn position(node: Node<'_, '_>) -> (i64, i64) {
-    let coordinate = |name| {
-        let place = child(node, "position").and_then(|position| attribute(position, name));
-        let value = place.and_then(|value| value.parse::<f64>().ok()).unwrap_or(0.0);
-        // Saturates, and is 0 for what is no number.
-        (value * 1000.0).round() as i64
+fn position(reader: &mut Reader, node: Node<'_, '_>) -> (i64, i64) {
+    let Some(place) = child(node, "position") else {
+        return (0, 0);
     };
+    // Saturates.
+    let mut coordinate =
+        |name| (number::<f64>(reader, place, name).unwrap_or(0.0) * 1000.0).round() as i64;
     (coordinate("x"), coordinate("y"))
 }
