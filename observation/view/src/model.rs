@@ -38,6 +38,7 @@ use changes::Changes;
 pub use counters::{Counters, MemberCounters, ProgramCounters};
 use cycle::{LastMargin, Received};
 use programs::ProgramTrack;
+use protection::Attribution;
 use reports::Reports;
 pub(crate) use standing::{ForcedSignal, Standing};
 pub use turns::SentTurn;
@@ -91,6 +92,8 @@ pub struct Model {
     series: Series,
     events: Events,
     alarms: Alarms,
+    /// Of each program that is not protected: which stations its remote I/O receives.
+    attributions: Vec<Attribution>,
     /// Who refuses whom.
     refusals: BTreeSet<members::Refusal>,
     pub(crate) process_alarms: ProcessAlarms,
@@ -121,8 +124,10 @@ impl Model {
         let bounds = bounds.holding(incomplete);
         let histories = (0..programs as u8)
             .filter_map(|program| History::new(&cluster, ProgramId(program), bounds.cycles));
+        let members = Members::of(&cluster);
         Self {
-            members: Members::of(&cluster),
+            alarms: Alarms::new(&members, programs),
+            members,
             writes: Writes::default(),
             cycles: Cycles::default(),
             changes: Changes::new(schedule.stations(), programs),
@@ -134,7 +139,7 @@ impl Model {
             turns: Turns::new(bounds.cycles),
             series: Series::new(programs, schedule.stations(), bounds.changes),
             events: Events::new(bounds.events),
-            alarms: Alarms::default(),
+            attributions: vec![Attribution::default(); programs],
             refusals: BTreeSet::new(),
             process_alarms: ProcessAlarms::new(cluster.alarms(), programs),
             timings: Timings::new(schedule, bounds.timings),
@@ -245,6 +250,7 @@ impl Model {
         self.series.shift(by);
         self.events.shift(by);
         self.alarms.shift(by);
+        self.attributions.iter_mut().for_each(|attribution| attribution.shift(by));
         self.process_alarms.shift(by);
         self.timings.shift(by);
         self.closed = self.closed.map(|closed| closed.saturating_add(by));

@@ -9,7 +9,11 @@ use understudy_wire::{
 
 use super::Model;
 use super::standing::{Change, ProgramChange, StationChange};
-use crate::describe::{PROGRAM_FAULT, describe, force_text, program_fault_text, source_text};
+use crate::alarm::VALUE_FAULT;
+use crate::describe::{
+    PROGRAM_FAULT, describe, force_text, missing_text, program_fault_text, program_name,
+    source_text,
+};
 use crate::event::{Event, Level};
 use crate::stop::{self, Stop};
 
@@ -126,18 +130,18 @@ impl Model {
                 own(ProgramChange::StartedCold { awaits_release: *awaits_release })
             }
             RemoteIoEvent::Released { .. } => {
-                let over = ["value-fault", "disputed", PROGRAM_FAULT];
-                self.alarms.all_over(&record.name, &over, cycle);
+                self.alarms.all_over(&record.name, &["disputed", PROGRAM_FAULT], cycle);
+                self.alarms.none_concerns(VALUE_FAULT, program, cycle);
                 self.programs[program.index()].stop.released();
                 own(ProgramChange::Released)
             }
             RemoteIoEvent::ValueFault { accused, located, .. } => {
-                alarm = Some("value-fault");
+                self.accused(record, program, *accused, cycle);
                 let excluded = own(ProgramChange::Excluded(*accused));
                 excluded.filter(|_| *located)
             }
             RemoteIoEvent::RecalledExclusion { stations, .. } => {
-                alarm = Some("value-fault");
+                self.accused(record, program, *stations, cycle);
                 own(ProgramChange::Excluded(*stations))
             }
             RemoteIoEvent::Disputed { .. } => {
@@ -184,6 +188,14 @@ impl Model {
             let text = describe(record, &self.members, &self.writes).text;
             self.alarms.raise(subject(alarm), cycle, text);
         }
+    }
+
+    /// The same stations may be accused by the remote I/Os of several programs.
+    fn accused(&mut self, record: &Record, program: ProgramId, accused: StationSet, cycle: i64) {
+        let names = accused.iter().map(|station| self.members.name(Member::Station(station)));
+        let subject = (names.collect::<Vec<_>>().join(" and "), VALUE_FAULT);
+        let text = describe(record, &self.members, &self.writes).text;
+        self.alarms.concerns(&subject, Some(program), cycle, text);
     }
 
     /// One alarm names all forces of a remote I/O. A further force asks for an acknowledgement again; the end of one does not.
@@ -302,8 +314,13 @@ impl Model {
         let cause = self.cause_of_source(program, source, *missing, *heard);
         let subject = (record.name.clone(), FAIL_SAFE);
         if source == Source::FailSafe {
-            let why = cause.clone().unwrap_or_else(|| text.clone());
-            self.alarms.raise(subject, cycle, why);
+            let why = cause.clone().unwrap_or_else(|| match missing {
+                Some(missing) => missing_text(*missing).to_owned(),
+                None => "no output was provable".to_owned(),
+            });
+            let of = program_name(program, &self.members);
+            let text = format!("{of}: fail-safe outputs, because {why}");
+            self.alarms.raise_critical(subject, cycle, text);
         } else {
             self.alarms.over(&subject, cycle);
         }
@@ -437,6 +454,7 @@ impl Model {
             for (rank, state) in states.into_iter().enumerate() {
                 self.series.station_was(rank, cycle, state);
             }
+            self.attribute_again(cycle);
             self.closed = Some(cycle);
         }
     }

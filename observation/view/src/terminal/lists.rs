@@ -8,7 +8,7 @@ use ratatui::text::{Line, Text};
 use understudy_cluster::Priority;
 
 use super::Bottom;
-use crate::alarm::Alarm;
+use crate::alarm::{Alarm, AlarmState};
 use crate::event::{Event, Level};
 use crate::model::Model;
 use crate::process_alarm::ProcessAlarm;
@@ -24,9 +24,11 @@ pub(super) fn draw(
 ) {
     let [head, list] = Layout::vertical([Constraint::Length(1), Constraint::Min(1)]).areas(area);
     let open = snapshot.alarms.len();
+    let asking = snapshot.alarms.iter().filter(|alarm| alarm.acknowledged_by.is_none()).count();
+    let asking = if asking == 0 { String::new() } else { format!(" ({asking} to acknowledge)") };
     let tabs = [
         (Bottom::Events, format!("events {}", snapshot.events)),
-        (Bottom::Alarms, format!("alarms {open}")),
+        (Bottom::Alarms, format!("alarms {open}{asking}")),
         (Bottom::Failures, "further failures".to_owned()),
     ];
     let spans = tabs.into_iter().flat_map(|(tab, text)| {
@@ -84,7 +86,11 @@ fn alarm(alarm: &Alarm) -> Line<'static> {
         "{:>7} {:12} {kind:12} {} ({state}{before}){action}",
         alarm.cycle, alarm.name, alarm.text
     );
-    let style = if alarm.is_open() { colour(Level::Alarm) } else { Style::new() };
+    let style = match alarm.state() {
+        AlarmState::Unacknowledged => colour(Level::Alarm),
+        AlarmState::Returned => colour(Level::Warning),
+        _ => Style::new(),
+    };
     Line::styled(text, style)
 }
 

@@ -5,6 +5,7 @@
     reason = "the age of what is shown is counted on the real clock"
 )]
 
+mod causes;
 mod complete;
 mod diffs;
 mod directory;
