@@ -52,8 +52,8 @@ fn unseen(state: &Value) -> Option<u64> {
 }
 
 fn acknowledge(page: &Page, alarm: u64) {
-    let path = format!("/api/alarms/{alarm}/acknowledge");
-    assert_eq!(page.post(&path, r#"{"owner":"anna"}"#).status, 200);
+    let body = json!({ "owner": "anna", "alarms": [alarm] }).to_string();
+    assert_eq!(page.post("/api/alarms/acknowledge", &body).status, 200);
     page.wait_for("a seen alarm", |state| {
         let alarms = state["alarms"].as_array().expect("alarms");
         let mut alarms = alarms.iter();

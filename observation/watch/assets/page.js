@@ -73,7 +73,9 @@ function head(state, live) {
   const button = document.getElementById("alarm-count");
   button.hidden = open === 0;
   const count = open === 1 ? "1 alarm" : `${open} alarms`;
-  setText(button, state.past ? `⚠ at least ${count}` : `⚠ ${count}`);
+  button.dataset.unseen = String(state.unacknowledged_alarms > 0);
+  const seen = state.unacknowledged_alarms === 0 ? ", acknowledged" : "";
+  setText(button, state.past ? `⚠ at least ${count}` : `⚠ ${count}${seen}`);
 }
 
 // A long journal is begun near its end; what is before comes behind it.

@@ -44,6 +44,8 @@ pub(crate) struct State {
     redundancy: Redundancy,
     /// Alarms that last or are not acknowledged.
     open_alarms: usize,
+    /// Those of them that are not acknowledged.
+    unacknowledged_alarms: usize,
     alarms: Vec<ShownAlarm>,
     process_alarms: Vec<ProcessAlarm>,
     event_count: u64,
@@ -163,6 +165,8 @@ struct ShownAlarm {
     id: u64,
     cycle: i64,
     who: String,
+    /// The programs concerned.
+    programs: Vec<String>,
     what: String,
     lasts: bool,
     acknowledged: Option<String>,
@@ -205,6 +209,7 @@ impl State {
     pub(crate) fn alarms_are(&mut self, known: &Known) {
         let (open, process) = known.run.open_alarms_at(self.cycle);
         self.open_alarms = open.len();
+        self.unacknowledged_alarms = unacknowledged(&open);
         self.alarms = shown_alarms(&known.run, self.cycle);
         self.process_alarms = process;
         self.event_count = known.run.event_count();
@@ -236,6 +241,7 @@ pub(crate) fn state(run: &RunModel, cycle: i64, finished: bool) -> Option<State>
         timing: timing(run, &snapshot),
         redundancy: redundancy(&snapshot),
         open_alarms: snapshot.alarms.len(),
+        unacknowledged_alarms: unacknowledged(&snapshot.alarms),
         alarms: shown_alarms(run, cycle),
         process_alarms: snapshot.process_alarms,
         event_count: snapshot.events,
@@ -401,11 +407,16 @@ fn failure(outcome: &OutcomeSnapshot) -> Failure {
     Failure { names: outcome.failed.clone(), masked: outcome.masked, why: outcome.why.clone() }
 }
 
-/// The newest alarms up to a cycle, newest first.
+fn unacknowledged(alarms: &[Alarm]) -> usize {
+    alarms.iter().filter(|alarm| alarm.acknowledged_by.is_none()).count()
+}
+
+/// The alarms up to a cycle: first those that wait for a person, then those that last, then the others, the newest of each first.
 fn shown_alarms(run: &RunModel, cycle: i64) -> Vec<ShownAlarm> {
     let alarms = run.alarms_at(cycle).rev();
-    let alarms = alarms.filter(|alarm| alarm.repeated_in.is_none());
-    alarms.take(LISTED_ALARMS).map(shown_alarm).collect()
+    let mut alarms: Vec<Alarm> = alarms.filter(|alarm| alarm.repeated_in.is_none()).collect();
+    alarms.sort_by_key(|alarm| (alarm.acknowledged_by.is_some(), alarm.over.is_some()));
+    alarms.into_iter().take(LISTED_ALARMS).map(shown_alarm).collect()
 }
 
 fn shown_alarm(alarm: Alarm) -> ShownAlarm {
@@ -417,6 +428,7 @@ fn shown_alarm(alarm: Alarm) -> ShownAlarm {
         id: alarm.number,
         cycle: alarm.cycle,
         who: alarm.name,
+        programs: alarm.programs,
         what: alarm.text,
         lasts: alarm.over.is_none(),
         acknowledged: alarm.acknowledged_by,
