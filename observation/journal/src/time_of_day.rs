@@ -16,7 +16,7 @@ use serde::{Serialize, Serializer};
 use time::{OffsetDateTime, UtcOffset};
 use understudy_bus::HostEvent;
 
-use crate::record::{Happening, Record};
+use crate::record::{Happening, Record, RunEvent};
 use crate::run_directory::time_text;
 
 /// A deadline that is further from the one before than its cycles take begins a new stretch: the clock was set, or the cluster paused.
@@ -75,6 +75,16 @@ pub struct ClocksApart {
     pub ahead_ms: i64,
 }
 
+impl ClocksApart {
+    /// The difference in words.
+    pub fn text(&self) -> String {
+        let Self { name, from, ahead_ms } = self;
+        let seconds = ahead_ms.unsigned_abs() as f64 / 1e3;
+        let word = if *ahead_ms < 0 { "behind" } else { "ahead of" };
+        format!("{name} is {seconds:.1} s {word} {from}")
+    }
+}
+
 /// The recorded wall clocks of a run, and the times of its cycles.
 #[derive(Debug, Clone)]
 pub struct TimesOfDay {
@@ -111,6 +121,14 @@ impl TimesOfDay {
         {
             let ahead = i128::from(unix_ns) - i128::from(record.at_ns);
             self.ahead.insert(record.name.clone(), ahead);
+        }
+    }
+
+    /// The same, also from a record of before that is in effect.
+    pub fn note_all(&mut self, record: &Record) {
+        match &record.event {
+            Happening::Run(RunEvent::InEffect { record, .. }) => self.note(record),
+            _ => self.note(record),
         }
     }
 
@@ -242,7 +260,7 @@ mod tests {
     #[test]
     fn a_clock_that_is_set_begins_a_new_stretch_and_changes_nothing_before() {
         let mut times = times();
-        for cycle in 0..100 {
+        for cycle in 0..100i64 {
             if cycle == 50 {
                 // An hour back.
                 times.note(&clock("robot-io", 505 * MS, NOON + 500 * MS - 3_600_000 * MS));
@@ -259,7 +277,7 @@ mod tests {
     #[test]
     fn one_clock_tells_the_cycles_and_another_that_differs_is_said() {
         let mut times = times();
-        for cycle in 0..20 {
+        for cycle in 0..20i64 {
             let at_ns = (5 + 10 * cycle.unsigned_abs()) * MS;
             times.passed("robot-io", cycle, at_ns);
             times.passed("press-io", cycle, at_ns);
@@ -269,7 +287,7 @@ mod tests {
         assert_eq!((apart.name.as_str(), apart.from.as_str()), ("press-io", "robot-io"));
         assert_eq!(apart.ahead_ms, 3200);
         // It ends, and the other one goes on.
-        for cycle in 20..400 {
+        for cycle in 20..400i64 {
             times.passed("press-io", cycle, (5 + 10 * cycle.unsigned_abs()) * MS);
         }
         assert_eq!((times.stretches(0).count(), times.apart()), (2, None));

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_cluster::{AlarmDeclaration, Priority};
-use understudy_journal::{Acknowledgement, Members};
+use understudy_journal::{Acknowledgement, Members, TimeOfDay, TimesOfDay};
 use understudy_wire::{Member, ProgramId};
 
 use crate::describe::program_name;
@@ -92,6 +92,15 @@ pub struct Alarm {
     pub priority: Option<Priority>,
     /// What the operator should do.
     pub action: Option<String>,
+    /// Time of day of `cycle`; nothing where no wall clock was recorded, as in a simulated run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub raised_at: Option<TimeOfDay>,
+    /// Time of day of `over`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub over_at: Option<TimeOfDay>,
+    /// Time of day of `acknowledged_in`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub acknowledged_at: Option<TimeOfDay>,
     /// The effects of a cause that concerns several programs.
     #[serde(skip)]
     concerns: Concerns,
@@ -125,6 +134,17 @@ impl Alarm {
             then.concerns_changed();
             then
         })
+    }
+
+    /// With its times of day.
+    pub(crate) fn timed(self, times: &TimesOfDay) -> Self {
+        let of = |cycle: Option<i64>| times.of_cycle(cycle?);
+        Self {
+            raised_at: of(Some(self.cycle)),
+            over_at: of(self.over),
+            acknowledged_at: of(self.acknowledged_in),
+            ..self
+        }
     }
 
     /// Whether it lasts or is not acknowledged.
@@ -285,6 +305,9 @@ impl Alarms {
             repeated_in: None,
             priority: None,
             action: None,
+            raised_at: None,
+            over_at: None,
+            acknowledged_at: None,
             concerns: Concerns::default(),
         };
         complete(&mut alarm);

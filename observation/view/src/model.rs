@@ -20,7 +20,7 @@ use std::sync::{Arc, OnceLock};
 
 use understudy_cluster::Cluster;
 use understudy_interchange::DrawnUnit;
-use understudy_journal::{Cycles, Happening, Members, Record};
+use understudy_journal::{Cycles, Happening, Members, Record, TimeOfDay, TimesOfDay};
 use understudy_ladder::Observer;
 use understudy_typed::Interpreter;
 use understudy_wire::{Member, Moment, ProgramId};
@@ -98,6 +98,9 @@ pub struct Model {
     refusals: BTreeSet<members::Refusal>,
     pub(crate) process_alarms: ProcessAlarms,
     timings: Timings,
+    pub(crate) times: TimesOfDay,
+    /// The time of day of the record that is taken, where the wall clock of its member is known.
+    now: Option<TimeOfDay>,
     observers: Vec<OnceLock<Option<Observer>>>,
     interpreters: Vec<OnceLock<Option<Interpreter>>>,
     /// The units of each program with numbers, as they are drawn.
@@ -143,6 +146,8 @@ impl Model {
             refusals: BTreeSet::new(),
             process_alarms: ProcessAlarms::new(cluster.alarms(), programs),
             timings: Timings::new(schedule, bounds.timings),
+            times: TimesOfDay::new(schedule.period()),
+            now: None,
             observers: vec![OnceLock::new(); programs],
             interpreters: vec![OnceLock::new(); programs],
             drawings: vec![OnceLock::new(); programs],
@@ -167,6 +172,8 @@ impl Model {
         self.records += 1;
         self.writes.note(record);
         self.at_ns = record.at_ns;
+        self.times.note(record);
+        self.now = self.times.of_record(&record.name, record.at_ns);
         self.alarms.now_ns = record.at_ns;
         self.counters.note(record);
         self.take(record);
@@ -214,13 +221,14 @@ impl Model {
             number: 0,
             cycle: self.cycles.of(None),
             at_ns: self.at_ns,
+            at: None,
             name: "journal".to_owned(),
             event: "left-out",
             level: Level::Warning,
             text: trouble.to_string(),
             cause: None,
         };
-        self.events.push(event);
+        self.tell(event);
     }
 
     /// Whether an answer needed more than is known.
@@ -253,14 +261,28 @@ impl Model {
         self.attributions.iter_mut().for_each(|attribution| attribution.shift(by));
         self.process_alarms.shift(by);
         self.timings.shift(by);
+        self.times.shift(by);
         self.closed = self.closed.map(|closed| closed.saturating_add(by));
+    }
+
+    /// Takes an event: its time of day is that of the record that is taken, or of its cycle.
+    fn tell(&mut self, event: Event) {
+        let at = self.now.filter(|_| event.at_ns == self.at_ns);
+        let at = at.or_else(|| self.times.of_cycle(event.cycle));
+        self.events.push(Event { at, ..event });
+    }
+
+    /// The wall clocks of the members before the first record that is read.
+    pub(crate) fn times_are(&mut self, times: TimesOfDay) {
+        self.times = times;
     }
 
     /// A record that is an event.
     fn happened(&mut self, record: &Record, cycle: i64, cause: Option<String>) {
         let description = describe(record, &self.members, &self.writes);
-        self.events.push(Event {
+        self.tell(Event {
             number: 0,
+            at: None,
             cycle,
             at_ns: record.at_ns,
             name: record.name.clone(),

@@ -3,6 +3,7 @@
 import { act, tell, toast } from "/ask.js";
 import { el, keyed, setText } from "/element.js";
 import { complete, nameField, owner, reasonField } from "/who.js";
+import { clockOf } from "/zone.js";
 
 const SHELVE_MINUTES = 60;
 
@@ -27,8 +28,10 @@ export function show(state) {
     line.dataset.state = alarm.state;
     const before = alarm.since_before ? " or before" : "";
     setText(line.querySelector(".alarm-words"), alarm.what);
-    const facts = [alarm.who, alarm.priority, `since cycle ${alarm.cycle}${before}`, alarm.lasts ? null : "over", alarm.action];
-    const seen = by ? `acknowledged by ${by} in cycle ${alarm.acknowledged_in}` : null;
+    const when = (at, cycle) => [clockOf(at, state.at), at ? `(cycle ${cycle})` : `cycle ${cycle}`].filter(Boolean).join(" ");
+    const over = alarm.lasts ? null : ["over", clockOf(alarm.over_at, state.at)].filter(Boolean).join(" since ");
+    const facts = [alarm.who, alarm.priority, `since ${when(alarm.at, alarm.cycle)}${before}`, over, alarm.action];
+    const seen = by ? `acknowledged by ${by}, ${when(alarm.acknowledged_at, alarm.acknowledged_in)}` : null;
     setText(line.querySelector(".alarm-by"), [...facts, seen].filter(Boolean).join(" · "));
     line.querySelector("button").hidden = Boolean(by);
   });
@@ -40,7 +43,7 @@ export function show(state) {
   keyed(document.querySelector("#signal-alarm-table tbody"), alarms, (alarm) => alarm.name, makeSignalAlarm, (row, alarm) => {
     const { shelved } = alarm;
     row.dataset.state = alarm.state;
-    const words = shelved ? `shelved until cycle ${shelved.until} by ${shelved.owner}: ${shelved.reason}` : alarm.state;
+    const words = shelved ? `shelved until ${clockOf(shelved.until_at, state.at) || `cycle ${shelved.until}`} by ${shelved.owner}: ${shelved.reason}` : alarm.state;
     setText(row.querySelector(".alarm-state"), words);
     setText(row.querySelector("button"), shelved ? "End shelving" : "Shelve");
   });

@@ -7,6 +7,7 @@ use std::time::Instant;
 use serde::Serialize;
 use serde_json::Value;
 use understudy_cluster::{Controller, Priority};
+use understudy_journal::{ClocksApart, TimeOfDay};
 use understudy_remote_io::SignalInput;
 use understudy_typed::{Point, Points};
 use understudy_view::{
@@ -30,6 +31,10 @@ pub(crate) struct State {
     /// Of the shown cycle, in milliseconds, when this was written.
     age_ms: u64,
     cycle: i64,
+    /// Time of day of the cycle; nothing where no wall clock was recorded.
+    at: Option<TimeOfDay>,
+    /// Wall clocks of the cluster that differ, in words.
+    clocks_apart: Option<String>,
     oldest: i64,
     newest: i64,
     finished: bool,
@@ -164,6 +169,10 @@ struct Failure {
 struct ShownAlarm {
     id: u64,
     cycle: i64,
+    /// Times of day at which it was raised, over and acknowledged.
+    at: Option<TimeOfDay>,
+    over_at: Option<TimeOfDay>,
+    acknowledged_at: Option<TimeOfDay>,
     who: String,
     /// The programs concerned.
     programs: Vec<String>,
@@ -231,6 +240,8 @@ pub(crate) fn state(run: &RunModel, cycle: i64, finished: bool) -> Option<State>
         past: None,
         age_ms: 0,
         cycle,
+        at: snapshot.at,
+        clocks_apart: snapshot.clocks_apart.as_ref().map(ClocksApart::text),
         oldest,
         newest,
         finished,
@@ -411,11 +422,14 @@ fn unacknowledged(alarms: &[Alarm]) -> usize {
     alarms.iter().filter(|alarm| alarm.acknowledged_by.is_none()).count()
 }
 
-/// The alarms up to a cycle: first those that wait for a person, then those that last, then the others, the newest of each first.
+/// The alarms up to a cycle: first those that wait for a person, then those that last, then the others; of each the critical and the newest first.
 fn shown_alarms(run: &RunModel, cycle: i64) -> Vec<ShownAlarm> {
     let alarms = run.alarms_at(cycle).rev();
     let mut alarms: Vec<Alarm> = alarms.filter(|alarm| alarm.repeated_in.is_none()).collect();
-    alarms.sort_by_key(|alarm| (alarm.acknowledged_by.is_some(), alarm.over.is_some()));
+    let is_critical = |alarm: &Alarm| alarm.priority == Some(Priority::Critical);
+    alarms.sort_by_key(|alarm| {
+        (alarm.acknowledged_by.is_some(), alarm.over.is_some(), !is_critical(alarm))
+    });
     alarms.into_iter().take(LISTED_ALARMS).map(shown_alarm).collect()
 }
 
@@ -427,6 +441,9 @@ fn shown_alarm(alarm: Alarm) -> ShownAlarm {
         since_before: alarm.since_before,
         id: alarm.number,
         cycle: alarm.cycle,
+        at: alarm.raised_at,
+        over_at: alarm.over_at,
+        acknowledged_at: alarm.acknowledged_at,
         who: alarm.name,
         programs: alarm.programs,
         what: alarm.text,

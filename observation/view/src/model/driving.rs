@@ -83,8 +83,9 @@ impl Model {
         }
         let reason = format!("{name} reports nothing, and no station receives its samples");
         let text = self.not_driven(program, cycle, &reason);
-        self.events.push(Event {
+        self.tell(Event {
             number: 0,
+            at: None,
             cycle,
             at_ns: record.at_ns,
             name,

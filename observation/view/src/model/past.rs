@@ -102,6 +102,8 @@ impl Model {
     fn in_effect(&mut self, cycle: i64, record: &Record) {
         self.cycles.fix(Some((cycle, moment(&record.event))));
         self.at_ns = record.at_ns;
+        self.times.note(record);
+        self.now = None;
         self.alarms.now_ns = record.at_ns;
         self.take(record);
         self.cycles.fix(None);

@@ -237,6 +237,7 @@ impl Model {
         let Some(driven) = event.driven() else {
             return;
         };
+        self.times.passed(&record.name, cycle, record.at_ns);
         self.timings.decided(moment, cycle);
         self.series.applied(program, cycle, sampled.as_ref(), driven, *source);
         self.received_at(cycle, *heard);
@@ -324,8 +325,9 @@ impl Model {
         } else {
             self.alarms.over(&subject, cycle);
         }
-        self.events.push(Event {
+        self.tell(Event {
             number: 0,
+            at: None,
             cycle,
             at_ns: self.alarms.now_ns,
             name: record.name.clone(),
@@ -425,8 +427,9 @@ impl Model {
     ) {
         let subject = (record.name.clone(), event);
         self.alarms.raise(subject, cycle, text.clone());
-        self.events.push(Event {
+        self.tell(Event {
             number: 0,
+            at: None,
             cycle,
             at_ns: record.at_ns,
             name: record.name.clone(),

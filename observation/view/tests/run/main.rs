@@ -23,5 +23,6 @@ mod replay;
 mod screen;
 mod state_signals;
 mod support;
+mod times;
 mod why;
 mod writes;

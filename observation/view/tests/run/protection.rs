@@ -183,7 +183,10 @@ fn a_remote_io_that_does_not_report_is_not_taken_at_its_last_word() {
     let of = |signal, cycle| model.why(signal, cycle).expect("it is known");
     let why = of("robot.grip", None);
     assert_eq!(why.age_cycles, Some(age));
-    assert!(why.to_text().contains("NOT THE PRESENT: robot-io has reported nothing for"));
+    assert!(
+        why.to_text(understudy_view::Zone::UTC)
+            .contains("NOT THE PRESENT: robot-io has reported nothing for")
+    );
     assert_eq!(of("robot.grip", Some(50)).age_cycles, None, "it was asked for");
     assert_eq!(of("press.move_down", None).age_cycles, None);
 }
