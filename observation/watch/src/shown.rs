@@ -22,6 +22,9 @@ use crate::model::{Known, Model};
 /// Failures that are listed, at most.
 const LISTED_FAILURES: usize = 40;
 
+/// Pairs of stations that the sentence about the remaining redundancy names, at most.
+const NAMED_PAIRS: usize = 2;
+
 /// Alarms that are listed, at most.
 const LISTED_ALARMS: usize = 100;
 
@@ -400,15 +403,29 @@ fn redundancy(snapshot: &Snapshot) -> Redundancy {
 fn in_words(margin: &MarginSnapshot, singles: &[&OutcomeSnapshot]) -> (&'static str, String) {
     let masked = singles.iter().filter(|outcome| outcome.masked).count();
     let of = singles.len();
-    let all_pairs = margin.pairs.iter().all(|pair| pair.masked);
-    let (level, words) = match (masked, all_pairs) {
+    let unmasked: Vec<String> = margin
+        .pairs
+        .iter()
+        .filter(|pair| !pair.masked)
+        .map(|pair| pair.failed.join(" and "))
+        .collect();
+    let (level, words) = match (masked, unmasked.is_empty()) {
         _ if margin.served.is_empty() => ("none", "no program has provable outputs"),
         (0, _) => ("none", "no further failure of a station would be masked"),
         (_, _) if masked < of => {
             let words = format!("{masked} of {of} failures of a single station would be masked");
             return ("some", words);
         }
-        (_, false) => ("all", "any one further failure of a station would be masked"),
+        (_, false) => {
+            let more = unmasked.len().saturating_sub(NAMED_PAIRS);
+            let named = unmasked[..unmasked.len() - more].join(", or ");
+            let more =
+                if more == 0 { String::new() } else { format!(", and {more} further pairs") };
+            return (
+                "all",
+                format!("any one of {of} stations may fail; {named}{more} together not"),
+            );
+        }
         _ => ("all", "any two further failures of stations would be masked"),
     };
     (level, words.to_owned())
