@@ -6,10 +6,10 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::json;
 use understudy_text::{MAXIMUM_SHOWN, visible, visible_json};
-use understudy_view::{Filter, JournalLine, Listing, Run, Source, Trouble};
+use understudy_view::{Filter, JournalLine, JournalText, Listing, Run, Source, Trouble};
 
 use crate::answer::{Answer, Status};
-use crate::inspect::view::{RunArgument, several};
+use crate::inspect::view::{RunArgument, ZoneArgument, several};
 
 /// Print or follow the journal of a run
 #[derive(Debug, Args)]
@@ -45,6 +45,8 @@ pub(crate) struct Arguments {
     /// Include the periodic records of every cycle
     #[arg(long)]
     all: bool,
+    #[command(flatten)]
+    zone: ZoneArgument,
 }
 
 /// Polling interval of a growing journal.
@@ -68,7 +70,8 @@ pub(crate) fn run(arguments: &Arguments, json: bool) -> Result<Answer, Answer> {
     };
     let (listing, source) = run.listing(filter).map_err(|errors| several(&errors))?;
     if arguments.follow {
-        return Ok(followed(&run, listing, source, json));
+        let shown = JournalText::new(arguments.zone.zone());
+        return Ok(followed(&run, listing, source, shown, json));
     }
     let mut lines = Vec::new();
     let (mut troubles, mut more) = (Vec::new(), 0_usize);
@@ -82,7 +85,8 @@ pub(crate) fn run(arguments: &Arguments, json: bool) -> Result<Answer, Answer> {
     if more > 0 {
         troubles.push(format!("{more} more unreadable lines of the journal"));
     }
-    let mut text: String = lines.iter().map(|line| line.to_text() + "\n").collect();
+    let mut shown = JournalText::new(arguments.zone.zone());
+    let mut text: String = lines.iter().map(|line| shown.text(line) + "\n").collect();
     if lines.is_empty() {
         text += match arguments.all {
             true => "No records.\n",
@@ -117,17 +121,27 @@ fn read(
 }
 
 /// Prints each new line until the run ends or the reader closes the pipe.
-fn followed(run: &Run, mut listing: Listing, mut source: Source, json: bool) -> Answer {
+fn followed(
+    run: &Run,
+    mut listing: Listing,
+    mut source: Source,
+    mut shown: JournalText,
+    json: bool,
+) -> Answer {
     let mut output = std::io::stdout();
     let mut reader_is_there = true;
     loop {
         let over = run.is_finished();
         let taken = source.poll(&mut |found| {
-            let text = |line: &JournalLine| {
-                if json { serde_json::to_string(line).unwrap_or_default() } else { line.to_text() }
+            let mut text = |line: &JournalLine| {
+                if json {
+                    serde_json::to_string(line).unwrap_or_default()
+                } else {
+                    shown.text(line)
+                }
             };
             let lines = match found {
-                Ok(record) => listing.take(&record).iter().map(text).collect(),
+                Ok(record) => listing.take(&record).iter().map(&mut text).collect(),
                 Err(trouble) if json => vec![json!({ "trouble": trouble.to_string() }).to_string()],
                 Err(trouble) => vec![format!("       -  {trouble}")],
             };

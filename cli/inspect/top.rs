@@ -9,13 +9,13 @@ use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::{self, KeyCode, KeyEventKind, KeyModifiers};
 use understudy_attach::Attached;
 use understudy_journal::{Commander, JOURNAL_LIMIT_BYTES, RunDirectory};
-use understudy_view::{Alarm, Bounds, Following, Key, Model, Run, Screen};
+use understudy_view::{Alarm, Bounds, Following, Key, Model, Run, Screen, Zone};
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::files;
 use crate::inspect::attach::AttachArguments;
-use crate::inspect::view::RunArgument;
+use crate::inspect::view::{RunArgument, ZoneArgument};
 
 /// Show a live view of a run on the terminal
 #[derive(Debug, Args)]
@@ -34,6 +34,8 @@ pub(crate) struct Arguments {
     /// Print the current state and exit
     #[arg(long)]
     once: bool,
+    #[command(flatten)]
+    zone: ZoneArgument,
     #[command(flatten)]
     elsewhere: AttachArguments,
 }
@@ -58,7 +60,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
             wait_for_a_cycle(&run);
         }
         let model = run.read(Bounds::default())?;
-        let mut screen = Screen::default();
+        let mut screen = Screen::in_zone(arguments.zone.zone());
         let snapshot = model.snapshot();
         return Ok(Answer::done(printed(&mut screen, &model)?, &snapshot));
     }
@@ -71,7 +73,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         Some((_, attached, person)) => (attached.commander(), person.clone()),
         None => (run.commander(), owner()),
     };
-    let shown = show(&mut terminal, &run, &commander, &owner);
+    let shown = show(&mut terminal, &run, &commander, &owner, arguments.zone.zone());
     ratatui::restore();
     shown.map_err(failed)?;
     Ok(Answer::done("", ()))
@@ -150,9 +152,10 @@ fn show(
     run: &Run,
     commander: &Commander,
     owner: &str,
+    zone: Zone,
 ) -> io::Result<()> {
     let (mut model, mut following) = Following::of(run, Bounds::default());
-    let mut screen = Screen::default();
+    let mut screen = Screen::in_zone(zone);
     loop {
         let drawn = Instant::now();
         while !screen.is_paused() {

@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use understudy_view::{Run, ViewError, find_run_of};
+use jiff::Timestamp;
+use jiff::tz::TimeZone;
+use understudy_view::{Run, ViewError, Zone, find_run_of};
 
 use crate::answer::{Answer, Status};
 use crate::files;
@@ -20,6 +22,26 @@ pub(crate) struct RunArgument {
     /// Directory of runs
     #[arg(long, value_name = "DIR", default_value = "runs")]
     pub(crate) out: PathBuf,
+}
+
+/// How times of day are shown.
+#[derive(Debug, Clone, Copy, Args)]
+pub(crate) struct ZoneArgument {
+    /// Show times of day in UTC instead of the local zone
+    #[arg(long)]
+    utc: bool,
+}
+
+impl ZoneArgument {
+    pub(crate) fn zone(self) -> Zone {
+        if self.utc { Zone::UTC } else { Zone::of(local_offset) }
+    }
+}
+
+/// Seconds by which the zone of this machine, or of the variable `TZ`, is ahead of UTC at a time.
+fn local_offset(unix_seconds: i64) -> i32 {
+    let time = Timestamp::from_second(unix_seconds).unwrap_or_default();
+    TimeZone::system().to_offset(time).seconds()
 }
 
 impl RunArgument {

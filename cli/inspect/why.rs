@@ -3,7 +3,7 @@
 use clap::Args;
 
 use crate::answer::Answer;
-use crate::inspect::view::RunArgument;
+use crate::inspect::view::{RunArgument, ZoneArgument};
 
 /// Explain the value of an output in a cycle of a run
 #[derive(Debug, Args)]
@@ -25,9 +25,12 @@ pub(crate) struct Arguments {
     at: Option<i64>,
     #[command(flatten)]
     run: RunArgument,
+    #[command(flatten)]
+    zone: ZoneArgument,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let why = arguments.run.open()?.why(&arguments.output, arguments.at)?;
-    Ok(Answer::done(why.to_text(), &why).and_next(&[&"watch", &arguments.run.run]))
+    Ok(Answer::done(why.to_text(arguments.zone.zone()), &why)
+        .and_next(&[&"watch", &arguments.run.run]))
 }

@@ -20,7 +20,9 @@ use std::time::Duration;
 use understudy_bus::HostEvent;
 use understudy_cluster::AlarmDeclaration;
 use understudy_cycle::Agreement;
-use understudy_journal::{AlarmChange, Happening, Members, Numbering, Record, moment};
+use understudy_journal::{
+    AlarmChange, Happening, Members, Numbering, Record, TimeOfDay, TimesOfDay, moment,
+};
 use understudy_node::Event as StationEvent;
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_simulator::{Action, Referee, Violation};
@@ -158,6 +160,7 @@ pub struct Account {
     presences: Presences,
     pub(crate) services: Vec<ServiceTrack>,
     stalls: Stalls,
+    times: TimesOfDay,
     alarms: Alarms,
     pub(crate) traces: Traces,
     pub(crate) steps: Vec<DoneStep>,
@@ -195,6 +198,7 @@ impl Account {
             presences: Presences::new(stations, terms.agreement.flag_after),
             services: vec![ServiceTrack::default(); programs],
             stalls: Stalls::default(),
+            times: TimesOfDay::new(terms.agreement.schedule.period()),
             alarms: Alarms::new(&terms.alarms, programs),
             traces: Traces {
                 plants: vec![PlantTrace::default(); programs],
@@ -225,6 +229,11 @@ impl Account {
     /// The moment of the origin, once there is one.
     pub fn origin(&self) -> Option<Moment> {
         self.origin.map(|(moment, _)| moment)
+    }
+
+    /// Time of day of the origin, where wall clocks were recorded.
+    pub fn origin_at(&self) -> Option<TimeOfDay> {
+        self.times.of_cycle(self.origin?.1)
     }
 
     /// The newest cycle that was decided, counted from the origin; none before it.
@@ -276,12 +285,18 @@ impl Account {
     /// Takes the next record.
     pub fn observe(&mut self, record: &Record) {
         self.records += 1;
+        self.times.note(record);
         match (&record.event, record.member) {
             (Happening::Station(event), Some(Member::Station(station))) => {
                 self.station(station, event);
             }
             (Happening::RemoteIo(event), Some(Member::RemoteIo(program))) => {
                 self.remote_io(program, event);
+                if let RemoteIoEvent::Applied { moment, .. } = event
+                    && let Some(number) = self.numbering.of(*moment)
+                {
+                    self.times.passed(&record.name, number, record.at_ns);
+                }
             }
             (Happening::Plant(event), Some(Member::Plant(program))) => self.plant(program, event),
             (Happening::Host(HostEvent::JournalLost { records }), Some(member)) => {

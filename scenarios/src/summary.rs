@@ -32,6 +32,8 @@ pub struct Summary {
     pub cycles_run: u64,
     /// The cluster's own epoch and cycle of cycle 0, as `epoch:cycle`; nothing where the cluster never was synchronised.
     pub origin: Option<String>,
+    /// Time of day of cycle 0, in UTC, by the wall clock that the journal has recorded; nothing in a simulated run.
+    pub origin_at: Option<String>,
     /// Whether it was asked to end early.
     pub interrupted: bool,
     /// By rank.
@@ -353,6 +355,7 @@ impl Summary {
             cycles_asked: scenario.cycles,
             cycles_run: finished.cycles_run,
             origin: account.origin().map(|origin| origin.to_string()),
+            origin_at: account.origin_at().map(|at| at.to_string()),
             interrupted: account.interrupted,
             stations: stations.collect(),
             remote_ios: remote_ios.collect(),

@@ -52,8 +52,8 @@ fn unseen(state: &Value) -> Option<u64> {
 }
 
 fn acknowledge(page: &Page, alarm: u64) {
-    let path = format!("/api/alarms/{alarm}/acknowledge");
-    assert_eq!(page.post(&path, r#"{"owner":"anna"}"#).status, 200);
+    let body = json!({ "owner": "anna", "alarms": [alarm] }).to_string();
+    assert_eq!(page.post("/api/alarms/acknowledge", &body).status, 200);
     page.wait_for("a seen alarm", |state| {
         let alarms = state["alarms"].as_array().expect("alarms");
         let mut alarms = alarms.iter();
@@ -87,6 +87,28 @@ fn a_laboratory_of_another_process_is_looked_at_and_commanded() {
     first.wait_for("another alarm", |state| {
         state["alarms"].as_array().is_some_and(|alarms| alarms.len() > 1)
     });
+    // Page, journal and `top` tell the same times of day, in UTC.
+    let state = first.wait_for("cycles", |_| true);
+    let at = |value: &Value| value.as_str().expect("a time of day").to_owned();
+    for alarm in state["alarms"].as_array().expect("alarms") {
+        assert!(at(&alarm["at"]).ends_with('Z'), "{state:#}");
+    }
+    assert!(at(&state["at"]).ends_with('Z'), "{state:#}");
+    let events = first.get("/api/events?levels=alarm").json();
+    assert!(at(&events["events"][0]["at"]).ends_with('Z'), "{events:#}");
+    let (_, top, _) = answer(&["top", text(&runs.join("latest")), "--once"]);
+    let of_page = |name: &str| {
+        let alarms = state["alarms"].as_array().expect("alarms").iter();
+        let mut alarms = alarms.filter(|alarm| alarm["who"] == name);
+        alarms.next().map(|alarm| (alarm["cycle"].clone(), alarm["at"].clone()))
+    };
+    let alarms = top["result"]["alarms"].as_array().expect("alarms");
+    let compared = alarms.iter().filter(|alarm| {
+        let found = of_page(alarm["name"].as_str().expect("a name"));
+        let own = (alarm["cycle"].clone(), alarm["raised_at"].clone());
+        found.inspect(|found| assert_eq!(*found, own, "{alarm:#} {state:#}")).is_some()
+    });
+    assert!(compared.count() > 0, "{top:#} {state:#}");
     // Seen at the one page, it is seen at the other.
     let alarm = unseen(&forced).expect("an alarm");
     acknowledge(&second, alarm);

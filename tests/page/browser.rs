@@ -69,6 +69,11 @@ fn a_browser_sees_a_kill_and_asks_why() {
 }
 
 #[test]
+fn a_browser_sees_no_red_before_outputs_are_fail_safe() {
+    drive("calm", "examples/press-cell/cluster.toml", "calm.mjs", |_| Vec::new());
+}
+
+#[test]
 fn a_browser_starts_a_shuttle_and_sees_since_when() {
     let cluster = "examples/two-shuttles/cluster.toml";
     drive("operate", cluster, "operate.mjs", |_| Vec::new());

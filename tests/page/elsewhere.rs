@@ -48,7 +48,7 @@ fn is_healthy(state: &Value) -> bool {
 }
 
 /// What the alarm of a remote I/O says that drives nothing.
-const NOT_DRIVEN: &str = "no remote I/O drives the outputs of";
+const NOT_DRIVEN: &str = "no remote I/O drives the outputs";
 
 /// What the alarm of a member says that runs another cluster file.
 const ODD: &str = "start it with this cluster file";
@@ -267,7 +267,7 @@ fn stations_that_stop_together_are_shown_as_such_and_a_lost_state_is_an_alarm() 
     let state = first.wait_for("stations that are not received", |state| {
         let mut states = stations.into_iter().map(|name| member(state, name));
         states.all(|member| member["state"] == "not-received")
-            && alarms(state, "NOT protected").len() == 2
+            && alarms(state, "not protected, because").len() == stations.len()
     });
     assert!(alarms(&state, "is broken").is_empty(), "{state:#}");
     assert!(alarms(&state, NOT_DRIVEN).is_empty(), "{state:#}");

@@ -228,8 +228,8 @@ fn bad_questions_get_clear_answers_and_stop_nothing() {
         ("/api/command", "{", 400, "U0682"),
         ("/api/command", "[]", 400, "U0682"),
         ("/api/command", r#"{"member":"robot"}"#, 400, "U0682"),
-        ("/api/alarms/77/acknowledge", r#"{"owner":"anna"}"#, 404, "U0681"),
-        ("/api/alarms/77/acknowledge", r#"{"owner":"\n"}"#, 400, "U0682"),
+        ("/api/alarms/acknowledge", r#"{"owner":"anna","alarms":[77]}"#, 404, "U0681"),
+        ("/api/alarms/acknowledge", r#"{"owner":"\n","alarms":[77]}"#, 400, "U0682"),
         ("/api/login", r#"{"token":"x"}"#, 400, "U0682"),
         ("/api/logout", "{}", 400, "U0682"),
         ("/api/state", "{}", 405, "U0682"),
@@ -260,8 +260,8 @@ fn other_pages_cannot_ask() {
     assert_eq!(of_host(&page.address), 200);
     assert_eq!(of_host("localhost:1"), 200);
     assert_eq!(of_host("evil.example"), 403, "a name that now means this machine");
-    let body = r#"{"owner":"anna"}"#;
-    let post = |lines: &str| page.post_with("/api/alarms/77/acknowledge", lines, body).code();
+    let body = r#"{"owner":"anna","alarms":[77]}"#;
+    let post = |lines: &str| page.post_with("/api/alarms/acknowledge", lines, body).code();
     assert_eq!(post("Origin: https://evil.example\r\n"), "U0685");
     assert_eq!(post("Origin: null\r\n"), "U0685");
     assert_eq!(post(""), "U0685");

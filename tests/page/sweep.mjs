@@ -50,7 +50,7 @@ async function dialog(member, name) {
 
 async function drive() {
   await until("everybody", `${members}.length > 2 && ${members}.every((member) => !["killed", "lost"].includes(member.dataset.state))`);
-  await until("a margin", `${text("#redundancy-words")}.includes("any one further failure")`);
+  await until("a margin", `${text("#redundancy-words")}.includes("any one of")`);
   await until("the tour", "document.querySelector('[data-tour=next]') !== null");
   await check("tour");
   await evaluate("localStorage.setItem('tour', 'seen'), document.querySelector('[data-tour=skip]')?.click()");

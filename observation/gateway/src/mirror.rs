@@ -127,6 +127,7 @@ fn documents(cluster: &Cluster, snapshot: &Snapshot, state: &str) -> Vec<(String
                 "cluster": snapshot.cluster,
                 "run": state,
                 "cycle": snapshot.cycle,
+                "at": snapshot.at,
                 "period_us": snapshot.period_us,
                 "mode": snapshot.mode,
                 "timing": snapshot.timing,

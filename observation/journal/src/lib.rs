@@ -25,6 +25,7 @@ mod run_directory;
 mod segments;
 mod source;
 mod tally;
+mod time_of_day;
 mod version;
 mod writer;
 
@@ -53,6 +54,7 @@ pub use run_directory::{KEYS, RunDirectory, RunDirectoryError, time_name, time_t
 pub use segments::{Segments, closed_segments, segments_of};
 pub use source::{SOURCES, source_word};
 pub use tally::{Deadlines, Tally};
+pub use time_of_day::{ClocksApart, TimeOfDay, TimesOfDay};
 pub use understudy_bus::JOURNAL_VERSION;
 pub use understudy_simulator::Action;
 pub use version::{WrongVersion, check_header, check_journal, check_version, journal_header};

@@ -16,6 +16,7 @@ mod signals;
 use opcua::types::{DataTypeId, StatusCode, UAString, Variant};
 use understudy_cluster::{Cluster, Controller, InputSource};
 use understudy_gateway::{Feed, Observation};
+use understudy_journal::TimeOfDay;
 use understudy_typed::Point;
 use understudy_view::{Event, ProgramSnapshot, StationSnapshot};
 use understudy_wire::Member;
@@ -273,7 +274,7 @@ impl Tree {
             "Open" UInt64 "alarms that last or are not acknowledged" => recorded(|of| Some((of.snapshot.alarms.len() as u64).into()));
             "Texts" Strings "open alarms, in words" => recorded(|of| {
                 let alarms = of.snapshot.alarms.iter();
-                let alarms = alarms.map(|alarm| format!("cycle {}: {}: {}", alarm.cycle, alarm.name, alarm.text));
+                let alarms = alarms.map(|alarm| format!("{}cycle {}: {}: {}", time(alarm.raised_at), alarm.cycle, alarm.name, alarm.text));
                 Some(texts(&alarms.collect::<Vec<_>>()))
             });
         }
@@ -282,7 +283,7 @@ impl Tree {
             "Count" UInt64 "events so far" => recorded(|of| Some(of.snapshot.events.into()));
             "Recent" Strings "the newest 20 events, in words, the newest last" => recorded(|of| {
                 let recent = of.recent.iter();
-                let recent = recent.map(|event| format!("cycle {}: {}: {}", event.cycle, event.name, message(event)));
+                let recent = recent.map(|event| format!("{}cycle {}: {}: {}", time(event.at), event.cycle, event.name, message(event)));
                 Some(texts(&recent.collect::<Vec<_>>()))
             });
         }
@@ -364,6 +365,11 @@ fn text(text: &str) -> Variant {
 fn texts(texts: &[String]) -> Variant {
     let texts: Vec<UAString> = texts.iter().map(|text| text.as_str().into()).collect();
     Variant::from(texts)
+}
+
+/// A time of day before a text.
+fn time(at: Option<TimeOfDay>) -> String {
+    at.map_or_else(String::new, |at| format!("{at}, "))
 }
 
 #[cfg(test)]

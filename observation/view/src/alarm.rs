@@ -1,11 +1,17 @@
 //! Alarms: conditions that an operator has to acknowledge, of members and of signals of the programs.
 
+mod concerns;
+
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_cluster::{AlarmDeclaration, Priority};
-use understudy_journal::Acknowledgement;
+use understudy_journal::{Acknowledgement, Members, TimeOfDay, TimesOfDay};
+use understudy_wire::{Member, ProgramId};
+
+use crate::describe::program_name;
+use concerns::Concerns;
 
 /// Alarms that are kept, at most; the oldest that are over and acknowledged go first.
 const MOST: usize = 1000;
@@ -64,11 +70,13 @@ pub struct Alarm {
     pub cycle: i64,
     /// The cycle in which it was over; nothing while it lasts.
     pub over: Option<i64>,
-    /// The member; the name of an alarm on a signal.
+    /// The member that is the cause; the name of an alarm on a signal.
     pub name: String,
     /// Kind of alarm, such as `value-fault`; `process` for an alarm on a signal.
     pub alarm: &'static str,
-    /// What is wrong.
+    /// The programs concerned, in the order of the cluster file; none where only the member is.
+    pub programs: Vec<String>,
+    /// What is wrong: the effect first, then its cause.
     pub text: String,
     /// The time of the record that raised it.
     pub raised_ns: u64,
@@ -84,6 +92,18 @@ pub struct Alarm {
     pub priority: Option<Priority>,
     /// What the operator should do.
     pub action: Option<String>,
+    /// Time of day of `cycle`; nothing where no wall clock was recorded, as in a simulated run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub raised_at: Option<TimeOfDay>,
+    /// Time of day of `over`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub over_at: Option<TimeOfDay>,
+    /// Time of day of `acknowledged_in`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub acknowledged_at: Option<TimeOfDay>,
+    /// The effects of a cause that concerns several programs.
+    #[serde(skip)]
+    concerns: Concerns,
 }
 
 impl Alarm {
@@ -92,7 +112,7 @@ impl Alarm {
         Acknowledgement {
             name: self.name.clone(),
             alarm: self.alarm.to_owned(),
-            raised_ns: self.raised_ns,
+            raised_ns: self.newest_ns(),
             cycle: self.cycle,
             owner,
             at_unix_s,
@@ -102,13 +122,29 @@ impl Alarm {
     /// The alarm as it was in a cycle; nothing where it was raised later.
     pub fn at(&self, cycle: i64) -> Option<Self> {
         let acknowledged = self.acknowledged_in.is_some_and(|at| at <= cycle);
-        (self.cycle <= cycle).then(|| Self {
-            over: self.over.filter(|over| *over <= cycle),
-            repeated_in: self.repeated_in.filter(|at| *at <= cycle),
-            acknowledged_by: self.acknowledged_by.clone().filter(|_| acknowledged),
-            acknowledged_in: self.acknowledged_in.filter(|_| acknowledged),
-            ..self.clone()
+        (self.cycle <= cycle).then(|| {
+            let mut then = Self {
+                over: self.over.filter(|over| *over <= cycle),
+                repeated_in: self.repeated_in.filter(|at| *at <= cycle),
+                acknowledged_by: self.acknowledged_by.clone().filter(|_| acknowledged),
+                acknowledged_in: self.acknowledged_in.filter(|_| acknowledged),
+                concerns: self.concerns.at(cycle),
+                ..self.clone()
+            };
+            then.concerns_changed();
+            then
         })
+    }
+
+    /// With its times of day.
+    pub(crate) fn timed(self, times: &TimesOfDay) -> Self {
+        let of = |cycle: Option<i64>| times.of_cycle(cycle?);
+        Self {
+            raised_at: of(Some(self.cycle)),
+            over_at: of(self.over),
+            acknowledged_at: of(self.acknowledged_in),
+            ..self
+        }
     }
 
     /// Whether it lasts or is not acknowledged.
@@ -129,6 +165,29 @@ impl Alarm {
     fn is_of(&self, subject: &Subject) -> bool {
         (&self.name, self.alarm) == (&subject.0, subject.1)
     }
+
+    /// The time of the record that raised it or told of its newest effect: what an acknowledgement has seen.
+    fn newest_ns(&self) -> u64 {
+        self.concerns.newest_ns().unwrap_or(self.raised_ns)
+    }
+
+    fn concerns_changed(&mut self) {
+        if !self.concerns.is_empty() {
+            self.programs = self.concerns.programs();
+            self.text = self.concerns.text(effect(self.alarm));
+        }
+    }
+}
+
+/// Alarm of a station without which programs are not protected.
+pub(crate) const UNPROTECTED: &str = "unprotected";
+
+/// Alarm of stations whose outputs or states are wrong.
+pub(crate) const VALUE_FAULT: &str = "value-fault";
+
+/// The effect on a program, of an alarm whose cause may concern several.
+fn effect(alarm: &str) -> &'static str {
+    if alarm == UNPROTECTED { "not protected" } else { "value fault" }
 }
 
 /// What an alarm is about, so that its end finds it.
@@ -136,6 +195,10 @@ pub(crate) type Subject = (String, &'static str);
 
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Alarms {
+    /// Names of the programs.
+    programs: Vec<String>,
+    /// The program of each remote I/O and plant.
+    of_member: BTreeMap<String, ProgramId>,
     alarms: BTreeMap<u64, Alarm>,
     lasting: BTreeMap<Subject, u64>,
     count: u64,
@@ -146,6 +209,20 @@ pub(crate) struct Alarms {
 }
 
 impl Alarms {
+    /// The alarms of a run before its first record.
+    pub(crate) fn new(members: &Members, programs: usize) -> Self {
+        let ids = (0..).map(ProgramId).take(programs);
+        let of_member = ids.clone().flat_map(|program| {
+            let own = [Member::RemoteIo(program), Member::Plant(program)];
+            own.map(|member| (members.name(member).to_owned(), program))
+        });
+        Self {
+            of_member: of_member.collect(),
+            programs: ids.map(|program| program_name(program, members).to_owned()).collect(),
+            ..Self::default()
+        }
+    }
+
     /// Raises an alarm that lasts; one that lasts already is not raised again.
     pub(crate) fn raise(&mut self, subject: Subject, cycle: i64, text: String) {
         self.raise_alarm(subject, cycle, text, |_| {});
@@ -177,6 +254,7 @@ impl Alarms {
         since_before: bool,
     ) {
         let subject = (declared.name.clone(), PROCESS);
+        let program = self.programs.get(declared.program.index()).cloned().into_iter().collect();
         let mut before = self.alarms.values_mut().rev();
         if let Some(alarm) = before.find(|alarm| alarm.is_of(&subject))
             && alarm.acknowledged_by.is_none()
@@ -186,6 +264,7 @@ impl Alarms {
         self.raise_alarm(subject, cycle, declared.text.clone(), |alarm| {
             alarm.since_before |= since_before;
             alarm.priority = Some(declared.priority);
+            alarm.programs = program;
             alarm.action.clone_from(&declared.action);
         });
     }
@@ -209,12 +288,15 @@ impl Alarms {
                 self.lasting.retain(|_, lasting| *lasting != number);
             }
         }
+        let program = self.of_member.get(&subject.0);
+        let program = program.and_then(|program| self.programs.get(program.index()));
         let mut alarm = Alarm {
             number: self.count,
             cycle,
             over: None,
             name: subject.0.clone(),
             alarm: subject.1,
+            programs: program.cloned().into_iter().collect(),
             text,
             raised_ns: self.now_ns,
             acknowledged_by: None,
@@ -223,10 +305,85 @@ impl Alarms {
             repeated_in: None,
             priority: None,
             action: None,
+            raised_at: None,
+            over_at: None,
+            acknowledged_at: None,
+            concerns: Concerns::default(),
         };
         complete(&mut alarm);
         self.alarms.insert(self.count, alarm);
         self.lasting.insert(subject, self.count);
+    }
+
+    /// A cause has an effect on a program, or is the failure of its member itself. One cause is one alarm: of one that lasts the list grows, and
+    /// the longer list asks for an acknowledgement again.
+    pub(crate) fn concerns(
+        &mut self,
+        subject: &Subject,
+        program: Option<ProgramId>,
+        cycle: i64,
+        cause: String,
+    ) {
+        let lasting = self.lasting.get(subject).copied();
+        let lasting = lasting.and_then(|lasting| self.alarms.get_mut(&lasting));
+        let mut concerns = Concerns::of(self.programs.len());
+        if let Some(alarm) = lasting {
+            if alarm.acknowledged_by.is_none() || alarm.concerns.has(program) {
+                concerns = std::mem::take(&mut alarm.concerns);
+            } else {
+                concerns = alarm.concerns.lasting();
+                self.over(subject, cycle);
+            }
+        }
+        let name = program.and_then(|program| self.programs.get(program.index()));
+        let name = name.cloned().unwrap_or_default();
+        concerns.begin(program, name, (cycle, self.now_ns), cause);
+        self.raise_alarm(subject.clone(), cycle, String::new(), |_| {});
+        self.concerns_are(subject, concerns);
+    }
+
+    fn concerns_are(&mut self, subject: &Subject, concerns: Concerns) {
+        let lasting = self.lasting.get(subject);
+        if let Some(alarm) = lasting.and_then(|lasting| self.alarms.get_mut(lasting)) {
+            alarm.concerns = concerns;
+            alarm.concerns_changed();
+        }
+    }
+
+    /// The causes of this kind that have an effect on a program.
+    pub(crate) fn causes_for(&self, alarm: &'static str, program: ProgramId) -> Vec<Subject> {
+        let of_program = |number| {
+            let alarm = self.alarms.get(number);
+            alarm.is_some_and(|alarm| alarm.concerns.has(Some(program)))
+        };
+        let lasting = self.lasting.iter();
+        let lasting = lasting.filter(|(subject, number)| subject.1 == alarm && of_program(number));
+        lasting.map(|(subject, _)| subject.clone()).collect()
+    }
+
+    /// A cause has no effect on a program any more, or its member has not failed any more. The alarm is over with its last effect.
+    pub(crate) fn concerns_no_more(
+        &mut self,
+        subject: &Subject,
+        program: Option<ProgramId>,
+        cycle: i64,
+    ) {
+        let lasting = self.lasting.get(subject).copied();
+        let Some(alarm) = lasting.and_then(|lasting| self.alarms.get_mut(&lasting)) else {
+            return;
+        };
+        alarm.concerns.end(program, cycle);
+        alarm.concerns_changed();
+        if !alarm.concerns.lasts() {
+            self.over(subject, cycle);
+        }
+    }
+
+    /// No cause of this kind has an effect on a program any more.
+    pub(crate) fn none_concerns(&mut self, alarm: &'static str, program: ProgramId, cycle: i64) {
+        for subject in self.causes_for(alarm, program) {
+            self.concerns_no_more(&subject, Some(program), cycle);
+        }
     }
 
     /// Puts an alarm in the place of one that lasts: what it is about has changed. The newer one counts; it is acknowledged if the one before it was
@@ -255,6 +412,7 @@ impl Alarms {
             && let Some(alarm) = self.alarms.get_mut(&lasting)
         {
             alarm.over = Some(cycle);
+            alarm.concerns.end_all(cycle);
         }
     }
 
@@ -269,6 +427,7 @@ impl Alarms {
         for alarm in self.alarms.values_mut() {
             alarm.cycle = alarm.cycle.saturating_add(by);
             alarm.over = alarm.over.map(|over| over.saturating_add(by));
+            alarm.concerns.shift(by);
             for at in [&mut alarm.acknowledged_in, &mut alarm.repeated_in] {
                 *at = at.map(|at| at.saturating_add(by));
             }
@@ -283,8 +442,18 @@ impl Alarms {
                 || alarm.alarm == PROCESS
                     && (alarm.since_before || alarm.raised_ns < seen.raised_ns)
         };
-        let of_name = |alarm: &&mut Alarm| alarm.name == seen.name && alarm.alarm == seen.alarm;
-        let found = self.alarms.values_mut().filter(of_name);
+        let of_name = |alarm: &Alarm| alarm.name == seen.name && alarm.alarm == seen.alarm;
+        // Of causes with several effects: the newest alarm that was there, if all of its effects were.
+        let seen_then = |alarm: &Alarm| of_name(alarm) && alarm.raised_ns <= seen.raised_ns;
+        let of_effects = self.alarms.values().rfind(|alarm| seen_then(alarm));
+        let of_effects = of_effects.filter(|alarm| alarm.newest_ns() <= seen.raised_ns);
+        let of_effects = of_effects.filter(|alarm| !alarm.concerns.is_empty());
+        let of_effects = of_effects.map(|alarm| alarm.number);
+        let found = self.alarms.values_mut().filter(|alarm| of_name(alarm));
+        let is_meant = |alarm: &Alarm| match of_effects {
+            Some(number) => alarm.number == number,
+            None => alarm.concerns.is_empty() && is_meant(alarm),
+        };
         for alarm in found.filter(|alarm| is_meant(alarm) && alarm.acknowledged_by.is_none()) {
             alarm.acknowledged_by = Some(seen.owner.clone());
             alarm.acknowledged_in = Some(cycle);
@@ -297,64 +466,4 @@ impl Alarms {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_alarm_lasts_until_it_is_over_and_seen() {
-        let mut alarms = Alarms::default();
-        let subject = || ("press-io".to_owned(), "fail-safe");
-        alarms.raise(subject(), 7, "no provable output".to_owned());
-        alarms.raise(subject(), 8, "still".to_owned());
-        assert_eq!(alarms.iter().count(), 1);
-        alarms.over(&subject(), 9);
-        assert!(alarms.iter().all(Alarm::is_open));
-        let seen = |alarms: &Alarms, by: &str| {
-            let alarm = alarms.iter().next().expect("one");
-            alarm.acknowledgement(by.to_owned(), 0)
-        };
-        let other = Acknowledgement { raised_ns: 1, ..seen(&alarms, "anna") };
-        alarms.acknowledged(&other, 10);
-        assert!(alarms.iter().all(Alarm::is_open), "another one");
-        alarms.acknowledged(&seen(&alarms, "anna"), 10);
-        alarms.acknowledged(&seen(&alarms, "bert"), 11);
-        alarms.shift(100);
-        let first = alarms.iter().next().expect("one");
-        assert_eq!(first.acknowledged_by.as_deref(), Some("anna"));
-        assert_eq!(first.acknowledged_in, Some(110));
-        assert!(!alarms.iter().any(Alarm::is_open));
-        alarms.raise(subject(), 12, "again".to_owned());
-        assert_eq!(alarms.iter().filter(|alarm| alarm.is_open()).count(), 1);
-    }
-
-    #[test]
-    fn an_alarm_that_is_replaced_asks_again_where_something_is_added() {
-        for (is_acknowledged, asks_again) in
-            [(false, false), (false, true), (true, false), (true, true)]
-        {
-            let mut alarms = Alarms::default();
-            let subject = || ("press-io".to_owned(), "forced");
-            alarms.replace(subject(), 3, "one".to_owned(), true);
-            if is_acknowledged {
-                let seen = alarms.iter().next().expect("one").acknowledgement("anna".to_owned(), 0);
-                alarms.acknowledged(&seen, 4);
-            }
-            alarms.replace(subject(), 5, "other".to_owned(), asks_again);
-            let open: Vec<&Alarm> = alarms.iter().filter(|alarm| alarm.is_open()).collect();
-            let [open] = open[..] else { panic!("{open:?}") };
-            assert_eq!((open.text.as_str(), open.over), ("other", None));
-            let acknowledged = is_acknowledged && !asks_again;
-            assert_eq!(open.acknowledged_by.is_some(), acknowledged);
-        }
-    }
-
-    #[test]
-    fn the_number_of_alarms_is_bounded() {
-        let mut alarms = Alarms::default();
-        for number in 0..5000 {
-            alarms.raise((format!("{number}"), "fail-safe"), number, String::new());
-        }
-        assert_eq!(alarms.iter().count(), MOST);
-        assert_eq!(alarms.lasting.len(), MOST);
-    }
-}
+mod tests;

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use understudy_journal::TimeOfDay;
 
 /// Severity of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, JsonSchema)]
@@ -40,6 +41,9 @@ pub struct Event {
     pub cycle: i64,
     /// Time of its record.
     pub at_ns: u64,
+    /// Time of day of its record; nothing where no wall clock was recorded, as in a simulated run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at: Option<TimeOfDay>,
     /// The member that reports it.
     pub name: String,
     /// Kind of event, such as `flagged`.

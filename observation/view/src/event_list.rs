@@ -175,6 +175,7 @@ mod tests {
             number,
             cycle: i64::try_from(number).expect("small"),
             at_ns: 0,
+            at: None,
             name: name.to_owned(),
             event: kind,
             level,

@@ -6,7 +6,9 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_cluster::{AlarmDeclaration, Cluster};
-use understudy_journal::{AlarmFold, Cycles, Happening, Members, Record, RunEvent, moment};
+use understudy_journal::{
+    AlarmFold, Cycles, Happening, Members, Record, RunEvent, TimeOfDay, TimesOfDay, moment,
+};
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_text::spelling::suggestion;
 use understudy_wire::{Member, Moment, ProgramId, Source};
@@ -15,6 +17,7 @@ use crate::describe::{PROGRAM_FAULT, Writes, alarm_event, describe, event_names}
 use crate::error::ViewError;
 use crate::event::Level;
 use crate::stop::Stops;
+use crate::zone::Zone;
 
 /// Which records are wanted; an empty list is all.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -40,6 +43,9 @@ pub struct JournalLine {
     pub cycle: Option<i64>,
     /// Time of the record.
     pub at_ns: u64,
+    /// Time of day of the record; nothing where no wall clock was recorded, as in a simulated run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at: Option<TimeOfDay>,
     /// Who.
     pub name: String,
     /// What, in one word.
@@ -62,6 +68,7 @@ pub struct Listing {
     stops: Stops,
     declared: Arc<[AlarmDeclaration]>,
     alarms: AlarmFold,
+    times: TimesOfDay,
 }
 
 impl Listing {
@@ -109,12 +116,18 @@ impl Listing {
             stops: Stops::new(cluster),
             declared: Arc::clone(cluster.alarms()),
             alarms: AlarmFold::new(Arc::clone(cluster.alarms()), cluster.controllers().len()),
+            times: TimesOfDay::new(cluster.agreement().schedule.period()),
         })
     }
 
     /// The records before are not read: `moment` is cycle `cycle` of the run.
     pub(crate) fn begins_at(&mut self, moment: Moment, cycle: i64) {
         self.cycles = Cycles::at(moment, cycle);
+    }
+
+    /// The wall clocks of the members before the first record that is read.
+    pub(crate) fn times_are(&mut self, times: TimesOfDay) {
+        self.times = times;
     }
 
     /// `moment` is cycle `cycle` of the run.
@@ -145,13 +158,20 @@ impl Listing {
         {
             self.cycles = Cycles::continuing(from.numbering.clone(), from.origin);
         }
+        self.times.note_all(record);
         let cycle = self.cycle_of(record);
         if let Some(shift) = self.cycles.take_shift() {
             self.alarms.shift(shift);
+            self.times.shift(shift);
         }
+        if let Happening::RemoteIo(RemoteIoEvent::Applied { .. }) = &record.event {
+            self.times.passed(&record.name, cycle, record.at_ns);
+        }
+        let at = self.times.of_record(&record.name, record.at_ns);
+        let at = at.or_else(|| self.times.of_cycle(cycle));
         let changes = self.alarms.take(record, cycle);
         let cycle = self.cycles.has_origin().then_some(cycle);
-        let mut lines: Vec<JournalLine> = self.line(record, cycle).into_iter().collect();
+        let mut lines: Vec<JournalLine> = self.line(record, cycle, at).into_iter().collect();
         if changes.is_empty() || !self.is_wanted(record, cycle) {
             return lines;
         }
@@ -164,6 +184,7 @@ impl Listing {
         lines.extend(wanted.map(|(event, level, text)| JournalLine {
             cycle,
             at_ns: record.at_ns,
+            at,
             name: record.name.clone(),
             event,
             level,
@@ -172,7 +193,12 @@ impl Listing {
         lines
     }
 
-    fn line(&mut self, record: &Record, cycle: Option<i64>) -> Option<JournalLine> {
+    fn line(
+        &mut self,
+        record: &Record,
+        cycle: Option<i64>,
+        at: Option<TimeOfDay>,
+    ) -> Option<JournalLine> {
         let changed = self.source_changed(record);
         let fault = self.stops.take(record);
         self.writes.note(record);
@@ -199,6 +225,7 @@ impl Listing {
         wanted.then(|| JournalLine {
             cycle,
             at_ns: record.at_ns,
+            at,
             name: record.name.clone(),
             event: description.event,
             level: description.level,
@@ -272,9 +299,39 @@ impl Listing {
 }
 
 impl JournalLine {
-    /// In columns.
+    /// In columns, without the time of day.
     pub fn to_text(&self) -> String {
         let cycle = self.cycle.map_or("-".to_owned(), |cycle| cycle.to_string());
         format!("{cycle:>8}  {:14} {:14} {}", self.name, self.event, self.text)
+    }
+}
+
+/// Lines as text, in a zone: the time of day first, and a line with the date and the zone wherever one of them changes.
+#[derive(Debug, Clone, Default)]
+pub struct JournalText {
+    zone: Zone,
+    day: Option<String>,
+}
+
+impl JournalText {
+    /// Times in this zone.
+    pub fn new(zone: Zone) -> Self {
+        Self { zone, day: None }
+    }
+
+    /// The next line, with that of the day before it where it is another one.
+    pub fn text(&mut self, line: &JournalLine) -> String {
+        let text = line.to_text();
+        let Some(at) = line.at else {
+            // Before the first wall clock of a run, or a simulated run.
+            return if self.day.is_some() { format!("{:12}  {text}", "") } else { text };
+        };
+        let text = format!("{}  {text}", self.zone.clock(at));
+        let day = Some(format!("{} {}", self.zone.date(at), self.zone.name(at)));
+        if self.day == day {
+            return text;
+        }
+        self.day = day;
+        format!("{}\n{text}", self.day.as_deref().unwrap_or_default())
     }
 }

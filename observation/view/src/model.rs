@@ -20,7 +20,7 @@ use std::sync::{Arc, OnceLock};
 
 use understudy_cluster::Cluster;
 use understudy_interchange::DrawnUnit;
-use understudy_journal::{Cycles, Happening, Members, Record};
+use understudy_journal::{Cycles, Happening, Members, Record, TimeOfDay, TimesOfDay};
 use understudy_ladder::Observer;
 use understudy_typed::Interpreter;
 use understudy_wire::{Member, Moment, ProgramId};
@@ -38,6 +38,7 @@ use changes::Changes;
 pub use counters::{Counters, MemberCounters, ProgramCounters};
 use cycle::{LastMargin, Received};
 use programs::ProgramTrack;
+use protection::Attribution;
 use reports::Reports;
 pub(crate) use standing::{ForcedSignal, Standing};
 pub use turns::SentTurn;
@@ -91,10 +92,15 @@ pub struct Model {
     series: Series,
     events: Events,
     alarms: Alarms,
+    /// Of each program that is not protected: which stations its remote I/O receives.
+    attributions: Vec<Attribution>,
     /// Who refuses whom.
     refusals: BTreeSet<members::Refusal>,
     pub(crate) process_alarms: ProcessAlarms,
     timings: Timings,
+    pub(crate) times: TimesOfDay,
+    /// The time of day of the record that is taken, where the wall clock of its member is known.
+    now: Option<TimeOfDay>,
     observers: Vec<OnceLock<Option<Observer>>>,
     interpreters: Vec<OnceLock<Option<Interpreter>>>,
     /// The units of each program with numbers, as they are drawn.
@@ -121,8 +127,10 @@ impl Model {
         let bounds = bounds.holding(incomplete);
         let histories = (0..programs as u8)
             .filter_map(|program| History::new(&cluster, ProgramId(program), bounds.cycles));
+        let members = Members::of(&cluster);
         Self {
-            members: Members::of(&cluster),
+            alarms: Alarms::new(&members, programs),
+            members,
             writes: Writes::default(),
             cycles: Cycles::default(),
             changes: Changes::new(schedule.stations(), programs),
@@ -134,10 +142,12 @@ impl Model {
             turns: Turns::new(bounds.cycles),
             series: Series::new(programs, schedule.stations(), bounds.changes),
             events: Events::new(bounds.events),
-            alarms: Alarms::default(),
+            attributions: vec![Attribution::default(); programs],
             refusals: BTreeSet::new(),
             process_alarms: ProcessAlarms::new(cluster.alarms(), programs),
             timings: Timings::new(schedule, bounds.timings),
+            times: TimesOfDay::new(schedule.period()),
+            now: None,
             observers: vec![OnceLock::new(); programs],
             interpreters: vec![OnceLock::new(); programs],
             drawings: vec![OnceLock::new(); programs],
@@ -162,6 +172,8 @@ impl Model {
         self.records += 1;
         self.writes.note(record);
         self.at_ns = record.at_ns;
+        self.times.note(record);
+        self.now = self.times.of_record(&record.name, record.at_ns);
         self.alarms.now_ns = record.at_ns;
         self.counters.note(record);
         self.take(record);
@@ -209,13 +221,14 @@ impl Model {
             number: 0,
             cycle: self.cycles.of(None),
             at_ns: self.at_ns,
+            at: None,
             name: "journal".to_owned(),
             event: "left-out",
             level: Level::Warning,
             text: trouble.to_string(),
             cause: None,
         };
-        self.events.push(event);
+        self.tell(event);
     }
 
     /// Whether an answer needed more than is known.
@@ -245,16 +258,31 @@ impl Model {
         self.series.shift(by);
         self.events.shift(by);
         self.alarms.shift(by);
+        self.attributions.iter_mut().for_each(|attribution| attribution.shift(by));
         self.process_alarms.shift(by);
         self.timings.shift(by);
+        self.times.shift(by);
         self.closed = self.closed.map(|closed| closed.saturating_add(by));
+    }
+
+    /// Takes an event: its time of day is that of the record that is taken, or of its cycle.
+    fn tell(&mut self, event: Event) {
+        let at = self.now.filter(|_| event.at_ns == self.at_ns);
+        let at = at.or_else(|| self.times.of_cycle(event.cycle));
+        self.events.push(Event { at, ..event });
+    }
+
+    /// The wall clocks of the members before the first record that is read.
+    pub(crate) fn times_are(&mut self, times: TimesOfDay) {
+        self.times = times;
     }
 
     /// A record that is an event.
     fn happened(&mut self, record: &Record, cycle: i64, cause: Option<String>) {
         let description = describe(record, &self.members, &self.writes);
-        self.events.push(Event {
+        self.tell(Event {
             number: 0,
+            at: None,
             cycle,
             at_ns: record.at_ns,
             name: record.name.clone(),

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::Serialize;
 use understudy_cluster::{AlarmDeclaration, Priority};
-use understudy_journal::{AlarmChange, AlarmFold};
+use understudy_journal::{AlarmChange, AlarmFold, TimeOfDay};
 
 use crate::alarm::{Alarm, AlarmState, PROCESS};
 
@@ -43,6 +43,9 @@ pub struct ProcessAlarm {
 pub struct Shelved {
     /// The first cycle in which it is not shelved any more.
     pub until: i64,
+    /// Time of day at which this cycle is due; nothing where no wall clock was recorded.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub until_at: Option<TimeOfDay>,
     /// Name of the person who shelved it.
     pub owner: String,
     /// Reason.

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use serde_json::Value;
 use understudy_cluster::Cluster;
 use understudy_journal::{
-    Commander, JournalError, Writing, check_journal, continuation_before, kept_cluster, open_file,
-    place_before, segments_of, writing,
+    Commander, JournalError, TimesOfDay, Writing, check_journal, continuation_before, kept_cluster,
+    open_file, place_before, segments_of, writing,
 };
 use understudy_node::STATES_EVERY;
 use understudy_wire::{Cycle, Epoch, Moment};
@@ -277,6 +277,7 @@ impl Run {
         let source = match begun {
             Some(begun) => {
                 model.begins_at(begun.moment, begun.cycle);
+                model.times_are(self.clocks_before(begun.cycle));
                 begun.source
             }
             None => self.follow(),
@@ -326,6 +327,7 @@ impl Run {
             && let Some(found) = self.source_before(from - self.unknown_at_first())
         {
             listing.begins_at(found.moment, found.cycle);
+            listing.times_are(self.clocks_before(found.cycle));
             return Ok((listing, found.source));
         }
         if let Some(moment) = self.origin_of_summary() {
@@ -343,6 +345,18 @@ impl Run {
             }
         }
         Ok((listing.again(), self.follow()))
+    }
+
+    /// The wall clocks that were recorded at the beginning of the segment that a cycle is in.
+    fn clocks_before(&self, cycle: i64) -> TimesOfDay {
+        let mut times = TimesOfDay::new(self.cluster.agreement().schedule.period());
+        let mut source = self.follow_segment(cycle, 0).unwrap_or_else(|| self.follow());
+        source.poll(&mut |found| {
+            if let Ok(record) = found {
+                times.note_all(&record);
+            }
+        });
+        times
     }
 
     /// The records from a checkpoint on that is not after `cycle`.

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
+use understudy_journal::{ClocksApart, TimeOfDay};
 use understudy_wire::Force;
 
 use crate::alarm::Alarm;
@@ -51,6 +52,12 @@ pub struct Snapshot {
     /// The cycle, from the origin; nothing before the first deadline. The newest is the newest complete one: every member that reports
     /// has reported it.
     pub cycle: Option<i64>,
+    /// Time of day of the cycle; nothing where no wall clock was recorded, as in a simulated run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at: Option<TimeOfDay>,
+    /// The member whose wall clock differs most from the one that tells the times of cycles, where it differs by more than 500 ms.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clocks_apart: Option<ClocksApart>,
     /// Cycles after it that only some members have reported.
     pub behind: u64,
     /// Whether cycles are counted from the origin of the run; otherwise as the cluster counts them.

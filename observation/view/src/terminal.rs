@@ -26,6 +26,7 @@ use crate::alarm::Alarm;
 use crate::model::Model;
 use crate::snapshot::Snapshot;
 use crate::source::{BEHIND, Progress};
+use crate::zone::Zone;
 
 /// A key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,11 +76,18 @@ pub struct Screen {
     age: Option<Duration>,
     /// How much of the journal is read while its past is not, in percent.
     past: Option<u8>,
+    /// The zone of the times of day.
+    zone: Zone,
 }
 
 const PAGE: usize = 10;
 
 impl Screen {
+    /// A screen with times of day in this zone.
+    pub fn in_zone(zone: Zone) -> Self {
+        Self { zone, ..Self::default() }
+    }
+
     /// Whether it is paused: then no record is to be noted.
     pub fn is_paused(&self) -> bool {
         self.paused
@@ -165,7 +173,8 @@ impl Screen {
         if self.help {
             frame.render_widget(help(), bottom);
         } else {
-            lists::draw(frame, bottom, model, &snapshot, self.bottom, &mut self.back);
+            let list = lists::List { bottom: self.bottom, zone: self.zone };
+            list.draw(frame, bottom, model, &snapshot, &mut self.back);
         }
     }
 
@@ -182,7 +191,14 @@ impl Screen {
             self.age.map_or(String::new(), |age| format!("  NO RECORD FOR {} s", age.as_secs()));
         let past =
             self.past.map_or(String::new(), |percent| format!("  reading the past: {percent} %"));
-        let right = format!("{run}  cycle {cycle}{past}{age}{left_out}  h help  q quit ");
+        let at = snapshot.at.map_or_else(String::new, |at| {
+            format!("  {} {}", self.zone.seconds(at), self.zone.name(at))
+        });
+        let apart = snapshot.clocks_apart.as_ref();
+        let apart =
+            apart.map_or_else(String::new, |apart| format!("  CLOCKS DIFFER: {}", apart.text()));
+        let right =
+            format!("{run}{at}  cycle {cycle}{past}{age}{apart}{left_out}  h help  q quit ");
         let gap = usize::from(width).saturating_sub(left.chars().count() + right.chars().count());
         let text = format!("{left}{}{right}", " ".repeat(gap.max(1)));
         Line::styled(text, Style::new().add_modifier(Modifier::REVERSED))

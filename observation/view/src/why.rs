@@ -13,6 +13,7 @@ use serde::{Serialize, Serializer};
 use serde_json::Value;
 use understudy_cluster::Code;
 use understudy_journal::source_word;
+use understudy_journal::{TimeOfDay, TimesOfDay};
 use understudy_ladder::Program;
 use understudy_parity::reconstruct;
 use understudy_remote_io::Missing;
@@ -38,6 +39,9 @@ pub struct Why {
     pub remote_io: String,
     /// From the origin of the run.
     pub cycle: i64,
+    /// Time of day of the cycle; nothing where no wall clock was recorded, as in a simulated run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at: Option<TimeOfDay>,
     /// Cycles since then, where it is the last one that the remote I/O reported and that does not report any more.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub age_cycles: Option<u64>,
@@ -155,6 +159,9 @@ pub struct Reason {
     pub of: Option<Elementary>,
     /// From the origin of the run.
     pub cycle: i64,
+    /// Time of day of the cycle.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at: Option<TimeOfDay>,
     /// The rung that determined it, counted from 1.
     pub rung: Option<usize>,
     /// The title of that rung.
@@ -167,6 +174,13 @@ pub struct Reason {
     pub text: String,
     /// The reasons behind it.
     pub because: Vec<Reason>,
+}
+
+impl Reason {
+    fn is_timed(&mut self, times: &TimesOfDay) {
+        self.at = times.of_cycle(self.cycle);
+        self.because.iter_mut().for_each(|reason| reason.is_timed(times));
+    }
 }
 
 impl Model {
@@ -187,6 +201,10 @@ impl Model {
         };
         let place = place.ok_or_else(|| self.no_cycle(program, cycle.unwrap_or(0)))?;
         let mut why = self.why_at(program, history, &name, place)?;
+        why.at = self.times.of_cycle(why.cycle);
+        if let Some(reason) = &mut why.because {
+            reason.is_timed(&self.times);
+        }
         if cycle.is_none() {
             let newest = self.newest();
             let standing = self.standing(newest.unwrap_or(i64::MAX));
@@ -253,6 +271,7 @@ impl Model {
         let is_typed = |_: &&Sampled| typed.is_some();
         let mut sampled = sampled.filter(is_typed);
         Ok(Why {
+            at: None,
             signal: name.to_owned(),
             program: controller.name.clone(),
             remote_io: self.members.name(Member::RemoteIo(program)).to_owned(),

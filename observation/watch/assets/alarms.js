@@ -3,13 +3,15 @@
 import { act, tell, toast } from "/ask.js";
 import { el, keyed, setText } from "/element.js";
 import { complete, nameField, owner, reasonField } from "/who.js";
+import { clockOf } from "/zone.js";
 
 const SHELVE_MINUTES = 60;
 
 export function card() {
   return el("section", { class: "card", "aria-labelledby": "alarms-title" },
     el("h2", { id: "alarms-title" }, "Alarms"),
-    el("p", { id: "alarm-who", class: "who" }, el("label", {}, "Your name ", nameField("alarm-owner"))),
+    el("p", { id: "alarm-who", class: "who" }, el("label", {}, "Your name ", nameField("alarm-owner")), " ",
+      el("button", { type: "button", id: "alarm-all", click: acknowledgeAll }, "Acknowledge all")),
     el("ul", { id: "alarm-list", class: "plain" }), el("p", { id: "no-alarm" }, "none"),
     el("div", { id: "signal-alarms", hidden: "" },
       el("h3", {}, "Alarms on signals"),
@@ -23,20 +25,25 @@ export function show(state) {
   document.getElementById("no-alarm").hidden = state.alarms.length > 0;
   keyed(document.getElementById("alarm-list"), state.alarms, (alarm) => alarm.id, makeAlarm, (line, alarm) => {
     const by = alarm.acknowledged;
-    line.dataset.open = String(!by);
-    const priority = alarm.priority ? ` (${alarm.priority})` : "";
+    line.dataset.state = alarm.state;
     const before = alarm.since_before ? " or before" : "";
-    setText(line.querySelector(".alarm-words"), `cycle ${alarm.cycle}${before}: ${alarm.who}${priority}: ${alarm.what}${alarm.lasts ? "" : " (over)"}`);
-    setText(line.querySelector(".alarm-by"), by ? `acknowledged by ${by} in cycle ${alarm.acknowledged_in}` : alarm.action ?? "");
+    setText(line.querySelector(".alarm-words"), alarm.what);
+    const when = (at, cycle) => [clockOf(at, state.at), at ? `(cycle ${cycle})` : `cycle ${cycle}`].filter(Boolean).join(" ");
+    const over = alarm.lasts ? null : ["over", clockOf(alarm.over_at, state.at)].filter(Boolean).join(" since ");
+    const facts = [alarm.who, alarm.priority, `since ${when(alarm.at, alarm.cycle)}${before}`, over, alarm.action];
+    const seen = by ? `acknowledged by ${by}, ${when(alarm.acknowledged_at, alarm.acknowledged_in)}` : null;
+    setText(line.querySelector(".alarm-by"), [...facts, seen].filter(Boolean).join(" · "));
     line.querySelector("button").hidden = Boolean(by);
   });
   const alarms = state.process_alarms;
-  document.getElementById("alarm-who").hidden = alarms.length === 0 && state.alarms.every((alarm) => alarm.acknowledged);
+  unseen = state.alarms.filter((alarm) => !alarm.acknowledged).map((alarm) => alarm.id);
+  document.getElementById("alarm-who").hidden = alarms.length === 0 && unseen.length === 0;
+  document.getElementById("alarm-all").hidden = unseen.length < 2;
   document.getElementById("signal-alarms").hidden = alarms.length === 0;
   keyed(document.querySelector("#signal-alarm-table tbody"), alarms, (alarm) => alarm.name, makeSignalAlarm, (row, alarm) => {
     const { shelved } = alarm;
     row.dataset.state = alarm.state;
-    const words = shelved ? `shelved until cycle ${shelved.until} by ${shelved.owner}: ${shelved.reason}` : alarm.state;
+    const words = shelved ? `shelved until ${clockOf(shelved.until_at, state.at) || `cycle ${shelved.until}`} by ${shelved.owner}: ${shelved.reason}` : alarm.state;
     setText(row.querySelector(".alarm-state"), words);
     setText(row.querySelector("button"), shelved ? "End shelving" : "Shelve");
   });
@@ -44,15 +51,24 @@ export function show(state) {
 
 const hasName = () => complete(document.getElementById("alarm-owner"));
 
+// The listed alarms that wait for a person.
+let unseen = [];
+
+const acknowledge = (alarms, what) => act(async () => {
+  if (hasName()) {
+    await tell("/api/alarms/acknowledge", { alarms, owner: owner() });
+    toast(`✓ ${what} acknowledged, by ${owner()}`);
+  }
+});
+
+function acknowledgeAll() {
+  acknowledge(unseen, `${unseen.length} alarms`);
+}
+
 function makeAlarm(alarm) {
-  const acknowledge = () => act(async () => {
-    if (hasName()) {
-      await tell(`/api/alarms/${alarm.id}/acknowledge`, { owner: owner() });
-      toast(`✓ ${alarm.who}: alarm of cycle ${alarm.cycle} acknowledged, by ${owner()}`);
-    }
-  });
-  return el("li", {}, el("span", { "aria-hidden": "true" }, "⚠ "), el("span", { class: "alarm-words" }), " ", el("span", { class: "alarm-by" }), " ",
-    el("button", { type: "button", click: acknowledge }, "Acknowledge"));
+  const seen = () => acknowledge([alarm.id], `${alarm.who}: alarm of cycle ${alarm.cycle}`);
+  return el("li", {}, el("span", { class: "alarm-sign", "aria-hidden": "true" }, "⚠"), el("span", { class: "alarm-words" }), el("span", { class: "alarm-by" }),
+    el("button", { type: "button", click: seen }, "Acknowledge"));
 }
 
 function makeSignalAlarm(alarm) {

@@ -27,8 +27,8 @@ export function bandPlugin(answer, color) {
       draw: (plot) => {
         const { ctx, bbox } = plot;
         ctx.save();
-        ctx.strokeStyle = color("--bad");
-        ctx.fillStyle = color("--bad");
+        ctx.strokeStyle = color("--ink");
+        ctx.fillStyle = color("--ink");
         ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
         ctx.textAlign = "left";
         ctx.setLineDash([5, 4]);

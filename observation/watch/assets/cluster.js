@@ -1,6 +1,6 @@
 // The cluster: states of the members, source of the outputs of each plant, and remaining redundancy.
 
-import { el, keyed, setText, setAttribute, valueText } from "/element.js";
+import { broken, el, keyed, setText, setAttribute, valueText } from "/element.js";
 import { signalLegend, sourceLegend, stateLegend } from "/legend.js";
 import { STATES, makePicture } from "/picture.js";
 import { continueWords, openChoice, openMember } from "/commands.js";
@@ -21,13 +21,15 @@ export function prepare(facts) {
     el("table", { id }, el("thead", {}, el("tr", {}, heads.map((head) => el("th", { scope: "col" }, head)))), el("tbody"));
   const card = (id, heading, ...content) =>
     el("section", { id: `${id}-card`, class: "card", "aria-labelledby": `${id}-title` }, el("h2", { id: `${id}-title` }, heading), content);
+  const folded = (id, words, ...content) => el("details", { id }, el("summary", { class: "soft" }, words), content);
   place = document.getElementById("view-cluster");
   place.append(
     el("div", { class: "picture-frame", tabindex: "0", role: "region", "aria-label": "Picture of the cluster" }, picture.element),
-    el("div", { class: "legends", id: "cluster-legend" }, sourceLegend(), stateLegend(LEGEND_STATES.map((name) => STATES[name]))),
+    folded("cluster-legend", "Legend", el("div", { class: "legends" }, sourceLegend(), stateLegend(LEGEND_STATES.map((name) => STATES[name])))),
     el("div", { class: "cards" },
-      card("protection", "Protection", el("ul", { id: "protection-list", class: "plain" })),
-      card("redundancy", "Remaining redundancy", el("p", { id: "redundancy-words", class: "verdict" }), el("ul", { id: "redundancy-list", class: "plain" })),
+      card("protection", "Protection", el("p", { id: "protection-words", class: "verdict" }),
+        folded("protection-details", "protected programs", el("ul", { id: "protected-list", class: "plain soft" })), el("ul", { id: "protection-list", class: "plain" })),
+      card("redundancy", "Remaining redundancy", el("p", { id: "redundancy-words", class: "verdict" }), folded("redundancy-details", "each further failure", el("ul", { id: "redundancy-list", class: "plain" }))),
       card("timing", "Cycle", el("dl", { id: "timing-list" })),
       card("counts", "Deadlines by source of the outputs", el("div", { class: "wide", tabindex: "0", role: "region", "aria-label": "Table of deadlines by source" }, table("counts-table", ["program", ...["direct", "reconstructed", "held", "fail-safe"].map((source) => `${SOURCES[source].sign} ${SOURCES[source].words}`)]))),
       card("signals", "Inputs and outputs", signalLegend(), el("div", { id: "signals-list" })),
@@ -55,9 +57,17 @@ function protection(programs) {
     }
     return protection.protected ? ["protected", "●", protection.words] : ["unprotected", "⚠", protection.words];
   };
+  const isProtected = ({ protection, lost }) => protection?.protected && !lost;
+  const sound = programs.filter(isProtected);
+  const all = programs.length === 1 ? "the program is protected" : `all ${programs.length} programs are protected`;
+  const words = document.getElementById("protection-words");
+  setText(words, sound.length === programs.length ? all : `${sound.length} of ${programs.length} programs ${sound.length === 1 ? "is" : "are"} protected`);
+  setAttribute(words, "data-level", sound.length === programs.length ? "all" : "some");
+  document.getElementById("protection-details").hidden = sound.length === 0;
+  keyed(document.getElementById("protected-list"), sound, (program) => program.name, (program) => el("li", { "data-protection": "protected" }, "● ", broken(program.name), ": protected"), () => {});
   keyed(
     document.getElementById("protection-list"),
-    programs,
+    programs.filter((program) => !isProtected(program)),
     (program) => program.name,
     ({ index }) => {
       const remote = run.programs[index].remote_io;
@@ -90,7 +100,7 @@ function redundancy(remaining) {
     () => el("li"),
     (line, failure) => {
       setText(line, item(failure));
-      setAttribute(line, "class", failure.masked ? "good" : "bad");
+      setAttribute(line, "data-masked", String(failure.masked));
     },
   );
 }
@@ -122,10 +132,11 @@ function counts(state) {
     body,
     state.programs,
     (program) => program.name,
-    (program) => el("tr", {}, el("th", { scope: "row" }, program.name), el("td"), el("td"), el("td"), el("td")),
-    (row, { counts }) => {
+    (program) => el("tr", {}, el("th", { scope: "row" }, broken(program.name)), el("td"), el("td"), el("td"), el("td")),
+    (row, { counts, source }) => {
       const numbers = [counts.direct, counts.reconstructed, counts.held, counts.fail_safe];
       numbers.forEach((number, index) => setText(row.children[index + 1], String(number)));
+      setAttribute(row.lastChild, "data-failed", String(source === "fail-safe"));
     },
   );
 }
@@ -139,7 +150,7 @@ function signals(state) {
       const facts = run.programs[program.index];
       const line = (signal, kind, index) =>
         el("button", { type: "button", class: "signal", "data-kind": kind, "data-index": index, click: () => pick(program.index, kind, index) },
-          el("span", { class: "lamp", "aria-hidden": "true" }), el("span", { class: "signal-name" }, signal.name), el("span", { class: "signal-value" }), el("span", { class: "signal-forced" }));
+          el("span", { class: "lamp", "aria-hidden": "true" }), el("span", { class: "signal-name" }, broken(signal.name)), el("span", { class: "signal-value" }), el("span", { class: "signal-forced" }));
       return el("details", { open: true },
         el("summary", {}, program.name, " ", el("span", { class: "source-words" })),
         el("div", { class: "signal-columns" },

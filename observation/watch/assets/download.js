@@ -1,6 +1,7 @@
 // Trends as files: a table of values and a picture.
 
 import { el } from "/element.js";
+import { stamp } from "/zone.js";
 
 function save(name, blob) {
   const link = el("a", { href: URL.createObjectURL(blob), download: name });
@@ -15,14 +16,14 @@ const cell = (value) => {
   return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
 };
 
-// A row for each cycle (RFC 4180): the time from the origin of the run, the values, and the source of the outputs of each program. What is not known is empty.
-export function csvOf(answer, headOf, periodUs) {
+// A row for each cycle (RFC 4180): the time from the origin of the run, the time of day where it is known, the values, and the source of the outputs of each program. What is not known is empty.
+export function csvOf(answer, headOf, periodUs, atOf) {
   const steps = answer.signals.map((signal) => reader(signal.runs));
   const sources = answer.sources.map((band) => (cycle) => band.runs.find(([from, to]) => from <= cycle && cycle <= to)?.[2]);
-  const head = ["cycle", "time_s", ...answer.signals.map(headOf), ...answer.sources.map((band) => `source of ${band.name}`)];
+  const head = ["cycle", "time_s", "time_of_day", ...answer.signals.map(headOf), ...answer.sources.map((band) => `source of ${band.name}`)];
   const rows = [head];
   for (let cycle = answer.from; cycle <= answer.to; cycle += 1) {
-    rows.push([cycle, (cycle * periodUs) / 1e6, ...steps.map((step) => step(cycle)), ...sources.map((source) => source(cycle))]);
+    rows.push([cycle, (cycle * periodUs) / 1e6, atOf(cycle) && stamp(atOf(cycle)), ...steps.map((step) => step(cycle)), ...sources.map((source) => source(cycle))]);
   }
   return `${rows.map((row) => row.map(cell).join(",")).join("\r\n")}\r\n`;
 }

@@ -32,6 +32,9 @@ export function shorten(name, most) {
   return `${name.slice(0, most - 1 - end)}…${name.slice(-end)}`;
 }
 
+// A name that is broken behind its dots and underscores, and not in the middle of a word.
+export const broken = (name) => name.split(/(?<=[._])/).flatMap((part, place) => (place === 0 ? [part] : [el("wbr"), part]));
+
 // Sets only what differs, so that focus, selection and scrolling stay.
 export function setText(element, text) {
   if (element.textContent !== text) {

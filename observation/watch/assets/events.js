@@ -7,6 +7,7 @@ import { chips, folded } from "/chips.js";
 import { el, keyed, setAttribute, setText } from "/element.js";
 import { keep, kept } from "/kept.js";
 import { goTo, isLive, state as stateNow } from "/time.js";
+import { clock, clockOf } from "/zone.js";
 
 const LEVELS = { alarm: "✗", warning: "⚠", notice: "•", info: "·" };
 
@@ -33,8 +34,9 @@ const id = (name) => document.getElementById(name);
 
 export function prepare() {
   const table = el("table", { id: "event-table" },
-    el("thead", {}, el("tr", {}, ["severity", "cycle", "member", "event"].map((head) => el("th", { scope: "col" }, head)))),
+    el("thead", {}, el("tr", {}, ["severity", "time", "cycle", "member", "event"].map((head) => el("th", { scope: "col", class: head === "time" ? "event-at" : null }, head)))),
     el("tbody"));
+  addEventListener("zone", again);
   id("view-events").append(
     alarms.card(),
     el("section", { class: "card", "aria-labelledby": "events-title" },
@@ -162,12 +164,14 @@ function fill(answer) {
   const { length } = answer.events;
   setText(id("event-rows"), length < answer.rows ? `the newest ${length} of ${answer.rows} rows` : length === 0 ? "no event" : "");
   id("event-more").hidden = !(length < answer.rows && length < MAXIMUM_ROWS);
+  id("event-table").toggleAttribute("data-timeless", answer.events.every((event) => !event.at));
   keyed(document.querySelector("#event-table tbody"), answer.events, (event) => event.id, makeRow, showRow);
 }
 
 function makeRow(event) {
   const row = el("tr", {},
     el("td", { class: "level" }),
+    el("td", { class: "event-at" }),
     el("td", {}, el("button", { class: "link", type: "button", click: () => goTo(row.dataset.cycle) })),
     el("td", {}, event.who),
     el("td", {}, el("span", { class: "event-words" }), el("span", { class: "soft event-cause" }), el("span", { class: "event-count" })));
@@ -180,6 +184,8 @@ function showRow(row, event) {
   setAttribute(row, "data-level", event.level);
   setAttribute(row, "data-cycle", String(event.cycle));
   setText(part(".level"), level(event.level));
+  setText(part(".event-at"), clockOf(event.at, stateNow()?.at));
+  part(".event-at").title = event.at ? clock(event.at, true) : "";
   setText(part("button"), String(event.cycle));
   setText(part(".event-words"), event.what);
   setText(part(".event-cause"), event.cause ? ` (${event.cause})` : "");

@@ -17,6 +17,7 @@ import * as commands from "/commands.js";
 import * as tour from "/tour.js";
 import * as who from "/who.js";
 import * as why from "/why.js";
+import * as zone from "/zone.js";
 
 const VIEWS = { cluster, operate, ladder, watch, trends, events, compare };
 
@@ -67,13 +68,20 @@ let period = 0;
 
 function head(state, live) {
   const when = !live ? "replay" : state.finished ? "finished" : time.stale() ? "old" : "live";
-  setText(document.getElementById("status"), `${when} · cycle ${state.cycle} of ${state.newest} · period ${period} ms`);
+  const at = state.at ? ` · ${zone.clockAndZone(state.at)}` : "";
+  setText(document.getElementById("status"), `${when}${at} · cycle ${state.cycle} of ${state.newest} · period ${period} ms`);
+  zone.showSwitch(state.at);
+  const apart = document.getElementById("clocks-apart");
+  apart.hidden = !state.clocks_apart;
+  setText(apart, state.clocks_apart ? `Clocks of the cluster differ: ${state.clocks_apart}. Times of day are those of one remote I/O.` : "");
   document.body.dataset.when = when;
   const open = state.open_alarms;
   const button = document.getElementById("alarm-count");
   button.hidden = open === 0;
   const count = open === 1 ? "1 alarm" : `${open} alarms`;
-  setText(button, state.past ? `⚠ at least ${count}` : `⚠ ${count}`);
+  button.dataset.unseen = String(state.unacknowledged_alarms > 0);
+  const seen = state.unacknowledged_alarms === 0 ? ", acknowledged" : "";
+  setText(button, state.past ? `⚠ at least ${count}` : `⚠ ${count}${seen}`);
 }
 
 // A long journal is begun near its end; what is before comes behind it.
@@ -138,7 +146,8 @@ async function begin() {
   }
   document.getElementById("tab-operate").hidden = !operate.has(run);
   document.getElementById("alarm-count").addEventListener("click", () => (location.hash = "events"));
-  time.onState((state, live) => {
+  zone.prepare();
+  const show = (state, live) => {
     head(state, live);
     showPast(state);
     scenarioOver(state, run);
@@ -146,7 +155,9 @@ async function begin() {
     why.show();
     showStale();
     address.changed();
-  });
+  };
+  time.onState(show);
+  addEventListener("zone", () => time.state() && show(time.state(), time.isLive()));
   setInterval(showStale, 250);
   addEventListener("visibilitychange", showStale);
   addEventListener("hashchange", showWanted);

@@ -106,12 +106,20 @@ function showAll(run, boxes, flows, state) {
     }
   }
   state.programs.forEach((program, index) => {
+    // What a program drives has the mark of its source: nothing is shown as sound below fail-safe outputs.
+    for (const name of [run.programs[index].remote_io, run.programs[index].plant]) {
+      const box = boxes.get(name);
+      if (box) {
+        setAttribute(box.element, "data-source", program.source);
+      }
+    }
     const { down, words, whose, letters, out, outWords } = flows[index];
     const source = SOURCES[program.source] ?? SOURCES.unknown;
     for (const line of [down, out]) {
       setAttribute(line, "data-source", program.source);
     }
     const by = program.source === "reconstructed" && program.word_of;
+    setAttribute(words, "data-source", program.source);
     setText(words, `${source.sign} ${source.words}${by ? " from" : ""}`);
     setText(whose, by ? shorten(by, letters * 2) : "");
     setText(outWords, program.forced.some((force) => force.kind === "output") ? "⚠ forced" : "");

@@ -9,6 +9,7 @@ import { chooser, find, load } from "/signals.js";
 import { goTo, isLive, state } from "/time.js";
 import { bandPlugin } from "/bands.js";
 import { bandLegend } from "/legend.js";
+import { clock, clockAndZone, timeOf } from "/zone.js";
 
 let run = null;
 let plot = null;
@@ -55,6 +56,7 @@ export function prepare(facts) {
     choice.element);
   addEventListener("resize", redraw);
   addEventListener("theme", redraw);
+  addEventListener("zone", redraw);
   addEventListener("pointerup", () => setTimeout(() => { dragging = false; }));
   addEventListener("pointercancel", () => { dragging = false; });
 }
@@ -213,12 +215,14 @@ async function refresh(now) {
   }
 }
 
+const atOf = (cycle) => timeOf(answer.times, cycle, run.period_us);
+
 const nameOfFile = () => `${run.cluster}-trends-${answer.from}-${answer.to}`;
 
 function csv() {
   if (answer) {
     const unit = (index) => (find(answer.ids[index])?.type === "TIME" ? " in ns" : "");
-    saveCsv(nameOfFile(), csvOf(answer, (signal, index) => `${signal.name}${unit(index)}`, run.period_us));
+    saveCsv(nameOfFile(), csvOf(answer, (signal, index) => `${signal.name}${unit(index)}`, run.period_us, atOf));
     toast(`saved ${nameOfFile()}.csv`);
   }
 }
@@ -297,10 +301,11 @@ function draw() {
     height: Math.max(220, 26 * height + 18 * bandRows + 110),
     scales: { x: { time: false }, y: { range: [-0.3 - bandRows * 0.7, Math.max(height, 1)] } },
     axes: [
-      { ...axis, label: "cycle", labelSize: 20, values: (_, values) => values.map((value) => (Number.isInteger(value) ? String(value) : "")) },
+      { ...axis, label: atOf(answer.from) ? `time of day (${clockAndZone(atOf(answer.from)).split(" ")[1]}), cycle` : "cycle", labelSize: 20, size: atOf(answer.from) ? 62 : 50,
+        space: 90, values: (_, values) => values.map((value) => (Number.isInteger(value) ? [clock(atOf(value), true), value].filter((part) => part !== "").join("\n") : "")) },
       { ...axis, size: 130, splits: () => labels.map(([at]) => at), values: () => labels.map(([, text]) => text), grid: { show: false } },
     ],
-    series: [{ label: "cycle", value: (_, value) => (value === null ? "" : String(value)) }, ...series],
+    series: [{ label: "cycle", value: (_, value) => (value === null ? "" : [value, clock(atOf(value), true)].filter((part) => part !== "").join(" · ")) }, ...series],
     plugins: [bandPlugin(answer, color)],
     cursor: { drag: { x: true, y: false, setScale: false }, bind: { dblclick: () => unzoom } },
     hooks: { setSelect: [selected] },

@@ -5,6 +5,7 @@ import { act, ask } from "/ask.js";
 import { el, valueText } from "/element.js";
 import { SOURCES } from "/sources.js";
 import { cycleParameter, goTo } from "/time.js";
+import { clock, clockAndZone } from "/zone.js";
 
 // What is shown, as an address has it: `PROGRAM/OUTPUT@CYCLE`.
 let open = null;
@@ -60,7 +61,7 @@ async function explain(program, output, cycle, takesFocus) {
   const close = el("button", { type: "button", click: hide }, "Close");
   drawer.replaceChildren(
     el("div", { class: "drawer-head" }, el("h2", {}, `Why is ${answer.signal} ${valueText(answer.value, answer.type)}?`), close),
-    el("p", { class: "soft" }, `${answer.program}, cycle ${answer.cycle}; remote I/O ${answer.remote_io}`),
+    el("p", { class: "soft" }, `${answer.program}, ${answer.at ? `${clockAndZone(answer.at)}, ` : ""}cycle ${answer.cycle}; remote I/O ${answer.remote_io}`),
     ...source(answer).map((line) => el("p", {}, line)),
     ...(answer.because ? [el("ul", { class: "cause" }, tree(answer.because))] : []),
     ...(answer.source === "fail-safe" && answer.ramp_to === undefined
@@ -103,7 +104,7 @@ function source(answer) {
 
 function tree(reason) {
   const line = [
-    el("button", { class: "link", type: "button", click: () => goTo(reason.cycle) }, `cycle ${reason.cycle}`),
+    el("button", { class: "link", type: "button", click: () => goTo(reason.cycle) }, `cycle ${reason.cycle}`), reason.at ? ` ${clock(reason.at, true)}` : "",
     ` ${reason.signal} = ${valueText(reason.value, reason.type)}`,
     reason.rung ? `, rung ${reason.rung}${reason.title ? ` “${reason.title}”` : ""}` : "",
     reason.line ? [`, line ${reason.line} `, el("code", {}, reason.statement)] : null,

@@ -45,7 +45,7 @@ pub(crate) fn router(app: Arc<App>) -> Router {
         .route("/api/values", get(signals::values))
         .route("/api/trends", get(trends::trends))
         .route("/api/compare", get(compare::compare))
-        .route("/api/alarms/{number}/acknowledge", post(alarms::acknowledge))
+        .route("/api/alarms/acknowledge", post(alarms::acknowledge))
         .route("/api/alarms/shelve", post(alarms::shelve))
         .route("/api/alarms/unshelve", post(alarms::unshelve))
         .route("/api/command", post(command::command))

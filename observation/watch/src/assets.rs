@@ -41,6 +41,7 @@ const ASSETS: &[(&str, &str, &str)] = assets![
     "ladder.js": SCRIPT,
     "who.js": SCRIPT,
     "why.js": SCRIPT,
+    "zone.js": SCRIPT,
     "values.js": SCRIPT,
     "signals.js": SCRIPT,
     "trends.js": SCRIPT,

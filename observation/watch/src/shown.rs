@@ -7,6 +7,7 @@ use std::time::Instant;
 use serde::Serialize;
 use serde_json::Value;
 use understudy_cluster::{Controller, Priority};
+use understudy_journal::{ClocksApart, TimeOfDay};
 use understudy_remote_io::SignalInput;
 use understudy_typed::{Point, Points};
 use understudy_view::{
@@ -21,6 +22,9 @@ use crate::model::{Known, Model};
 /// Failures that are listed, at most.
 const LISTED_FAILURES: usize = 40;
 
+/// Pairs of stations that the sentence about the remaining redundancy names, at most.
+const NAMED_PAIRS: usize = 2;
+
 /// Alarms that are listed, at most.
 const LISTED_ALARMS: usize = 100;
 
@@ -30,6 +34,10 @@ pub(crate) struct State {
     /// Of the shown cycle, in milliseconds, when this was written.
     age_ms: u64,
     cycle: i64,
+    /// Time of day of the cycle; nothing where no wall clock was recorded.
+    at: Option<TimeOfDay>,
+    /// Wall clocks of the cluster that differ, in words.
+    clocks_apart: Option<String>,
     oldest: i64,
     newest: i64,
     finished: bool,
@@ -44,6 +52,8 @@ pub(crate) struct State {
     redundancy: Redundancy,
     /// Alarms that last or are not acknowledged.
     open_alarms: usize,
+    /// Those of them that are not acknowledged.
+    unacknowledged_alarms: usize,
     alarms: Vec<ShownAlarm>,
     process_alarms: Vec<ProcessAlarm>,
     event_count: u64,
@@ -162,7 +172,13 @@ struct Failure {
 struct ShownAlarm {
     id: u64,
     cycle: i64,
+    /// Times of day at which it was raised, over and acknowledged.
+    at: Option<TimeOfDay>,
+    over_at: Option<TimeOfDay>,
+    acknowledged_at: Option<TimeOfDay>,
     who: String,
+    /// The programs concerned.
+    programs: Vec<String>,
     what: String,
     lasts: bool,
     acknowledged: Option<String>,
@@ -205,6 +221,7 @@ impl State {
     pub(crate) fn alarms_are(&mut self, known: &Known) {
         let (open, process) = known.run.open_alarms_at(self.cycle);
         self.open_alarms = open.len();
+        self.unacknowledged_alarms = unacknowledged(&open);
         self.alarms = shown_alarms(&known.run, self.cycle);
         self.process_alarms = process;
         self.event_count = known.run.event_count();
@@ -226,6 +243,8 @@ pub(crate) fn state(run: &RunModel, cycle: i64, finished: bool) -> Option<State>
         past: None,
         age_ms: 0,
         cycle,
+        at: snapshot.at,
+        clocks_apart: snapshot.clocks_apart.as_ref().map(ClocksApart::text),
         oldest,
         newest,
         finished,
@@ -236,6 +255,7 @@ pub(crate) fn state(run: &RunModel, cycle: i64, finished: bool) -> Option<State>
         timing: timing(run, &snapshot),
         redundancy: redundancy(&snapshot),
         open_alarms: snapshot.alarms.len(),
+        unacknowledged_alarms: unacknowledged(&snapshot.alarms),
         alarms: shown_alarms(run, cycle),
         process_alarms: snapshot.process_alarms,
         event_count: snapshot.events,
@@ -383,15 +403,29 @@ fn redundancy(snapshot: &Snapshot) -> Redundancy {
 fn in_words(margin: &MarginSnapshot, singles: &[&OutcomeSnapshot]) -> (&'static str, String) {
     let masked = singles.iter().filter(|outcome| outcome.masked).count();
     let of = singles.len();
-    let all_pairs = margin.pairs.iter().all(|pair| pair.masked);
-    let (level, words) = match (masked, all_pairs) {
+    let unmasked: Vec<String> = margin
+        .pairs
+        .iter()
+        .filter(|pair| !pair.masked)
+        .map(|pair| pair.failed.join(" and "))
+        .collect();
+    let (level, words) = match (masked, unmasked.is_empty()) {
         _ if margin.served.is_empty() => ("none", "no program has provable outputs"),
         (0, _) => ("none", "no further failure of a station would be masked"),
         (_, _) if masked < of => {
             let words = format!("{masked} of {of} failures of a single station would be masked");
             return ("some", words);
         }
-        (_, false) => ("all", "any one further failure of a station would be masked"),
+        (_, false) => {
+            let more = unmasked.len().saturating_sub(NAMED_PAIRS);
+            let named = unmasked[..unmasked.len() - more].join(", or ");
+            let more =
+                if more == 0 { String::new() } else { format!(", and {more} further pairs") };
+            return (
+                "all",
+                format!("any one of {of} stations may fail; {named}{more} together not"),
+            );
+        }
         _ => ("all", "any two further failures of stations would be masked"),
     };
     (level, words.to_owned())
@@ -401,11 +435,19 @@ fn failure(outcome: &OutcomeSnapshot) -> Failure {
     Failure { names: outcome.failed.clone(), masked: outcome.masked, why: outcome.why.clone() }
 }
 
-/// The newest alarms up to a cycle, newest first.
+fn unacknowledged(alarms: &[Alarm]) -> usize {
+    alarms.iter().filter(|alarm| alarm.acknowledged_by.is_none()).count()
+}
+
+/// The alarms up to a cycle: first those that wait for a person, then those that last, then the others; of each the critical and the newest first.
 fn shown_alarms(run: &RunModel, cycle: i64) -> Vec<ShownAlarm> {
     let alarms = run.alarms_at(cycle).rev();
-    let alarms = alarms.filter(|alarm| alarm.repeated_in.is_none());
-    alarms.take(LISTED_ALARMS).map(shown_alarm).collect()
+    let mut alarms: Vec<Alarm> = alarms.filter(|alarm| alarm.repeated_in.is_none()).collect();
+    let is_critical = |alarm: &Alarm| alarm.priority == Some(Priority::Critical);
+    alarms.sort_by_key(|alarm| {
+        (alarm.acknowledged_by.is_some(), alarm.over.is_some(), !is_critical(alarm))
+    });
+    alarms.into_iter().take(LISTED_ALARMS).map(shown_alarm).collect()
 }
 
 fn shown_alarm(alarm: Alarm) -> ShownAlarm {
@@ -416,7 +458,11 @@ fn shown_alarm(alarm: Alarm) -> ShownAlarm {
         since_before: alarm.since_before,
         id: alarm.number,
         cycle: alarm.cycle,
+        at: alarm.raised_at,
+        over_at: alarm.over_at,
+        acknowledged_at: alarm.acknowledged_at,
         who: alarm.name,
+        programs: alarm.programs,
         what: alarm.text,
         lasts: alarm.over.is_none(),
         acknowledged: alarm.acknowledged_by,

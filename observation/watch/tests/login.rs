@@ -148,8 +148,8 @@ fn only_who_shows_a_token_sees_the_page() {
     let run = page.ask("GET", "/api/run", &session, "");
     is(&run, "404");
     assert!(run.contains("U0683"), "{run}");
-    let seen = r#"{"owner":"anna"}"#;
-    let looks_only = page.ask("POST", "/api/alarms/1/acknowledge", &session, seen);
+    let seen = r#"{"owner":"anna","alarms":[1]}"#;
+    let looks_only = page.ask("POST", "/api/alarms/acknowledge", &session, seen);
     is(&looks_only, "403");
     is(&page.ask("POST", "/api/logout", &session, "{}"), "200");
     is(&page.ask("GET", "/api/run", &session, ""), "401");

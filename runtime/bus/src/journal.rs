@@ -321,12 +321,13 @@ fn write_all<'name, E: Serialize + 'name>(
     let mut tally = Tally::default();
     while let Ok(first) = receiver.recv() {
         // Flushed when nothing waits: a reader sees each record at once, and a burst costs one write.
+        // The wall clock comes first, so that every record has a time of day.
+        if let Some(anchor) = anchor() {
+            tally.count(write_line(output, &anchor));
+        }
         let burst = std::iter::once(first).chain(receiver.try_iter());
         for noted in burst {
             tally.count(write_line(output, &record(noted)));
-        }
-        if let Some(anchor) = anchor() {
-            tally.count(write_line(output, &anchor));
         }
         tally.count(output.flush());
     }

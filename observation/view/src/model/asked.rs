@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use understudy_cluster::Cluster;
-use understudy_journal::{Members, SourceCounts};
+use understudy_journal::{Members, SourceCounts, TimeOfDay};
 use understudy_ladder::{Evaluation, Observer};
 use understudy_logic::Scratch;
 use understudy_typed::{Interpreter, Trace};
@@ -124,6 +124,11 @@ impl Model {
         let newest = steps.back()?;
         let later = i64::try_from(cycle.checked_sub(newest.moment.cycle.0)?).ok()?;
         newest.cycle.checked_add(later)
+    }
+
+    /// The first cycles of stretches in which cycles are a period apart, with their times of day: those of a range of cycles.
+    pub fn times(&self, from: i64, to: i64) -> impl Iterator<Item = (i64, TimeOfDay)> {
+        self.times.stretches(from).take_while(move |(first, _)| *first <= to)
     }
 
     /// The turns of the stations in a cycle of the cluster.

@@ -69,7 +69,7 @@ impl Model {
     /// A remote I/O whose process does not execute drives nothing.
     pub(super) fn not_driven(&mut self, program: ProgramId, cycle: i64, reason: &str) -> String {
         let of = program_name(program, &self.members);
-        let text = format!("no remote I/O drives the outputs of {of}: {reason}");
+        let text = format!("{of}: no remote I/O drives the outputs, because {reason}");
         let name = self.members.name(Member::RemoteIo(program)).to_owned();
         self.alarms.raise_critical((name, NOT_DRIVEN), cycle, text.clone());
         text
@@ -83,8 +83,9 @@ impl Model {
         }
         let reason = format!("{name} reports nothing, and no station receives its samples");
         let text = self.not_driven(program, cycle, &reason);
-        self.events.push(Event {
+        self.tell(Event {
             number: 0,
+            at: None,
             cycle,
             at_ns: record.at_ns,
             name,

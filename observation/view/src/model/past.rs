@@ -16,6 +16,7 @@ use understudy_wire::{Member, Moment, ProgramId, Source};
 use super::Model;
 use super::programs::FAIL_SAFE;
 use super::standing::{Change, StationChange};
+use crate::describe::program_name;
 use crate::history::History;
 
 /// Cycles in which an alarm that lasts is found that was raised before.
@@ -85,9 +86,13 @@ impl Model {
                 is_provable(deadlines.source) || before.direct > 0 || before.reconstructed > 0;
             if deadlines.source == Source::FailSafe && track.served {
                 let remote_io = self.members.name(Member::RemoteIo(program));
-                let text = "its outputs are fail-safe".to_owned();
+                let text = format!("{}: fail-safe outputs", program_name(program, &self.members));
                 self.alarms.now_ns = deadlines.since_ns;
-                self.alarms.raise((remote_io.to_owned(), FAIL_SAFE), deadlines.since, text);
+                self.alarms.raise_critical(
+                    (remote_io.to_owned(), FAIL_SAFE),
+                    deadlines.since,
+                    text,
+                );
             }
         }
         self.reports.find_complete(&self.received);
@@ -97,6 +102,8 @@ impl Model {
     fn in_effect(&mut self, cycle: i64, record: &Record) {
         self.cycles.fix(Some((cycle, moment(&record.event))));
         self.at_ns = record.at_ns;
+        self.times.note(record);
+        self.now = None;
         self.alarms.now_ns = record.at_ns;
         self.take(record);
         self.cycles.fix(None);

@@ -41,8 +41,9 @@ impl Model {
             }
             let (event, level, text) = alarm_event(&declared, transition);
             let is_shelved = self.process_alarms.is_shelved(change.alarm, cycle);
-            self.events.push(Event {
+            self.tell(Event {
                 number: 0,
+                at: None,
                 cycle,
                 at_ns: self.at_ns,
                 name: name.to_owned(),
@@ -59,6 +60,7 @@ impl Model {
         let cycles = (u128::from(shelving.seconds) * 1_000_000_000).div_ceil(period_ns.max(1));
         let shelved = Shelved {
             until: cycle.saturating_add(i64::try_from(cycles).unwrap_or(i64::MAX)),
+            until_at: None,
             owner: shelving.owner.clone(),
             reason: shelving.reason.clone(),
         };

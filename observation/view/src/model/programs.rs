@@ -9,7 +9,11 @@ use understudy_wire::{
 
 use super::Model;
 use super::standing::{Change, ProgramChange, StationChange};
-use crate::describe::{PROGRAM_FAULT, describe, force_text, program_fault_text, source_text};
+use crate::alarm::VALUE_FAULT;
+use crate::describe::{
+    PROGRAM_FAULT, describe, force_text, missing_text, program_fault_text, program_name,
+    source_text,
+};
 use crate::event::{Event, Level};
 use crate::stop::{self, Stop};
 
@@ -126,18 +130,18 @@ impl Model {
                 own(ProgramChange::StartedCold { awaits_release: *awaits_release })
             }
             RemoteIoEvent::Released { .. } => {
-                let over = ["value-fault", "disputed", PROGRAM_FAULT];
-                self.alarms.all_over(&record.name, &over, cycle);
+                self.alarms.all_over(&record.name, &["disputed", PROGRAM_FAULT], cycle);
+                self.alarms.none_concerns(VALUE_FAULT, program, cycle);
                 self.programs[program.index()].stop.released();
                 own(ProgramChange::Released)
             }
             RemoteIoEvent::ValueFault { accused, located, .. } => {
-                alarm = Some("value-fault");
+                self.accused(record, program, *accused, cycle);
                 let excluded = own(ProgramChange::Excluded(*accused));
                 excluded.filter(|_| *located)
             }
             RemoteIoEvent::RecalledExclusion { stations, .. } => {
-                alarm = Some("value-fault");
+                self.accused(record, program, *stations, cycle);
                 own(ProgramChange::Excluded(*stations))
             }
             RemoteIoEvent::Disputed { .. } => {
@@ -186,6 +190,14 @@ impl Model {
         }
     }
 
+    /// The same stations may be accused by the remote I/Os of several programs.
+    fn accused(&mut self, record: &Record, program: ProgramId, accused: StationSet, cycle: i64) {
+        let names = accused.iter().map(|station| self.members.name(Member::Station(station)));
+        let subject = (names.collect::<Vec<_>>().join(" and "), VALUE_FAULT);
+        let text = describe(record, &self.members, &self.writes).text;
+        self.alarms.concerns(&subject, Some(program), cycle, text);
+    }
+
     /// One alarm names all forces of a remote I/O. A further force asks for an acknowledgement again; the end of one does not.
     fn alarm_of_forces(
         &mut self,
@@ -225,6 +237,7 @@ impl Model {
         let Some(driven) = event.driven() else {
             return;
         };
+        self.times.passed(&record.name, cycle, record.at_ns);
         self.timings.decided(moment, cycle);
         self.series.applied(program, cycle, sampled.as_ref(), driven, *source);
         self.received_at(cycle, *heard);
@@ -302,13 +315,19 @@ impl Model {
         let cause = self.cause_of_source(program, source, *missing, *heard);
         let subject = (record.name.clone(), FAIL_SAFE);
         if source == Source::FailSafe {
-            let why = cause.clone().unwrap_or_else(|| text.clone());
-            self.alarms.raise(subject, cycle, why);
+            let why = cause.clone().unwrap_or_else(|| match missing {
+                Some(missing) => missing_text(*missing).to_owned(),
+                None => "no output was provable".to_owned(),
+            });
+            let of = program_name(program, &self.members);
+            let text = format!("{of}: fail-safe outputs, because {why}");
+            self.alarms.raise_critical(subject, cycle, text);
         } else {
             self.alarms.over(&subject, cycle);
         }
-        self.events.push(Event {
+        self.tell(Event {
             number: 0,
+            at: None,
             cycle,
             at_ns: self.alarms.now_ns,
             name: record.name.clone(),
@@ -408,8 +427,9 @@ impl Model {
     ) {
         let subject = (record.name.clone(), event);
         self.alarms.raise(subject, cycle, text.clone());
-        self.events.push(Event {
+        self.tell(Event {
             number: 0,
+            at: None,
             cycle,
             at_ns: record.at_ns,
             name: record.name.clone(),
@@ -437,6 +457,7 @@ impl Model {
             for (rank, state) in states.into_iter().enumerate() {
                 self.series.station_was(rank, cycle, state);
             }
+            self.attribute_again(cycle);
             self.closed = Some(cycle);
         }
     }

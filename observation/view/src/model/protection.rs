@@ -4,15 +4,42 @@ use std::ops::RangeInclusive;
 
 use understudy_journal::Record;
 use understudy_remote_io::{Event as RemoteIoEvent, Lacking, LackingReason};
-use understudy_wire::{Member, ProgramId, StationId, StationSet};
+use understudy_wire::{Member, ProgramId, ProgramSet, StationId, StationSet};
 
 use super::Model;
 use super::standing::{Change, ProgramChange, Standing};
+use crate::alarm::UNPROTECTED;
 use crate::protection::{LackingStation, LostState, Protection};
 use crate::station::StationState;
 
-const UNPROTECTED: &str = "unprotected";
 const STATE_LOST: &str = "state-lost";
+
+/// What is known of the stations that prove the outputs of a program which is not protected.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Attribution {
+    /// Those that its remote I/O receives, and those of them that publish for it.
+    evidence: Option<(StationSet, StationSet)>,
+    /// The first cycle of those in a row with it.
+    since: i64,
+    /// Whether its causes follow from it.
+    is_done: bool,
+}
+
+impl Attribution {
+    /// Takes the evidence of a cycle; whether it has been the same for long enough and was not used.
+    fn is_due(&mut self, evidence: (StationSet, StationSet), cycle: i64, flag_after: i64) -> bool {
+        if self.evidence != Some(evidence) {
+            *self = Self { evidence: Some(evidence), since: cycle, is_done: false };
+        }
+        let is_due = !self.is_done && cycle.saturating_sub(self.since) >= flag_after;
+        self.is_done |= is_due;
+        is_due
+    }
+
+    pub(super) fn shift(&mut self, by: i64) {
+        self.since = self.since.saturating_add(by);
+    }
+}
 
 /// Reasons that a later cycle can refute.
 const NOT_RECEIVED: &str = "not-received";
@@ -41,7 +68,7 @@ impl Model {
         match event {
             RemoteIoEvent::Protected { .. } => {
                 let protection = Protection { protected: true, since: cycle, lacking: Vec::new() };
-                self.alarms.over(&subject(UNPROTECTED), cycle);
+                self.alarms.none_concerns(UNPROTECTED, program, cycle);
                 self.protection_is(program, cycle, protection);
             }
             RemoteIoEvent::Unprotected { since, lacking, .. } => {
@@ -51,8 +78,7 @@ impl Model {
                 let cycles = since.saturating_add(1)..=until;
                 let lacking = lacking.iter().map(|one| self.lacking(program, one, cycles.clone()));
                 let protection = Protection { protected: false, since, lacking: lacking.collect() };
-                let text = protection.text();
-                self.alarms.raise(subject(UNPROTECTED), cycle, text);
+                self.attributed(program, cycle, &protection.lacking);
                 self.protection_is(program, cycle, protection);
             }
             RemoteIoEvent::StateLost { applied, newest, holder, asks, .. } => {
@@ -92,6 +118,77 @@ impl Model {
         }
     }
 
+    /// Each station that cannot prove the outputs of a program is a cause, and has its alarm.
+    fn attributed(&mut self, program: ProgramId, cycle: i64, lacking: &[LackingStation]) {
+        let mut causes: Vec<_> = lacking
+            .iter()
+            .map(|one| ((one.station.clone(), UNPROTECTED), one.text.clone()))
+            .collect();
+        if causes.is_empty() {
+            let remote_io = self.members.name(Member::RemoteIo(program)).to_owned();
+            let text = format!("{remote_io} does not name a station that lacks");
+            causes.push(((remote_io, UNPROTECTED), text));
+        }
+        for subject in self.alarms.causes_for(UNPROTECTED, program) {
+            if causes.iter().all(|(cause, _)| *cause != subject) {
+                self.alarms.concerns_no_more(&subject, Some(program), cycle);
+            }
+        }
+        for (subject, text) in causes {
+            self.alarms.concerns(&subject, Some(program), cycle, text);
+        }
+    }
+
+    /// The causes in a closed cycle. A remote I/O reports them once, when protection is lost: one that returns or fails meanwhile is found from the
+    /// turns that the remote I/O receives, once they have been the same for as long as a loss of protection takes to be reported.
+    pub(super) fn attribute_again(&mut self, cycle: i64) {
+        let lacks = |standing: &Standing, program| {
+            let known = standing.program(program).and_then(|own| own.protection.as_ref());
+            known.is_some_and(|protection| !protection.protected)
+        };
+        let now = self.changes.now();
+        let lacking: ProgramSet = self.program_ids().filter(|id| lacks(now, *id)).collect();
+        let mut attributions = std::mem::take(&mut self.attributions);
+        if lacking.is_empty() {
+            attributions.fill(Attribution::default());
+            self.attributions = attributions;
+            return;
+        }
+        let standing = self.changes.at(cycle);
+        let mut due = Vec::new();
+        for (program, attribution) in self.program_ids().zip(&mut attributions) {
+            if !lacking.contains(program) || !lacks(&standing, program) {
+                *attribution = Attribution::default();
+            } else if self.evidence(program, cycle).is_some_and(|evidence| {
+                let flag_after = i64::from(self.cluster.agreement().flag_after);
+                attribution.is_due(evidence, cycle, flag_after)
+            }) {
+                due.extend(
+                    self.protection_in(&standing, program, cycle).map(|found| (program, found)),
+                );
+            }
+        }
+        drop(standing);
+        self.attributions = attributions;
+        for (program, found) in due.into_iter().filter(|(_, found)| !found.lacking.is_empty()) {
+            self.attributed(program, cycle, &found.lacking);
+        }
+    }
+
+    /// The stations that a remote I/O receives about a cycle, and those of them that publish for its program.
+    fn evidence(&self, program: ProgramId, cycle: i64) -> Option<(StationSet, StationSet)> {
+        let heard = self.heard_in(program, cycle.saturating_sub(1)..=cycle)?;
+        let heard: StationSet = self.provers(program).filter(|id| heard.contains(*id)).collect();
+        let covers = |id: &StationId| self.covers(*id, cycle).contains(program);
+        Some((heard, heard.iter().filter(covers).collect()))
+    }
+
+    /// The stations that prove the outputs of a program: its controller and the understudies.
+    fn provers(&self, program: ProgramId) -> impl Iterator<Item = StationId> + '_ {
+        let schedule = &self.cluster.agreement().schedule;
+        self.station_ids().filter(move |id| id.0 == program.0 || schedule.is_understudy(*id))
+    }
+
     fn protection_is(&mut self, program: ProgramId, cycle: i64, protection: Protection) {
         let change = ProgramChange::Protection(Box::new(protection));
         let change = Change::Program(program, change);
@@ -117,12 +214,11 @@ impl Model {
         let Some(heard) = heard.filter(|_| !reported.protected) else {
             return Some(reported);
         };
-        let schedule = &self.cluster.agreement().schedule;
-        let proves = |id: StationId| id.0 == program.0 || schedule.is_understudy(id);
+        let proves: StationSet = self.provers(program).collect();
         let lacking = self.station_ids().filter_map(|id| {
             let name = self.members.name(Member::Station(id));
             let known = reported.lacking.iter().find(|one| one.station == name);
-            if !proves(id) {
+            if !proves.contains(id) {
                 return known.cloned();
             }
             let is_received = heard.contains(id);

@@ -5,7 +5,11 @@ use understudy_wire::Member;
 
 use super::Model;
 use super::standing::{Change, StationChange};
+use crate::alarm::UNPROTECTED;
 use crate::describe::fault_text;
+
+/// The alarm of a simulated plant that has ended.
+const ENDED: &str = "ended";
 
 impl Model {
     pub(super) fn run(&mut self, record: &Record, event: &RunEvent) {
@@ -24,7 +28,8 @@ impl Model {
                 let name = self.members.name(*member).to_owned();
                 self.process_is(*member, Process::Running, cycle);
                 self.done(*member, format!("{name} is started"), Some(false), cycle);
-                self.alarms.over(&(name, "ended"), cycle);
+                self.alarms.over(&(name.clone(), ENDED), cycle);
+                self.alarms.concerns_no_more(&(name, UNPROTECTED), None, cycle);
             }
             RunEvent::Fault { action, member, .. } => self.fault(*action, *member, cycle),
             RunEvent::Ended { member, how, .. } => {
@@ -34,7 +39,11 @@ impl Model {
                 self.done(*member, text.clone(), Some(true), cycle);
                 match member {
                     Member::RemoteIo(program) => drop(self.not_driven(*program, cycle, &text)),
-                    _ => self.alarms.raise((name, "ended"), cycle, text),
+                    // Of a station it is the cause of what its programs lack.
+                    Member::Station(_) => {
+                        self.alarms.concerns(&(name, UNPROTECTED), None, cycle, text);
+                    }
+                    Member::Plant(_) => self.alarms.raise((name, ENDED), cycle, text),
                 }
             }
             RunEvent::Origin { moment, cycle } => {

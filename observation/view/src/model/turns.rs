@@ -101,8 +101,9 @@ impl Model {
             }
             Some(text) => {
                 if self.turns.differing.insert(station) {
-                    self.events.push(Event {
+                    self.tell(Event {
                         number: 0,
+                        at: None,
                         cycle,
                         at_ns: self.at_ns,
                         name,

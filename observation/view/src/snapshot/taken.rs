@@ -45,7 +45,7 @@ impl Model {
     /// The alarms as they were in a cycle, oldest first; all of them in the newest.
     pub fn alarms_at(&self, cycle: i64) -> impl DoubleEndedIterator<Item = Alarm> {
         let until = self.recorded_until(cycle);
-        self.alarms().filter_map(move |alarm| alarm.at(until))
+        self.alarms().filter_map(move |alarm| Some(alarm.at(until)?.timed(&self.times)))
     }
 
     /// The alarms as they were in a cycle, and those of the cluster file with their states.
@@ -59,9 +59,12 @@ impl Model {
         let alarms: Vec<Alarm> = self.alarms_at(cycle).collect();
         let until = self.recorded_until(cycle);
         let cycle = cycle.min(self.newest().unwrap_or(0));
-        let process = self
+        let mut process = self
             .process_alarms
             .at(cycle, until, &alarms, |alarm| self.program_name(alarm.program).to_owned());
+        for shelved in process.iter_mut().filter_map(|alarm| alarm.shelved.as_mut()) {
+            shelved.until_at = self.times.of_cycle(shelved.until);
+        }
         (alarms, process)
     }
 
@@ -103,6 +106,8 @@ impl Picture<'_> {
             cluster: model.cluster().name().to_owned(),
             run: self.run(),
             cycle: self.cycle,
+            at: self.cycle.and_then(|cycle| model.times.of_cycle(cycle)),
+            clocks_apart: model.times.apart(),
             behind: if self.cycle == model.newest() { model.behind() } else { 0 },
             from_origin: model.has_origin(),
             mode: match agreement.mode {

@@ -81,6 +81,7 @@ impl<'m> Explainer<'m> {
 
     fn leaf(&self, signal: &str, value: bool, place: usize, text: impl Into<String>) -> Reason {
         Reason {
+            at: None,
             signal: signal.to_owned(),
             value: value.into(),
             of: None,
@@ -235,6 +236,7 @@ impl<'m> Explainer<'m> {
         };
         let rung = &self.program.rungs[decision.rung];
         Reason {
+            at: None,
             signal: name.to_owned(),
             value: value.into(),
             of: None,

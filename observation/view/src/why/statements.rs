@@ -91,6 +91,7 @@ impl<'m> Explainer<'m> {
         let trace = self.trace(at)?;
         let text = format!("program fault: {}", fault.describe(self.program));
         let mut reason = Reason {
+            at: None,
             value,
             of: self.program.part(name).and_then(|part| part.of.elementary()),
             ..self.leaf(name, None, at, text)
@@ -130,6 +131,7 @@ impl<'m> Explainer<'m> {
 
     fn leaf(&self, signal: &str, stored: Stored, place: usize, text: impl Into<String>) -> Reason {
         Reason {
+            at: None,
             signal: signal.to_owned(),
             value: stored.map_or(Value::Null, |(of, stored)| elementary(of, stored)),
             of: stored.map(|(of, _)| of),

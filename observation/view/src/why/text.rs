@@ -7,14 +7,19 @@ use understudy_typed::Elementary;
 
 use super::{Reason, Why, WhyForced};
 use crate::value::{stored_text, value_text};
+use crate::zone::Zone;
 
 impl Why {
-    /// For a terminal; lines end in a newline.
-    pub fn to_text(&self) -> String {
+    /// For a terminal, with times of day in a zone; lines end in a newline.
+    pub fn to_text(&self, zone: Zone) -> String {
         let mut text = String::new();
         let value = shown(&self.value, self.of);
-        let _ =
-            writeln!(text, "{}.{} is {value} in cycle {}", self.program, self.signal, self.cycle);
+        let at = self.at.map_or_else(String::new, |at| format!(", {}", zone.whole(at)));
+        let _ = writeln!(
+            text,
+            "{}.{} is {value} in cycle {}{at}",
+            self.program, self.signal, self.cycle
+        );
         if let Some(age) = self.age_cycles {
             let _ = writeln!(
                 text,
@@ -68,8 +73,8 @@ impl Why {
             let _ = writeln!(text, "  {it} is the configured fail-safe value");
         }
         if let Some(reason) = &self.because {
-            line(&mut text, reason, self.cycle, "");
-            children(&mut text, reason, "");
+            line(&mut text, reason, self.cycle, zone);
+            children(&mut text, reason, "", zone);
         }
         text
     }
@@ -122,20 +127,24 @@ fn shown(value: &Value, of: Option<Elementary>) -> String {
     }
 }
 
-fn children(text: &mut String, reason: &Reason, indent: &str) {
+fn children(text: &mut String, reason: &Reason, indent: &str, zone: Zone) {
     let last = reason.because.len().saturating_sub(1);
     for (place, child) in reason.because.iter().enumerate() {
         let (branch, below) = if place == last { ("└ ", "  ") } else { ("├ ", "│ ") };
         let _ = write!(text, "{indent}{branch}");
-        line(text, child, reason.cycle, "");
-        children(text, child, &format!("{indent}{below}"));
+        line(text, child, reason.cycle, zone);
+        children(text, child, &format!("{indent}{below}"), zone);
     }
 }
 
-fn line(text: &mut String, reason: &Reason, parent: i64, indent: &str) {
+fn line(text: &mut String, reason: &Reason, parent: i64, zone: Zone) {
     let value = shown(&reason.value, reason.of);
-    let when =
-        if reason.cycle == parent { String::new() } else { format!(" in cycle {}", reason.cycle) };
+    let at = reason.at.map_or_else(String::new, |at| format!(", {}", zone.clock(at)));
+    let when = if reason.cycle == parent {
+        String::new()
+    } else {
+        format!(" in cycle {}{at}", reason.cycle)
+    };
     let rung = reason.rung.map_or(String::new(), |rung| {
         let title = reason.title.as_ref();
         let title = title.map_or(String::new(), |title| format!(" \"{title}\""));
@@ -145,6 +154,5 @@ fn line(text: &mut String, reason: &Reason, parent: i64, indent: &str) {
         (Some(line), Some(statement)) => format!(" [line {line} \"{statement}\"]"),
         _ => String::new(),
     };
-    let _ =
-        writeln!(text, "{indent}{} = {value}{when}: {}{rung}{written}", reason.signal, reason.text);
+    let _ = writeln!(text, "{} = {value}{when}: {}{rung}{written}", reason.signal, reason.text);
 }

@@ -189,7 +189,7 @@ fn a_remote_io_that_gives_no_sign_is_an_alarm_within_two_seconds_until_it_is_bac
     assert_eq!(
         alarms(snapshot),
         [
-            "robot-io: no remote I/O drives the outputs of robot: robot-io reports nothing, and no station receives its samples"
+            "robot-io: robot: no remote I/O drives the outputs, because robot-io reports nothing, and no station receives its samples"
         ]
     );
     // The other members are shown as they are meanwhile, and this one as what it is.

@@ -89,7 +89,7 @@ fn every_view_states_the_forced_value_while_an_output_is_forced() {
             assert_eq!(program.forced.len(), usize::from(is_forced), "{cycle}");
             let force = why.forced.as_ref();
             assert_eq!(force.is_some(), is_forced, "{cycle}");
-            let text = why.to_text();
+            let text = why.to_text(understudy_view::Zone::UTC);
             assert_eq!(text.contains("forced by anna since cycle"), is_forced, "{text}");
             if let Some(force) = force {
                 assert_eq!(

@@ -57,7 +57,7 @@ fn a_changed_journal_is_read_without_a_panic() {
         for output in ["press.move_down", "grip", "pressing"] {
             for cycle in [None, Some(10), Some(79), Some(i64::MAX), Some(i64::MIN)] {
                 if let Ok(why) = model.why(output, cycle) {
-                    why.to_text();
+                    why.to_text(understudy_view::Zone::UTC);
                 }
             }
         }

@@ -5,6 +5,7 @@
     reason = "the age of what is shown is counted on the real clock"
 )]
 
+mod causes;
 mod complete;
 mod diffs;
 mod directory;
@@ -22,5 +23,6 @@ mod replay;
 mod screen;
 mod state_signals;
 mod support;
+mod times;
 mod why;
 mod writes;

@@ -197,7 +197,7 @@ fn an_output_is_explained_by_statements_and_inputs() {
     let fault = stopped.because.as_ref().expect("the program fault");
     assert_eq!(fault.line, Some(15));
     assert_eq!(find(fault, "speed").map(|speed| &speed.value), Some(&json!(0)));
-    let text = stopped.to_text();
+    let text = stopped.to_text(understudy_view::Zone::UTC);
     assert!(text.contains("division of 600 by zero"), "{text}");
     let error = model.why("feed.rat", None).expect_err("no such variable");
     assert_eq!(error.code(), "U0573");

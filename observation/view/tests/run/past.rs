@@ -10,14 +10,14 @@ use serde_json::Value;
 use understudy_cluster::{Cluster, press_cell};
 use understudy_journal::{Journal, Record, keep_cluster};
 use understudy_testing::Folder;
-use understudy_view::{Bounds, Following, Model, Run, Source};
+use understudy_view::{Bounds, Following, Model, RemoteIoState, Run, Source};
 
 use crate::support::{cell, records, scenario};
 
 const CYCLES: u64 = 1200;
 
 /// Steps that no member refuses, at random cycles.
-fn random_scenario(random: &mut Pcg64) -> String {
+pub(crate) fn random_scenario(random: &mut Pcg64) -> String {
     let stations = ["press", "robot", "understudy"];
     let remote_ios = ["press-io", "robot-io"];
     let mut text = format!("title = \"at random\"\ncycles = {CYCLES}\nseed = 1\n");
@@ -118,13 +118,33 @@ fn present(model: &Model) -> Value {
 }
 
 /// Alarms that last, without when they were raised. Wrong outputs and words of before are found only by who has read the samples of then.
-fn lasting(model: &Model) -> Vec<(String, &'static str)> {
+fn lasting(model: &Model) -> Vec<(String, &'static str, Option<String>)> {
     let found_with_samples = ["wrong", "word-differs"];
     let alarms = model
         .alarms()
         .filter(|alarm| alarm.over.is_none() && !found_with_samples.contains(&alarm.alarm));
-    let mut found: Vec<_> = alarms.map(|alarm| (alarm.name.clone(), alarm.alarm)).collect();
+    let snapshot = model.snapshot();
+    let programs = snapshot.programs.iter().map(|program| &program.program);
+    let is_away = [RemoteIoState::Suspended, RemoteIoState::Killed, RemoteIoState::NotReporting];
+    let reporting = programs.zip(&snapshot.remote_ios);
+    let reporting: Vec<&String> = reporting
+        .filter(|(_, remote_io)| !is_away.contains(&remote_io.state))
+        .map(|(program, _)| program)
+        .collect();
+    let mut found = Vec::new();
+    for alarm in alarms {
+        // Stations that fail or return after the report are found from what its remote I/O receives.
+        for program in &alarm.programs {
+            let is_known = alarm.alarm != "unprotected" || reporting.contains(&program);
+            let cause = is_known.then(|| alarm.name.clone());
+            found.push((program.clone(), alarm.alarm, cause));
+        }
+        if alarm.programs.is_empty() {
+            found.push((alarm.name.clone(), alarm.alarm, None));
+        }
+    }
     found.sort();
+    found.dedup();
     found
 }
 

@@ -191,6 +191,7 @@ fn a_shelved_alarm_is_not_open_until_its_time_is_over() {
             model.note(&shelving(1));
             let snapshot = model.snapshot();
             let expected = Shelved {
+                until_at: None,
                 until: 220,
                 owner: "anna".to_owned(),
                 reason: "sensor is exchanged".to_owned(),

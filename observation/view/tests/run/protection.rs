@@ -28,9 +28,10 @@ fn changes(records: &[Record]) -> Vec<String> {
         let lost = robot.lost.as_ref().map(LostState::text);
         let alarms = model.alarms().filter(|alarm| {
             let of_protection = ["unprotected", "state-lost"].contains(&alarm.alarm);
-            of_protection && alarm.over.is_none() && alarm.name == "robot-io"
+            of_protection && alarm.over.is_none() && alarm.programs == ["robot"]
         });
-        let alarms: Vec<&str> = alarms.map(|alarm| alarm.alarm).collect();
+        let alarms: Vec<String> =
+            alarms.map(|alarm| format!("{} of {}", alarm.alarm, alarm.name)).collect();
         let text = format!("{protection:?} {lost:?} {alarms:?}");
         if told.last().is_none_or(|last| !last.ends_with(&text)) {
             told.push(format!("{}: {text}", model.cycle().expect("a cycle")));
@@ -182,7 +183,10 @@ fn a_remote_io_that_does_not_report_is_not_taken_at_its_last_word() {
     let of = |signal, cycle| model.why(signal, cycle).expect("it is known");
     let why = of("robot.grip", None);
     assert_eq!(why.age_cycles, Some(age));
-    assert!(why.to_text().contains("NOT THE PRESENT: robot-io has reported nothing for"));
+    assert!(
+        why.to_text(understudy_view::Zone::UTC)
+            .contains("NOT THE PRESENT: robot-io has reported nothing for")
+    );
     assert_eq!(of("robot.grip", Some(50)).age_cycles, None, "it was asked for");
     assert_eq!(of("press.move_down", None).age_cycles, None);
 }
@@ -206,7 +210,7 @@ fn the_cause_of_lost_outputs_is_the_newest_true_one() {
     assert_eq!(alarm.name, "robot-io");
     assert_eq!(
         alarm.text,
-        "robot and understudy are not received: understudy is killed in cycle 140"
+        "robot: fail-safe outputs, because robot and understudy are not received: understudy is killed in cycle 140"
     );
     // Suspended by somebody else: nobody knows of it here.
     let mut model = Model::new(Arc::new(cell.clone()), Bounds::default());
@@ -218,7 +222,10 @@ fn the_cause_of_lost_outputs_is_the_newest_true_one() {
         model.note(&record);
     }
     let alarm = model.alarms().find(|alarm| alarm.alarm == "fail-safe").expect("an alarm");
-    assert_eq!(alarm.text, "robot and understudy are not received");
+    assert_eq!(
+        alarm.text,
+        "robot: fail-safe outputs, because robot and understudy are not received"
+    );
 }
 
 /// What is shown of the robot's protection and of the stations after each cycle from `from` on, by a viewer that is told of no action.
@@ -373,6 +380,9 @@ fn a_program_that_was_never_protected_is_an_alarm() {
         let lacking: Vec<&str> = of_robot.lacking.iter().map(|one| one.text.as_str()).collect();
         assert_eq!(lacking, ["understudy is killed"]);
         let mut alarms = model.alarms().filter(|alarm| alarm.alarm == "unprotected");
-        assert!(alarms.any(|alarm| alarm.name == "robot-io" && alarm.over.is_none()));
+        assert!(alarms.any(|alarm| {
+            let of_robot = alarm.programs.iter().any(|program| program == "robot");
+            of_robot && alarm.name == "understudy" && alarm.over.is_none()
+        }));
     }
 }

@@ -10,7 +10,7 @@ fn a_reconstructed_output_names_parity_word_mask_and_lineage() {
     let cell = cell();
     let model = model(&cell, &scenario(&cell, KILL_EACH), 1);
     let why = model.why("press.move_down", Some(140)).expect("it is known");
-    insta::assert_snapshot!(why.to_text());
+    insta::assert_snapshot!(why.to_text(understudy_view::Zone::UTC));
     let reconstructed = why.reconstructed.expect("the press is killed");
     assert!(reconstructed.proved);
     assert_eq!(reconstructed.word_of, "understudy");

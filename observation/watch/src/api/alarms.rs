@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use axum::Json;
-use axum::extract::rejection::{JsonRejection, PathRejection};
-use axum::extract::{Extension, Path, State};
+use axum::extract::rejection::JsonRejection;
+use axum::extract::{Extension, State};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use understudy_bus::RefusedOrder;
@@ -17,24 +17,34 @@ use crate::error::Problem;
 use crate::login::Person;
 use crate::model::Known;
 
+/// Alarms that are acknowledged at once, at most.
+const MOST_ACKNOWLEDGED: usize = 1000;
+
+/// Alarms that a person has seen.
 #[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct Acknowledged {
+    /// Numbers of the alarms.
+    alarms: Vec<u64>,
     owner: String,
 }
 
 pub(super) async fn acknowledge(
     State(app): State<Arc<App>>,
     Extension(person): Extension<Person>,
-    number: Result<Path<u64>, PathRejection>,
     body: Result<Json<Acknowledged>, JsonRejection>,
 ) -> Answered<Json<Value>> {
-    let Path(number) = number?;
-    let Json(Acknowledged { owner }) = body?;
+    let Json(Acknowledged { alarms, owner }) = body?;
     let owner = named(&person, owner)?;
-    let refused =
-        |why: &str| RefusedOrder::new("acknowledge-alarm", &format!("alarm {number}"), &owner, why);
+    if alarms.len() > MOST_ACKNOWLEDGED {
+        let problem = format!("at most {MOST_ACKNOWLEDGED} alarms are acknowledged at once");
+        return Err(Problem::bad(problem));
+    }
+    let refused = |what: &str, why: &str| RefusedOrder::new("acknowledge-alarm", what, &owner, why);
     if let Some(why) = App::why_not_act(&person) {
-        app.commanding.record_refused(Some(refused(why))).await;
+        let numbers: Vec<String> = alarms.iter().map(u64::to_string).collect();
+        let what = format!("alarm {}", numbers.join(", "));
+        app.commanding.record_refused(Some(refused(&what, why))).await;
         return Err(Problem::forbidden(why));
     }
     if let Some((from, percent)) = app.model().known().and_then(Known::past) {
@@ -42,15 +52,21 @@ pub(super) async fn acknowledge(
             "the alarms before cycle {from} are being read ({percent} %): try again in some seconds"
         )));
     }
-    let Some(alarm) = app.alarm(number)? else {
-        let problem = Problem::unknown(format!("the run has no alarm {number}"));
-        app.commanding.record_refused(Some(refused(&problem.words()))).await;
-        return Err(problem);
-    };
-    let seen = alarm.acknowledgement(owner, unix_seconds());
-    // It is shown as acknowledged once the journal contains it.
-    let done = app.commanding.commander.acknowledge(seen).await;
-    done.map_err(|refusal| Problem::refused(&refusal.to_string()))?;
+    let mut seen = Vec::new();
+    for number in alarms {
+        let Some(alarm) = app.alarm(number)? else {
+            let problem = Problem::unknown(format!("the run has no alarm {number}"));
+            let what = format!("alarm {number}");
+            app.commanding.record_refused(Some(refused(&what, &problem.words()))).await;
+            return Err(problem);
+        };
+        seen.push(alarm.acknowledgement(owner.clone(), unix_seconds()));
+    }
+    for seen in seen {
+        // It is shown as acknowledged once the journal contains it.
+        let done = app.commanding.commander.acknowledge(seen).await;
+        done.map_err(|refusal| Problem::refused(&refusal.to_string()))?;
+    }
     Ok(Json(json!({})))
 }
 

@@ -7,6 +7,7 @@ use axum::Json;
 use axum::extract::rejection::QueryRejection;
 use axum::extract::{Query, State};
 use serde::{Deserialize, Serialize};
+use understudy_journal::TimeOfDay;
 use understudy_view::{EventFilter, EventRow, Level};
 
 use super::Answered;
@@ -58,6 +59,7 @@ struct ShownEvent {
     id: u64,
     /// Of the newest event of the row.
     cycle: i64,
+    at: Option<TimeOfDay>,
     /// Of the oldest one.
     first_cycle: i64,
     count: usize,
@@ -118,6 +120,7 @@ fn shown(row: &EventRow<'_>) -> ShownEvent {
     ShownEvent {
         id: first.number,
         cycle: event.cycle,
+        at: event.at,
         first_cycle: first.cycle,
         count,
         who: event.name.clone(),

@@ -8,7 +8,7 @@ use axum::extract::rejection::QueryRejection;
 use axum::extract::{Query, State};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use understudy_journal::source_word;
+use understudy_journal::{TimeOfDay, source_word};
 use understudy_typed::Point;
 use understudy_view::{StateSignal, Timeline, number_of};
 use understudy_wire::{Image, ProgramId};
@@ -33,6 +33,9 @@ const MAXIMUM_CHANGES: usize = 20_000;
 /// Cycles of which the states of the programs are recomputed for one answer, at most: the newest.
 const MAXIMUM_SCANS: usize = 2000;
 
+/// Steps of the wall clock and pauses of the cluster in one answer, at most.
+const MAXIMUM_TIMES: usize = 1000;
+
 /// Faults in one answer, at most.
 const MAXIMUM_FAULTS: usize = 200;
 
@@ -53,6 +56,8 @@ pub(super) struct Trends {
     signals: Vec<Trend>,
     sources: Vec<Band>,
     faults: Vec<Fault>,
+    /// From this cycle on cycles are a period apart, up to the next one, with its time of day; none where no wall clock was recorded.
+    times: Vec<(i64, TimeOfDay)>,
 }
 
 #[derive(Debug, Serialize)]
@@ -98,6 +103,7 @@ pub(super) async fn trends(
         from,
         to,
         signals: trends_of(known, &names, from, to)?,
+        times: known.run.times(from, to).take(MAXIMUM_TIMES).collect(),
         sources: sources.collect(),
         faults: faults
             .take(MAXIMUM_FAULTS)
