@@ -1,6 +1,7 @@
 //! Free ports of the loopback interface, for members whose cluster file names no address.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, UdpSocket};
 use std::ops::Range;
@@ -35,8 +36,8 @@ fn claim(block: u16) -> io::Result<UnixDatagram> {
 /// Another process has.
 fn claimed(block: u16) -> io::Result<()> {
     let mut claimed = CLAIMED.lock().unwrap_or_else(PoisonError::into_inner);
-    if !claimed.contains_key(&block) {
-        claimed.insert(block, claim(block)?);
+    if let Entry::Vacant(place) = claimed.entry(block) {
+        place.insert(claim(block)?);
     }
     Ok(())
 }
