@@ -319,13 +319,20 @@ fn write_all<'name, E: Serialize + 'name>(
     mut anchor: impl FnMut() -> Option<Record<'name, E>>,
 ) -> u64 {
     let mut tally = Tally::default();
+    let mut is_begun = false;
     while let Ok(first) = receiver.recv() {
         // Flushed when nothing waits: a reader sees each record at once, and a burst costs one write.
-        // The wall clock comes first, so that every record has a time of day.
+        let mut burst = std::iter::once(first).chain(receiver.try_iter());
+        // The first record of a journal states its version.
+        if !std::mem::replace(&mut is_begun, true) {
+            for noted in burst.by_ref().take(1) {
+                tally.count(write_line(output, &record(noted)));
+            }
+        }
+        // The wall clock comes before the others, so that they have a time of day.
         if let Some(anchor) = anchor() {
             tally.count(write_line(output, &anchor));
         }
-        let burst = std::iter::once(first).chain(receiver.try_iter());
         for noted in burst {
             tally.count(write_line(output, &record(noted)));
         }
