@@ -319,22 +319,14 @@ fn write_all<'name, E: Serialize + 'name>(
     mut anchor: impl FnMut() -> Option<Record<'name, E>>,
 ) -> u64 {
     let mut tally = Tally::default();
-    let mut is_begun = false;
+    let mut is_first = true;
     while let Ok(first) = receiver.recv() {
         // Flushed when nothing waits: a reader sees each record at once, and a burst costs one write.
-        let mut burst = std::iter::once(first).chain(receiver.try_iter());
-        // The first record of a journal states its version.
-        if !std::mem::replace(&mut is_begun, true) {
-            for noted in burst.by_ref().take(1) {
-                tally.count(write_line(output, &record(noted)));
-            }
-        }
-        // The wall clock comes before the others, so that they have a time of day.
-        if let Some(anchor) = anchor() {
-            tally.count(write_line(output, &anchor));
-        }
-        for noted in burst {
-            tally.count(write_line(output, &record(noted)));
+        let mut burst = std::iter::once(first).chain(receiver.try_iter()).map(&record);
+        // The first record of a journal states its version; the wall clock comes before all others, so that they have a time of day.
+        let version = if std::mem::take(&mut is_first) { burst.next() } else { None };
+        for line in version.into_iter().chain(anchor()).chain(burst) {
+            tally.count(write_line(output, &line));
         }
         tally.count(output.flush());
     }

@@ -15,7 +15,7 @@ use understudy_wire::ZENOH_PORT_OFFSET;
 /// Ports that no system gives to outgoing connections of its own accord, so that a member that is restarted finds its port
 /// again: Linux begins at 32768, others at 49152. So do the ports of their frames over Zenoh.
 const PORTS: Range<u16> = 16_384..32_768 - ZENOH_PORT_OFFSET;
-/// Ports that a process claims at once. The next process, whose number is one higher, begins so many ports further on.
+/// Ports that a process claims at once. The next process, whose number is one higher, begins as many ports further on.
 const BLOCK: u16 = 61;
 
 /// The port, counted from the first of [`PORTS`], that this process tries next: nobody in it is given one twice before all were tried.
