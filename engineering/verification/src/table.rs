@@ -21,7 +21,7 @@ const REPEATED: usize = 8;
 pub(crate) enum Part {
     /// One scan.
     Scan(usize),
-    /// From one scan to another, both included, in which the signals are as in so many scans before, over and over.
+    /// From one scan to another, both included, in which the signals repeat the scans before, as many as the third number, over and over.
     Again(usize, usize, usize),
 }
 
@@ -49,7 +49,7 @@ pub(crate) fn parts(trace: &Trace) -> Vec<Part> {
     let rows: Vec<Vec<bool>> = (0..trace.scans.len()).map(row).collect();
     // What a run shows often happens in its last scan, which is always told.
     let end = rows.len().saturating_sub(1);
-    // How many scans, in whole rounds, are as so many before them; none where they are few.
+    // How many scans, in whole rounds, repeat those before them; nothing where they are few.
     let repeated = |from: usize, scans: usize| {
         let same = (from..end).take_while(|&next| rows[next] == rows[next - scans]).count();
         let whole = same / scans * scans;

@@ -176,7 +176,8 @@ impl System {
         program: &Program,
         after: &HashMap<u64, Term>,
     ) {
-        for point in program.inputs.iter().chain(&program.outputs) {
+        let has_names = !program.enumerations.is_empty();
+        for point in program.inputs.iter().chain(&program.outputs).filter(|_| has_names) {
             let part = program.part(&point.name);
             if let Some(values) = part.and_then(|part| named_values(program, &part.of)) {
                 self.values.insert(format!("{prefix}{}", point.name), values);

@@ -82,16 +82,19 @@ pub(crate) fn one_scan() -> BoxedStrategy<Resolved> {
 /// Formulas of one scan over inputs.
 fn of_inputs() -> BoxedStrategy<Resolved> {
     let leaf = (0..INPUTS).prop_map(|input| Formula::Signal(Signal::Input(input)));
-    leaf.prop_recursive(2, 5, 2, |inner| {
-        let pair = || (inner.clone(), inner.clone()).prop_map(|(a, b)| (Box::new(a), Box::new(b)));
-        prop_oneof![
-            inner.clone().prop_map(Formula::negated),
-            pair().prop_map(|(a, b)| Formula::And(a, b)),
-            pair().prop_map(|(a, b)| Formula::Or(a, b)),
-            pair().prop_map(|(a, b)| Formula::Implies(a, b)),
-            pair().prop_map(|(a, b)| Formula::Same(a, b)),
-        ]
-    })
+    leaf.prop_recursive(2, 5, 2, connected).boxed()
+}
+
+/// Formulas that are made of others in one scan.
+fn connected(inner: BoxedStrategy<Resolved>) -> BoxedStrategy<Resolved> {
+    let pair = || (inner.clone(), inner.clone()).prop_map(|(a, b)| (Box::new(a), Box::new(b)));
+    prop_oneof![
+        inner.clone().prop_map(Formula::negated),
+        pair().prop_map(|(a, b)| Formula::And(a, b)),
+        pair().prop_map(|(a, b)| Formula::Or(a, b)),
+        pair().prop_map(|(a, b)| Formula::Implies(a, b)),
+        pair().prop_map(|(a, b)| Formula::Same(a, b)),
+    ]
     .boxed()
 }
 
@@ -104,16 +107,12 @@ pub(crate) fn formula() -> impl Strategy<Value = Resolved> {
         let pair = || (inner.clone(), inner.clone()).prop_map(|(a, b)| (Box::new(a), Box::new(b)));
         let single = || (path(), inner.clone().prop_map(Box::new));
         prop_oneof![
-            inner.clone().prop_map(Formula::negated),
-            pair().prop_map(|(a, b)| Formula::And(a, b)),
-            pair().prop_map(|(a, b)| Formula::Or(a, b)),
-            pair().prop_map(|(a, b)| Formula::Implies(a, b)),
-            pair().prop_map(|(a, b)| Formula::Same(a, b)),
-            single().prop_map(|(path, inner)| Formula::Next(path, inner)),
-            single().prop_map(|(path, inner)| Formula::Eventually(path, inner)),
-            single().prop_map(|(path, inner)| Formula::Always(path, inner)),
-            (path(), pair()).prop_map(|(path, (a, b))| Formula::Until(path, a, b)),
-            (single(), 0..4_u32).prop_map(|((path, inner), n)| Formula::Within(path, n, inner)),
+            5 => connected(inner.clone()),
+            1 => single().prop_map(|(path, inner)| Formula::Next(path, inner)),
+            1 => single().prop_map(|(path, inner)| Formula::Eventually(path, inner)),
+            1 => single().prop_map(|(path, inner)| Formula::Always(path, inner)),
+            1 => (path(), pair()).prop_map(|(path, (a, b))| Formula::Until(path, a, b)),
+            1 => (single(), 0..4_u32).prop_map(|((path, inner), n)| Formula::Within(path, n, inner)),
         ]
     })
 }

@@ -20,7 +20,7 @@ use crate::term::{Node, Term, Variable};
 pub(super) struct Monotone {
     operation: Operation,
     operands: Vec<Term>,
-    /// The place of the one that is none.
+    /// The place of that operand.
     place: usize,
     /// Whether the result grows with it.
     grows: bool,
@@ -43,35 +43,30 @@ impl Pass<'_> {
             let value = self.system.terms.value(operand)?;
             real(self.system.terms.of(operand), value).filter(|value| value.is_finite())
         };
+        // The place of the operand that is no constant, and the constant.
+        let known = || match (operands.len(), constant(0), constant(1)) {
+            (2, None, Some(by)) => Some((0, by)),
+            (2, Some(by), None) => Some((1, by)),
+            _ => None,
+        };
+        use Operation as O;
         let (place, grows) = match operation {
-            Operation::Convert(from, to)
-                if to.is_real() && (from.is_real() || from.is_integer()) =>
-            {
+            O::Convert(from, to) if to.is_real() && (from.is_real() || from.is_integer()) => {
                 (0, true)
             }
-            Operation::Add(of) if of.is_real() && operands.len() == 2 => {
-                match (constant(0), constant(1)) {
-                    (None, Some(_)) => (0, true),
-                    (Some(_), None) => (1, true),
-                    _ => return None,
-                }
+            O::Add(of) if of.is_real() => (known()?.0, true),
+            O::Subtract(of) if of.is_real() => {
+                let (place, _) = known()?;
+                (place, place == 0)
             }
-            Operation::Subtract(of) if of.is_real() => match (constant(0), constant(1)) {
-                (None, Some(_)) => (0, true),
-                (Some(_), None) => (1, false),
-                _ => return None,
-            },
-            Operation::Multiply(of) if of.is_real() && operands.len() == 2 => {
-                match (constant(0), constant(1)) {
-                    (None, Some(by)) if by != 0.0 => (0, by > 0.0),
-                    (Some(by), None) if by != 0.0 => (1, by > 0.0),
-                    _ => return None,
+            O::Multiply(of) | O::Divide(of) if of.is_real() => {
+                let (place, by) = known()?;
+                let is_divided_by = matches!(operation, O::Divide(_)) && place == 1;
+                if by == 0.0 || is_divided_by {
+                    return None;
                 }
+                (place, by > 0.0)
             }
-            Operation::Divide(of) if of.is_real() => match (constant(0), constant(1)) {
-                (None, Some(by)) if by != 0.0 => (0, by > 0.0),
-                _ => return None,
-            },
             _ => return None,
         };
         let monotone = Monotone { operation, operands: operands.to_vec(), place, grows };
