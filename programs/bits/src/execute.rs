@@ -8,14 +8,16 @@ mod expressions;
 mod loops;
 mod memory;
 mod selections;
+pub(crate) mod timers;
 
 use std::collections::HashMap;
 
 use understudy_typed::{
-    Comparison, Cost, Declared, Elementary, Expression, Program, RoutineId, Statement,
+    Comparison, Cost, Declared, Elementary, Expression, Place, Program, RoutineId, Statement,
     StatementKind,
 };
 
+use self::timers::Timers;
 use crate::term::{Term, Terms};
 
 /// Turns of a loop whose condition depends on values.
@@ -64,6 +66,7 @@ pub(super) struct Execution<'a> {
     /// Whether a fault ends the scan.
     pub(super) faulted: Term,
     elapsed: Term,
+    timers: &'a mut Timers,
     turns: u32,
     /// Statements that were executed.
     executed: usize,
@@ -115,6 +118,7 @@ impl<'a> Execution<'a> {
         terms: &'a mut Terms,
         cells: &'a mut dyn Cells,
         elapsed: Term,
+        timers: &'a mut Timers,
     ) -> Self {
         let (path, faulted) = (terms.boolean(true), terms.boolean(false));
         let routines = program.routines.iter();
@@ -131,6 +135,7 @@ impl<'a> Execution<'a> {
             path,
             faulted,
             elapsed,
+            timers,
             turns: 0,
             executed: 0,
             line: 0,
@@ -378,6 +383,28 @@ impl<'a> Execution<'a> {
         Ok(self.staying())
     }
 
+    fn invoke(&mut self, context: Context, routine: RoutineId, place: &Place) -> Result<()> {
+        let places = self.places(context, place)?;
+        let timer = self.timer(routine, place);
+        for &(condition, address) in &places {
+            if let Some(timer) = &timer {
+                if let Some(&scans) = self.timers.counted.get(&address) {
+                    self.count(timer, address, scans);
+                    continue;
+                }
+                self.watch(timer, address, places.len() == 1);
+            }
+            self.timers.inside += u32::from(timer.is_some());
+            let (changes, ()) = self.within(condition, |this| {
+                this.clear_frame(routine);
+                this.body(Context { routine, own: address / 64 })
+            })?;
+            self.timers.inside -= u32::from(timer.is_some());
+            self.merge(condition, changes, HashMap::new());
+        }
+        Ok(())
+    }
+
     fn statement(&mut self, context: Context, statement: &Statement) -> Result<Left> {
         self.line = statement.line;
         let mut left = self.staying();
@@ -393,15 +420,7 @@ impl<'a> Execution<'a> {
                 let address = self.terms.constant(Elementary::Lword, address);
                 self.set(slot, address);
             }
-            StatementKind::Invoke(routine, place) => {
-                for (condition, address) in self.places(context, place)? {
-                    let (changes, ()) = self.within(condition, |this| {
-                        this.clear_frame(*routine);
-                        this.body(Context { routine: *routine, own: address / 64 })
-                    })?;
-                    self.merge(condition, changes, HashMap::new());
-                }
-            }
+            StatementKind::Invoke(routine, place) => self.invoke(context, *routine, place)?,
             StatementKind::Evaluate(expression) => {
                 self.value(context, expression)?;
             }

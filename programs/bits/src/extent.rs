@@ -13,12 +13,14 @@ use self::applied::applied;
 use crate::System;
 use crate::term::{Node, Term, Terms, Variable};
 
-/// Scans after which a bound that grows goes to the next constant.
+/// Times that a bound grows by what a scan adds, before it goes to the next constant.
 const EXACT: usize = 3;
-/// Scans after which it goes to the end of its type.
+/// Times that it grows before it goes to the end of its type.
 const CONSTANTS: usize = 24;
+/// Scans after which every bound that grows goes to the end of its type.
+const HELD: usize = 200;
 /// Scans after which nothing is known of any cell.
-const ALL: usize = 60;
+const ALL: usize = 240;
 /// Terms of which conditions are not followed.
 const MANY: usize = 60_000;
 /// Terms that are looked at again for one side of a selection.
@@ -106,6 +108,7 @@ impl Extents {
             system,
             cells: cells.map(|cell| first(cell.initial, cell.of)).collect(),
             terms: Vec::new(),
+            grown: vec![0; system.cells.len()],
             follows: system.terms.len() <= MANY,
         };
         let ends = search.ends();
@@ -136,6 +139,8 @@ struct Search<'s> {
     system: &'s System,
     cells: Vec<Extent>,
     terms: Vec<Extent>,
+    /// How often each cell has left its extent.
+    grown: Vec<usize>,
     follows: bool,
 }
 
@@ -183,10 +188,12 @@ impl Search<'_> {
             }
             grew = true;
             let full = Extent::of(cell.of);
+            let times = self.grown[place];
+            self.grown[place] += 1;
             if round >= ALL {
                 next = full;
-            } else if round >= EXACT {
-                let is_held = round < CONSTANTS;
+            } else if times >= EXACT || round >= HELD {
+                let is_held = times < CONSTANTS && round < HELD;
                 if next.high > known.high {
                     let end = ends.range(next.high..).next().filter(|_| is_held);
                     next.high = end.copied().unwrap_or(full.high).min(full.high);

@@ -16,6 +16,7 @@ use understudy_logic::{Circuit, Operation as Gate, Variable as Bit};
 use understudy_typed::{Comparison, Elementary, Operation, Point, Points, Program};
 
 use crate::execute::Unsupported;
+use crate::execute::timers::Timers;
 use crate::system::{Source, System};
 use crate::term::Term;
 use scan::Scan;
@@ -375,14 +376,22 @@ impl System {
             clock: None,
         };
         let mut numbers = HashMap::new();
-        let mut scan = self.scan(&how, &mut numbers)?;
+        let mut timers = Timers::default();
+        let mut scan = self.scan(&how, &mut numbers, &mut timers)?;
+        let wanted = self.wanted.iter().filter_map(|name| name.strip_prefix(prefix));
+        let wanted = wanted.filter_map(|name| Some(program.part(name)?.address)).collect();
+        timers.choose(program, &wanted);
+        if !timers.counted.is_empty() {
+            numbers.retain(|address, _| !timers.dropped.contains(address));
+            scan = self.scan(&how, &mut numbers, &mut timers)?;
+        }
         if !self.terms.is(scan.faulted, false) {
             // It can stop: a scan may begin with the initial values.
             how.stopped = Some(was_stopped);
-            scan = self.scan(&how, &mut numbers)?;
+            scan = self.scan(&how, &mut numbers, &mut timers)?;
         }
-        let (scan, ages) = self.scan_with_ages(&how, scan, &mut numbers)?;
-        let (scan, clock) = self.scan_with_clock(&how, scan, &ages, &mut numbers)?;
+        let (scan, ages) = self.scan_with_ages(&how, scan, &mut numbers, &mut timers)?;
+        let (scan, clock) = self.scan_with_clock(&how, scan, &ages, &mut numbers, &mut timers)?;
         let sums = self.sums(&how, &scan, &ages, &numbers);
         let can_fault = scan.faulted;
         let resets = program.inputs.iter().zip(inputs);

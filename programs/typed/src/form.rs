@@ -159,6 +159,31 @@ pub struct Routine {
     pub initial: Vec<Initial>,
     /// What it does.
     pub body: Vec<Statement>,
+    /// Which timer of the standard it is, of such a block.
+    pub timer: Option<Timer>,
+}
+
+/// A timer of the standard. Its variables are IN, PT, Q and ET, and what it keeps from call to call.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Timer {
+    /// `TP`: Q for PT from the rise of IN on.
+    Pulse,
+    /// `TON`: Q when IN has been TRUE for PT.
+    OnDelay,
+    /// `TOF`: Q until IN has been FALSE for PT.
+    OffDelay,
+}
+
+impl Timer {
+    /// The one of this name, in capitals.
+    pub fn of(name: &str) -> Option<Self> {
+        match name {
+            "TP" => Some(Self::Pulse),
+            "TON" => Some(Self::OnDelay),
+            "TOF" => Some(Self::OffDelay),
+            _ => None,
+        }
+    }
 }
 
 /// A statement and the line of its text, from 1; 0 where it has none.

@@ -28,7 +28,7 @@ pub use self::cost::Cost;
 pub use self::fault::{Cause, Fault};
 pub use self::form::{
     Argument, Branch, Call, Case, Expression, ExpressionKind, For, Index, Initial, Place, Program,
-    Root, Routine, RoutineId, RoutineKind, Statement, StatementKind, Task, Variable,
+    Root, Routine, RoutineId, RoutineKind, Statement, StatementKind, Task, Timer, Variable,
 };
 pub use self::image::{Declared, Point, Points};
 pub use self::interpreter::{Done, Effect, Interpreter, Made, Read, Trace};

@@ -95,6 +95,7 @@ impl Execution<'_> {
                     let before = self.get(address + offset, of);
                     self.terms.choose(condition, value, before)
                 };
+                self.timers.written(address + offset);
                 self.set(address + offset, value);
             }
         }
@@ -117,6 +118,7 @@ impl Execution<'_> {
 
     /// The number at an address as one of type `of`, which has the width of what was stored there.
     pub(super) fn typed(&mut self, address: u64, of: Elementary) -> Term {
+        self.timers.read(address);
         let stored = self.get(address, of);
         self.terms.as_type(stored, of)
     }

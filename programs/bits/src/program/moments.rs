@@ -11,6 +11,7 @@ use understudy_typed::{Comparison, Elementary, Operation, Program};
 use super::scan::{Scan, Scanned};
 use crate::System;
 use crate::execute::Unsupported;
+use crate::execute::timers::Timers;
 use crate::term::{Node, Term, Terms, Variable};
 
 /// Selections inside each other that are looked through.
@@ -34,6 +35,7 @@ impl System {
         scan: &Scan<'_>,
         scanned: Scanned,
         numbers: &mut HashMap<u64, u32>,
+        timers: &mut Timers,
     ) -> Result<(Scanned, HashMap<u64, Age>), Unsupported> {
         let mut ages = HashMap::new();
         for address in self.moments(scan, &scanned, numbers) {
@@ -46,7 +48,7 @@ impl System {
         }
         loop {
             let again = Scan { ages: &ages, ..*scan };
-            let scanned = self.scan(&again, numbers)?;
+            let scanned = self.scan(&again, numbers, timers)?;
             let mut counted = HashMap::new();
             for (&address, age) in &ages {
                 let carrier = Carrier::Age(address, self.age(*age, scan.stopped));
@@ -70,6 +72,7 @@ impl System {
         scanned: Scanned,
         ages: &HashMap<u64, Age>,
         numbers: &mut HashMap<u64, u32>,
+        timers: &mut Timers,
     ) -> Result<(Scanned, Option<Age>), Unsupported> {
         let elapsed = scanned.elapsed;
         let is_compared = |term: Term| match self.terms.node(term) {
@@ -82,7 +85,7 @@ impl System {
         }
         let cell = self.cell(format!("{}TIME()", scan.prefix), Elementary::Time, 0);
         let clock = self.cells[cell as usize].term;
-        let again = self.scan(&Scan { ages, clock: Some(clock), ..*scan }, numbers)?;
+        let again = self.scan(&Scan { ages, clock: Some(clock), ..*scan }, numbers, timers)?;
         match self.most(scan, &again, ages, Carrier::Clock(clock)) {
             Some(most) => Ok((again, Some(Age { cell, most }))),
             None => Ok((scanned, None)),

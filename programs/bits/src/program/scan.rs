@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use understudy_typed::{Elementary, Operation, Point, Program};
 
+use crate::execute::timers::Timers;
 use crate::execute::{Cells, Execution, Unsupported};
 use crate::program::moments::Age;
 use crate::term::{Node, Term, Terms, Variable};
@@ -31,6 +32,12 @@ impl ProgramCells<'_> {
         }
         let number = self.cells.len() as u32;
         let name = match self.program.part_at(address) {
+            Some(part)
+                if of == Elementary::Udint && part.of.elementary() == Some(Elementary::Time) =>
+            {
+                let timer = part.name.rsplit_once('.').map_or("", |(timer, _)| timer);
+                format!("{}{timer}.scans", self.prefix)
+            }
             Some(part) => format!("{}{}", self.prefix, part.name),
             None => format!("{}memory {}", self.prefix, address / 64),
         };
@@ -73,6 +80,7 @@ impl System {
         &mut self,
         scan: &Scan<'_>,
         numbers: &mut HashMap<u64, u32>,
+        timers: &mut Timers,
     ) -> Result<Scanned, Unsupported> {
         let Scan { prefix, program, inputs, .. } = *scan;
         let ages = scan.ages.iter().map(|(&address, &age)| (address, self.age(age, scan.stopped)));
@@ -105,10 +113,11 @@ impl System {
                 cells.number(&mut self.terms, 64 * u64::from(point.slot), point.of);
             }
         }
-        for address in bool_variables(program) {
+        let kept = |address: &u64| !timers.dropped.contains(address);
+        for address in bool_variables(program).into_iter().filter(kept) {
             cells.number(&mut self.terms, address, Elementary::Bool);
         }
-        let mut execution = Execution::new(program, &mut self.terms, &mut cells, elapsed);
+        let mut execution = Execution::new(program, &mut self.terms, &mut cells, elapsed, timers);
         for (point, &input) in program.inputs.iter().zip(inputs) {
             if point.slot != 0 {
                 execution.put(point.slot, input);

@@ -64,6 +64,7 @@ impl<'a> Lowering<'a> {
             frame: (self.program.frames, 0),
             initial: Vec::new(),
             body,
+            timer: None,
         });
         Some(id)
     }

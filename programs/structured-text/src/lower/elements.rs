@@ -178,6 +178,7 @@ impl Lowering<'_> {
             frame: (self.program.frames, 0),
             initial: Vec::new(),
             body,
+            timer: None,
         });
         id
     }

@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::rc::Rc;
 
-use understudy_typed::{Initial, Root, Routine as Lowered, RoutineId, RoutineKind, Type};
+use understudy_typed::{Initial, Root, Routine as Lowered, RoutineId, RoutineKind, Timer, Type};
 
 use crate::syntax::{Class, Declaration, Name, Span, UnitKind};
 
@@ -100,6 +100,9 @@ impl<'a> Lowering<'a> {
             None => unit.name.as_str().to_owned(),
         };
         frame.initial.sort_by_key(|initial| initial.slot);
+        let owner = &self.units[key.owner.unit];
+        let is_standard = owner.is_library && is_body;
+        let timer = is_standard.then(|| Timer::of(owner.unit.name.as_str())).flatten();
         self.program.routines.push(Lowered {
             name,
             kind: match has_memory {
@@ -109,6 +112,7 @@ impl<'a> Lowering<'a> {
             frame: (start, frame.next - start),
             initial: frame.initial,
             body: Vec::new(),
+            timer,
         });
         self.calls.push(Vec::new());
         Some(Routine { id, parameters: frame.parameters, result, symbols: Rc::new(frame.symbols) })

@@ -47,6 +47,7 @@ fn routine(name: &str, body: Vec<Statement>) -> Routine {
         frame: (0, 0),
         initial: Vec::new(),
         body,
+        timer: None,
     }
 }
 

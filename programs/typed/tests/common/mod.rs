@@ -283,6 +283,7 @@ impl Generator {
             frame: (first, self.program.frames - first),
             initial,
             body,
+            timer: None,
         });
         self.callables.push(callable);
     }
@@ -346,6 +347,7 @@ impl Generator {
                 frame: (first, self.program.frames - first),
                 initial: Vec::new(),
                 body,
+                timer: None,
             });
             self.program.tasks.push(Task { routine, own, every: 1 + self.random.below(3) as u32 });
         }
