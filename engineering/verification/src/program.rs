@@ -12,7 +12,7 @@ use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use understudy_ladder::{Block, Comparison, LowerError, Program, Relation};
+use understudy_ladder::{Block, Comparison, LowerError, Program};
 use understudy_logic::Circuit;
 use understudy_logic::bdd::Diagrams;
 use understudy_text::Diagnostic;
@@ -66,7 +66,7 @@ fn counted(program: &Program, prefix: &str, named: &Named) -> Option<(String, Co
     let is_counter =
         |block: &&Block| block.name.as_str() == counter && block.kind.preset_value().is_some();
     let counter = blocks.find(is_counter)?.name.clone();
-    let relation = Relation::of(compared.comparison.sign())?;
+    let relation = compared.comparison;
     let value = compared.with.parse().ok()?;
     let text = named.to_string().strip_prefix(prefix)?.to_owned();
     Some((text, Comparison { counter, relation, value }))

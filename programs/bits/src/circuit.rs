@@ -57,24 +57,38 @@ pub struct Derivation {
     pub meanings: Vec<Meaning>,
     /// Boundaries of each number that has free inputs, in order.
     pub boundaries: HashMap<Term, BTreeSet<i128>>,
+    /// For each register the bit of a cell that it holds, where it holds one.
+    pub(crate) held: Vec<Option<Held>>,
     extents: Extents,
+}
+
+/// A bit of a cell: the value of the cell has the weight where the bit is set.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Held {
+    pub(crate) cell: u32,
+    pub(crate) weight: i128,
 }
 
 impl Derivation {
     /// # Errors
     /// Where a number has too many boundaries.
     pub fn new(system: &System) -> Result<Self, Unsupported> {
-        Self::of(system, &[])
+        Self::of(system, &[], &[])
     }
 
-    /// With bits of numbers as further outputs: each a name, and a number as the bits of its type.
-    pub(crate) fn of(system: &System, points: &[(String, Term)]) -> Result<Self, Unsupported> {
+    /// With bits of numbers as further outputs: each a name, and a number as the bits of its type; and with the registers of cells, whether an
+    /// output depends on them or not.
+    pub(crate) fn of(
+        system: &System,
+        points: &[(String, Term)],
+        kept: &[u32],
+    ) -> Result<Self, Unsupported> {
         // The first pass finds the boundaries of each number, the second one has them in order.
         let mut boundaries: HashMap<Term, BTreeSet<i128>> = HashMap::new();
         let extents = Extents::new(system);
         loop {
             let mut pass = Pass::new(system, &extents, boundaries);
-            pass.build(points);
+            pass.build(points, kept);
             let found = pass.found;
             if let Some((&term, _)) = found.iter().find(|(_, all)| all.len() > BOUNDARIES) {
                 return Err(Unsupported {
@@ -93,7 +107,8 @@ impl Derivation {
                     what: error.to_string(),
                 })?;
                 let meanings = pass.meanings;
-                return Ok(Self { circuit, meanings, boundaries: found, extents });
+                let held = pass.held;
+                return Ok(Self { circuit, meanings, boundaries: found, held, extents });
             }
             boundaries = found;
         }
@@ -138,6 +153,7 @@ struct Pass<'s> {
     pending: Vec<Pending>,
     names: HashSet<String>,
     registers: HashSet<String>,
+    held: Vec<Option<Held>>,
 }
 
 /// The name, with a number behind it where it is taken.
@@ -174,10 +190,11 @@ impl<'s> Pass<'s> {
             pending: Vec::new(),
             names: HashSet::new(),
             registers: HashSet::new(),
+            held: Vec::new(),
         }
     }
 
-    fn build(&mut self, points: &[(String, Term)]) {
+    fn build(&mut self, points: &[(String, Term)], kept: &[u32]) {
         // Inputs that people name come first, under their own names.
         for number in 0..self.system.inputs.len() as u32 {
             let input = &self.system.inputs[number as usize];
@@ -188,8 +205,9 @@ impl<'s> Pass<'s> {
         }
         // Operands first, so that no long chain of terms is walked at once.
         let named = self.system.observed.iter().chain(points);
-        let roots = named.map(|(_, term)| *term).collect();
         let cells = &self.system.cells;
+        let kept = kept.iter().map(|&cell| cells[cell as usize].term);
+        let roots = named.map(|(_, term)| *term).chain(kept).collect();
         let reached = self.system.terms.reached(roots, |cell| cells[cell as usize].next);
         for term in reached {
             if self.is_bits(term) {
@@ -243,6 +261,7 @@ impl<'s> Pass<'s> {
 
     fn register(&mut self, name: &str, initial: bool) -> (RegisterId, Expression) {
         let name = unique(&mut self.registers, name);
+        self.held.push(None);
         self.builder.register(name, initial)
     }
 

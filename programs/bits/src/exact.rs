@@ -1,12 +1,13 @@
 //! The circuit that does in every scan what the program does.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use understudy_logic::{Circuit, CircuitBuilder, Expression, Variable as Bit};
-use understudy_typed::{Elementary, Program};
+use understudy_typed::{Comparison, Elementary, Program};
 
 use crate::circuit::{Derivation, Meaning};
 use crate::execute::Unsupported;
+use crate::layout::Layout;
 use crate::system::System;
 use crate::term::{Node, Term, Variable};
 
@@ -40,58 +41,125 @@ fn gaps(gaps: &[Gap]) -> String {
     format!("no bits for {}{more}", shown.join(", "))
 }
 
-/// The circuit of a program whose values are finite. Its inputs and outputs are the bits of the points, in their order: a BOOL under its own name, the
-/// bits of another point as `NAME.0` for the lowest and so on. A number has as many registers as its values need; the bits of a BOOL, of a
-/// timer or of a counter stand behind the name of the variable. A program that never stops by a fault has neither the reset nor the fault among them.
+/// What a circuit shows beside the outputs of its program.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Shown<'a> {
+    /// BOOL variables, as they are after the scan.
+    pub variables: &'a [String],
+    /// Numbers that are compared.
+    pub compared: &'a [Compared],
+    /// It keeps all that the program keeps: what no output depends on too.
+    pub keeps_all: bool,
+}
+
+/// A number of a program, compared with a value.
+#[derive(Debug, Clone)]
+pub struct Compared {
+    /// The name of the output.
+    pub name: String,
+    /// The variable.
+    pub number: String,
+    /// How.
+    pub comparison: Comparison,
+    /// The value, as it is stored.
+    pub stored: u64,
+}
+
+/// A circuit that does in every scan what a program does.
+#[derive(Debug, Clone)]
+pub struct Exact {
+    /// The circuit.
+    pub circuit: Circuit,
+    /// What its registers are in the state of the program.
+    pub layout: Layout,
+}
+
+/// The circuit of a program whose values are finite; see [`Exact::new`].
 ///
 /// # Errors
 /// What of the program is not followed, or not bit by bit.
 pub fn exact(program: &Program) -> Result<Circuit, Inexact> {
-    let system = System::of_program(program)?;
-    let mut values: HashMap<&str, Term> = HashMap::new();
-    for (name, term) in system.observed.iter().chain(&system.shown) {
-        values.entry(name).or_insert(*term);
-    }
-    let value = |name: &str| values.get(name).copied();
-    let wide = program.outputs.iter().filter(|point| point.of != Elementary::Bool);
-    let wide: Vec<(String, Term)> =
-        wide.filter_map(|point| Some((point.name.clone(), value(&point.name)?))).collect();
-    let derivation = Derivation::of(&system, &wide)?;
-    let circuit = &derivation.circuit;
-    let never = |value: Term| system.terms.is(value, false) || derivation.is_never(value);
-    let stops = !value(Program::FAULT).is_some_and(never);
-    let mut known: HashMap<&str, Expression> = HashMap::new();
-    for output in circuit.outputs() {
-        known.entry(&output.name).or_insert(output.value);
-    }
-    let outputs: Vec<(String, Expression)> = program
-        .outputs
-        .iter()
-        .filter(|point| stops || point.slot != 0)
-        .flat_map(|point| match point.of {
+    Exact::new(program, Shown::default()).map(|exact| exact.circuit)
+}
+
+impl Exact {
+    /// The circuit of a program whose values are finite. Its inputs and outputs are the bits of the points, in their order: a BOOL under its own name,
+    /// the bits of another point as `NAME.0` for the lowest and so on; behind them stands what is shown. A number has as many registers as its values
+    /// need; the bits of a BOOL, of a timer or of a counter stand behind the name of the variable. A program that never stops by a fault has
+    /// neither the reset nor the fault among them.
+    ///
+    /// # Errors
+    /// What of the program is not followed, or not bit by bit.
+    pub fn new(program: &Program, shown: Shown<'_>) -> Result<Self, Inexact> {
+        let numbers = shown.compared.iter().map(|compared| compared.number.clone());
+        let mut system = System::comparing(program, numbers.collect())?;
+        for Compared { name, number, comparison, stored } in shown.compared {
+            if let Some(number) = system.number(number) {
+                system.compare_with_value(name, number, *comparison, *stored);
+            }
+        }
+        let mut values: HashMap<&str, Term> = HashMap::new();
+        for (name, term) in system.observed.iter().chain(&system.shown) {
+            values.entry(name).or_insert(*term);
+        }
+        let value = |name: &str| values.get(name).copied();
+        let wide = program.outputs.iter().filter(|point| point.of != Elementary::Bool);
+        let wide: Vec<(String, Term)> =
+            wide.filter_map(|point| Some((point.name.clone(), value(&point.name)?))).collect();
+        let kept: Vec<u32> = match shown.keeps_all {
+            true => system.read.iter().copied().collect(),
+            false => Vec::new(),
+        };
+        let derivation = Derivation::of(&system, &wide, &kept)?;
+        let circuit = &derivation.circuit;
+        let never = |value: Term| system.terms.is(value, false) || derivation.is_never(value);
+        let stops = !value(Program::FAULT).is_some_and(never);
+        let mut known: HashMap<&str, Expression> = HashMap::new();
+        for output in circuit.outputs() {
+            known.entry(&output.name).or_insert(output.value);
+        }
+        let points = program.outputs.iter().filter(|point| stops || point.slot != 0);
+        let points = points.flat_map(|point| match point.of {
             Elementary::Bool => vec![point.name.clone()],
             of => (0..of.bits()).map(|bit| format!("{}.{bit}", point.name)).collect(),
-        })
-        .filter_map(|name| known.get(name.as_str()).map(|&value| (name, value)))
-        .collect();
-    let live = live(circuit, outputs.iter().map(|(_, value)| *value).collect());
-    let mut gaps = derivation.gaps_among(&system, &live);
-    let points = program.inputs.iter().chain(&program.outputs);
-    for point in points.filter(|point| point.of.is_real()) {
-        gaps.insert(Gap { what: point.name.clone(), of: point.of });
+        });
+        let compared = shown.compared.iter().map(|compared| compared.name.clone());
+        let further = shown.variables.iter().cloned().chain(compared);
+        let mut names = HashSet::new();
+        let outputs = points.chain(further).filter(|name| names.insert(name.clone()));
+        let outputs: Vec<(String, Expression)> = outputs
+            .filter_map(|name| known.get(name.as_str()).map(|&value| (name, value)))
+            .collect();
+        let roots = outputs.iter().map(|(_, value)| *value).collect();
+        let live = live(circuit, roots, derivation.registers_of(&kept));
+        let mut gaps = derivation.gaps_among(&system, &live);
+        let points = program.inputs.iter().chain(&program.outputs);
+        for point in points.filter(|point| point.of.is_real()) {
+            gaps.insert(Gap { what: point.name.clone(), of: point.of });
+        }
+        if !gaps.is_empty() {
+            return Err(Inexact::Gaps(gaps.into_iter().collect()));
+        }
+        let layout = Layout::new(program, &system, &derivation, &live);
+        Ok(Self { circuit: pruned(&system, &derivation, &outputs, &live, stops), layout })
     }
-    if !gaps.is_empty() {
-        return Err(Inexact::Gaps(gaps.into_iter().collect()));
-    }
-    Ok(pruned(&system, &derivation, &outputs, &live, stops))
 }
 
 impl Derivation {
     /// The values of the system that the circuit does not follow bit by bit; none where it is exact.
     pub fn gaps(&self, system: &System) -> Vec<Gap> {
         let outputs = self.circuit.outputs().iter();
-        let live = live(&self.circuit, outputs.map(|output| output.value).collect());
+        let roots = outputs.map(|output| output.value).collect();
+        let live = live(&self.circuit, roots, BTreeSet::new());
         self.gaps_among(system, &live).into_iter().collect()
+    }
+
+    /// The registers of some cells.
+    fn registers_of(&self, cells: &[u32]) -> BTreeSet<Bit> {
+        let cells: HashSet<&u32> = cells.iter().collect();
+        let held = (0..).zip(&self.held);
+        let of = held.filter(|(_, held)| held.is_some_and(|held| cells.contains(&held.cell)));
+        of.map(|(register, _)| Bit::Register(register)).collect()
     }
 
     fn gaps_among(&self, system: &System, live: &BTreeSet<Bit>) -> BTreeSet<Gap> {
@@ -116,9 +184,18 @@ fn gap(meaning: &Meaning) -> Option<Term> {
     }
 }
 
-/// Inputs and registers that the roots depend on.
-fn live(circuit: &Circuit, mut roots: Vec<Expression>) -> BTreeSet<Bit> {
-    let mut live = BTreeSet::new();
+/// Inputs and registers that the roots and some registers depend on, those among them.
+fn live(
+    circuit: &Circuit,
+    mut roots: Vec<Expression>,
+    registers: BTreeSet<Bit>,
+) -> BTreeSet<Bit> {
+    let next = |register: u32| circuit.registers()[register as usize].next;
+    roots.extend(registers.iter().filter_map(|variable| match variable {
+        Bit::Register(register) => Some(next(*register)),
+        Bit::Input(_) => None,
+    }));
+    let mut live = registers;
     loop {
         let reached = circuit.graph().reached(&roots);
         let operations = circuit.graph().operations().iter().zip(reached);
@@ -128,7 +205,7 @@ fn live(circuit: &Circuit, mut roots: Vec<Expression>) -> BTreeSet<Bit> {
                 && live.insert(*variable)
                 && let Bit::Register(register) = variable
             {
-                more.push(circuit.registers()[*register as usize].next);
+                more.push(next(*register));
             }
         }
         if more.is_empty() {
@@ -136,6 +213,14 @@ fn live(circuit: &Circuit, mut roots: Vec<Expression>) -> BTreeSet<Bit> {
         }
         roots.extend(more);
     }
+}
+
+/// The registers among inputs and registers, in their order.
+pub(crate) fn registers(live: &BTreeSet<Bit>) -> impl Iterator<Item = usize> {
+    live.iter().filter_map(|variable| match variable {
+        Bit::Register(register) => Some(*register as usize),
+        Bit::Input(_) => None,
+    })
 }
 
 /// The circuit with the bits of points as its inputs and outputs, and the registers that they depend on.
@@ -169,17 +254,11 @@ fn pruned(
             }
         }
     }
-    let kept: Vec<usize> = live
-        .iter()
-        .filter_map(|variable| match variable {
-            Bit::Register(register) => Some(*register as usize),
-            Bit::Input(_) => None,
-        })
-        .collect();
-    let mut registers = vec![None; circuit.registers().len()];
+    let kept: Vec<usize> = registers(live).collect();
+    let mut copied = vec![None; circuit.registers().len()];
     for &place in &kept {
         let register = &circuit.registers()[place];
-        registers[place] = Some(builder.register(&register.name, register.initial));
+        copied[place] = Some(builder.register(&register.name, register.initial));
     }
     let mut roots: Vec<Expression> =
         kept.iter().map(|&place| circuit.registers()[place].next).collect();
@@ -187,12 +266,12 @@ fn pruned(
     let copies = builder.graph().import(circuit.graph(), &roots, |graph, variable| {
         let value = match variable {
             Bit::Input(input) => places[input as usize],
-            Bit::Register(register) => registers[register as usize].map(|(_, value)| value),
+            Bit::Register(register) => copied[register as usize].map(|(_, value)| value),
         };
         value.unwrap_or_else(|| graph.constant(false))
     });
     for (&place, &next) in kept.iter().zip(&copies) {
-        if let Some((register, _)) = registers[place] {
+        if let Some((register, _)) = copied[place] {
             builder.set_next(register, next);
         }
     }

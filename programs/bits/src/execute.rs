@@ -274,7 +274,12 @@ impl<'a> Execution<'a> {
         let mut addresses: Vec<u64> = then.keys().chain(otherwise.keys()).copied().collect();
         addresses.sort_unstable();
         addresses.dedup();
+        let is_certain = self.terms.is(condition, true);
         for address in addresses {
+            if let (true, Some(&value)) = (is_certain, then.get(&address)) {
+                self.set(address, value);
+                continue;
+            }
             let of = then.get(&address).or_else(|| otherwise.get(&address));
             let Some(of) = of.map(|&value| self.terms.of(value)) else {
                 continue;
@@ -388,8 +393,8 @@ impl<'a> Execution<'a> {
         let timer = self.timer(routine, place);
         for &(condition, address) in &places {
             if let Some(timer) = &timer {
-                if let Some(&scans) = self.timers.counted.get(&address) {
-                    self.count(timer, address, scans);
+                if let Some(counted) = self.timers.counted.get(&address).cloned() {
+                    self.count(&counted);
                     continue;
                 }
                 self.watch(timer, address, places.len() == 1);

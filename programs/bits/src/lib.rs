@@ -12,6 +12,7 @@ mod circuit;
 mod exact;
 mod execute;
 mod extent;
+mod layout;
 mod number;
 mod program;
 mod system;
@@ -21,8 +22,9 @@ mod tests;
 
 pub use circuit::boundaries::{between, boundary_text, position};
 pub use circuit::{Derivation, Meaning};
-pub use exact::{Gap, Inexact, exact};
+pub use exact::{Compared, Exact, Gap, Inexact, Shown, exact};
 pub use execute::Unsupported;
+pub use layout::Layout;
 pub use program::{Code, Member};
 pub use system::{Cell, Input, Source, System};
 pub use term::{Node, Term, Terms, Variable};

@@ -17,7 +17,7 @@ use understudy_typed::{Comparison, Elementary, Operation, Point, Points, Program
 
 use crate::execute::Unsupported;
 use crate::execute::timers::Timers;
-use crate::system::{Source, System};
+use crate::system::{Holds, Source, System};
 use crate::term::Term;
 use scan::Scan;
 
@@ -67,6 +67,14 @@ impl System {
         Self::alone(program, Source::declared, compared)
     }
 
+    /// As [`Self::of_program`]; properties compare the numbers `compared` too.
+    pub(crate) fn comparing(
+        program: &Program,
+        compared: BTreeSet<String>,
+    ) -> Result<Self, Unsupported> {
+        Self::alone(program, |_| Source::Any(None), compared)
+    }
+
     fn alone(
         program: &Program,
         source: fn(&Point) -> Source,
@@ -111,7 +119,7 @@ impl System {
 }
 
 /// Scans after which all tasks of a program begin together again.
-fn together(program: &Program) -> u64 {
+pub(crate) fn together(program: &Program) -> u64 {
     program.tasks.iter().map(|task| u64::from(task.every.max(1))).fold(1, |all, every| {
         let divisor = crate::extent::divisor(all.into(), every.into()) as u64;
         // Past every count of scans, the tasks do not meet again.
@@ -393,6 +401,14 @@ impl System {
         let (scan, ages) = self.scan_with_ages(&how, scan, &mut numbers, &mut timers)?;
         let (scan, clock) = self.scan_with_clock(&how, scan, &ages, &mut numbers, &mut timers)?;
         let sums = self.sums(&how, &scan, &ages, &numbers);
+        self.cells[scans as usize].holds = Holds::Scans;
+        self.cells[phase as usize].holds = Holds::Phase;
+        for counted in timers.counted.values() {
+            if let Some(&cell) = numbers.get(&counted.start()) {
+                self.cells[cell as usize].holds = Holds::Count(Box::new(counted.clone()));
+            }
+        }
+        self.read.extend(scan.read.iter().filter_map(|address| numbers.get(address)));
         let can_fault = scan.faulted;
         let resets = program.inputs.iter().zip(inputs);
         let mut reset = resets.filter(|(point, _)| point.slot == 0).map(|(_, &term)| term);

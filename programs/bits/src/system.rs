@@ -6,6 +6,7 @@ use std::ops::RangeInclusive;
 use understudy_typed::{Comparison, Elementary, Part, Point, Program, Type};
 
 use crate::circuit::boundaries::position;
+use crate::execute::timers::Counted;
 use crate::term::{Term, Terms, Variable};
 
 /// An input of a system.
@@ -34,6 +35,27 @@ pub struct Cell {
     pub term: Term,
     /// Its value after the scan.
     pub next: Term,
+    /// What it is in the state of a program.
+    pub(crate) holds: Holds,
+}
+
+/// What a cell is in the state of a program.
+#[derive(Debug, Clone)]
+pub(crate) enum Holds {
+    /// Nothing of a program's own.
+    Other,
+    /// The value at an address, of a type.
+    Value(u64, Elementary),
+    /// The scans of a timer.
+    Count(Box<Counted>),
+    /// The time since the moment at an address.
+    Age(u64),
+    /// `TIME()`.
+    Clock,
+    /// The scans since the start.
+    Scans,
+    /// The same, from 0 again where all tasks begin together.
+    Phase,
 }
 
 /// Programs on terms, one step a cycle.
@@ -46,6 +68,8 @@ pub struct System {
     pub inputs: Vec<Input>,
     /// What scans keep.
     pub cells: Vec<Cell>,
+    /// Cells that a program reads before it writes them.
+    pub(crate) read: BTreeSet<u32>,
     /// BOOLs that properties can name.
     pub observed: Vec<(String, Term)>,
     /// Values that a run shows beside them.
@@ -102,6 +126,7 @@ impl System {
             terms: Terms::default(),
             inputs: Vec::new(),
             cells: Vec::new(),
+            read: BTreeSet::new(),
             observed: Vec::new(),
             shown: Vec::new(),
             wanted: BTreeSet::new(),
@@ -165,7 +190,8 @@ impl System {
     pub(crate) fn cell(&mut self, name: String, of: Elementary, initial: u64) -> u32 {
         let number = self.cells.len() as u32;
         let term = self.terms.variable(of, Variable::Cell(number));
-        self.cells.push(Cell { name, of, initial: initial & of.mask(), term, next: term });
+        let initial = initial & of.mask();
+        self.cells.push(Cell { name, of, initial, term, next: term, holds: Holds::Other });
         number
     }
 

@@ -12,19 +12,19 @@
 //!     ram_down {TON pause 300ms}
 //! ```
 //!
-//! [`parse`] reads such a text and finds everything that is wrong with it in one run; [`Program::lower`] turns the program
-//! into the [`Circuit`](understudy_logic::Circuit) that all else works on; [`Interpreter`] is the reference for both.
+//! [`parse`] reads such a text and finds everything that is wrong with it in one run; [`Program::typed`] is the typed program that it means, and
+//! [`Program::lower`] the [`Circuit`](understudy_logic::Circuit) of it; [`Observer`] tells what the power did in a scan.
 //! The format and its grammar are described in `docs/reference/ladder-format.md`.
 
 mod check;
 mod draw;
 mod flow;
 mod from_circuit;
-mod interpreter;
 mod layout;
 mod lexer;
 mod lower;
 mod names;
+mod observer;
 mod parser;
 mod plan;
 mod print;
@@ -35,10 +35,10 @@ pub use check::check;
 pub use draw::{draw_svg, draw_svg_rungs, draw_text, draw_text_rungs};
 pub use flow::{ElementFlow, Evaluation, Reading, RungFlow};
 pub use from_circuit::from_circuit;
-pub use interpreter::Interpreter;
 pub use lexer::{MAXIMUM_NAME_LENGTH, MAXIMUM_PRESET_TIME, parse_address};
-pub use lower::{LowerError, Observer, PERIODS, Write};
+pub use lower::{LowerError, PERIODS, Write};
 pub use names::{Language, Namer, StandardNames, legal_name};
+pub use observer::{Interpreter, Observer};
 pub use parser::{
     KEYWORDS, MAXIMUM_NESTING, MAXIMUM_PRESET_VALUE, MAXIMUM_RUNGS, MAXIMUM_TEXT_BYTES, Parsed,
     parse,

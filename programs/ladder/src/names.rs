@@ -3,6 +3,7 @@
 mod standard;
 
 use std::collections::HashSet;
+use std::sync::OnceLock;
 
 pub use self::standard::StandardNames;
 
@@ -55,8 +56,7 @@ impl Namer {
             Language::Ladder => !KEYWORDS.contains(&name) && self.taken.insert(name.to_owned()),
             Language::StructuredText => {
                 let capitals = name.to_uppercase();
-                let is_reserved = RESERVED.split(' ').any(|word| word == capitals);
-                !is_reserved && self.taken.insert(capitals)
+                !reserved().contains(capitals.as_str()) && self.taken.insert(capitals)
             }
         }
     }
@@ -98,6 +98,11 @@ fn structured_text_name(wanted: &str) -> String {
 fn shortened(name: &str, separator: char) -> String {
     let short: String = name.chars().take(MAXIMUM_WANTED_LENGTH).collect();
     short.trim_end_matches(separator).to_owned()
+}
+
+fn reserved() -> &'static HashSet<&'static str> {
+    static WORDS: OnceLock<HashSet<&'static str>> = OnceLock::new();
+    WORDS.get_or_init(|| RESERVED.split(' ').collect())
 }
 
 /// Words of IEC 61131-3 that a variable cannot have for its name: keywords, types, standard functions and blocks, and

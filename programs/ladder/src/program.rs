@@ -11,6 +11,7 @@ use std::fmt;
 pub use block::{Block, BlockKind, Feed};
 pub use name::Name;
 use understudy_text::words;
+pub use understudy_typed::Comparison as Relation;
 
 /// A whole program.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -155,63 +156,6 @@ pub struct Comparison {
     pub relation: Relation,
     /// With what.
     pub value: u16,
-}
-
-words! {
-    /// A relation between two numbers.
-    pub enum Relation by sign {
-        /// `=`
-        Equal = "=",
-        /// `<>`
-        NotEqual = "<>",
-        /// `<`
-        Less = "<",
-        /// `<=`
-        LessOrEqual = "<=",
-        /// `>`
-        Greater = ">",
-        /// `>=`
-        GreaterOrEqual = ">=",
-    }
-}
-
-impl Relation {
-    /// The relation that holds where this one does not.
-    #[must_use]
-    pub fn opposite(self) -> Self {
-        match self {
-            Self::Equal => Self::NotEqual,
-            Self::NotEqual => Self::Equal,
-            Self::Less => Self::GreaterOrEqual,
-            Self::LessOrEqual => Self::Greater,
-            Self::Greater => Self::LessOrEqual,
-            Self::GreaterOrEqual => Self::Less,
-        }
-    }
-
-    /// The same with its sides exchanged.
-    #[must_use]
-    pub fn mirrored(self) -> Self {
-        match self {
-            Self::Less => Self::Greater,
-            Self::LessOrEqual => Self::GreaterOrEqual,
-            Self::Greater => Self::Less,
-            Self::GreaterOrEqual => Self::LessOrEqual,
-            same => same,
-        }
-    }
-
-    /// Whether it holds.
-    pub fn holds(self, left: u16, right: u16) -> bool {
-        match self {
-            Self::Equal => left == right,
-            Self::NotEqual => left != right,
-            Self::Less => left < right,
-            Self::LessOrEqual => left <= right,
-            Self::Greater => left > right,
-            Self::GreaterOrEqual => left >= right,
-        }
-    }
 }
 
 /// A coil: what becomes of the rung's power.

@@ -15,6 +15,7 @@ use understudy_text::duration;
 use crate::names::Namer;
 
 pub use self::circuit::circuit_as_structured_text;
+pub(crate) use self::program::Written;
 pub use self::program::structured_text;
 
 /// Characters of a line past which a statement is broken before an operator.

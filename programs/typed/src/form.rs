@@ -6,6 +6,7 @@
 //!
 //! The first slots of the state are the program's own: [`Program::HEADER`].
 
+use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -88,6 +89,18 @@ impl Program {
     /// If the program has no such routine.
     pub fn routine(&self, id: RoutineId) -> &Routine {
         &self.routines[id.0 as usize]
+    }
+
+    /// Gives variables and points other names: each name is found with its new one.
+    pub fn rename(&mut self, names: &HashMap<String, String>) {
+        let new = |name: &mut String| {
+            if let Some(new) = names.get(name) {
+                name.clone_from(new);
+            }
+        };
+        self.variables.iter_mut().for_each(|variable| new(&mut variable.name));
+        self.inputs.names_mut().for_each(new);
+        self.outputs.names_mut().for_each(new);
     }
 
     /// x(0).

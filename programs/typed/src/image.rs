@@ -3,6 +3,7 @@
 //! An image is a row of bits. A point takes as many as its type is wide, at a multiple of its width, in order of declaration; so one of BOOLs alone
 //! is the image of a circuit, and no point crosses a word of 64 bits.
 
+use std::collections::HashMap;
 use std::fmt;
 
 use crate::types::Elementary;
@@ -120,6 +121,23 @@ impl Points {
         }
     }
 
+    /// Puts the points of these names first, in this order.
+    pub fn put_first<'a>(&mut self, names: impl Iterator<Item = &'a str>) {
+        let mut places: HashMap<&str, usize> = HashMap::new();
+        for (place, name) in names.enumerate() {
+            places.entry(name).or_insert(place);
+        }
+        let mut points = std::mem::take(self).points;
+        points.sort_by_key(|point| places.get(point.name.as_str()).copied().unwrap_or(usize::MAX));
+        for point in points {
+            let declared = point.declared();
+            self.push_declared(point.name, declared, point.slot);
+            if let Some(last) = self.points.last_mut() {
+                last.initial = point.initial;
+            }
+        }
+    }
+
     /// The image of all initial values.
     pub fn initial_image(&self) -> Vec<u64> {
         let mut image = vec![0; self.width().div_ceil(64)];
@@ -137,6 +155,10 @@ impl Points {
     /// The names of all points, in order.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.points.iter().map(|point| point.name.as_str())
+    }
+
+    pub(crate) fn names_mut(&mut self) -> impl Iterator<Item = &mut String> {
+        self.points.iter_mut().map(|point| &mut point.name)
     }
 
     /// A name for each bit of the image: that of its point where it is a BOOL, else `NAME.0` for its lowest bit and so on; empty for a bit of no

@@ -155,6 +155,16 @@ impl Comparison {
         (Self::GreaterOrEqual, ">=", "GE"),
     ];
 
+    /// All, in the order of their signs in Structured Text.
+    pub const ALL: [Self; 6] = [
+        Self::Equal,
+        Self::NotEqual,
+        Self::Less,
+        Self::LessOrEqual,
+        Self::Greater,
+        Self::GreaterOrEqual,
+    ];
+
     fn written(self) -> (Self, &'static str, &'static str) {
         Self::WRITTEN.into_iter().find(|(of, _, _)| *of == self).expect("each is written")
     }
@@ -177,6 +187,18 @@ impl Comparison {
     /// That of a function or instruction, in capitals.
     pub fn of_word(word: &str) -> Option<Self> {
         Self::WRITTEN.into_iter().find(|(_, _, known)| *known == word).map(|(of, _, _)| of)
+    }
+
+    /// Whether it holds between two values.
+    pub fn holds<T: PartialOrd>(self, left: T, right: T) -> bool {
+        match self {
+            Self::Equal => left == right,
+            Self::NotEqual => left != right,
+            Self::Less => left < right,
+            Self::LessOrEqual => left <= right,
+            Self::Greater => left > right,
+            Self::GreaterOrEqual => left >= right,
+        }
     }
 
     /// The one that holds where this one does not; of reals only where neither is NaN.

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use understudy_cluster::Cluster;
 use understudy_journal::{Members, SourceCounts, TimeOfDay};
 use understudy_ladder::{Evaluation, Observer};
-use understudy_logic::Scratch;
 use understudy_typed::{Interpreter, Trace};
 use understudy_wire::{Member, Moment, ProgramId, StationId};
 
@@ -162,8 +161,7 @@ impl Model {
             program: self.program_name(program).to_owned(),
             reason: "only a ladder has a power flow".to_owned(),
         })?;
-        let mut scratch = Scratch::default();
-        Ok(observer.evaluate(&mut scratch, sampled.state.words(), sampled.inputs.words()))
+        Ok(observer.evaluate(sampled.state.words(), sampled.inputs.words()))
     }
 
     /// The scan of a program with numbers in a cycle, statement by statement.

@@ -3,7 +3,7 @@
 use understudy_logic::Expression;
 use understudy_typed::{Comparison, Elementary, Operation};
 
-use super::{Meaning, PRODUCT, Pass, Pending, WIDE};
+use super::{Held, Meaning, PRODUCT, Pass, Pending, WIDE};
 use crate::extent::{Extent, divisor};
 use crate::number::{
     Coding, Number, aligned, is_equal, is_less, mux, negated, product, quotient, sum,
@@ -159,6 +159,12 @@ impl Pass<'_> {
                 _ => format!("{name}.{bit}"),
             };
             let (register, value) = self.register(&name, initial >> bit & 1 == 1);
+            let is_sign = coding.is_signed && bit + 1 == coding.width;
+            let weight = coding.unit.max(1) << bit;
+            let weight = if is_sign { -weight } else { weight };
+            if let Some(held) = self.held.last_mut() {
+                *held = Some(Held { cell: place, weight });
+            }
             registers.push(register);
             bits.push(value);
         }

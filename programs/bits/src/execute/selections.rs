@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use understudy_typed::{Case, Comparison, Statement};
+use understudy_typed::{Case, Comparison, Statement, StatementKind};
 
 use super::{Context, Execution, Left, Result};
 use crate::term::Term;
@@ -24,12 +24,30 @@ impl Execution<'_> {
             return self.statements(context, otherwise);
         };
         let condition = self.number(context, &first.condition)?;
+        if self.terms.is(condition, false) {
+            self.keep(context, &first.body)?;
+        }
         let left = self.either(
             condition,
             |this| this.statements(context, &first.body),
             |this| this.branches(context, rest, otherwise),
         )?;
         Ok(self.one_of(condition, left))
+    }
+
+    /// Reads what statements that are never executed would assign: it has its value from before the scan.
+    fn keep(&mut self, context: Context, statements: &[Statement]) -> Result<()> {
+        for statement in statements {
+            if let StatementKind::Assign(place, _) = &statement.kind
+                && let Some(of) = place.of.elementary()
+                && place.indices.is_empty()
+            {
+                for (_, address) in self.places(context, place)? {
+                    self.get(address, of);
+                }
+            }
+        }
+        Ok(())
     }
 
     /// As [`Self::branches`], one after the other: each under the condition that none before it was taken.

@@ -17,8 +17,8 @@ const MOST: i64 = u32::MAX as i64;
 /// The timers of a program.
 #[derive(Debug, Default)]
 pub(crate) struct Timers {
-    /// Scans until they are over, of those that are counted, by address.
-    pub(crate) counted: BTreeMap<u64, u64>,
+    /// Those that are counted, by address.
+    pub(crate) counted: BTreeMap<u64, Counted>,
     /// What they do not keep then, by address.
     pub(crate) dropped: BTreeSet<u64>,
     uses: BTreeMap<u64, Use>,
@@ -29,15 +29,77 @@ pub(crate) struct Timers {
 }
 
 /// A timer, and the slots of its variables in an instance.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Variables {
     timer: Timer,
     input: u64,
     preset: u64,
     output: u64,
+    elapsed: u64,
     start: u64,
+    state: u64,
+    last: u64,
+}
+
+impl Variables {
     /// What nothing else may read or write: the time that has elapsed, and what it keeps.
-    own: Vec<u64>,
+    fn own(self) -> [u64; 4] {
+        [self.elapsed, self.start, self.state, self.last]
+    }
+}
+
+/// A timer that is counted.
+#[derive(Debug, Clone)]
+pub(crate) struct Counted {
+    address: u64,
+    variables: Variables,
+    /// Scans until it is over.
+    scans: u64,
+    /// Nanoseconds.
+    preset: i64,
+}
+
+impl Counted {
+    fn at(&self, slot: u64) -> u64 {
+        self.address + 64 * slot
+    }
+
+    /// The address whose cell has the count.
+    pub(crate) fn start(&self) -> u64 {
+        self.at(self.variables.start)
+    }
+
+    /// How many scans the count may reach back.
+    pub(crate) fn reach(&self) -> u64 {
+        self.scans
+    }
+
+    /// What the timer keeps where its count is `count`, so that every later scan is the same: values by address. `now` is the `TIME()` of the next
+    /// scan.
+    pub(crate) fn kept(&self, count: u64, now: i64, period: i64) -> [(u64, u64); 5] {
+        let variables = self.variables;
+        let time = |scans: u64| period.saturating_mul(scans as i64);
+        // Scans that it runs, its input, its output, and the time that has elapsed where it does not run.
+        let (runs, input, output, rest) = match variables.timer {
+            Timer::OnDelay => (count, count > 0, false, 0),
+            Timer::Pulse => (count, count > 0, count > 0, 0),
+            Timer::OffDelay if count >= self.scans => (0, true, true, 0),
+            Timer::OffDelay if count == 0 => (0, false, false, self.preset),
+            Timer::OffDelay => (self.scans - count, false, true, 0),
+        };
+        let elapsed = match runs {
+            0 => rest,
+            runs => time(runs - 1).min(self.preset),
+        };
+        [
+            (variables.state, u64::from(runs > 0)),
+            (variables.last, u64::from(input)),
+            (variables.start, now.saturating_sub(time(runs)) as u64),
+            (variables.elapsed, elapsed as u64),
+            (variables.output, u64::from(output)),
+        ]
+        .map(|(slot, value)| (self.at(slot), value))
+    }
 }
 
 /// How a timer is called in a scan.
@@ -45,7 +107,7 @@ pub(super) struct Variables {
 struct Use {
     variables: Variables,
     calls: u32,
-    /// Nanoseconds, where every call has the same.
+    /// Nanoseconds, where the call is certain and has always the same.
     preset: Option<i64>,
 }
 
@@ -68,15 +130,17 @@ impl Timers {
             let Use { variables, calls: 1, preset: Some(preset) } = used else {
                 continue;
             };
-            let mut own = variables.own.iter().map(|slot| address + 64 * slot);
+            let mut own = variables.own().into_iter().map(|slot| address + 64 * slot);
             let is_read = |of: &u64| self.read.contains(of) || wanted.contains(of);
             let is_used = own.any(|of| is_read(&of) || self.written.contains(&of))
                 || self.written.contains(&(address + 64 * variables.output));
             let period = program.period.max(1);
             let scans = (*preset).max(1).checked_add(period - 1).map(|time| time / period);
             if let (false, Some(scans @ ..=MOST)) = (is_used, scans) {
-                self.counted.insert(address, scans as u64);
-                self.dropped.extend(variables.own.iter().map(|slot| address + 64 * slot));
+                let (scans, preset) = (scans as u64, *preset);
+                let counted = Counted { address, variables: *variables, scans, preset };
+                self.counted.insert(address, counted);
+                self.dropped.extend(variables.own().map(|slot| address + 64 * slot));
             }
         }
         (self.uses, self.read, self.written) = Default::default();
@@ -93,14 +157,15 @@ impl Execution<'_> {
             let field = fields.iter().find(|field| field.name.eq_ignore_ascii_case(name))?;
             Some(u64::from(field.slot))
         };
-        let start = slot("START")?;
         Some(Variables {
             timer,
             input: slot("IN")?,
             preset: slot("PT")?,
             output: slot("Q")?,
-            start,
-            own: vec![start, slot("ET")?, slot("STATE")?, slot("LAST")?],
+            elapsed: slot("ET")?,
+            start: slot("START")?,
+            state: slot("STATE")?,
+            last: slot("LAST")?,
         })
     }
 
@@ -110,17 +175,18 @@ impl Execution<'_> {
         let is_certain = is_only && self.terms.is(self.path, true);
         let preset = self.terms.value(preset).filter(|_| is_certain);
         let used = self.timers.uses.entry(address).or_insert_with(|| Use {
-            variables: variables.clone(),
+            variables: *variables,
             calls: 0,
             preset: preset.map(|stored| stored as i64),
         });
         used.calls += 1;
     }
 
-    /// A call of a timer that is over after so many scans.
-    pub(super) fn count(&mut self, variables: &Variables, address: u64, scans: u64) {
+    /// A call of a timer that is counted.
+    pub(super) fn count(&mut self, counted: &Counted) {
         let of = Elementary::Udint;
-        let at = |slot: u64| address + 64 * slot;
+        let Counted { variables, scans, .. } = *counted;
+        let at = |slot: u64| counted.at(slot);
         let input = self.get(at(variables.input), Elementary::Bool);
         let before = self.get(at(variables.start), of);
         let [zero, one, all] = [0, 1, scans].map(|value| self.terms.constant(of, value));

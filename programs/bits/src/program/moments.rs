@@ -12,6 +12,7 @@ use super::scan::{Scan, Scanned};
 use crate::System;
 use crate::execute::Unsupported;
 use crate::execute::timers::Timers;
+use crate::system::Holds;
 use crate::term::{Node, Term, Terms, Variable};
 
 /// Selections inside each other that are looked through.
@@ -41,6 +42,7 @@ impl System {
         for address in self.moments(scan, &scanned, numbers) {
             let name = format!("{}.age", self.cells[numbers[&address] as usize].name);
             let cell = self.cell(name, Elementary::Time, 0);
+            self.cells[cell as usize].holds = Holds::Age(address);
             ages.insert(address, Age { cell, most: 0 });
         }
         if ages.is_empty() {
@@ -84,6 +86,7 @@ impl System {
             return Ok((scanned, None));
         }
         let cell = self.cell(format!("{}TIME()", scan.prefix), Elementary::Time, 0);
+        self.cells[cell as usize].holds = Holds::Clock;
         let clock = self.cells[cell as usize].term;
         let again = self.scan(&Scan { ages, clock: Some(clock), ..*scan }, numbers, timers)?;
         match self.most(scan, &again, ages, Carrier::Clock(clock)) {

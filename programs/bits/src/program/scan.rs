@@ -1,6 +1,6 @@
 //! One scan of a program, from the cells that hold its state.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use understudy_typed::{Elementary, Operation, Point, Program};
 
@@ -8,6 +8,7 @@ use crate::execute::timers::Timers;
 use crate::execute::{Cells, Execution, Unsupported};
 use crate::program::moments::Age;
 use crate::term::{Node, Term, Terms, Variable};
+use crate::system::Holds;
 use crate::{Input, System};
 
 /// Cells of one program, made when they are read first.
@@ -23,6 +24,8 @@ struct ProgramCells<'s> {
     elapsed: Term,
     /// The times since moments, in place of the moments.
     ages: HashMap<u64, Term>,
+    /// What is read before it is written.
+    read: BTreeSet<u64>,
 }
 
 impl ProgramCells<'_> {
@@ -49,6 +52,7 @@ impl ProgramCells<'_> {
             initial: slot.unwrap_or(0) >> (address % 64) & of.mask(),
             term,
             next: term,
+            holds: Holds::Value(address, of),
         });
         self.numbers.insert(address, number);
         number
@@ -58,6 +62,7 @@ impl ProgramCells<'_> {
 impl Cells for ProgramCells<'_> {
     fn before(&mut self, terms: &mut Terms, address: u64, of: Elementary) -> Term {
         let number = self.number(terms, address, of);
+        self.read.insert(address);
         if let Some(&age) = self.ages.get(&address) {
             let since = Operation::Subtract(Elementary::Time);
             return terms.apply(since, Elementary::Time, &[self.elapsed, age]);
@@ -106,6 +111,7 @@ impl System {
             cells: &mut self.cells,
             numbers: std::mem::take(numbers),
             stopped: scan.stopped,
+            read: BTreeSet::new(),
         };
         // What is shown or read by others has a cell, whether the scan reads it or not.
         for point in &program.outputs {
@@ -144,11 +150,12 @@ impl System {
         }
         let faulted = execution.faulted;
         let memory = execution.written();
+        let read = cells.read;
         *numbers = cells.numbers;
         let written = memory.iter();
         let written =
             written.filter_map(|(address, &value)| Some((*numbers.get(address)?, value))).collect();
-        Ok(Scanned { memory, faulted, elapsed, written })
+        Ok(Scanned { memory, faulted, elapsed, written, read })
     }
 }
 
@@ -187,6 +194,8 @@ pub(super) struct Scanned {
     pub(super) elapsed: Term,
     /// What it writes into cells.
     pub(super) written: HashMap<u32, Term>,
+    /// What it reads before it writes it, by address.
+    pub(super) read: BTreeSet<u64>,
 }
 
 /// Most BOOL variables that properties can name.

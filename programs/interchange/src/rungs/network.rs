@@ -2,7 +2,7 @@
 
 use understudy_ladder::{
     CoilKind, Comparison, ContactKind, Element, MAXIMUM_NESTING, MAXIMUM_PRESET_VALUE, Name,
-    Relation, Series,
+    Series,
 };
 use understudy_structured_text::syntax::{
     Argument, Expression, ExpressionKind, Literal, Operator, Path, Span, Step,
@@ -248,14 +248,6 @@ impl Writer<'_> {
                     let what =
                         format!("a counter is compared with numbers to {MAXIMUM_PRESET_VALUE}");
                     return Err(Refused { what, span: number.span.clone() });
-                };
-                let relation = match relation {
-                    Compared::Equal => Relation::Equal,
-                    Compared::NotEqual => Relation::NotEqual,
-                    Compared::Less => Relation::Less,
-                    Compared::LessOrEqual => Relation::LessOrEqual,
-                    Compared::Greater => Relation::Greater,
-                    Compared::GreaterOrEqual => Relation::GreaterOrEqual,
                 };
                 self.read.push((counter.clone(), first.span.clone()));
                 let counter = Name::from(counter);

@@ -2,10 +2,12 @@
 
 use std::time::Duration;
 
-use understudy_logic::{Circuit, Expression};
+use understudy_logic::Circuit;
 
-use super::{LowerError, Lowering, validate};
-use crate::program::Program;
+use understudy_bits::Shown;
+
+use super::{LowerError, validate};
+use crate::program::{Coil, CoilKind, Contact, ContactKind, Element, Name, Program, Rung, Signal};
 
 /// One coil, and by their index the outputs of the circuit that tell what it does in a scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,6 +24,16 @@ pub struct Write {
     pub after: usize,
 }
 
+fn contact(operand: &Name) -> Element {
+    Element::Contact(Contact { kind: ContactKind::NormallyOpen, operand: operand.clone() })
+}
+
+/// A rung that keeps a signal in an output of its own.
+fn keep(signal: &Name, output: &Name) -> Rung {
+    let coils = vec![Coil { kind: CoilKind::Plain, target: output.clone() }];
+    Rung { network: vec![contact(signal)], coils, ..Rung::default() }
+}
+
 impl Program {
     /// A circuit whose outputs say what every coil does, and the coils in the order of the scan.
     ///
@@ -29,30 +41,29 @@ impl Program {
     /// As [`Program::lower`].
     pub fn lower_writes(&self, period: Duration) -> Result<(Circuit, Vec<Write>), LowerError> {
         validate(self, period)?;
-        let mut lowering = Lowering::new(self, period);
+        let mut watched = Self { rungs: Vec::new(), ..self.clone() };
         let mut writes = Vec::new();
-        let mut shown: Vec<(String, Expression)> = Vec::new();
         for (place, rung) in self.rungs.iter().enumerate() {
-            let rail = lowering.graph.constant(true);
-            let power = lowering.series(&rung.network, rail);
+            let mut show = |what: String| {
+                let name = Name::from(format!("rung {place} {what}"));
+                watched.outputs.push(Signal::new(name.clone()));
+                (name, watched.outputs.len() - 1)
+            };
+            let (power, powered) = show("power".into());
+            let coils = vec![Coil { kind: CoilKind::Plain, target: power.clone() }];
+            let mut rungs = vec![Rung { coils, ..rung.clone() }];
             for (number, coil) in rung.coils.iter().enumerate() {
-                let target = lowering.places[coil.target.as_str()];
-                let before = lowering.read(target);
-                lowering.coil(coil.kind, &coil.target, power);
-                let after = lowering.read(target);
-                let mut show = |what: &str, value| {
-                    shown.push((format!("rung {place} coil {number} {what}"), value));
-                    shown.len() - 1
-                };
-                writes.push(Write {
-                    rung: place,
-                    coil: number,
-                    power: show("power", power),
-                    before: show("before", before),
-                    after: show("after", after),
-                });
+                let [before, after] =
+                    ["before", "after"].map(|when| show(format!("coil {number} {when}")));
+                rungs.push(keep(&coil.target, &before.0));
+                let coils = vec![coil.clone()];
+                rungs.push(Rung { network: vec![contact(&power)], coils, ..Rung::default() });
+                rungs.push(keep(&coil.target, &after.0));
+                let (before, after) = (before.1, after.1);
+                writes.push(Write { rung: place, coil: number, power: powered, before, after });
             }
+            watched.rungs.extend(rungs);
         }
-        Ok((lowering.finish(self, shown), writes))
+        Ok((watched.exact(period, Shown::default())?.circuit, writes))
     }
 }

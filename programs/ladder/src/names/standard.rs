@@ -57,6 +57,11 @@ impl StandardNames {
         self.namer.name(wanted)
     }
 
+    /// The names of all signals and blocks: their own, and in a file of the standard.
+    pub(crate) fn all(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.known.iter().map(|(own, written)| (own.as_str(), written.as_str()))
+    }
+
     pub(crate) fn namer(&mut self) -> &mut Namer {
         &mut self.namer
     }

@@ -103,7 +103,7 @@ impl Parser {
         }
         let operand = self.name("the name of a signal")?;
         let relation = match self.lexeme() {
-            Lexeme::Sign(sign) => Relation::of(sign),
+            Lexeme::Sign(sign) => Relation::of_sign(sign),
             _ => None,
         };
         let Some(relation) = relation else {

@@ -18,11 +18,45 @@ use crate::program::{
 /// Timers, counters, latches and triggers are instances of the standard function blocks; edge contacts and edge coils are instances of R_TRIG and
 /// F_TRIG. Names become identifiers of the standard; the ladder's name is in the comment behind one that was changed.
 pub fn structured_text(program: &Program, period: Duration) -> String {
-    let mut writer = Writer::new(program);
-    for rung in &program.rungs {
-        writer.rung(rung);
+    Written::new(program, period, false).text
+}
+
+/// A text, and its names.
+pub(crate) struct Written {
+    pub(crate) text: String,
+    /// The names of the text, each with what it is in the ladder: a signal, a block, what sees the edges of an operand.
+    pub(crate) names: Vec<(String, String)>,
+    /// Outputs behind those of the program that keep what is read where it is read, in the order of the scan: for a contact its operand, behind it
+    /// what sees its edge; for a comparison the count; for a block its output, and behind it its time or count. Then, behind the elements of a rung, for each
+    /// coil its target before the first coil, and for each coil that sees an edge what sees it. Behind all rungs the memory bits.
+    pub(crate) taps: Vec<String>,
+}
+
+impl Written {
+    pub(crate) fn new(program: &Program, period: Duration, is_tapped: bool) -> Self {
+        let mut writer = Writer::new(program);
+        writer.taps = is_tapped.then(Vec::new);
+        for rung in &program.rungs {
+            writer.rung(rung);
+        }
+        for signal in &program.memory {
+            let operand = writer.names.operand(&signal.name);
+            writer.tap("BOOL", &operand);
+        }
+        let text = writer.text(period);
+        let names = writer.names.all().map(|(own, written)| (written.to_owned(), own.to_owned()));
+        let edges = writer.edges.into_iter().map(|edge| (edge.name, edge.of));
+        let names = names.chain(edges).collect();
+        let taps = writer.taps.unwrap_or_default().into_iter().map(|(name, _)| name).collect();
+        Self { text, names, taps }
     }
-    let mut text = String::new();
+}
+
+impl Writer<'_> {
+    fn text(&mut self, period: Duration) -> String {
+        let program = self.program;
+        let writer = self;
+        let mut text = String::new();
     for line in program.comments.iter().chain(&program.description) {
         text.push_str(&format!("{}\n", comment(line)));
     }
@@ -38,6 +72,7 @@ pub fn structured_text(program: &Program, period: Duration) -> String {
     text.push_str("END_PROGRAM\n");
     writer.names.configuration(&mut text, period);
     text
+    }
 }
 
 impl StandardNames {
@@ -121,14 +156,24 @@ impl Power {
     }
 }
 
+/// An instance of R_TRIG or F_TRIG.
+struct Edge {
+    name: String,
+    block: &'static str,
+    /// What it is called in a ladder.
+    of: String,
+}
+
 struct Writer<'a> {
     program: &'a Program,
     names: StandardNames,
     presets: HashMap<&'a str, u16>,
     /// Bits that hold an expression, in the order of their use.
     held: Vec<String>,
-    /// Instances for edge contacts and edge coils, with their types.
-    edges: Vec<(String, &'static str)>,
+    /// Instances for edge contacts and edge coils.
+    edges: Vec<Edge>,
+    /// Variables that keep what is read where it is read, with their types; where they are asked for.
+    taps: Option<Vec<(String, &'static str)>>,
     /// Blocks of the present rung that are called further on.
     pending: HashSet<&'a str>,
     /// Blocks whose call takes the power of the present series: what is read of them goes into their call.
@@ -150,6 +195,7 @@ impl<'a> Writer<'a> {
             presets,
             held: Vec::new(),
             edges: Vec::new(),
+            taps: None,
             pending: HashSet::new(),
             taking: HashSet::new(),
             depth: 0,
@@ -168,6 +214,10 @@ impl<'a> Writer<'a> {
             }
         });
         let mut power = self.series(&rung.network, Power::On);
+        for coil in &rung.coils {
+            let target = self.names.operand(&coil.target);
+            self.tap("BOOL", &target);
+        }
         if rung.coils.is_empty() && !matches!(rung.network.last(), Some(Element::Block(_))) {
             power = self.hold("power", power);
         }
@@ -215,13 +265,25 @@ impl<'a> Writer<'a> {
     /// Calls an instance of its own that sees the edges of `power`, and gives its output; `of` is what the contact or coil is drawn with.
     fn edge(&mut self, kind: &'static str, of: &str, power: &Power) -> Power {
         let direction = if kind == "R_TRIG" { "rising" } else { "falling" };
-        let name = self.names.add(&format!("{of}_{direction}"));
+        let name = self.names.add(&format!("{}_{direction}", self.names.operand(of)));
         let mut words = vec![format!("{name}("), "CLK".into(), ":=".into()];
         power.words(0, &mut words);
         words.push(")".into());
         self.state(&words);
-        self.edges.push((name.clone(), kind));
-        Power::Word(format!("{name}.Q"))
+        let pulse = format!("{name}.Q");
+        let of = format!("{of}.{direction}");
+        self.edges.push(Edge { name, block: kind, of });
+        Power::Word(pulse)
+    }
+
+    /// Keeps what is read here.
+    fn tap(&mut self, of: &'static str, operand: &str) {
+        if self.taps.is_none() {
+            return;
+        }
+        let name = self.names.add("tap");
+        self.state(&[name.clone(), ":=".into(), operand.to_owned()]);
+        self.taps.get_or_insert_default().push((name, of));
     }
 
     /// Set and reset coils with the same power, which is read once.
@@ -271,12 +333,14 @@ impl<'a> Writer<'a> {
                 self.state(&words);
             }
             CoilKind::Rising => {
-                let pulse = self.edge("R_TRIG", &target, power);
+                let pulse = self.edge("R_TRIG", &coil.target, power);
                 self.assign(&target, &pulse);
+                self.tap("BOOL", &target);
             }
             CoilKind::Falling => {
-                let pulse = self.edge("F_TRIG", &target, power);
+                let pulse = self.edge("F_TRIG", &coil.target, power);
                 self.assign(&target, &pulse);
+                self.tap("BOOL", &target);
             }
         }
     }
@@ -296,6 +360,7 @@ impl<'a> Writer<'a> {
                     let sign = portable(comparison.relation, comparison.value, preset).sign();
                     let counter_name = self.names.operand(counter);
                     let text = format!("{counter_name}.CV {sign} {}", comparison.value);
+                    self.tap("INT", &format!("{counter_name}.CV"));
                     let passes = self.before(counter, Power::Compared(text));
                     power.and(passes)
                 }
@@ -329,12 +394,18 @@ impl<'a> Writer<'a> {
 
     fn contact(&mut self, contact: &Contact) -> Power {
         let operand = self.names.operand(&contact.operand);
-        match contact.kind {
-            ContactKind::NormallyOpen => self.read(contact, Power::Word(operand)),
-            ContactKind::NormallyClosed => self.read(contact, Power::Not(operand)),
-            ContactKind::Rising => self.edge("R_TRIG", &operand, &Power::Word(operand.clone())),
-            ContactKind::Falling => self.edge("F_TRIG", &operand, &Power::Word(operand.clone())),
+        self.tap("BOOL", &operand);
+        let block = match contact.kind {
+            ContactKind::NormallyOpen => return self.read(contact, Power::Word(operand)),
+            ContactKind::NormallyClosed => return self.read(contact, Power::Not(operand)),
+            ContactKind::Rising => "R_TRIG",
+            ContactKind::Falling => "F_TRIG",
+        };
+        let pulse = self.edge(block, &contact.operand, &Power::Word(operand));
+        if let Power::Word(word) = &pulse {
+            self.tap("BOOL", &word.clone());
         }
+        pulse
     }
 
     fn read(&mut self, contact: &Contact, power: Power) -> Power {
@@ -379,7 +450,14 @@ impl<'a> Writer<'a> {
         words.push(")".into());
         self.state(&words);
         self.pending.remove(block.name.as_str());
-        Power::Word(format!("{name}.{}", kind.outputs()[0]))
+        let output = format!("{name}.{}", kind.outputs()[0]);
+        self.tap("BOOL", &output);
+        let value = kind.value_output().map(|pin| format!("{name}.{pin}"));
+        if let Some(value) = value {
+            let of = if kind.preset_time().is_some() { "TIME" } else { "INT" };
+            self.tap(of, &value);
+        }
+        Power::Word(output)
     }
 
     fn declarations(&self, text: &mut String) {
@@ -404,10 +482,14 @@ impl<'a> Writer<'a> {
             let about = remark(&block.name, name, &Signal::default());
             format!("{name} : {};{about}", block.kind.word())
         });
-        let edges = self.edges.iter().map(|(name, word)| format!("{name} : {word};"));
+        let edges = self.edges.iter().map(|edge| format!("{} : {};", edge.name, edge.block));
         let held = self.held.iter().map(|name| format!("{name} : BOOL;"));
         let lines: Vec<String> = blocks.chain(edges).chain(held).collect();
         section(text, "VAR", &lines);
+        // They come last, so that all others stand where they stand without them.
+        let taps = self.taps.iter().flatten();
+        let taps: Vec<String> = taps.map(|(name, of)| format!("{name} : {of};")).collect();
+        section(text, "VAR_OUTPUT", &taps);
     }
 
     fn declaration(&self, signal: &Signal) -> String {

@@ -229,14 +229,14 @@ fn only_what_outlives_a_scan_is_a_register() {
     check(&format!("{declared}rung n (y)\nrung m (n)\nrung a (m)"), &["m", "n"]);
     check(
         &format!("{declared}rung +a {{TON t 300ms}} (y)"),
-        &["t.scans.0", "t.scans.1", "a.rising"],
+        &["a.rising.M", "t.scans.0", "t.scans.1"],
     );
     check(
         &format!("{declared}rung a {{TON t 300ms}} (m)\nrung m (y)"),
         &["t.scans.0", "t.scans.1"],
     );
-    check(&format!("{declared}rung a /t.Q {{TON t 100ms}} (y)"), &["t.scans.0", "t.Q"]);
-    check(&format!("{declared}rung a {{CTU c 5}} (y)"), &["c.CV.0", "c.CV.1", "c.CV.2", "c.CU"]);
+    check(&format!("{declared}rung a /t.Q {{TON t 100ms}} (y)"), &["t.Q", "t.scans.0"]);
+    check(&format!("{declared}rung a {{CTU c 5}} (y)"), &["c.LAST", "c.CV.0", "c.CV.1", "c.CV.2"]);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! What each operation gives for elementary operands.
 
 use crate::fault::Cause;
-use crate::operation::real::{Float, binary, compare, unary};
+use crate::operation::real::{Float, binary, unary};
 use crate::operation::{Comparison, Operation, RealFunction};
 use crate::types::Elementary;
 
@@ -132,9 +132,9 @@ fn canonical(of: Elementary, stored: u64) -> u64 {
 /// Whether two stored values stand so to each other.
 fn stands(comparison: Comparison, of: Elementary, left: u64, right: u64) -> bool {
     match of {
-        Elementary::Real => compare(comparison, f32::unpack(left), f32::unpack(right)),
-        Elementary::Lreal => compare(comparison, f64::unpack(left), f64::unpack(right)),
-        _ => compare(comparison, of.signed(left), of.signed(right)),
+        Elementary::Real => comparison.holds(f32::unpack(left), f32::unpack(right)),
+        Elementary::Lreal => comparison.holds(f64::unpack(left), f64::unpack(right)),
+        _ => comparison.holds(of.signed(left), of.signed(right)),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Reals: IEEE 754 binary32 and binary64, rounded to nearest even, with one NaN.
 
-use crate::operation::{Comparison, RealFunction};
+use crate::operation::RealFunction;
 
 /// A format of reals. Every value that leaves an operation is packed by [`Float::pack`], which knows one NaN only.
 pub(crate) trait Float: Copy + PartialOrd {
@@ -133,17 +133,4 @@ pub(crate) fn binary<F: Float>(operands: &[u64], function: fn(F, F) -> F) -> u64
 /// A function of a stored real.
 pub(crate) fn unary<F: Float>(operands: &[u64], function: impl Fn(F) -> F) -> u64 {
     function(F::unpack(operands[0])).pack()
-}
-
-/// Whether two values stand so to each other; false with NaN, but for `<>`.
-#[inline]
-pub(crate) fn compare<T: PartialOrd>(comparison: Comparison, left: T, right: T) -> bool {
-    match comparison {
-        Comparison::Equal => left == right,
-        Comparison::NotEqual => left != right,
-        Comparison::Less => left < right,
-        Comparison::LessOrEqual => left <= right,
-        Comparison::Greater => left > right,
-        Comparison::GreaterOrEqual => left >= right,
-    }
 }

@@ -1,6 +1,6 @@
 //! What each operation on texts gives. A text is a row of bytes.
 
-use crate::operation::{TextOperation, number_text, real};
+use crate::operation::{TextOperation, number_text};
 use crate::types::Elementary;
 
 /// A value that an operation on texts takes.
@@ -86,7 +86,7 @@ impl TextOperation {
             }
             Self::Find => return find(text(0), text(1)),
             Self::Compare(comparison) => {
-                return u64::from(real::compare(comparison, text(0), text(1)));
+                return u64::from(comparison.holds(text(0), text(1)));
             }
             Self::Select => {
                 result.extend_from_slice(text(1 + usize::from(operands[0].number() != 0)));

@@ -1,0 +1,112 @@
+//! What the registers of an exact circuit are in the state of its program.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use understudy_logic::Variable as Bit;
+use understudy_typed::Program;
+
+use crate::System;
+use crate::circuit::Derivation;
+use crate::exact::registers;
+use crate::program::together;
+use crate::system::Holds;
+
+/// The slot of the scans since the start.
+const SCANS: usize = Program::HEADER as usize - 1;
+
+/// The state of a program by the registers of its circuit.
+#[derive(Debug, Clone)]
+pub struct Layout {
+    initial: Vec<u64>,
+    period: i64,
+    together: u64,
+    /// The cells that registers hold.
+    cells: Vec<Holds>,
+    /// For each register its cell, and the weight of its bit.
+    registers: Vec<(usize, i128)>,
+}
+
+impl Layout {
+    pub(crate) fn new(
+        program: &Program,
+        system: &System,
+        derivation: &Derivation,
+        live: &BTreeSet<Bit>,
+    ) -> Self {
+        let mut places = BTreeMap::new();
+        let mut cells = Vec::new();
+        let registers = registers(live).filter_map(|register| derivation.held[register]);
+        let registers = registers.map(|held| {
+            let place = *places.entry(held.cell).or_insert_with(|| {
+                cells.push(system.cells[held.cell as usize].holds.clone());
+                cells.len() - 1
+            });
+            (place, held.weight)
+        });
+        let registers = registers.collect();
+        let initial = program.initial_state();
+        let together = together(program);
+        Self { initial, period: program.period.max(1), together, cells, registers }
+    }
+
+    /// A state of the program from which every scan is that of the circuit from `registers`, packed. What no scan depends on is as it was at the
+    /// start.
+    ///
+    /// # Panics
+    /// If there are fewer registers than the circuit has.
+    pub fn state(&self, registers: &[u64]) -> Vec<u64> {
+        let mut values = vec![0_i128; self.cells.len()];
+        for (place, &(cell, weight)) in self.registers.iter().enumerate() {
+            if registers[place / 64] >> (place % 64) & 1 == 1 {
+                values[cell] += weight;
+            }
+        }
+        let scans = self.scans(&values);
+        let now = self.period.saturating_mul(scans as i64);
+        let mut state = self.initial.clone();
+        state[SCANS] = scans;
+        let mut put = |address: u64, mask: u64, value: u64| {
+            let (slot, bit) = (&mut state[(address / 64) as usize], address % 64);
+            *slot = *slot & !(mask << bit) | (value & mask) << bit;
+        };
+        // What a timer keeps comes first: its output may be a register too.
+        for (holds, &value) in self.cells.iter().zip(&values) {
+            match holds {
+                Holds::Count(counted) => {
+                    let kept = counted.kept(value as u64, now, self.period);
+                    kept.into_iter().for_each(|(address, value)| put(address, u64::MAX, value));
+                }
+                Holds::Age(address) => {
+                    put(*address, u64::MAX, now.saturating_sub(value as i64) as u64);
+                }
+                _ => {}
+            }
+        }
+        let own = self.cells.iter().zip(&values).filter_map(|(holds, &value)| match holds {
+            Holds::Value(address, of) => Some((*address, of.mask(), value)),
+            _ => None,
+        });
+        for (address, mask, value) in own {
+            put(address, mask, value as u64);
+        }
+        state
+    }
+
+    /// Scans since the start that all times reach back from.
+    fn scans(&self, values: &[i128]) -> u64 {
+        let mut least = 0;
+        let mut phase = 0;
+        for (holds, &value) in self.cells.iter().zip(values) {
+            match holds {
+                Holds::Count(counted) => least = least.max(counted.reach()),
+                Holds::Age(_) => least = least.max(value as u64 / self.period as u64),
+                Holds::Clock => return value as u64 / self.period as u64,
+                Holds::Scans => return value as u64,
+                Holds::Phase => phase = value as u64,
+                Holds::Value(..) | Holds::Other => {}
+            }
+        }
+        let late = least % self.together;
+        least + (self.together + phase - late) % self.together
+    }
+}
