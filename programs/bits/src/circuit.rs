@@ -85,7 +85,10 @@ impl Derivation {
     ) -> Result<Self, Unsupported> {
         // The first pass finds the boundaries of each number, the second one has them in order.
         let mut boundaries: HashMap<Term, BTreeSet<i128>> = HashMap::new();
-        let extents = Extents::new(system);
+        let mut extents = Extents::new(system);
+        for &cell in kept {
+            extents.widen(system.cells[cell as usize].term);
+        }
         loop {
             let mut pass = Pass::new(system, &extents, boundaries);
             pass.build(points, kept);

@@ -185,11 +185,7 @@ fn gap(meaning: &Meaning) -> Option<Term> {
 }
 
 /// Inputs and registers that the roots and some registers depend on, those among them.
-fn live(
-    circuit: &Circuit,
-    mut roots: Vec<Expression>,
-    registers: BTreeSet<Bit>,
-) -> BTreeSet<Bit> {
+fn live(circuit: &Circuit, mut roots: Vec<Expression>, registers: BTreeSet<Bit>) -> BTreeSet<Bit> {
     let next = |register: u32| circuit.registers()[register as usize].next;
     roots.extend(registers.iter().filter_map(|variable| match variable {
         Bit::Register(register) => Some(next(*register)),

@@ -130,6 +130,13 @@ impl Extents {
         Self(search.terms)
     }
 
+    /// Gives a number all bits below its highest, and a BOOL its bit.
+    pub(crate) fn widen(&mut self, term: Term) {
+        let extent = &mut self.0[Terms::index(term)];
+        let high = extent.high.max(1);
+        *extent = Extent { low: extent.low, high, unit: 1 };
+    }
+
     pub(crate) fn get(&self, term: Term) -> Extent {
         self.0[Terms::index(term)]
     }

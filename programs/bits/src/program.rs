@@ -10,10 +10,10 @@
 mod moments;
 mod scan;
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use understudy_logic::{Circuit, Operation as Gate, Variable as Bit};
-use understudy_typed::{Comparison, Elementary, Operation, Point, Points, Program};
+use understudy_typed::{Comparison, Elementary, Operation, Parts, Point, Points, Program};
 
 use crate::execute::Unsupported;
 use crate::execute::timers::Timers;
@@ -473,7 +473,7 @@ impl System {
         after: &HashMap<u64, Term>,
         faulted: Term,
     ) -> Outputs {
-        let mut points = HashMap::new();
+        let mut read = HashMap::new();
         for point in &program.outputs {
             let name = format!("{prefix}{}", point.name);
             let value = match point.slot {
@@ -481,7 +481,7 @@ impl System {
                 slot => after.get(&(64 * u64::from(slot))).copied(),
             };
             let Some(value) = value else { continue };
-            points.insert(point.name.clone(), value);
+            read.insert(point.name.clone(), value);
             match point.of {
                 Elementary::Bool => self.observed.push((name, value)),
                 _ => self.shown.push((name, value)),
@@ -493,22 +493,22 @@ impl System {
         self.name_numbers(prefix, program, after);
         let mut rest: Vec<(u64, Term)> = after.iter().map(|(&at, &term)| (at, term)).collect();
         rest.sort_unstable();
-        let is_point = |address: u64| {
-            let slots = program.outputs.iter().chain(&program.inputs);
-            let mut slots = slots.map(|point| 64 * u64::from(point.slot));
-            slots.any(|slot| slot == address)
-        };
+        let slots = program.outputs.iter().chain(&program.inputs);
+        let points: HashSet<u64> = slots.map(|point| 64 * u64::from(point.slot)).collect();
+        let mut known: HashSet<String> =
+            self.observed.iter().map(|(name, _)| name.clone()).collect();
+        let parts = Parts::new(program);
         for (address, value) in rest {
             if self.terms.of(value) == Elementary::Bool
-                && !is_point(address)
-                && let Some(part) = program.part_at(address)
+                && !points.contains(&address)
+                && let Some(part) = parts.at(address)
             {
                 let name = format!("{prefix}{}", part.name);
-                if self.observed.iter().all(|(known, _)| *known != name) {
+                if known.insert(name.clone()) {
                     self.observed.push((name, value));
                 }
             }
         }
-        Outputs { points, can_be_read: self.terms.not(faulted) }
+        Outputs { points: read, can_be_read: self.terms.not(faulted) }
     }
 }

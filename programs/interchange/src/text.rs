@@ -49,7 +49,8 @@ pub(crate) fn whole(
         // Nothing was read, so there is nothing to lower.
         return Whole { diagnostics, ..Whole::default() };
     }
-    let options = Options { text, program, period: period.map(nanoseconds) };
+    let period_given = period.map(nanoseconds);
+    let options = Options { text, program, period: period_given, ..Options::default() };
     let Lowered { program: typed, checked, diagnostics: found } = lower(&file, &options);
     diagnostics.extend(found);
     let period = understudy_structured_text::lower::period(&file, program);

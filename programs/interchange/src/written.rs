@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::time::Duration;
 
 use understudy_ladder::{
-    Block, LowerError, PERIODS, Program, Signal, StandardNames, print, structured_text,
+    Block, LowerError, PERIODS, Program, Signal, StandardNames, edge_names, print, structured_text,
 };
 use understudy_logic::Circuit;
 use understudy_text::{Diagnostic, Severity};
@@ -127,8 +127,20 @@ struct Comparison<'a> {
     again: &'a Program,
     /// The names in the text of what the program declares.
     names: HashMap<&'a str, String>,
+    /// What the text calls what sees edges.
+    edges: HashMap<String, String>,
     losses: Vec<Diagnostic>,
     compared: Compared,
+}
+
+/// What sees edges in a program, and in what was read of its text: a block there in Structured Text, else in the order of the scan.
+fn edges(format: Format, program: &Program, again: &Program) -> HashMap<String, String> {
+    let own = edge_names(program);
+    if format == Format::StructuredText {
+        return own.into_iter().collect();
+    }
+    let again = edge_names(again).into_iter().map(|(name, _)| name);
+    own.into_iter().map(|(name, _)| name).zip(again).collect()
 }
 
 impl<'a> Comparison<'a> {
@@ -147,6 +159,7 @@ impl<'a> Comparison<'a> {
             program,
             again,
             names: signals.chain(blocks).collect(),
+            edges: edges(format, program, again),
             losses: Vec::new(),
             compared: Compared::default(),
         }
@@ -309,15 +322,15 @@ impl<'a> Comparison<'a> {
         Ok(())
     }
 
-    /// The name in the text of a signal, or of something that a block has, such as `pause.Q`; none of what an edge contact or coil has, which is
-    /// called after what it reads or writes.
+    /// The name in the text of a signal, of something that a block has, such as `pause.Q`, or of what an edge contact or coil keeps.
     fn written(&self, name: &str, blocks: &HashSet<String>) -> Option<String> {
         if let Some(written) = self.names.get(name) {
             return Some(written.clone());
         }
-        let last = name.rsplit('.').next().unwrap_or_default();
-        if last.starts_with("rising") || last.starts_with("falling") {
-            return None;
+        if let Some((edge, keeps)) = name.rsplit_once('.')
+            && let Some(written) = self.edges.get(edge)
+        {
+            return Some(format!("{written}.{keeps}"));
         }
         let dots = name.match_indices('.').rev();
         let mut blocks_before =

@@ -48,4 +48,4 @@ pub use program::{
     Address, Area, Block, BlockKind, Coil, CoilKind, Comparison, Contact, ContactKind, Element,
     Feed, Name, Program, Relation, Rung, Series, Signal, visit,
 };
-pub use structured_text::{circuit_as_structured_text, standard_time, structured_text};
+pub use structured_text::{circuit_as_structured_text, edge_names, standard_time, structured_text};

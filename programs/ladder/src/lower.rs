@@ -8,7 +8,7 @@
 
 mod writes;
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
@@ -82,7 +82,12 @@ pub(crate) fn of_text(
 ) -> Result<Typed, LowerError> {
     let (file, mut found) = parse(&written.text);
     let period = i64::try_from(period.as_nanos()).unwrap_or(i64::MAX);
-    let options = Options { text: &written.text, program: None, period: Some(period) };
+    let options = Options {
+        text: &written.text,
+        period: Some(period),
+        is_circuit: true,
+        ..Options::default()
+    };
     let lowered = lower(&file, &options);
     found.extend(lowered.diagnostics);
     without_errors(program, found)?;
@@ -107,17 +112,7 @@ impl Program {
     fn typed_without_check(&self, period: Duration) -> Result<Typed, LowerError> {
         let written = Written::new(self, period, false);
         let mut typed = of_text(self, &written, period)?;
-        let mut taken = HashSet::new();
-        let names = written.names.into_iter().map(|(name, own)| {
-            let mut unique = own.clone();
-            let mut count = 2;
-            while !taken.insert(unique.clone()) {
-                unique = format!("{own}_{count}");
-                count += 1;
-            }
-            (name, unique)
-        });
-        let names: HashMap<String, String> = names.collect();
+        let names = written.names.into_iter().chain(written.edges).collect();
         typed.rename(&names);
         typed.inputs.put_first(self.inputs.iter().map(|signal| signal.name.as_str()));
         typed.outputs.put_first(self.outputs.iter().map(|signal| signal.name.as_str()));

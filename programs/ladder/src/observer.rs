@@ -154,7 +154,9 @@ impl Flow<'_> {
                 self.next();
                 Reading::Time(preset)
             }
-            kind if kind.preset_time().is_some() => Reading::Time(Duration::from_nanos(self.next())),
+            kind if kind.preset_time().is_some() => {
+                Reading::Time(Duration::from_nanos(self.next()))
+            }
             kind if kind.preset_value().is_some() => {
                 Reading::Number(u16::try_from(self.next()).unwrap_or(u16::MAX))
             }

@@ -16,7 +16,7 @@ use crate::names::Namer;
 
 pub use self::circuit::circuit_as_structured_text;
 pub(crate) use self::program::Written;
-pub use self::program::structured_text;
+pub use self::program::{edge_names, structured_text};
 
 /// Characters of a line past which a statement is broken before an operator.
 const LINE_WIDTH: usize = 96;

@@ -61,6 +61,9 @@ use self::types::{StructureInfo, TypeState};
 /// The state of a program takes at most so many slots: 256 KiB.
 pub const MAXIMUM_SLOTS: u32 = 256 * 1024 / 8;
 
+/// The memory of a program that becomes a circuit takes at most so many slots: 128 MiB.
+const MAXIMUM_CIRCUIT: u64 = 128 * 1024 * 1024 / 8;
+
 /// The frames of all routines of a program together take at most so many slots: 1 MiB.
 const MAXIMUM_FRAMES: u32 = 1024 * 1024 / 8;
 
@@ -85,6 +88,8 @@ pub struct Options<'a> {
     pub program: Option<&'a str>,
     /// Nanoseconds from one scan to the next, in place of those in the file.
     pub period: Option<i64>,
+    /// It becomes a circuit, whose state is not this memory: so it may have more of it.
+    pub is_circuit: bool,
 }
 
 /// What was lowered.
@@ -105,6 +110,9 @@ pub fn lower(file: &File, options: &Options<'_>) -> Lowered {
     let file = &*expand::expand(file, &mut found);
     let mut lowering = Lowering::new(file, library, options.text);
     lowering.diagnostics = found;
+    if options.is_circuit {
+        lowering.most = MAXIMUM_CIRCUIT;
+    }
     lowering.declare(file, library);
     let checked = lowering.programs(file, options);
     lowering.finish(checked)
@@ -170,6 +178,8 @@ struct Lowering<'a> {
     sets_cycle: bool,
     /// The file has no PROGRAM.
     is_library: bool,
+    /// Slots that the state may take.
+    most: u64,
     nesting: u32,
     /// The length of the expressions around this one.
     length: usize,
@@ -226,6 +236,7 @@ impl<'a> Lowering<'a> {
             without_cycle: Vec::new(),
             sets_cycle: false,
             is_library: false,
+            most: MAXIMUM_SLOTS.into(),
             nesting: 0,
             length: 0,
             silent: 0,
@@ -337,7 +348,7 @@ impl<'a> Lowering<'a> {
     fn state(&mut self, slots: u64, span: &Range<usize>) -> Option<u32> {
         let start = self.program.state;
         let end = u64::from(start) + slots;
-        if end > u64::from(MAXIMUM_SLOTS) {
+        if end > self.most {
             self.too_large(end, span);
             return None;
         }
@@ -349,7 +360,7 @@ impl<'a> Lowering<'a> {
         let needed = slots.saturating_mul(8).div_ceil(1024);
         let message = format!(
             "the variables take {needed} KiB; a program has at most {} KiB of state",
-            MAXIMUM_SLOTS / 128
+            self.most / 128
         );
         self.error_with("U1048", message, span.clone(), "use smaller arrays");
     }

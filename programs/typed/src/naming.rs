@@ -1,6 +1,6 @@
 //! Variables by name and by address: `pid.integral`, `table[3]`.
 
-use crate::form::Program;
+use crate::form::{Program, Variable};
 use crate::operation::number_text;
 use crate::types::{Array, Elementary, Type};
 
@@ -41,6 +41,11 @@ impl Program {
         };
         let mut variables = self.variables.iter();
         let variable = variables.find(|variable| holds(variable.slot, &variable.of))?;
+        self.part_of(variable, address)
+    }
+
+    /// The part of a variable that lies at an address.
+    fn part_of(&self, variable: &Variable, address: u64) -> Option<Part> {
         let mut part = Part {
             name: variable.name.clone(),
             of: variable.of.clone(),
@@ -84,11 +89,14 @@ impl Program {
                 && name[known.len()..].starts_with(['.', '['])
         };
         let addressed = |address: &Option<String>| address.as_deref().is_some_and(is);
-        let mut variables = self.variables.iter();
-        let whole = variables.find(|variable| is(&variable.name) || addressed(&variable.address));
+        let variables = || self.variables.iter();
+        // The names of a ladder may differ in their case alone.
+        let same = variables().find(|variable| variable.name == name);
+        let other = || variables().find(|known| is(&known.name) || addressed(&known.address));
+        let whole = same.or_else(other);
         let within = || {
-            let found = self.variables.iter().filter(|known| begins(&known.name));
-            found.max_by_key(|known| known.name.len())
+            let found = variables().filter(|known| begins(&known.name));
+            found.max_by_key(|known| (known.name.len(), name.starts_with(&known.name)))
         };
         let variable = whole.or_else(within)?;
         let mut part = Part {
@@ -127,6 +135,36 @@ impl Program {
             }
         }
         Some(part)
+    }
+}
+
+/// The parts of a program by their addresses, for many questions.
+#[derive(Debug)]
+pub struct Parts<'p> {
+    program: &'p Program,
+    /// For each slot of the state the variable that holds it.
+    holders: Vec<Option<&'p Variable>>,
+}
+
+impl<'p> Parts<'p> {
+    /// Of a program.
+    pub fn new(program: &'p Program) -> Self {
+        let mut holders = vec![None; program.state as usize];
+        // Of several that share a slot, the first one.
+        for variable in program.variables.iter().rev() {
+            let first = variable.slot as usize;
+            let behind = first.saturating_add(variable.of.slots() as usize).min(holders.len());
+            if let Some(slots) = holders.get_mut(first..behind) {
+                slots.fill(Some(variable));
+            }
+        }
+        Self { program, holders }
+    }
+
+    /// As [`Program::part_at`].
+    pub fn at(&self, address: u64) -> Option<Part> {
+        let variable = (*self.holders.get((address / 64) as usize)?)?;
+        self.program.part_of(variable, address)
     }
 }
 

@@ -149,9 +149,9 @@ fn prove_with(
 #[test]
 fn module_two_is_proved() {
     let prompt = prove_line(Analysis::Prompt, 1, |_| {}).expect("proved");
-    assert_eq!((prompt.states, prompt.scans), (227, 1089));
+    assert_eq!((prompt.states, prompt.scans), (194, 887));
     let late = prove_line(Analysis::Late, 1, |_| {}).expect("proved");
-    assert_eq!((late.states, late.scans), (270, 1239));
+    assert_eq!((late.states, late.scans), (237, 1029));
     assert!(late.latched > prompt.latched);
 }
 

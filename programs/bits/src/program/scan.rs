@@ -2,18 +2,18 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use understudy_typed::{Elementary, Operation, Point, Program};
+use understudy_typed::{Elementary, Operation, Parts, Point, Program};
 
 use crate::execute::timers::Timers;
 use crate::execute::{Cells, Execution, Unsupported};
 use crate::program::moments::Age;
-use crate::term::{Node, Term, Terms, Variable};
 use crate::system::Holds;
+use crate::term::{Node, Term, Terms, Variable};
 use crate::{Input, System};
 
 /// Cells of one program, made when they are read first.
 struct ProgramCells<'s> {
-    program: &'s Program,
+    parts: &'s Parts<'s>,
     prefix: &'s str,
     initial: Vec<u64>,
     cells: &'s mut Vec<crate::system::Cell>,
@@ -34,7 +34,7 @@ impl ProgramCells<'_> {
             return known;
         }
         let number = self.cells.len() as u32;
-        let name = match self.program.part_at(address) {
+        let name = match self.parts.at(address) {
             Some(part)
                 if of == Elementary::Udint && part.of.elementary() == Some(Elementary::Time) =>
             {
@@ -102,10 +102,11 @@ impl System {
             Some(clock) => clock,
             None => self.terms.apply(Operation::Elapsed, Elementary::Time, &[count, period]),
         };
+        let parts = Parts::new(program);
         let mut cells = ProgramCells {
             elapsed,
             ages,
-            program,
+            parts: &parts,
             prefix,
             initial: program.initial_state(),
             cells: &mut self.cells,
@@ -120,7 +121,7 @@ impl System {
             }
         }
         let kept = |address: &u64| !timers.dropped.contains(address);
-        for address in bool_variables(program).into_iter().filter(kept) {
+        for address in bool_variables(program, &parts).into_iter().filter(kept) {
             cells.number(&mut self.terms, address, Elementary::Bool);
         }
         let mut execution = Execution::new(program, &mut self.terms, &mut cells, elapsed, timers);
@@ -202,14 +203,14 @@ pub(super) struct Scanned {
 const NAMED: usize = 10_000;
 
 /// Addresses of the BOOLs in the state that people can see.
-fn bool_variables(program: &Program) -> Vec<u64> {
+fn bool_variables(program: &Program, parts: &Parts<'_>) -> Vec<u64> {
     let mut found = Vec::new();
     for variable in &program.variables {
         let first = 64 * u64::from(variable.slot);
         let mut address = first;
         let end = first + 64 * variable.of.slots();
         while address < end && found.len() < NAMED {
-            match program.part_at(address) {
+            match parts.at(address) {
                 Some(part) if part.address == address => match part.of.elementary() {
                     Some(Elementary::Bool) => {
                         found.push(address);

@@ -1,8 +1,7 @@
 //! Expressions of BOOLs as networks of contacts.
 
 use understudy_ladder::{
-    CoilKind, Comparison, ContactKind, Element, MAXIMUM_NESTING, MAXIMUM_PRESET_VALUE, Name,
-    Series,
+    CoilKind, Comparison, ContactKind, Element, MAXIMUM_NESTING, MAXIMUM_PRESET_VALUE, Name, Series,
 };
 use understudy_structured_text::syntax::{
     Argument, Expression, ExpressionKind, Literal, Operator, Path, Span, Step,

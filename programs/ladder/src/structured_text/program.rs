@@ -21,11 +21,20 @@ pub fn structured_text(program: &Program, period: Duration) -> String {
     Written::new(program, period, false).text
 }
 
+/// What sees the edges of contacts and coils, in the order of the scan: its name as [`Program::typed`] has it, such as `a.rising`, and in the Structured
+/// Text of the program.
+pub fn edge_names(program: &Program) -> Vec<(String, String)> {
+    let written = Written::new(program, Duration::from_millis(1), false);
+    written.edges.into_iter().map(|(name, own)| (own, name)).collect()
+}
+
 /// A text, and its names.
 pub(crate) struct Written {
     pub(crate) text: String,
-    /// The names of the text, each with what it is in the ladder: a signal, a block, what sees the edges of an operand.
+    /// The names of signals and blocks in the text, each with the name in the ladder.
     pub(crate) names: Vec<(String, String)>,
+    /// The names in the text of what sees edges, in the order of the scan, each with what it is called in the ladder: `a.rising`.
+    pub(crate) edges: Vec<(String, String)>,
     /// Outputs behind those of the program that keep what is read where it is read, in the order of the scan: for a contact its operand, behind it
     /// what sees its edge; for a comparison the count; for a block its output, and behind it its time or count. Then, behind the elements of a rung, for each
     /// coil its target before the first coil, and for each coil that sees an edge what sees it. Behind all rungs the memory bits.
@@ -45,10 +54,20 @@ impl Written {
         }
         let text = writer.text(period);
         let names = writer.names.all().map(|(own, written)| (written.to_owned(), own.to_owned()));
-        let edges = writer.edges.into_iter().map(|edge| (edge.name, edge.of));
-        let names = names.chain(edges).collect();
+        let names: Vec<(String, String)> = names.collect();
+        let mut taken: HashSet<String> = names.iter().map(|(_, own)| own.clone()).collect();
+        let edges = writer.edges.into_iter().map(|edge| {
+            let mut unique = edge.of.clone();
+            let mut count = 2;
+            while !taken.insert(unique.clone()) {
+                unique = format!("{}_{count}", edge.of);
+                count += 1;
+            }
+            (edge.name, unique)
+        });
+        let edges = edges.collect();
         let taps = writer.taps.unwrap_or_default().into_iter().map(|(name, _)| name).collect();
-        Self { text, names, taps }
+        Self { text, names, edges, taps }
     }
 }
 
@@ -57,21 +76,21 @@ impl Writer<'_> {
         let program = self.program;
         let writer = self;
         let mut text = String::new();
-    for line in program.comments.iter().chain(&program.description) {
-        text.push_str(&format!("{}\n", comment(line)));
-    }
-    text.push_str(&format!("PROGRAM {}\n", writer.names.program()));
-    writer.declarations(&mut text);
-    text.push_str(&writer.body);
-    if !program.footer.is_empty() {
-        text.push('\n');
-    }
-    for line in &program.footer {
-        text.push_str(&format!("  {}\n", comment(line)));
-    }
-    text.push_str("END_PROGRAM\n");
-    writer.names.configuration(&mut text, period);
-    text
+        for line in program.comments.iter().chain(&program.description) {
+            text.push_str(&format!("{}\n", comment(line)));
+        }
+        text.push_str(&format!("PROGRAM {}\n", writer.names.program()));
+        writer.declarations(&mut text);
+        text.push_str(&writer.body);
+        if !program.footer.is_empty() {
+            text.push('\n');
+        }
+        for line in &program.footer {
+            text.push_str(&format!("  {}\n", comment(line)));
+        }
+        text.push_str("END_PROGRAM\n");
+        writer.names.configuration(&mut text, period);
+        text
     }
 }
 

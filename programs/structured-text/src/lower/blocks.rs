@@ -11,7 +11,7 @@ use crate::syntax::{Class, Declaration, Span, TypeKind, TypeName, UnitKind};
 use super::images::{Builder, Image};
 use super::names::{Owner, Symbol, Variable};
 use super::types::{Resolved, StructureInfo};
-use super::{BlockState, Lowering, MAXIMUM_SLOTS};
+use super::{BlockState, Lowering};
 
 /// A body and what it is lowered for.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -92,6 +92,8 @@ struct Layout {
     /// Bounds of the fields that are subranges, by their slots.
     ranges: HashMap<u32, (i128, i128)>,
     slots: u64,
+    /// Slots that it may take.
+    most: u64,
     block: Block,
 }
 
@@ -99,7 +101,7 @@ impl Layout {
     fn add(&mut self, name: &str, resolved: &Resolved, is_reference: bool) -> u32 {
         let slot = self.slots.min(u64::from(u32::MAX)) as u32;
         self.slots += if is_reference { 1 } else { resolved.of.slots() };
-        if !is_reference && self.slots <= u64::from(MAXIMUM_SLOTS) {
+        if !is_reference && self.slots <= self.most {
             self.image.put(u64::from(slot) * 64, &resolved.of, &resolved.image);
         }
         self.ranges.extend(resolved.range.map(|range| (slot, range)));
@@ -161,6 +163,7 @@ impl<'a> Lowering<'a> {
             image: Builder::default(),
             ranges: HashMap::new(),
             slots: 0,
+            most: self.most,
             block: Block {
                 of: Type::Text(1),
                 image: super::images::zero(),
@@ -193,7 +196,7 @@ impl<'a> Lowering<'a> {
                 self.member(unit, declaration, &mut layout);
             }
         }
-        if layout.slots > u64::from(MAXIMUM_SLOTS) {
+        if layout.slots > self.most {
             self.too_large(layout.slots, &found.name.span());
             return None;
         }

@@ -1,5 +1,6 @@
 //! What a file says beside its bodies: global variables, addresses, programs and their tasks.
 
+use std::collections::HashMap;
 use std::rc::Rc;
 
 use understudy_text::spelling;
@@ -7,7 +8,7 @@ use understudy_typed::{Root, Task, Type, Variable as Shown};
 
 use crate::syntax::{Argument, Class, Declaration, Expression, File, Name, Span, Unit, UnitKind};
 
-use super::blocks::{Block, Key};
+use super::blocks::{Block, Key, Parameter};
 use super::called::roots;
 use super::images::initial;
 use super::names::{Owner, Symbol, Variable};
@@ -279,6 +280,9 @@ impl<'a> Lowering<'a> {
         prefix: &str,
         connections: &[Argument],
     ) {
+        // Of two of a name, which were reported, the first one.
+        let parameters: HashMap<&str, &Parameter> =
+            block.parameters.iter().rev().map(|found| (found.name.as_str(), found)).collect();
         for name in &block.order {
             let Some(member) = block.members.get(name) else {
                 continue;
@@ -290,7 +294,7 @@ impl<'a> Lowering<'a> {
             if variable.name.contains('.') {
                 continue;
             }
-            let parameter = block.parameters.iter().find(|found| found.name == variable.name);
+            let parameter = parameters.get(variable.name.as_str()).copied();
             let slot = match (variable.root, parameter) {
                 (_, Some(parameter)) => own + parameter.slot,
                 (Root::Own(slot), None) => own + slot,

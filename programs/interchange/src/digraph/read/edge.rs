@@ -104,8 +104,7 @@ impl Reader {
         match word.as_str() {
             "ComparisonEdge" => {
                 let relation = xml::child(node, "relation").map(xml::word).unwrap_or_default();
-                let found =
-                    Relation::of_sign(relation.as_str());
+                let found = Relation::of_sign(relation.as_str());
                 let value = xml::child(node, "value").map(xml::word).unwrap_or_default();
                 let value = self.whole(node, &value, "the value of a comparison")?;
                 let value = u16::try_from(value)
