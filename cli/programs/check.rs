@@ -284,8 +284,8 @@ impl Found<'_> {
             };
             let known = seen.contains(&report.name) || has_errors(&report.diagnostics);
             seen.push(report.name.clone());
-            if let Some(program) = controller.code.typed() {
-                self.sizes.push((report.name.clone(), Size::of(program)));
+            if controller.ladder().is_none() {
+                self.sizes.push((report.name.clone(), Size::of(controller.code.typed())));
             }
             if !known
                 && let Some(ladder) = controller.ladder()

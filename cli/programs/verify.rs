@@ -331,15 +331,14 @@ fn cluster(arguments: &Arguments, patience: &Patience<'_>) -> Result<Answer, Ans
     for controller in cluster.controllers() {
         patience.turn_to(format!("`{}`", controller.name));
         let period = cluster.agreement().schedule.period();
-        match (controller.ladder(), controller.code.typed()) {
-            (Some(ladder), _) => {
+        match controller.ladder() {
+            Some(ladder) => {
                 let subject =
                     Subject::new(ladder, period, &Asked::default()).map_err(not_lowered)?;
                 let remarks = subject.remarks(ladder, period, bounds).map_err(not_lowered)?;
                 programs.push(ProgramAnswer::of(&subject, bounds, &remarks));
             }
-            (None, Some(program)) => programs.push(numbers::standard(program, bounds)?),
-            (None, None) => {}
+            None => programs.push(numbers::standard(controller.code.typed(), bounds)?),
         }
     }
     patience.turn_to("the understudy".to_owned());

@@ -151,12 +151,14 @@ fn of_cluster(cluster: Cluster, prefix: String) -> Result<Group, Answer> {
     let members = cluster.controllers().iter().zip(circuits).map(|(controller, circuit)| {
         let of_text = |text| read_ladder(&controller.file, text, Some(period)).program;
         let ladder = controller.ladder().cloned();
-        let ladder = ladder.or_else(|| controller.code.source_text().and_then(of_text));
+        let typed = controller.ladder().is_none().then(|| Arc::clone(controller.code.typed()));
+        let text = controller.code.source_text();
+        let ladder = ladder.or_else(|| text.and_then(|text| of_text(text)));
         Member {
             name: controller.name.clone(),
             ladder: ladder.unwrap_or_else(|| from_circuit(&circuit)),
             circuit,
-            typed: controller.code.typed().cloned(),
+            typed,
         }
     });
     Ok(Group {

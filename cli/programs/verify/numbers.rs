@@ -3,19 +3,17 @@
 use std::time::Duration;
 
 use serde_json::json;
-use understudy_bits::{Code, Member, Source, Unsupported};
-use understudy_cluster::{Cluster, Controller, InputSourceKind, RemoteIo};
-use understudy_ladder::LowerError;
-use understudy_logic::Circuit;
+use understudy_bits::{Member, Source, Unsupported};
+use understudy_cluster::{Cluster, InputSourceKind, RemoteIo};
 use understudy_typed::{Elementary, Point, Program};
 use understudy_verification::numbers::Model;
-use understudy_verification::program::{Bounds, OutputFinding, compared_counts};
+use understudy_verification::program::{Bounds, OutputFinding};
 use understudy_verification::property::{Asked, Property, read_one};
 use understudy_verification::smv;
 use understudy_verification::symbolic::{Resolved, Signal};
 
 use super::answer::{self, Finding, ProgramAnswer};
-use super::{Arguments, Smv, Texts, ToProve, bounds, not_lowered, used};
+use super::{Arguments, Smv, Texts, ToProve, bounds, used};
 use crate::answer::{Answer, Status};
 use crate::files::{self, ProgramFile};
 use crate::patience::Patience;
@@ -100,13 +98,7 @@ pub(super) fn of_cluster(
     patience.turn_to("the programs together".to_owned());
     let period = cluster.agreement().schedule.period();
     let texts = Texts::read(arguments, period)?;
-    let circuits: Result<Vec<_>, _> = cluster
-        .controllers()
-        .iter()
-        .map(|controller| observed(controller, period, &texts.asked()))
-        .collect();
-    let circuits = circuits.map_err(not_lowered)?;
-    let members = members(cluster, &circuits);
+    let members = members(cluster);
     let model = Model::of_cluster(cluster.name(), &members, &texts.asked())
         .map_err(|error| unsupported(&error))?;
     let wrong = |assumed: &Property| model.wrong_assumption(assumed);
@@ -163,30 +155,12 @@ fn standard_property(
     Some((property, formula))
 }
 
-/// The circuit of a ladder with its memory, the outputs of its blocks and the counts that are compared.
-fn observed(
-    controller: &Controller,
-    period: Duration,
-    asked: &Asked<'_>,
-) -> Result<Option<Circuit>, LowerError> {
-    let Some(ladder) = controller.ladder() else {
-        return Ok(None);
-    };
-    let counts = compared_counts(ladder, &format!("{}.", controller.name), asked);
-    ladder.lower_comparing(period, &counts).map(Some)
-}
-
 /// The programs of a cluster with the sources of their inputs.
-fn members<'c>(cluster: &'c Cluster, circuits: &'c [Option<Circuit>]) -> Vec<Member<'c>> {
-    let controllers = cluster.controllers().iter().zip(cluster.remote_ios()).zip(circuits);
-    let members = controllers.map(|((controller, remote_io), circuit)| {
-        let code = match (circuit, controller.code.typed()) {
-            (Some(circuit), _) => Code::Circuit(circuit),
-            (None, Some(program)) => Code::Typed(program),
-            (None, None) => unreachable!("a program is one or the other"),
-        };
+fn members(cluster: &Cluster) -> Vec<Member<'_>> {
+    let controllers = cluster.controllers().iter().zip(cluster.remote_ios());
+    let members = controllers.map(|(controller, remote_io)| {
         let points = controller.interface.inputs.iter();
-        let points = points.filter(|point| point.name != Program::RESET);
+        let points = points.filter(|point| point.slot != 0);
         let sources = points.map(|point| {
             let source = remote_io.inputs.iter().find(|input| input.name == point.name);
             match source.map(|input| &input.kind) {
@@ -206,7 +180,8 @@ fn members<'c>(cluster: &'c Cluster, circuits: &'c [Option<Circuit>]) -> Vec<Mem
                 },
             }
         });
-        Member { name: controller.name.clone(), code, sources: sources.collect() }
+        let (name, program) = (controller.name.clone(), controller.code.typed().as_ref());
+        Member { name, program, sources: sources.collect() }
     });
     members.collect()
 }

@@ -9,7 +9,6 @@ mod stages;
 mod unasked;
 
 use std::cell::OnceCell;
-use std::collections::BTreeMap;
 use std::time::Duration;
 
 use understudy_ladder::{Block, Comparison, LowerError, Program};
@@ -50,26 +49,16 @@ impl Default for Bounds<'_> {
     }
 }
 
-/// The comparisons of counts of a ladder whose names stand behind `prefix`, each as properties write it without that.
-pub fn compared_counts(
-    program: &Program,
-    prefix: &str,
-    asked: &Asked<'_>,
-) -> BTreeMap<String, Comparison> {
-    asked.compared.iter().filter_map(|named| counted(program, prefix, named)).collect()
-}
-
-fn counted(program: &Program, prefix: &str, named: &Named) -> Option<(String, Comparison)> {
+/// The count that a property compares, and the comparison as it is written.
+fn compared_count(program: &Program, named: &Named) -> Option<(String, Comparison)> {
     let compared = named.compared.as_ref()?;
-    let counter = named.name.strip_prefix(prefix)?.strip_suffix(".CV")?;
+    let counter = named.name.strip_suffix(".CV")?;
     let mut blocks = program.blocks().into_iter();
     let is_counter =
         |block: &&Block| block.name.as_str() == counter && block.kind.preset_value().is_some();
     let counter = blocks.find(is_counter)?.name.clone();
-    let relation = compared.comparison;
-    let value = compared.with.parse().ok()?;
-    let text = named.to_string().strip_prefix(prefix)?.to_owned();
-    Some((text, Comparison { counter, relation, value }))
+    let (relation, value) = (compared.comparison, compared.with.parse().ok()?);
+    Some((named.to_string(), Comparison { counter, relation, value }))
 }
 
 /// What came of one property.
@@ -121,7 +110,9 @@ impl Subject {
     /// # Errors
     /// The program has errors, or the period is out of bounds.
     pub fn new(program: &Program, period: Duration, asked: &Asked<'_>) -> Result<Self, LowerError> {
-        let circuit = program.lower_comparing(period, &compared_counts(program, "", asked))?;
+        let compared = asked.compared.iter();
+        let compared = compared.filter_map(|named| compared_count(program, named)).collect();
+        let circuit = program.lower_comparing(period, &compared)?;
         let mut subject = Self::of(circuit, program.outputs.len());
         let right = asked.assumed.iter().filter(|it| subject.wrong_assumption(it).is_empty());
         let assumed: Vec<Resolved> = right.filter_map(|it| subject.resolve(it).ok()).collect();

@@ -130,7 +130,7 @@ pub(crate) fn program_fault_text(
 ) -> String {
     let controller = cluster.controllers().get(program.index());
     let name = controller.map_or("an unknown program", |controller| controller.name.as_str());
-    let typed = controller.and_then(|controller| controller.code.typed());
+    let typed = controller.map(|controller| controller.code.typed());
     match typed.zip(fault) {
         Some((typed, fault)) => {
             let assigned = fault_lines::assigned_text(typed, fault);

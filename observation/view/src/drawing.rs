@@ -27,7 +27,7 @@ impl Model {
         cycle: i64,
     ) -> Option<(String, Option<ViewError>)> {
         let code = &self.cluster.controllers().get(program.index())?.code;
-        let (typed, text) = (code.typed()?, code.source_text()?);
+        let (typed, text) = (code.typed(), code.source_text()?);
         let units = self.drawings.get(program.index())?.get_or_init(|| {
             // A document begins with a sign that no Structured Text begins with.
             let name =

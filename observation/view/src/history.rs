@@ -120,7 +120,7 @@ impl History {
         let controller = cluster.controllers().get(program.index())?;
         let inputs = &controller.interface.inputs;
         let reset = inputs.find(TypedProgram::RESET);
-        let reset = reset.filter(|_| controller.code.typed().is_some());
+        let reset = reset.filter(|_| controller.can_stop());
         Some(Self {
             program,
             initial: Image::from_words(executable.state_count(), executable.initial()).ok(),

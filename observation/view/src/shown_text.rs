@@ -63,7 +63,7 @@ impl Model {
         cycle: i64,
     ) -> Option<(Vec<ShownLine>, Option<ViewError>)> {
         let code = &self.cluster.controllers().get(program.index())?.code;
-        let (typed, text) = (code.typed()?, code.source_text()?);
+        let (typed, text) = (code.typed(), code.source_text()?);
         let source = SourceText::new(text);
         Some(match self.trace(program, cycle) {
             Ok(trace) => (lines(typed, &source, Some(&trace)), None),
@@ -74,7 +74,7 @@ impl Model {
     /// The variables of a program with numbers, and the lines that use them.
     pub fn uses(&self, program: ProgramId) -> Option<Vec<Uses>> {
         let code = &self.cluster.controllers().get(program.index())?.code;
-        let (typed, text) = (code.typed()?, code.source_text()?);
+        let (typed, text) = (code.typed(), code.source_text()?);
         let source = SourceText::new(text);
         let uses = typed.variables.iter().map(|variable| {
             let (mut written, mut read) = (BTreeSet::new(), BTreeSet::new());

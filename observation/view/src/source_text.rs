@@ -284,7 +284,7 @@ mod tests {
                 read_with("cluster.toml", &text, Overrides::default(), &mut |name| file(name));
             for controller in read.cluster.expect("right").controllers() {
                 let code = &controller.code;
-                let (Some(typed), Some(text)) = (code.typed(), code.source_text()) else {
+                let (typed, Some(text)) = (code.typed(), code.source_text()) else {
                     continue;
                 };
                 let source = SourceText::new(text);

@@ -74,11 +74,9 @@ impl Model {
     pub fn state_signals(&self, program: ProgramId) -> Vec<StateSignal> {
         let controller = self.cluster.controllers().get(program.index());
         controller.map_or_else(Vec::new, |controller| {
-            let typed = controller.code.typed();
-            match (controller.ladder(), typed) {
-                (Some(ladder), _) => of_ladder(ladder),
-                (None, Some(typed)) => of_typed(controller, typed),
-                (None, None) => Vec::new(),
+            match controller.ladder() {
+                Some(ladder) => of_ladder(ladder),
+                None => of_typed(controller, controller.code.typed()),
             }
         })
     }

@@ -87,8 +87,8 @@ impl Stops {
 
     fn begun(cluster: &Cluster) -> Vec<(History, Stop)> {
         let programs = (0..).map(ProgramId).zip(cluster.controllers());
-        let typed = programs.filter(|(_, controller)| controller.code.typed().is_some());
-        let histories = typed.filter_map(|(program, _)| History::new(cluster, program, CYCLES));
+        let stopping = programs.filter(|(_, controller)| controller.can_stop());
+        let histories = stopping.filter_map(|(program, _)| History::new(cluster, program, CYCLES));
         histories.map(|history| (history, Stop::Running)).collect()
     }
 

@@ -11,7 +11,6 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 use serde_json::Value;
-use understudy_cluster::Code;
 use understudy_journal::source_word;
 use understudy_journal::{TimeOfDay, TimesOfDay};
 use understudy_ladder::Program;
@@ -23,7 +22,7 @@ use understudy_wire::{Image, Member, ProgramId, Source, StationId};
 
 use crate::describe::missing_text;
 use crate::error::ViewError;
-use crate::history::{Driven, History, Sampled, Step};
+use crate::history::{Driven, History, Step};
 use crate::model::Model;
 use crate::value::{forced_point, forced_value, named, named_text, value_in};
 use explain::Explainer;
@@ -244,11 +243,14 @@ impl Model {
         let drives = decided.or(kept.and_then(|kept| kept.driven.as_ref()));
         let driven = drives.and_then(|driven| Some(value_in(output?, &driven.outputs)));
         let unforced = drives.and_then(|driven| Some(value_in(output?, &driven.unforced)));
-        let because = match &controller.code {
-            Code::Ladder(ladder, _) => explained
+        let typed = controller.code.typed();
+        let text = controller.code.source_text();
+        let because = match (controller.ladder(), text) {
+            (Some(ladder), _) => explained
                 .map(|explained| Explainer::new(self, history, ladder).root(name, explained))
                 .transpose()?,
-            Code::Typed(typed, text) => {
+            (None, None) => None,
+            (None, Some(text)) => {
                 let mut explainer = statements::Explainer::new(self, history, typed, text);
                 let stopped = missing == Some(Missing::ProgramFault);
                 let value = unforced.clone().unwrap_or_default();
@@ -267,9 +269,7 @@ impl Model {
             driven.or(because.as_ref().map(|reason| reason.value.clone())).unwrap_or_default();
         let sampled = step.sampled.as_ref().into_iter();
         let inputs = sampled.clone().flat_map(|it| named(&controller.interface.inputs, &it.inputs));
-        let typed = controller.code.typed();
-        let is_typed = |_: &&Sampled| typed.is_some();
-        let mut sampled = sampled.filter(is_typed);
+        let mut sampled = sampled.filter(|_| text.is_some());
         Ok(Why {
             at: None,
             signal: name.to_owned(),
@@ -286,7 +286,7 @@ impl Model {
             inputs_text: sampled
                 .next()
                 .map(|it| named_text(&controller.interface.inputs, &it.inputs)),
-            of: typed.and_then(|typed| typed.part(name)?.of.elementary()),
+            of: text.and_then(|_| typed.part(name)?.of.elementary()),
             ramp_to: configured.filter(|_| on_ramp),
             value,
             reconstructed: decided.and_then(|driven| self.reconstructed(program, step, driven)),
@@ -338,9 +338,10 @@ impl Model {
             }
         }
         for (place, controller) in controllers.iter().enumerate() {
-            let Some(typed) = controller.code.typed() else {
+            if controller.ladder().is_some() {
                 continue;
-            };
+            }
+            let typed = controller.code.typed();
             let prefix = format!("{}.", controller.name);
             let name = asked.strip_prefix(&prefix).unwrap_or(asked);
             known.extend(typed.variables.iter().map(|it| it.name.clone()));
@@ -395,8 +396,8 @@ impl Model {
             outputs.flat_map(|outputs| named(outputs, image)).collect()
         };
         let values_text = |program: ProgramId, image: &Image| {
-            let typed = self.cluster.controllers()[program.index()].code.typed();
-            Some(named_text(outputs_of(program, image).filter(|_| typed.is_some())?, image))
+            self.cluster.controllers()[program.index()].code.source_text()?;
+            Some(named_text(outputs_of(program, image)?, image))
         };
         let others = others.filter_map(|other| {
             let outputs = published(other)?;

@@ -12,7 +12,6 @@ mod scan;
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 
-use understudy_logic::{Circuit, Operation as Gate, Variable as Bit};
 use understudy_typed::{Comparison, Elementary, Operation, Parts, Point, Points, Program};
 
 use crate::execute::Unsupported;
@@ -21,22 +20,13 @@ use crate::system::{Holds, Source, System};
 use crate::term::Term;
 use scan::Scan;
 
-/// A program of a system.
-#[derive(Debug, Clone, Copy)]
-pub enum Code<'a> {
-    /// A Boolean program.
-    Circuit(&'a Circuit),
-    /// A program with numbers.
-    Typed(&'a Program),
-}
-
 /// A program, its name and what its inputs are.
 #[derive(Debug, Clone)]
 pub struct Member<'a> {
     /// The name that its signals stand behind, and a dot.
     pub name: String,
     /// The program.
-    pub code: Code<'a>,
+    pub program: &'a Program,
     /// One for each input, in their order, but for [`Program::RESET`].
     pub sources: Vec<Source>,
 }
@@ -108,10 +98,7 @@ impl System {
             let prefix = format!("{}.", member.name);
             let sampled = system.input(format!("{prefix}sampled"), Elementary::Bool, None);
             let inputs = system.sampled(&prefix, member, &before, sampled);
-            let outputs = match member.code {
-                Code::Typed(program) => system.add_program(&prefix, program, &inputs, sampled)?,
-                Code::Circuit(circuit) => system.add_circuit(&prefix, circuit, &inputs, sampled),
-            };
+            let outputs = system.add_program(&prefix, member.program, &inputs, sampled)?;
             system.keep_outputs(&before[place], &outputs, sampled);
         }
         Ok(system)
@@ -156,19 +143,9 @@ struct Before {
 
 impl System {
     fn outputs_before(&mut self, member: &Member<'_>) -> Before {
-        let points: Vec<(String, Elementary)> = match member.code {
-            Code::Typed(program) => {
-                let points = program.outputs.iter();
-                points.map(|point| (point.name.clone(), point.of)).collect()
-            }
-            Code::Circuit(circuit) => {
-                let outputs = circuit.outputs().iter();
-                outputs.map(|output| (output.name.clone(), Elementary::Bool)).collect()
-            }
-        };
-        let outputs = points.into_iter().map(|(name, of)| {
-            let shown = format!("{}.{name} before", member.name);
-            (name, self.cell(shown, of, 0))
+        let outputs = member.program.outputs.iter().map(|point| {
+            let shown = format!("{}.{} before", member.name, point.name);
+            (point.name.clone(), self.cell(shown, point.of, 0))
         });
         let outputs = outputs.collect();
         let name = format!("{} can be read", member.name);
@@ -193,16 +170,7 @@ impl System {
         before: &[Before],
         sampled: Term,
     ) -> Vec<Term> {
-        let points: Vec<(String, Elementary, bool)> = match member.code {
-            Code::Typed(program) => {
-                let points = program.inputs.iter();
-                points.map(|point| (point.name.clone(), point.of, point.slot == 0)).collect()
-            }
-            Code::Circuit(circuit) => {
-                let inputs = circuit.inputs().iter();
-                inputs.map(|name| (name.clone(), Elementary::Bool, false)).collect()
-            }
-        };
+        let points = &member.program.inputs;
         // A remote I/O that restarts has no value of a signal; it samples nothing meanwhile.
         let reads = member.sources.iter();
         let reads = reads.filter(|source| matches!(source, Source::Signal { .. })).count() > 0;
@@ -219,10 +187,10 @@ impl System {
         let mut terms = Vec::with_capacity(points.len());
         let mut late = Vec::new();
         let mut sources = member.sources.iter();
-        for (name, of, is_reset) in points {
-            let source = match is_reset {
-                true => None,
-                false => sources.next(),
+        for Point { name, of, slot, .. } in points {
+            let (of, source) = match slot {
+                0 => (*of, None),
+                _ => (*of, sources.next()),
             };
             let shown = format!("{prefix}{name}");
             let term = match source {
@@ -304,61 +272,7 @@ impl System {
         (newest, is_valid)
     }
 
-    /// Adds a Boolean program; it makes a step where `runs` holds.
-    fn add_circuit(
-        &mut self,
-        prefix: &str,
-        circuit: &Circuit,
-        inputs: &[Term],
-        runs: Term,
-    ) -> Outputs {
-        let cells: Vec<u32> = circuit
-            .registers()
-            .iter()
-            .map(|register| {
-                let name = format!("{prefix}{}", register.name);
-                self.cell(name, Elementary::Bool, u64::from(register.initial))
-            })
-            .collect();
-        let graph = circuit.graph();
-        let mut terms: Vec<Term> = Vec::with_capacity(graph.operations().len());
-        for gate in graph.operations() {
-            let of = |expression: &understudy_logic::Expression| terms[expression.index()];
-            let term = match gate {
-                Gate::Constant(value) => self.terms.boolean(*value),
-                Gate::Variable(Bit::Input(input)) => inputs[*input as usize],
-                Gate::Variable(Bit::Register(register)) => {
-                    self.cells[cells[*register as usize] as usize].term
-                }
-                Gate::Not(inner) => self.terms.not(of(inner)),
-                Gate::And(left, right) => self.terms.and(of(left), of(right)),
-                Gate::Or(left, right) => self.terms.or(of(left), of(right)),
-                Gate::Xor(left, right) => {
-                    let xor = Operation::Xor(Elementary::Bool);
-                    self.terms.apply(xor, Elementary::Bool, &[of(left), of(right)])
-                }
-            };
-            terms.push(term);
-        }
-        for (register, &cell) in circuit.registers().iter().zip(&cells) {
-            let before = self.cells[cell as usize].term;
-            let next = terms[register.next.index()];
-            self.cells[cell as usize].next = self.terms.choose(runs, next, before);
-        }
-        let mut points = HashMap::new();
-        for output in circuit.outputs() {
-            let name = format!("{prefix}{}", output.name);
-            let kept = self.cell(format!("{name} kept"), Elementary::Bool, 0);
-            let before = self.cells[kept as usize].term;
-            let value = self.terms.choose(runs, terms[output.value.index()], before);
-            self.cells[kept as usize].next = value;
-            self.observed.push((name, value));
-            points.insert(output.name.clone(), value);
-        }
-        Outputs { points, can_be_read: self.terms.boolean(true) }
-    }
-
-    /// Adds a program with numbers; it makes a scan where `runs` holds.
+    /// Adds a program; it makes a scan where `runs` holds.
     fn add_program(
         &mut self,
         prefix: &str,

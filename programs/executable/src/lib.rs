@@ -1,4 +1,4 @@
-//! A program as a station executes it, whatever it was written in: a circuit of bits, or a typed program.
+//! A program as a station executes it: by its circuit, or by the register machine. What uses it does not know which.
 
 mod digest;
 mod value;
@@ -12,10 +12,12 @@ pub use self::value::{stored_value, typed_value, value_text, whole_number};
 
 /// A compiled program; cheap to share, it holds no state.
 #[derive(Debug, Clone)]
-pub enum Executable {
-    /// All Boolean.
+pub struct Executable(Engine);
+
+/// What executes it.
+#[derive(Debug, Clone)]
+enum Engine {
     Circuit(Scan),
-    /// With numbers.
     Machine(Machine),
 }
 
@@ -28,46 +30,46 @@ pub struct Scratch {
 
 impl From<&Circuit> for Executable {
     fn from(circuit: &Circuit) -> Self {
-        Self::Circuit(Scan::new(circuit))
+        Self(Engine::Circuit(Scan::new(circuit)))
     }
 }
 
 impl From<&Program> for Executable {
     fn from(program: &Program) -> Self {
-        Self::Machine(Machine::new(program))
+        Self(Engine::Machine(Machine::new(program)))
     }
 }
 
 impl Executable {
     /// Width of u in bits.
     pub fn input_count(&self) -> usize {
-        match self {
-            Self::Circuit(scan) => scan.input_count(),
-            Self::Machine(machine) => machine.input_count(),
+        match &self.0 {
+            Engine::Circuit(scan) => scan.input_count(),
+            Engine::Machine(machine) => machine.input_count(),
         }
     }
 
     /// Width of x in bits.
     pub fn state_count(&self) -> usize {
-        match self {
-            Self::Circuit(scan) => scan.register_count(),
-            Self::Machine(machine) => machine.state_words() * 64,
+        match &self.0 {
+            Engine::Circuit(scan) => scan.register_count(),
+            Engine::Machine(machine) => machine.state_words() * 64,
         }
     }
 
     /// Width of y in bits.
     pub fn output_count(&self) -> usize {
-        match self {
-            Self::Circuit(scan) => scan.output_count(),
-            Self::Machine(machine) => machine.output_count(),
+        match &self.0 {
+            Engine::Circuit(scan) => scan.output_count(),
+            Engine::Machine(machine) => machine.output_count(),
         }
     }
 
     /// x(0), packed.
     pub fn initial(&self) -> &[u64] {
-        match self {
-            Self::Circuit(scan) => scan.initial(),
-            Self::Machine(machine) => machine.initial(),
+        match &self.0 {
+            Engine::Circuit(scan) => scan.initial(),
+            Engine::Machine(machine) => machine.initial(),
         }
     }
 
@@ -82,9 +84,9 @@ impl Executable {
         inputs: &[u64],
         outputs: &mut [u64],
     ) {
-        match self {
-            Self::Circuit(scan) => scan.step(&mut scratch.circuit, state, inputs, outputs),
-            Self::Machine(machine) => machine.step(&mut scratch.machine, state, inputs, outputs),
+        match &self.0 {
+            Engine::Circuit(scan) => scan.step(&mut scratch.circuit, state, inputs, outputs),
+            Engine::Machine(machine) => machine.step(&mut scratch.machine, state, inputs, outputs),
         }
     }
 }

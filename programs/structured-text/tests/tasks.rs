@@ -51,7 +51,7 @@ fn a_given_period_keeps_the_intervals_or_is_told() {
         let text = two_tasks(intervals.0, intervals.1);
         let (file, _) = parse(&text);
         let period = Some(period * 1_000_000);
-        let lowered = lower(&file, &Options { text: &text, program: None, period });
+        let lowered = lower(&file, &Options { text: &text, period, ..Options::default() });
         let program = lowered.program.expect("a program");
         let found: Vec<u32> = program.tasks.iter().map(|task| task.every).collect();
         assert_eq!(found, every, "{period:?}");

@@ -22,7 +22,7 @@ use understudy_plant::{Followed, Plant};
 use understudy_remote_io::{
     Diagnosis, PointPlace, Ramp, Release, SignalSource, StaleState, StopPoints, ValueFault,
 };
-use understudy_typed::Program as TypedProgram;
+use understudy_typed::{Points, Program as TypedProgram};
 use understudy_wire::{Epoch, Image, Member, ProgramHash, ProgramId, Roster, StationId};
 
 /// What carries the frames.
@@ -90,14 +90,21 @@ impl Controller {
         self.code.ladder()
     }
 
-    /// Where its program reports a program fault, of a program with numbers.
+    /// Where its program reports a program fault, of one that can stop by a fault.
     fn stop_points(&self) -> Option<StopPoints> {
         let Interface { inputs, outputs } = &self.interface;
-        self.code.typed()?;
+        let implied = |points: &Points, name| {
+            points.find(name).filter(|point| point.slot == 0).map(|point| point.bit as usize)
+        };
         Some(StopPoints {
-            stopped: outputs.find(TypedProgram::FAULT)?.bit as usize,
-            reset: inputs.find(TypedProgram::RESET)?.bit as usize,
+            stopped: implied(outputs, TypedProgram::FAULT)?,
+            reset: implied(inputs, TypedProgram::RESET)?,
         })
+    }
+
+    /// Whether its program can stop by a program fault.
+    pub fn can_stop(&self) -> bool {
+        self.stop_points().is_some()
     }
 
     /// The circuit that does in every scan what the program does, under the name of the controller.

@@ -1,11 +1,12 @@
-//! What a controller runs, in the form in which it was read.
+//! What a controller runs.
 
 use std::borrow::Cow;
 use std::sync::Arc;
+use std::time::Duration;
 
 use understudy_bits::{Inexact, exact};
 use understudy_executable::{Executable, Interface};
-use understudy_ladder::Program as LadderProgram;
+use understudy_ladder::{LowerError, Program as LadderProgram};
 use understudy_logic::Circuit;
 use understudy_typed::Program as TypedProgram;
 use understudy_wire::ProgramHash;
@@ -14,27 +15,53 @@ use crate::canonical::{circuit_text, typed_text};
 
 /// A program, read.
 #[derive(Debug, Clone)]
-pub enum Code {
-    /// All Boolean: a ladder and its circuit for the period of the cluster. What is proved is proved of the circuit.
-    Ladder(Box<LadderProgram>, Circuit),
-    /// With numbers, and the text of its file, whose lines a program fault names.
-    Typed(Arc<TypedProgram>, Arc<str>),
+pub struct Code {
+    typed: Arc<TypedProgram>,
+    body: Body,
+}
+
+/// What a program is written in.
+#[derive(Debug, Clone)]
+enum Body {
+    /// Rungs. They are executed as the circuit for the period of the cluster, and what is proved is proved of it.
+    Rungs(Box<LadderProgram>, Circuit),
+    /// The text of its file, whose lines a program fault names.
+    Text(Arc<str>),
 }
 
 impl Code {
-    /// The ladder, of one that is Boolean.
+    /// A ladder, for the period of the cluster.
+    ///
+    /// # Errors
+    /// Those of [`LadderProgram::lower`].
+    pub fn of_ladder(ladder: LadderProgram, period: Duration) -> Result<Self, LowerError> {
+        let (typed, circuit) = (Arc::new(ladder.typed(period)?), ladder.lower(period)?);
+        Ok(Self { typed, body: Body::Rungs(Box::new(ladder), circuit) })
+    }
+
+    /// A program of a text.
+    pub fn of_text(typed: Arc<TypedProgram>, text: Arc<str>) -> Self {
+        Self { typed, body: Body::Text(text) }
+    }
+
+    /// The program.
+    pub fn typed(&self) -> &Arc<TypedProgram> {
+        &self.typed
+    }
+
+    /// Its rungs, of one that is written in rungs.
     pub fn ladder(&self) -> Option<&LadderProgram> {
-        match self {
-            Self::Ladder(program, _) => Some(program.as_ref()),
-            Self::Typed(..) => None,
+        match &self.body {
+            Body::Rungs(ladder, _) => Some(ladder.as_ref()),
+            Body::Text(_) => None,
         }
     }
 
-    /// The circuit, of one that is Boolean.
+    /// The circuit that stations execute, of one that is written in rungs.
     pub fn circuit(&self) -> Option<&Circuit> {
-        match self {
-            Self::Ladder(_, circuit) => Some(circuit),
-            Self::Typed(..) => None,
+        match &self.body {
+            Body::Rungs(_, circuit) => Some(circuit),
+            Body::Text(_) => None,
         }
     }
 
@@ -43,58 +70,36 @@ impl Code {
     /// # Errors
     /// The values of the program that have no bits.
     pub fn exact_circuit(&self) -> Result<Cow<'_, Circuit>, Inexact> {
-        match self {
-            Self::Ladder(_, circuit) => Ok(Cow::Borrowed(circuit)),
-            Self::Typed(program, _) => exact(program).map(Cow::Owned),
+        match self.circuit() {
+            Some(circuit) => Ok(Cow::Borrowed(circuit)),
+            None => exact(&self.typed).map(Cow::Owned),
         }
     }
 
-    /// The typed program, of one with numbers.
-    pub fn typed(&self) -> Option<&Arc<TypedProgram>> {
-        match self {
-            Self::Ladder(..) => None,
-            Self::Typed(program, _) => Some(program),
-        }
-    }
-
-    /// The text of its file, of one with numbers.
-    pub fn source_text(&self) -> Option<&str> {
-        match self {
-            Self::Ladder(..) => None,
-            Self::Typed(_, text) => Some(text),
+    /// The text of its file, of one that is written in statements, charts and networks.
+    pub fn source_text(&self) -> Option<&Arc<str>> {
+        match &self.body {
+            Body::Rungs(..) => None,
+            Body::Text(text) => Some(text),
         }
     }
 
     /// Its inputs and its outputs.
     pub fn interface(&self) -> Interface {
-        match self {
-            Self::Ladder(_, circuit) => circuit.into(),
-            Self::Typed(program, _) => program.as_ref().into(),
-        }
-    }
-
-    /// Bits of its state.
-    pub fn state_bits(&self) -> usize {
-        match self {
-            Self::Ladder(_, circuit) => circuit.registers().len(),
-            Self::Typed(program, _) => program.state as usize * 64,
-        }
+        self.typed.as_ref().into()
     }
 
     /// As stations execute it.
     pub fn executable(&self) -> Executable {
-        match self {
-            Self::Ladder(_, circuit) => circuit.into(),
-            Self::Typed(program, _) => program.as_ref().into(),
+        match self.circuit() {
+            Some(circuit) => circuit.into(),
+            None => self.typed.as_ref().into(),
         }
     }
 
-    /// The canonical text that its hash is of: equal texts mean equal behaviour.
+    /// The canonical text that its hash is of: equal texts mean equal behaviour, and equal states.
     pub(crate) fn text(&self) -> String {
-        match self {
-            Self::Ladder(_, circuit) => circuit_text(circuit),
-            Self::Typed(program, _) => typed_text(program),
-        }
+        self.circuit().map_or_else(|| typed_text(&self.typed), circuit_text)
     }
 
     /// Of the canonical text; the program's own name is not in it, its role is the cluster's affair.

@@ -4,7 +4,7 @@ mod compared;
 
 use std::time::Duration;
 
-use understudy_bits::{Code, Source};
+use understudy_bits::Source;
 use understudy_structured_text::{Options, lower};
 use understudy_typed::Program;
 
@@ -102,7 +102,7 @@ fn inputs_keep_their_subranges() {
     let alone = Model::of_program(&program, &Asked::default()).expect("followed");
     let member = |source| Member {
         name: "p".to_owned(),
-        code: Code::Typed(&program),
+        program: &program,
         sources: vec![source],
     };
     let of_cluster =
@@ -154,12 +154,12 @@ fn two_programs_keep_what_each_alone_does_not() {
         let members = [
             Member {
                 name: "left".to_owned(),
-                code: Code::Typed(&left),
+                program: &left,
                 sources: vec![Source::Any(None), signal(1, "wants_in", 0), signal(1, "inside", 1)],
             },
             Member {
                 name: "right".to_owned(),
-                code: Code::Typed(&right),
+                program: &right,
                 sources: vec![Source::Any(None), signal(0, "grant", 0)],
             },
         ];

@@ -188,8 +188,8 @@ impl Model {
     ) -> Result<&Interpreter, ViewError> {
         let program = history.program();
         let interpreter = self.interpreters[program.index()].get_or_init(|| {
-            let typed = self.cluster.controllers()[program.index()].code.typed()?;
-            Some(Interpreter::new(typed))
+            let code = &self.cluster.controllers()[program.index()].code;
+            code.source_text().map(|_| Interpreter::new(code.typed()))
         });
         interpreter.as_ref().ok_or_else(|| ViewError::NoState {
             cycle: history.steps()[place].cycle,

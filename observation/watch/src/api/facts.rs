@@ -204,7 +204,7 @@ fn signal_facts(controller: &Controller, points: &Points) -> Vec<SignalFacts> {
         Some((address, signal.description.clone()))
     };
     let declared = |name: &str| {
-        let mut variables = controller.code.typed()?.variables.iter();
+        let mut variables = controller.code.typed().variables.iter();
         let variable = variables.find(|variable| variable.name == name)?;
         Some((variable.address.clone(), variable.description.clone()))
     };

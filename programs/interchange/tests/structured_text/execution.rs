@@ -29,7 +29,7 @@ fn shaped(name: &str) -> String {
 
 /// The typed program of a file.
 pub(crate) fn typed(text: &str, file: &File) -> Option<Program> {
-    let options = Options { text, program: None, period: i64::try_from(PERIOD.as_nanos()).ok() };
+    let options = Options { text, period: i64::try_from(PERIOD.as_nanos()).ok(), ..Options::default() };
     lower(file, &options).program
 }
 

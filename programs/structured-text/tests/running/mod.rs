@@ -8,7 +8,7 @@ use understudy_typed::{Elementary, Fault, Interpreter, Machine, Point, Program, 
 /// What a text is lowered to, and everything that was found.
 pub(crate) fn read(text: &str, program: Option<&str>) -> (Lowered, Vec<Diagnostic>) {
     let (file, mut found) = parse(text);
-    let options = Options { text, program, period: None };
+    let options = Options { text, program, ..Options::default() };
     let lowered = lower(&file, &options);
     found.extend(lowered.diagnostics.iter().cloned());
     (lowered, found)

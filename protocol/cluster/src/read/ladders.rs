@@ -58,7 +58,7 @@ impl<'a> Ladders<'a> {
             Source::Ladder(program) => program,
             Source::Typed(program) => {
                 let text = Arc::from(read.text.as_str());
-                return Some(Code::Typed(Arc::clone(program), text));
+                return Some(Code::of_text(Arc::clone(program), text));
             }
             Source::Library(_) => return None,
         };
@@ -70,8 +70,8 @@ impl<'a> Ladders<'a> {
         }
         let mut program = program.clone();
         program.name = name.into();
-        match program.lower(period) {
-            Ok(circuit) => Some(Code::Ladder(Box::new(program), circuit)),
+        match Code::of_ladder(program, period) {
+            Ok(code) => Some(code),
             Err(error) => {
                 let message = format!("`{}`: {error}", file.value);
                 diagnostics.push(Diagnostic::error("U0212", message, file.span.clone()));

@@ -106,7 +106,7 @@ pub(crate) fn too_wide(name: &str, code: &Code) -> Option<String> {
     let interface = code.interface();
     let widths = [
         ("inputs", interface.inputs.width(), MAXIMUM_IMAGE_BITS),
-        ("state bits", code.state_bits(), MAXIMUM_STATE_BITS),
+        ("state bits", code.executable().state_count(), MAXIMUM_STATE_BITS),
         ("outputs", interface.outputs.width(), MAXIMUM_IMAGE_BITS),
     ];
     let mut widths = widths.into_iter();
