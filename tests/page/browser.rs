@@ -74,6 +74,11 @@ fn a_browser_sees_no_red_before_outputs_are_fail_safe() {
 }
 
 #[test]
+fn a_browser_sees_the_alarms_at_every_place_of_the_page() {
+    drive("banner", "examples/press-cell/cluster.toml", "banner.mjs", |_| Vec::new());
+}
+
+#[test]
 fn a_browser_starts_a_shuttle_and_sees_since_when() {
     let cluster = "examples/two-shuttles/cluster.toml";
     drive("operate", cluster, "operate.mjs", |_| Vec::new());

@@ -26,6 +26,7 @@ const ASSETS: &[(&str, &str, &str)] = assets![
     "page.js": SCRIPT,
     "address.js": SCRIPT,
     "ask.js": SCRIPT,
+    "banner.js": SCRIPT,
     "chips.js": SCRIPT,
     "kept.js": SCRIPT,
     "element.js": SCRIPT,
