@@ -33,6 +33,7 @@ const ASSETS: &[(&str, &str, &str)] = assets![
     "theme.js": SCRIPT,
     "time.js": SCRIPT,
     "cluster.js": SCRIPT,
+    "overview.js": SCRIPT,
     "picture.js": SCRIPT,
     "sources.js": SCRIPT,
     "legend.js": SCRIPT,
