@@ -84,7 +84,8 @@ impl Observation {
     }
 }
 
-fn alarms(model: &Model, cycle: i64) -> Vec<Alarm> {
+/// The alarms that are open in a cycle, and the newest of the others.
+pub(crate) fn alarms(model: &Model, cycle: i64) -> Vec<Alarm> {
     let newest = model.alarms_at(cycle).rev().enumerate();
     let kept = newest.filter(|(place, alarm)| *place < RECENT_ALARMS || alarm.is_open());
     let mut kept: Vec<Alarm> = kept.map(|(_, alarm)| alarm).collect();

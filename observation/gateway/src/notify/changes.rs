@@ -108,3 +108,6 @@ impl Changes {
         changes
     }
 }
+
+#[cfg(test)]
+mod tests;
