@@ -10,8 +10,8 @@ use clap::{Args, Subcommand};
 use serde_json::json;
 use understudy_bus::interruption;
 use understudy_gateway::{
-    Area, Followed, GatewayError, Rate, RegisterMap, Run, WriteGate, forward_signals, mirror,
-    serve_metrics, serve_modbus,
+    Area, Followed, GatewayError, Notified, Rate, RegisterMap, Run, WriteGate, forward_signals,
+    mirror, notify, serve_metrics, serve_modbus,
 };
 use understudy_keys::{Date, OperatorKeys};
 use understudy_member::tls_keys;
@@ -20,7 +20,7 @@ use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::overrides::parse_address;
 
-/// Publish a run by Prometheus, Modbus TCP or Zenoh
+/// Publish a run by Prometheus, Modbus TCP or Zenoh, and pass its alarms on
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -28,6 +28,7 @@ Example:
   understudy gateway modbus runs/latest --listen 127.0.0.1:1502
   understudy gateway modbus runs/latest --allow-writes
   understudy gateway registers runs/latest
+  understudy gateway notify runs/latest
   understudy gateway zenoh runs/latest --listen 127.0.0.1:7447 --mirror 5/s
   understudy gateway signals runs/latest --from 192.168.20.1:7447
 
@@ -68,6 +69,17 @@ enum What {
         /// Let clients write operator inputs, with the role of an operator
         #[arg(long)]
         allow_writes: bool,
+    },
+    /// Run the command of [notify] for each alarm
+    #[command(after_help = "\
+Example:
+  understudy gateway notify runs/latest
+
+Runs the command of the cluster file when an alarm is raised, acknowledged or over, until the run has ended. Start it only
+for a cluster file that you trust: the command has the rights of this process (docs/how-to/alarms.md).")]
+    Notify {
+        #[command(flatten)]
+        run: RunArgument,
     },
     /// Print the register map of the Modbus TCP server
     #[command(after_help = "Example:\n  understudy gateway registers runs/latest")]
@@ -157,6 +169,17 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
             forward_signals(&gate, *from, keys.as_ref(), &ends, &mut |said| console.note(said))
                 .map_err(failed)?;
             Ok(ended())
+        }
+        What::Notify { run } => {
+            let run = Followed::new(&run.open()?).map_err(failed)?;
+            if let Some(command) = run.cluster().notify() {
+                console.note(&format!("alarms are passed on to `{}`", command.program));
+            }
+            let notified = notify(&run, &mut |error| console.note(&error.to_string()));
+            let Notified { delivered, undelivered } = notified.map_err(failed)?;
+            let text = format!("notifications: {delivered} delivered, {undelivered} not delivered");
+            let counts = json!({ "delivered": delivered, "undelivered": undelivered });
+            Ok(Answer::done(text.as_str(), counts))
         }
         What::Registers { run } => {
             let map = RegisterMap::new(run.open()?.cluster()).map_err(failed)?;

@@ -9,7 +9,7 @@ use std::process::{Command, Stdio};
 use crate::{empty_folder, understudy, understudy_in};
 
 /// Examples that this test does not run, by a part of each, and why. The command line understands them all (`cli/commands.rs`).
-const NOT_RUN: [(&str, &str); 28] = [
+const NOT_RUN: [(&str, &str); 29] = [
     ("TcPOU", "names the files of a project of another tool"),
     ("understudy demo", "runs for a minute; the tests of the page run it"),
     ("understudy lab ", "runs for a minute; the tests of the laboratory run it"),
@@ -22,6 +22,7 @@ const NOT_RUN: [(&str, &str); 28] = [
     ("gateway modbus ", "serves until it is interrupted"),
     ("gateway zenoh ", "serves until it is interrupted"),
     ("gateway signals ", "serves until it is interrupted"),
+    ("gateway notify ", "needs a cluster file with a command"),
     ("understudy node ", "is a member of a cluster"),
     ("understudy remote-io ", "is a member of a cluster"),
     ("understudy plant ", "is a member of a cluster"),

@@ -7,7 +7,7 @@ use std::process::Command;
 use serde_json::Value;
 use understudy_testing::skip;
 
-use crate::{Page, empty_folder, one_at_a_time, understudy};
+use crate::{Page, answer, empty_folder, one_at_a_time, understudy};
 
 /// The exit status of the script where no browser starts.
 const NOT_STARTED: i32 = 77;
@@ -17,13 +17,21 @@ fn is_there(program: &str) -> bool {
     output.is_ok_and(|output| output.status.success())
 }
 
-/// Starts a page that commands a laboratory of `cluster`, and drives it by a script in this folder.
-fn drive(name: &str, cluster: &str, script: &str, more: impl Fn(&Page) -> Vec<String>) {
+/// The browser, where this machine has one.
+fn browser() -> Option<String> {
     let browser = std::env::var("UNDERSTUDY_BROWSER").unwrap_or_default();
     if browser.is_empty() || !is_there("node") || !is_there(&browser) {
         skip("UNDERSTUDY_BROWSER names no Chromium, or Node is not installed");
-        return;
+        return None;
     }
+    Some(browser)
+}
+
+/// Starts a page that commands a laboratory of `cluster`, and drives it by a script in this folder.
+fn drive(name: &str, cluster: &str, script: &str, more: impl Fn(&Page) -> Vec<String>) {
+    let Some(browser) = browser() else {
+        return;
+    };
     let _turn = one_at_a_time();
     let folder = empty_folder(name);
     let mut command = understudy(&["watch", cluster]);
@@ -41,11 +49,16 @@ fn drive(name: &str, cluster: &str, script: &str, more: impl Fn(&Page) -> Vec<St
             .filter(|member| ["controller", "understudy"].contains(&&*text(&member["kind"])));
         stations.all(|station| station["state"] == "publishing")
     });
+    drive_page(&browser, &page, &folder, script, more(&page));
+}
+
+/// Drives a page by a script in this folder.
+fn drive_page(browser: &str, page: &Page, folder: &Path, script: &str, more: Vec<String>) {
     let output = Command::new("node")
         .arg(format!("tests/page/{script}"))
         .arg(format!("http://{}/", page.address))
         .arg(folder.join("pictures"))
-        .args(more(&page))
+        .args(more)
         .current_dir(env!("CARGO_MANIFEST_DIR"))
         .output()
         .expect("node runs");
@@ -71,6 +84,11 @@ fn a_browser_sees_a_kill_and_asks_why() {
 #[test]
 fn a_browser_sees_no_red_before_outputs_are_fail_safe() {
     drive("calm", "examples/press-cell/cluster.toml", "calm.mjs", |_| Vec::new());
+}
+
+#[test]
+fn a_browser_sees_the_alarms_at_every_place_of_the_page() {
+    drive("banner", "examples/press-cell/cluster.toml", "banner.mjs", |_| Vec::new());
 }
 
 #[test]
@@ -115,4 +133,46 @@ fn large_cell(folder: &Path) -> String {
 fn a_browser_reads_events_rungs_values_and_links() {
     let cluster = large_cell(&empty_folder("reader-cell"));
     drive("reader", &cluster, "reader.mjs", |_| Vec::new());
+}
+
+/// A line of 24 robots and presses with two understudies.
+fn line_of_24(folder: &Path) -> String {
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/press-cell");
+    let mut text = "[cluster]\nname = \"line\"\nperiod = \"10ms\"\n".to_owned();
+    for name in ["robot", "press"] {
+        let ladder = format!("{name}.ladder");
+        fs::copy(example.join(&ladder), folder.join(&ladder)).expect("an example");
+        text += &format!("[[understudy]]\nname = \"understudy-{name}\"\n");
+    }
+    for place in 0..24 {
+        let kind = ["robot", "press"][place % 2];
+        text += &format!(
+            "[[controller]]\nname = \"{kind}-{place}\"\nladder = \"{kind}.ladder\"\n\
+             [[remote_io]]\nname = \"io-{place}\"\ncontroller = \"{kind}-{place}\"\n"
+        );
+    }
+    let cluster = folder.join("cluster.toml");
+    fs::write(&cluster, text).expect("written");
+    cluster.display().to_string()
+}
+
+#[test]
+fn a_browser_sees_what_is_not_normal_of_many_programs() {
+    let Some(browser) = browser() else {
+        return;
+    };
+    let folder = empty_folder("overview");
+    let scenario = folder.join("scenario.toml");
+    let crash = |at: u32, station: &str| {
+        format!("[[step]]\nat = {at}\naction = \"crash\"\nstation = \"{station}\"\n")
+    };
+    let steps = crash(60, "robot-4") + &crash(120, "understudy-press") + &crash(180, "press-9");
+    fs::write(&scenario, format!("title = \"crashes\"\ncycles = 240\n{steps}")).expect("written");
+    let (scenario, out) = (scenario.display().to_string(), folder.join("runs"));
+    let cluster = line_of_24(&folder);
+    let simulate = ["simulate", &cluster, "--seed", "7", "--scenario", &scenario];
+    let (_, _, said) = answer(&[&simulate[..], &["--out", &out.display().to_string()]].concat());
+    assert!(out.join("latest").exists(), "{said}");
+    let page = Page::of_run(&fs::canonicalize(out.join("latest")).expect("a run"));
+    drive_page(&browser, &page, &folder, "overview.mjs", Vec::new());
 }

@@ -10,6 +10,7 @@ mod browser;
 mod commands;
 mod demo;
 mod elsewhere;
+mod notify;
 mod paths;
 mod present;
 #[allow(dead_code, reason = "each test uses its part")]

@@ -52,6 +52,14 @@ pub enum GatewayError {
         /// Name of the cluster.
         cluster: String,
     },
+    /// No command for alarms.
+    #[error(
+        "U0599: the cluster file of `{cluster}` has no [notify]; add one with the command: command = [\"logger\", \"-t\", \"understudy\"]"
+    )]
+    NoNotify {
+        /// Name of the cluster.
+        cluster: String,
+    },
     /// Zenoh did not start.
     #[error(transparent)]
     Bus(#[from] BusError),
@@ -66,6 +74,7 @@ impl GatewayError {
             Self::TooManyBits { .. } | Self::TooManyRegisters { .. } => "U0592",
             Self::Journal(_) => "U0593",
             Self::NoGroupSignals { .. } => "U0597",
+            Self::NoNotify { .. } => "U0599",
             Self::Bus(error) => error.code(),
         }
     }

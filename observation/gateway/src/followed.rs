@@ -8,7 +8,7 @@ use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
 use understudy_cluster::Cluster;
-use understudy_view::{Bounds, Event, Following, Model, Progress, Reading, Run, Snapshot};
+use understudy_view::{Alarm, Bounds, Event, Following, Model, Progress, Reading, Run, Snapshot};
 use understudy_wire::ProgramId;
 
 use crate::error::GatewayError;
@@ -42,6 +42,8 @@ pub struct Observation {
     pub states: Vec<Option<Vec<bool>>>,
     /// The newest events, oldest first.
     pub recent: Vec<Event>,
+    /// The alarms that are open, and the newest of the others, in the order of their numbers.
+    pub alarms: Vec<Alarm>,
     /// How much of the journal is read while its past is not, in percent: alarms and events of then are not known.
     pub past_percent: Option<u8>,
     /// The time at which the newest record was written.
@@ -52,6 +54,9 @@ pub struct Observation {
 
 /// Events in [`Observation::recent`].
 const RECENT: usize = 20;
+
+/// Newest alarms in [`Observation::alarms`].
+const RECENT_ALARMS: usize = 200;
 
 impl Observation {
     /// The observation of a model whose newest record was written at `heard`.
@@ -69,6 +74,7 @@ impl Observation {
         recent.reverse();
         Self {
             states: programs.map(state).collect(),
+            alarms: alarms(model, until),
             snapshot: Arc::new(snapshot),
             recent,
             past_percent: None,
@@ -76,6 +82,15 @@ impl Observation {
             advanced: heard,
         }
     }
+}
+
+/// The alarms that are open in a cycle, and the newest of the others.
+pub(crate) fn alarms(model: &Model, cycle: i64) -> Vec<Alarm> {
+    let newest = model.alarms_at(cycle).rev().enumerate();
+    let kept = newest.filter(|(place, alarm)| *place < RECENT_ALARMS || alarm.is_open());
+    let mut kept: Vec<Alarm> = kept.map(|(_, alarm)| alarm).collect();
+    kept.reverse();
+    kept
 }
 
 #[derive(Debug)]

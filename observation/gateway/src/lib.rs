@@ -3,6 +3,7 @@
 //! ```text
 //!   journal ──► Followed: snapshot ──┬─► Metrics     ──► Prometheus, over HTTP
 //!   (files that grow)                ├─► RegisterMap ──► Modbus TCP: bits and registers
+//!                                    ├─► Changes     ──► the command of `[notify]`
 //!                                    └─► documents   ──► JSON under keys of Zenoh, at a limited rate
 //! ```
 //!
@@ -25,6 +26,7 @@ mod labels;
 mod metrics;
 mod mirror;
 mod modbus;
+mod notify;
 mod questions;
 mod register_map;
 mod requests;
@@ -39,6 +41,7 @@ pub use http::serve_metrics;
 pub use metrics::{Metrics, exposition_of};
 pub use mirror::{Rate, mirror};
 pub use modbus::serve_modbus;
+pub use notify::{Change, Notification, Notified, NotifyError, notify};
 pub use register_map::{Area, Place, ProcessImage, RegisterMap};
 pub use writing::{MAXIMUM_WRITES, WRITES_PER_SECOND, WriteGate};
 

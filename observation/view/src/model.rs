@@ -12,6 +12,7 @@ mod programs;
 mod protection;
 mod reports;
 mod run_events;
+mod silence;
 mod standing;
 mod turns;
 

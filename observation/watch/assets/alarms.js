@@ -1,6 +1,7 @@
 // Alarms: what each says, and what an operator does with it.
 
 import { act, tell, toast } from "/ask.js";
+import { SIGNS } from "/banner.js";
 import { el, keyed, setText } from "/element.js";
 import { complete, nameField, owner, reasonField } from "/who.js";
 import { clockOf } from "/zone.js";
@@ -26,10 +27,11 @@ export function show(state) {
   keyed(document.getElementById("alarm-list"), state.alarms, (alarm) => alarm.id, makeAlarm, (line, alarm) => {
     const by = alarm.acknowledged;
     line.dataset.state = alarm.state;
+    setText(line.querySelector(".alarm-sign"), SIGNS[alarm.state]);
     const before = alarm.since_before ? " or before" : "";
     setText(line.querySelector(".alarm-words"), alarm.what);
     const when = (at, cycle) => [clockOf(at, state.at), at ? `(cycle ${cycle})` : `cycle ${cycle}`].filter(Boolean).join(" ");
-    const over = alarm.lasts ? null : ["over", clockOf(alarm.over_at, state.at)].filter(Boolean).join(" since ");
+    const over = alarm.lasts ? null : `returned to normal ${when(alarm.over_at, alarm.over)}`;
     const facts = [alarm.who, alarm.priority, `since ${when(alarm.at, alarm.cycle)}${before}`, over, alarm.action];
     const seen = by ? `acknowledged by ${by}, ${when(alarm.acknowledged_at, alarm.acknowledged_in)}` : null;
     setText(line.querySelector(".alarm-by"), [...facts, seen].filter(Boolean).join(" · "));
@@ -67,7 +69,7 @@ function acknowledgeAll() {
 
 function makeAlarm(alarm) {
   const seen = () => acknowledge([alarm.id], `${alarm.who}: alarm of cycle ${alarm.cycle}`);
-  return el("li", {}, el("span", { class: "alarm-sign", "aria-hidden": "true" }, "⚠"), el("span", { class: "alarm-words" }), el("span", { class: "alarm-by" }),
+  return el("li", {}, el("span", { class: "alarm-sign", "aria-hidden": "true" }), el("span", { class: "alarm-words" }), el("span", { class: "alarm-by" }),
     el("button", { type: "button", click: seen }, "Acknowledge"));
 }
 

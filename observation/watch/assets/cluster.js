@@ -1,10 +1,13 @@
 // The cluster: states of the members, source of the outputs of each plant, and remaining redundancy.
 
+import { changed } from "/address.js";
 import { broken, el, keyed, setText, setAttribute, valueText } from "/element.js";
 import { signalLegend, sourceLegend, stateLegend } from "/legend.js";
+import * as overview from "/overview.js";
 import { STATES, makePicture } from "/picture.js";
 import { continueWords, openChoice, openMember } from "/commands.js";
 import { SOURCES } from "/sources.js";
+import * as time from "/time.js";
 import { openWhy } from "/why.js";
 
 // States that are common; the others need no explanation.
@@ -13,17 +16,21 @@ const LEGEND_STATES = ["publishing", "not-received", "flagged", "joining", "shad
 let run = null;
 let place = null;
 let picture = null;
+let large = false;
 
 export function prepare(facts) {
   run = facts;
-  picture = makePicture(run, openMember);
+  large = overview.isLarge(run);
+  picture = makePicture(run, openMember, large ? 0 : null);
   const table = (id, heads) =>
     el("table", { id }, el("thead", {}, el("tr", {}, heads.map((head) => el("th", { scope: "col" }, head)))), el("tbody"));
   const card = (id, heading, ...content) =>
     el("section", { id: `${id}-card`, class: "card", "aria-labelledby": `${id}-title` }, el("h2", { id: `${id}-title` }, heading), content);
   const folded = (id, words, ...content) => el("details", { id }, el("summary", { class: "soft" }, words), content);
   place = document.getElementById("view-cluster");
+  place.classList.toggle("large", large);
   place.append(
+    ...(large ? overview.prepare(run, choose, again) : []),
     el("div", { class: "picture-frame", tabindex: "0", role: "region", "aria-label": "Picture of the cluster" }, picture.element),
     folded("cluster-legend", "Legend", el("div", { class: "legends" }, sourceLegend(), stateLegend(LEGEND_STATES.map((name) => STATES[name])))),
     el("div", { class: "cards" },
@@ -37,13 +44,36 @@ export function prepare(facts) {
   );
 }
 
+export const selection = () => (large ? overview.selection() : {});
+export const select = (wanted) => large && overview.select(wanted);
+
+// A large cluster has the picture of one program, with the understudies.
+function choose(program) {
+  const before = picture.element;
+  picture = makePicture(run, openMember, program);
+  before.replaceWith(picture.element);
+  const { name } = run.programs[program];
+  for (const details of document.querySelectorAll("#signals-list details")) {
+    details.open = details.dataset.key === name;
+  }
+}
+
+// Shows another choice of the same cycle.
+function again() {
+  if (time.state()) {
+    show(time.state());
+    changed();
+  }
+}
+
 export function show(state) {
+  const programs = large ? overview.show(state) : state.programs;
   picture.show(state);
   protection(state.programs);
   redundancy(state.redundancy);
   timing(state);
-  counts(state);
-  signals(state);
+  counts(programs);
+  signals(programs);
 }
 
 // A lamp for each program: whether the failure of one station would be masked, and the choices of the operator where its state is lost.
@@ -126,11 +156,11 @@ function timing(state) {
   );
 }
 
-function counts(state) {
+function counts(programs) {
   const body = document.querySelector("#counts-table tbody");
   keyed(
     body,
-    state.programs,
+    programs,
     (program) => program.name,
     (program) => el("tr", {}, el("th", { scope: "row" }, broken(program.name)), el("td"), el("td"), el("td"), el("td")),
     (row, { counts, source }) => {
@@ -141,17 +171,17 @@ function counts(state) {
   );
 }
 
-function signals(state) {
+function signals(programs) {
   keyed(
     document.getElementById("signals-list"),
-    state.programs,
+    programs,
     (program) => program.name,
     (program) => {
       const facts = run.programs[program.index];
       const line = (signal, kind, index) =>
         el("button", { type: "button", class: "signal", "data-kind": kind, "data-index": index, click: () => pick(program.index, kind, index) },
           el("span", { class: "lamp", "aria-hidden": "true" }), el("span", { class: "signal-name" }, broken(signal.name)), el("span", { class: "signal-value" }), el("span", { class: "signal-forced" }));
-      return el("details", { open: true },
+      return el("details", { open: !large },
         el("summary", {}, program.name, " ", el("span", { class: "source-words" })),
         el("div", { class: "signal-columns" },
           el("div", {}, el("h3", {}, "inputs"), facts.inputs.map((signal, index) => line(signal, "input", index))),

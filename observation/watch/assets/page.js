@@ -2,6 +2,7 @@
 
 import * as address from "/address.js";
 import { act, ask, tell, toast } from "/ask.js";
+import * as banner from "/banner.js";
 import { setText } from "/element.js";
 import * as kept from "/kept.js";
 import * as signals from "/signals.js";
@@ -75,13 +76,7 @@ function head(state, live) {
   apart.hidden = !state.clocks_apart;
   setText(apart, state.clocks_apart ? `Clocks of the cluster differ: ${state.clocks_apart}. Times of day are those of one remote I/O.` : "");
   document.body.dataset.when = when;
-  const open = state.open_alarms;
-  const button = document.getElementById("alarm-count");
-  button.hidden = open === 0;
-  const count = open === 1 ? "1 alarm" : `${open} alarms`;
-  button.dataset.unseen = String(state.unacknowledged_alarms > 0);
-  const seen = state.unacknowledged_alarms === 0 ? ", acknowledged" : "";
-  setText(button, state.past ? `⚠ at least ${count}` : `⚠ ${count}${seen}`);
+  banner.show(state);
 }
 
 // A long journal is begun near its end; what is before comes behind it.
@@ -145,7 +140,7 @@ async function begin() {
     part.prepare(run);
   }
   document.getElementById("tab-operate").hidden = !operate.has(run);
-  document.getElementById("alarm-count").addEventListener("click", () => (location.hash = "events"));
+  banner.prepare(run);
   zone.prepare();
   const show = (state, live) => {
     head(state, live);

@@ -32,14 +32,17 @@ const GAP = 22;
 const BOX = { height: 62 };
 const ROWS = { station: 14, bus: 112, remote: 152, plant: 262 };
 
-export function makePicture(run, pick) {
-  const names = [...run.stations.map((station) => station.name), ...run.programs.flatMap((program) => [program.remote_io, program.plant ?? ""])];
+// The picture of the cluster, or of one program of it with its controller and all understudies.
+export function makePicture(run, pick, only = null) {
+  const shown = run.programs.filter((program) => only === null || program.index === only);
+  const shownStations = run.stations.filter((station) => only === null || station.role !== "controller" || station.program === only);
+  const names = [...shownStations.map((station) => station.name), ...shown.flatMap((program) => [program.remote_io, program.plant ?? ""])];
   const longest = Math.max(...names.map((name) => name.length));
   const WIDTH = Math.round(Math.min(WIDEST, Math.max(NARROWEST, longest * LETTER + 24)));
   const letters = Math.floor((WIDTH - 24) / LETTER);
-  const columns = Math.max(run.stations.length, run.programs.length);
+  const columns = Math.max(shownStations.length, shown.length);
   const width = columns * (WIDTH + GAP) + GAP;
-  const height = ROWS.plant + BOX.height + 14;
+  const height = (shown.some((program) => program.plant) ? ROWS.plant : ROWS.remote) + BOX.height + 14;
   const left = (column) => GAP + column * (WIDTH + GAP);
   const lines = svg("g", { class: "flows" });
   const boxes = new Map();
@@ -48,19 +51,19 @@ export function makePicture(run, pick) {
     boxes.set(name, made);
     return made.element;
   };
-  const stations = run.stations.map((station) =>
-    box(station.name, station.role, station.rank, ROWS.station, { kind: "station", name: station.name, program: station.program }));
-  const remotes = run.programs.map((program, index) =>
-    box(program.remote_io, "remote I/O", index, ROWS.remote, { kind: "remote-io", name: program.remote_io, program: index }));
-  const plants = run.programs.flatMap((program, index) =>
-    program.plant ? [box(program.plant, "plant", index, ROWS.plant, { kind: "plant", name: program.plant, program: index })] : []);
+  const stations = shownStations.map((station, column) =>
+    box(station.name, station.role, column, ROWS.station, { kind: "station", name: station.name, program: station.program }));
+  const remotes = shown.map((program, column) =>
+    box(program.remote_io, "remote I/O", column, ROWS.remote, { kind: "remote-io", name: program.remote_io, program: program.index }));
+  const plants = shown.flatMap((program, column) =>
+    program.plant ? [box(program.plant, "plant", column, ROWS.plant, { kind: "plant", name: program.plant, program: program.index })] : []);
   const bus = svg("g", { class: "bus" },
     svg("line", { x1: GAP / 2, x2: width - GAP / 2, y1: ROWS.bus, y2: ROWS.bus }),
     svg("text", { x: width - GAP / 2, y: ROWS.bus - 7, "text-anchor": "end" }, "network"));
-  const drops = run.stations.map((station) => drop(left(station.rank) + WIDTH / 2, ROWS.station + BOX.height, ROWS.bus));
+  const drops = shownStations.map((_, column) => drop(left(column) + WIDTH / 2, ROWS.station + BOX.height, ROWS.bus));
   const element = svg("svg", { class: "picture", viewBox: `0 0 ${width} ${height}`, width, height, role: "group", "aria-label": "Stations, remote I/Os and plants" },
     bus, drops, lines, stations, remotes, plants);
-  const flows = run.programs.map((program, index) => makeFlow(lines, left(index) + WIDTH / 2, Math.floor(letters * 0.7), Boolean(program.plant)));
+  const flows = new Map(shown.map((program, column) => [program.index, makeFlow(lines, left(column) + WIDTH / 2, Math.floor(letters * 0.7), Boolean(program.plant))]));
   return { element, show: (state) => showAll(run, boxes, flows, state) };
 }
 
@@ -105,7 +108,8 @@ function showAll(run, boxes, flows, state) {
       showBox(box, member);
     }
   }
-  state.programs.forEach((program, index) => {
+  state.programs.filter((program) => flows.has(program.index)).forEach((program) => {
+    const { index } = program;
     // What a program drives has the mark of its source: nothing is shown as sound below fail-safe outputs.
     for (const name of [run.programs[index].remote_io, run.programs[index].plant]) {
       const box = boxes.get(name);
@@ -113,7 +117,7 @@ function showAll(run, boxes, flows, state) {
         setAttribute(box.element, "data-source", program.source);
       }
     }
-    const { down, words, whose, letters, out, outWords } = flows[index];
+    const { down, words, whose, letters, out, outWords } = flows.get(index);
     const source = SOURCES[program.source] ?? SOURCES.unknown;
     for (const line of [down, out]) {
       setAttribute(line, "data-source", program.source);

@@ -181,6 +181,8 @@ struct ShownAlarm {
     programs: Vec<String>,
     what: String,
     lasts: bool,
+    /// The cycle in which it was over.
+    over: Option<i64>,
     acknowledged: Option<String>,
     acknowledged_in: Option<i64>,
     /// `unacknowledged`, `acknowledged`, `returned` or `normal`.
@@ -465,6 +467,7 @@ fn shown_alarm(alarm: Alarm) -> ShownAlarm {
         programs: alarm.programs,
         what: alarm.text,
         lasts: alarm.over.is_none(),
+        over: alarm.over,
         acknowledged: alarm.acknowledged_by,
         acknowledged_in: alarm.acknowledged_in,
     }

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use crate::alarm::AlarmDeclaration;
 use crate::code::Code;
 use crate::device::FieldDevice;
+use crate::notify::Notify;
 use crate::source::{InputSource, OperatorDeclaration, SignalDeclaration};
 use crate::undriven::initial_image;
 use serde::{Deserialize, Serialize};
@@ -211,6 +212,7 @@ pub struct Cluster {
     pub(crate) remote_ios: Vec<RemoteIo>,
     pub(crate) plants: Vec<Option<PlantPlace>>,
     pub(crate) alarms: Arc<[AlarmDeclaration]>,
+    pub(crate) notify: Option<Notify>,
     pub(crate) programs: Arc<[Program]>,
     pub(crate) parity: Option<ParityController>,
 }
@@ -298,6 +300,11 @@ impl Cluster {
     /// Alarms on signals of the programs, in the order of the file.
     pub fn alarms(&self) -> &Arc<[AlarmDeclaration]> {
         &self.alarms
+    }
+
+    /// Command that passes alarms on, where the file has one.
+    pub fn notify(&self) -> Option<&Notify> {
+        self.notify.as_ref()
     }
 
     /// All programs, compiled, in order.

@@ -3,6 +3,8 @@
 //! Invariant: a value that leaves here has the type and the bounds of its [`Key`]; where the text has another one, that is
 //! reported and the default goes on in its place, so that the rest is still checked.
 
+mod command;
+
 use std::collections::BTreeMap;
 use std::net::{SocketAddr, SocketAddrV4};
 use std::ops::Range;

@@ -14,9 +14,10 @@ use understudy_text::tables::{Value, unknown_key};
 use crate::device::{BAUD_RATES, Connection, Parity, SerialLine};
 use crate::fields::{CODES, ConnectionText, Fields, PlaceEntry, Placed, SourceEntry};
 use crate::format::{
-    ALARM, CLUSTER, CONTROLLER, FIELD, LADDER_PARAMETERS, MODELS, PLANT, PRESS_PARAMETERS,
+    ALARM, CLUSTER, CONTROLLER, FIELD, LADDER_PARAMETERS, MODELS, NOTIFY, PLANT, PRESS_PARAMETERS,
     REMOTE_IO, ROBOT_PARAMETERS, SECTIONS, Section, UNDERSTUDY,
 };
+use crate::notify::Notify;
 
 /// What a text says; whole only where no diagnostic is an error.
 #[derive(Debug)]
@@ -28,6 +29,7 @@ pub(crate) struct ClusterFile {
     pub(crate) remote_ios: Vec<RemoteIoSection>,
     pub(crate) plants: Vec<PlantSection>,
     pub(crate) alarms: Vec<AlarmSection>,
+    pub(crate) notify: Option<Notify>,
 }
 
 #[derive(Debug)]
@@ -217,7 +219,25 @@ pub(crate) fn read(text: &str, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
             action: fields.text("action", diagnostics).map(|text| text.value),
         })
         .collect();
-    Some(ClusterFile { cluster: cluster?, controllers, understudies, remote_ios, plants, alarms })
+    let notify = notify(root, diagnostics);
+    Some(ClusterFile {
+        cluster: cluster?,
+        controllers,
+        understudies,
+        remote_ios,
+        plants,
+        alarms,
+        notify,
+    })
+}
+
+fn notify(root: &DeTable<'_>, diagnostics: &mut Vec<Diagnostic>) -> Option<Notify> {
+    let value = Value::new(NOTIFY.name, root.get(NOTIFY.name)?, &CODES);
+    let table = value.table("a table, [notify]", diagnostics)?;
+    let fields = Fields::new(&NOTIFY, table, diagnostics);
+    let timeout = fields.time("timeout", diagnostics);
+    let (program, arguments) = fields.command("command", diagnostics)?;
+    Some(Notify { program, arguments, timeout })
 }
 
 fn missing(section: &Section) -> Diagnostic {

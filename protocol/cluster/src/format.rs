@@ -63,6 +63,8 @@ pub(crate) enum Kind {
     Points,
     /// A table from inputs to their sources.
     Sources,
+    /// A list of texts: a program and its arguments.
+    Command,
     /// A value of a signal.
     Value,
     /// `true` or `false`; `false` where absent.
@@ -271,12 +273,22 @@ pub(crate) static ALARM: Section = Section {
     },
 };
 
+pub(crate) static NOTIFY: Section = Section {
+    name: "notify",
+    repeated: false,
+    meaning: "the command that `understudy gateway notify` runs for alarms",
+    keys: keys! {
+        required command: Kind::Command, "program and arguments, without a shell; the alarm is its standard input";
+        key timeout: time(Duration::from_millis(100), Duration::from_mins(10), Duration::from_secs(10)), "time after which the command is killed";
+    },
+};
+
 /// The longest delay of an alarm.
 const LONGEST_DELAY: Duration = Duration::from_hours(24);
 
 /// In the order of the documentation.
-pub(crate) static SECTIONS: [&Section; 6] =
-    [&CLUSTER, &CONTROLLER, &UNDERSTUDY, &REMOTE_IO, &PLANT, &ALARM];
+pub(crate) static SECTIONS: [&Section; 7] =
+    [&CLUSTER, &CONTROLLER, &UNDERSTUDY, &REMOTE_IO, &PLANT, &ALARM, &NOTIFY];
 
 pub(crate) static ROBOT_PARAMETERS: Section = Section {
     name: "plant.parameters",
@@ -362,6 +374,9 @@ impl Kind {
             }
             Self::Sources => {
                 "a table from inputs to sources, such as { start = { operator = \"pulse\" }, ready = { from = \"press.done\", default = false } }".into()
+            }
+            Self::Command => {
+                "a list of texts in quotes, such as [\"logger\", \"-t\", \"understudy\"]".into()
             }
             Self::Value => "a value of the signal, such as `true`, 12.5 or \"1.5 s\"".into(),
             Self::Flag | Self::State => "`true` or `false`".into(),

@@ -18,6 +18,7 @@ mod draft;
 mod fields;
 mod file;
 mod format;
+mod notify;
 mod place;
 mod read;
 mod schema;
@@ -34,6 +35,7 @@ pub use cluster::{Cluster, Controller, Link, PlantPlace, RemoteIo, Security, Und
 pub use code::Code;
 pub use device::{BAUD_RATES, Binding, Connection, FieldDevice, Parity, SerialLine, Side};
 pub use draft::{Draft, DraftProgram, MAXIMUM_PROGRAM_NAME};
+pub use notify::Notify;
 pub use place::{BitPlace, ByteOrder, Place, PlaceError, RegisterTable, Registers};
 pub use read::{Loaded, MAXIMUM_TEXT_BYTES, Overrides, read, read_with};
 pub use schema::schema;

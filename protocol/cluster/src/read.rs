@@ -216,6 +216,7 @@ fn build(
         remote_ios,
         plants: plants.places,
         alarms: alarms.into(),
+        notify: file.notify,
         programs,
         parity,
     };

@@ -86,6 +86,9 @@ fn property(key: &Key) -> Value {
             "type": "object",
             "additionalProperties": { "anyOf": [table(&OPERATOR_INPUT), table(&SIGNAL_INPUT)] },
         }),
+        Kind::Command => {
+            json!({ "type": "array", "items": { "type": "string" }, "minItems": 1 })
+        }
         Kind::Value => json!({ "type": ["boolean", "number", "string"] }),
         Kind::Flag => json!({ "type": "boolean", "default": false }),
         Kind::State => json!({ "type": "boolean" }),

@@ -7,18 +7,21 @@ use understudy_remote_io::{Event as RemoteIoEvent, Lacking, LackingReason};
 use understudy_wire::{Member, ProgramId, ProgramSet, StationId, StationSet};
 
 use super::Model;
+use super::silence::{NOT_RECEIVED, Silence};
 use super::standing::{Change, ProgramChange, Standing};
-use crate::alarm::UNPROTECTED;
+use crate::alarm::{Subject, UNPROTECTED};
 use crate::protection::{LackingStation, LostState, Protection};
 use crate::station::StationState;
 
 const STATE_LOST: &str = "state-lost";
 
+/// The stations that a remote I/O receives, those of them that publish for its program, and whether it receives no station at all.
+type Evidence = (StationSet, StationSet, Option<Silence>);
+
 /// What is known of the stations that prove the outputs of a program which is not protected.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Attribution {
-    /// Those that its remote I/O receives, and those of them that publish for it.
-    evidence: Option<(StationSet, StationSet)>,
+    evidence: Option<Evidence>,
     /// The first cycle of those in a row with it.
     since: i64,
     /// Whether its causes follow from it.
@@ -27,7 +30,7 @@ pub(super) struct Attribution {
 
 impl Attribution {
     /// Takes the evidence of a cycle; whether it has been the same for long enough and was not used.
-    fn is_due(&mut self, evidence: (StationSet, StationSet), cycle: i64, flag_after: i64) -> bool {
+    fn is_due(&mut self, evidence: Evidence, cycle: i64, flag_after: i64) -> bool {
         if self.evidence != Some(evidence) {
             *self = Self { evidence: Some(evidence), since: cycle, is_done: false };
         }
@@ -42,7 +45,6 @@ impl Attribution {
 }
 
 /// Reasons that a later cycle can refute.
-const NOT_RECEIVED: &str = "not-received";
 const JOINING: &str = "joining";
 
 impl Model {
@@ -78,7 +80,8 @@ impl Model {
                 let cycles = since.saturating_add(1)..=until;
                 let lacking = lacking.iter().map(|one| self.lacking(program, one, cycles.clone()));
                 let protection = Protection { protected: false, since, lacking: lacking.collect() };
-                self.attributed(program, cycle, &protection.lacking);
+                let causes = self.causes(program, &protection.lacking, &cycles);
+                self.attributed(program, cycle, causes);
                 self.protection_is(program, cycle, protection);
             }
             RemoteIoEvent::StateLost { applied, newest, holder, asks, .. } => {
@@ -118,17 +121,8 @@ impl Model {
         }
     }
 
-    /// Each station that cannot prove the outputs of a program is a cause, and has its alarm.
-    fn attributed(&mut self, program: ProgramId, cycle: i64, lacking: &[LackingStation]) {
-        let mut causes: Vec<_> = lacking
-            .iter()
-            .map(|one| ((one.station.clone(), UNPROTECTED), one.text.clone()))
-            .collect();
-        if causes.is_empty() {
-            let remote_io = self.members.name(Member::RemoteIo(program)).to_owned();
-            let text = format!("{remote_io} does not name a station that lacks");
-            causes.push(((remote_io, UNPROTECTED), text));
-        }
+    /// Each cause has its alarm.
+    fn attributed(&mut self, program: ProgramId, cycle: i64, causes: Vec<(Subject, String)>) {
         for subject in self.alarms.causes_for(UNPROTECTED, program) {
             if causes.iter().all(|(cause, _)| *cause != subject) {
                 self.alarms.concerns_no_more(&subject, Some(program), cycle);
@@ -171,16 +165,20 @@ impl Model {
         drop(standing);
         self.attributions = attributions;
         for (program, found) in due.into_iter().filter(|(_, found)| !found.lacking.is_empty()) {
-            self.attributed(program, cycle, &found.lacking);
+            let cycles = cycle.saturating_sub(1)..=cycle;
+            let causes = self.causes(program, &found.lacking, &cycles);
+            self.attributed(program, cycle, causes);
         }
     }
 
-    /// The stations that a remote I/O receives about a cycle, and those of them that publish for its program.
-    fn evidence(&self, program: ProgramId, cycle: i64) -> Option<(StationSet, StationSet)> {
-        let heard = self.heard_in(program, cycle.saturating_sub(1)..=cycle)?;
+    /// What a remote I/O receives about a cycle.
+    fn evidence(&self, program: ProgramId, cycle: i64) -> Option<Evidence> {
+        let cycles = cycle.saturating_sub(1)..=cycle;
+        let heard = self.heard_in(program, cycles.clone())?;
         let heard: StationSet = self.provers(program).filter(|id| heard.contains(*id)).collect();
         let covers = |id: &StationId| self.covers(*id, cycle).contains(program);
-        Some((heard, heard.iter().filter(covers).collect()))
+        let publish = heard.iter().filter(covers).collect();
+        Some((heard, publish, self.silence(program, &cycles)))
     }
 
     /// The stations that prove the outputs of a program: its controller and the understudies.
@@ -237,7 +235,11 @@ impl Model {
     }
 
     /// The stations that the remote I/O of a program received in any of these cycles; nothing where none of its deadlines is known.
-    fn heard_in(&self, program: ProgramId, cycles: RangeInclusive<i64>) -> Option<StationSet> {
+    pub(super) fn heard_in(
+        &self,
+        program: ProgramId,
+        cycles: RangeInclusive<i64>,
+    ) -> Option<StationSet> {
         let deadlines = cycles.filter_map(|cycle| self.deadline(program, cycle)?.driven.as_ref());
         deadlines.map(|driven| driven.heard).reduce(StationSet::or)
     }

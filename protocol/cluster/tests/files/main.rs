@@ -6,6 +6,7 @@ mod configuration;
 mod findings;
 mod inputs;
 mod meeting;
+mod notify;
 mod press_cell;
 mod schema;
 mod template;
