@@ -73,11 +73,9 @@ impl Model {
     /// The signals in the state of a program; nothing where the cluster has no such program.
     pub fn state_signals(&self, program: ProgramId) -> Vec<StateSignal> {
         let controller = self.cluster.controllers().get(program.index());
-        controller.map_or_else(Vec::new, |controller| {
-            match controller.ladder() {
-                Some(ladder) => of_ladder(ladder),
-                None => of_typed(controller, controller.code.typed()),
-            }
+        controller.map_or_else(Vec::new, |controller| match controller.ladder() {
+            Some(ladder) => of_ladder(ladder),
+            None => of_typed(controller, controller.code.typed()),
         })
     }
 

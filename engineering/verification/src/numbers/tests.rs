@@ -100,11 +100,7 @@ fn inputs_keep_their_subranges() {
          END_PROGRAM",
     );
     let alone = Model::of_program(&program, &Asked::default()).expect("followed");
-    let member = |source| Member {
-        name: "p".to_owned(),
-        program: &program,
-        sources: vec![source],
-    };
+    let member = |source| Member { name: "p".to_owned(), program: &program, sources: vec![source] };
     let of_cluster =
         |source| Model::of_cluster("cell", &[member(source)], &Asked::default()).expect("followed");
     let x = program.inputs.find("x").expect("an input");

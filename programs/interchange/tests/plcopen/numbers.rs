@@ -15,7 +15,8 @@ use crate::support::{PERIOD, data};
 /// The program of a document, or its errors.
 pub(crate) fn typed(text: &str, period: Duration) -> Result<Program, Vec<Diagnostic>> {
     let (file, mut found) = read_typed(text);
-    let options = Options { text, program: None, period: i64::try_from(period.as_nanos()).ok() };
+    let options =
+        Options { text, period: i64::try_from(period.as_nanos()).ok(), ..Options::default() };
     let lowered = lower(&file, &options);
     found.extend(lowered.diagnostics);
     found.retain(|found| found.severity == Severity::Error);

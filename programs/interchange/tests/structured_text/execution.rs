@@ -29,7 +29,8 @@ fn shaped(name: &str) -> String {
 
 /// The typed program of a file.
 pub(crate) fn typed(text: &str, file: &File) -> Option<Program> {
-    let options = Options { text, period: i64::try_from(PERIOD.as_nanos()).ok(), ..Options::default() };
+    let options =
+        Options { text, period: i64::try_from(PERIOD.as_nanos()).ok(), ..Options::default() };
     lower(file, &options).program
 }
 
