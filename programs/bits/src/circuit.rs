@@ -85,10 +85,7 @@ impl Derivation {
     ) -> Result<Self, Unsupported> {
         // The first pass finds the boundaries of each number, the second one has them in order.
         let mut boundaries: HashMap<Term, BTreeSet<i128>> = HashMap::new();
-        let mut extents = Extents::new(system);
-        for &cell in kept {
-            extents.widen(system.cells[cell as usize].term);
-        }
+        let extents = Extents::new(system, kept);
         loop {
             let mut pass = Pass::new(system, &extents, boundaries);
             pass.build(points, kept);

@@ -11,6 +11,7 @@ use understudy_typed::{Comparison, Elementary, Operation};
 
 use self::applied::applied;
 use crate::System;
+use crate::system::Cell;
 use crate::term::{Node, Term, Terms, Variable};
 
 /// Times that a bound grows by what a scan adds, before it goes to the next constant.
@@ -95,18 +96,28 @@ pub(crate) fn divisor(mut one: i128, mut other: i128) -> i128 {
 pub(crate) struct Extents(Vec<Extent>);
 
 impl Extents {
-    pub(crate) fn new(system: &System) -> Self {
-        let cells = system.cells.iter();
-        let first = |stored, of: Elementary| {
-            if of.is_real() {
-                return Extent::of(of);
+    /// The cells `whole` have all bits below their highest, and a BOOL among them its bit; of a time the bits of its multiples of a period.
+    pub(crate) fn new(system: &System, whole: &[u32]) -> Self {
+        let first = |cell: &Cell| {
+            if cell.of.is_real() {
+                return Extent::of(cell.of);
             }
-            let number = of.signed(stored);
+            let number = cell.of.signed(cell.initial);
             Extent::new(number, number)
         };
+        let mut first: Vec<Extent> = system.cells.iter().map(first).collect();
+        for &cell in whole {
+            let extent = &mut first[cell as usize];
+            match system.cells[cell as usize].of {
+                Elementary::Bool => *extent = Extent::of(Elementary::Bool),
+                of if of.is_time() => {}
+                _ => extent.unit = 1,
+            }
+        }
         let mut search = Search {
             system,
-            cells: cells.map(|cell| first(cell.initial, cell.of)).collect(),
+            cells: first.clone(),
+            first,
             terms: Vec::new(),
             grown: vec![0; system.cells.len()],
             follows: system.terms.len() <= MANY,
@@ -130,13 +141,6 @@ impl Extents {
         Self(search.terms)
     }
 
-    /// Gives a number all bits below its highest, and a BOOL its bit.
-    pub(crate) fn widen(&mut self, term: Term) {
-        let extent = &mut self.0[Terms::index(term)];
-        let high = extent.high.max(1);
-        *extent = Extent { low: extent.low, high, unit: 1 };
-    }
-
     pub(crate) fn get(&self, term: Term) -> Extent {
         self.0[Terms::index(term)]
     }
@@ -145,6 +149,8 @@ impl Extents {
 struct Search<'s> {
     system: &'s System,
     cells: Vec<Extent>,
+    /// Those before the first scan.
+    first: Vec<Extent>,
     terms: Vec<Extent>,
     /// How often each cell has left its extent.
     grown: Vec<usize>,
@@ -227,9 +233,8 @@ impl Search<'_> {
     fn shrink(&mut self) {
         for (place, cell) in self.system.cells.iter().enumerate() {
             let next = self.terms[Terms::index(cell.next)];
-            let initial = cell.of.signed(cell.initial);
             if !cell.of.is_real() {
-                self.cells[place] = Extent::new(initial, initial).joined(next);
+                self.cells[place] = self.first[place].joined(next);
             }
         }
     }

@@ -1,5 +1,7 @@
 //! A system does what the machine does, and its circuit has every run of it.
 
+mod timers;
+
 use std::collections::BTreeSet;
 
 use understudy_structured_text::{Options, lower};

@@ -5,6 +5,7 @@
 //! ([`circuit_as_structured_text`]).
 
 mod circuit;
+mod power;
 mod program;
 
 use std::fmt::Write;
