@@ -20,7 +20,7 @@ use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::overrides::parse_address;
 
-/// Publish a run by Prometheus, Modbus TCP or Zenoh, and pass its alarms on
+/// Publish a run by Prometheus, Modbus or Zenoh, and pass its alarms on
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:

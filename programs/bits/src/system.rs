@@ -186,6 +186,12 @@ impl System {
         term
     }
 
+    /// Whether some scan gives a cell another value.
+    pub(crate) fn is_written(&self, cell: u32) -> bool {
+        let cell = &self.cells[cell as usize];
+        cell.next != cell.term
+    }
+
     /// A cell that keeps its value until [`Cell::next`] is set.
     pub(crate) fn cell(&mut self, name: String, of: Elementary, initial: u64) -> u32 {
         let number = self.cells.len() as u32;
