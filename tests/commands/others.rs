@@ -132,7 +132,7 @@ controller = \"b\"
     }
     let parity = understudy_in(&folder, &["parity", "numbers.toml"]);
     assert_eq!(parity.status, 0, "{}", parity.shown());
-    for word in ["a.n.0", "a.t.Q", "a.c.CV.1", "b.stop", "Outputs over GF(2)"] {
+    for word in ["a.n.0", "a.t.scans.4", "a.c.CV.1", "b.stop", "Outputs over GF(2)"] {
         assert!(parity.output.contains(word), "{word}: {}", parity.shown());
     }
     let scan = understudy_in(&folder, &["verify", "a.st", "--smv", "scan"]);

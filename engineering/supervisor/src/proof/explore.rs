@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use hashbrown::HashTable;
 use rustc_hash::FxBuildHasher;
-use understudy_ladder::{Name, Program};
+use understudy_ladder::{Name, Program, Signal};
 use understudy_logic::{Circuit, SPARSE, Scan, Sparse, SparseRun, ones_in, pack};
 
 use super::environment::Environment;
@@ -79,7 +79,8 @@ pub fn prove_with_progress(
 ) -> Result<Verdict, ProofError> {
     let partition = Partition::new(map, modules).map_err(ProofError::Partition)?;
     let compared = relevant(program, map, correspondence);
-    let (freed, timers) = free_timers(&compared);
+    let (mut freed, timers) = free_timers(&compared);
+    show(freed.to_mut(), map);
     let circuit = freed.lower(Duration::from_millis(1))?;
     drop(freed);
     let reference = Reference::new(modules, map, &partition, settings.mode);
@@ -107,6 +108,19 @@ pub fn prove_with_progress(
         scans: 0,
     };
     exploration.run(report)
+}
+
+/// Makes the memory bits that the map names outputs: what a scan leaves in them is looked at, and it need not outlive the scan.
+fn show(program: &mut Program, map: &InputOutputMap) {
+    let positions = map.switches.iter().flat_map(|switch| &switch.positions);
+    let signals = positions.map(|position| &position.signal);
+    let signals = signals.chain(map.pulses.iter().map(|pulse| &pulse.signal));
+    let named: HashSet<&str> = signals.map(Name::as_str).collect();
+    let is_named = |signal: &Signal| named.contains(signal.name.as_str());
+    let (shown, kept) = std::mem::take(&mut program.memory).into_iter().partition(is_named);
+    program.memory = kept;
+    let shown: Vec<Signal> = shown;
+    program.outputs.extend(shown);
 }
 
 /// A reached state, and how.
