@@ -10,7 +10,8 @@ use std::time::{Duration, SystemTime};
 use serde_json::{Value, json};
 use understudy_cluster::{Cluster, Loaded, Overrides, TemplateFile};
 use understudy_interchange::{
-    Joined, Source, USUAL_PERIOD, Wanted, files_of_project, is_part, read_ladder, read_source,
+    Joined, Rungs, Source, USUAL_PERIOD, Wanted, files_of_project, is_part, read_ladder,
+    read_source,
 };
 use understudy_journal::{Members, RunDirectory, RunDirectoryError, named_file};
 use understudy_ladder::Program;
@@ -162,8 +163,8 @@ impl ProgramText {
 /// A program that was read, as one text, with what was found in it.
 pub(crate) struct ProgramFile {
     pub(crate) report: Report,
-    /// The rungs that it is drawn as.
-    pub(crate) rungs: Option<Program>,
+    /// The rungs that it is written in or drawn as.
+    pub(crate) rungs: Option<Rungs>,
     joined: Option<Joined>,
 }
 

@@ -228,19 +228,18 @@ impl Found<'_> {
     ) -> (Option<Source>, Option<Duration>, Vec<Diagnostic>) {
         let SourceFile { source, rungs, period, mut diagnostics } =
             read_source(name, text, Wanted { program, period: None });
+        let is_ladder = rungs.as_ref().is_some_and(|rungs| rungs.are_written);
         let every = period.unwrap_or(USUAL_PERIOD);
         let shown = shown.to_owned();
-        let ladder = match &source {
-            Some(Source::Ladder(program)) => Some(program),
-            _ => rungs.as_ref(),
-        };
+        let ladder = rungs.as_ref().filter(|_| source.is_some()).map(|rungs| &rungs.ladder);
         if ladder.is_some_and(|ladder| looking.at_rungs(ladder, every, &mut diagnostics)) {
             self.cut_short.push(shown.clone());
         }
         match &source {
-            Some(Source::Typed(program)) => self.sizes.push((shown, Size::of(program))),
+            Some(Source::Program(_)) if is_ladder => {}
+            Some(Source::Program(program)) => self.sizes.push((shown, Size::of(program))),
             Some(Source::Library(units)) => self.libraries.push((shown, units.clone())),
-            Some(Source::Ladder(_)) | None => {}
+            None => {}
         }
         (source, period, diagnostics)
     }

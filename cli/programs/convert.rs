@@ -96,7 +96,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let failed = |error: WriteError| (code(&error), error.to_string());
     let as_it_is = Wanted { period: None, ..wanted };
     let as_it_is = read_source(&report.name, &report.text, as_it_is);
-    let is_typed = matches!(as_it_is.source, Some(Source::Typed(_)));
+    let is_program = matches!(as_it_is.source, Some(Source::Program(_)));
+    let is_typed = is_program && as_it_is.ladder().is_none();
     let written = match (&reading.program, form) {
         // Statements are written as they are in each form that has statements.
         (program, Ok(form @ (Form::St | Form::Plcopen | Form::PlcopenFbd)))

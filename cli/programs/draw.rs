@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
-use understudy_interchange::{Bodies, Source, Wanted, digraph, draw_typed, listing};
+use understudy_interchange::{Bodies, Wanted, digraph, draw_typed, listing};
 use understudy_ladder::{draw_svg, draw_text};
 use understudy_text::Report;
 
@@ -51,11 +51,8 @@ enum Form {
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let path = arguments.file.as_path();
     let wanted = Wanted { program: arguments.program.as_deref(), period: None };
-    let (source, mut file, _) = files::program(path, wanted)?;
-    let ladder = match source {
-        Source::Ladder(program) => Some(program),
-        _ => file.rungs.take(),
-    };
+    let (_, mut file, _) = files::program(path, wanted)?;
+    let ladder = file.rungs.take().map(|rungs| rungs.ladder);
     let is_picture = arguments.output.as_ref().and_then(|path| path.extension());
     let is_picture = is_picture.is_some_and(|ending| ending.eq_ignore_ascii_case("svg"));
     let form = arguments.form.unwrap_or(if is_picture { Form::Svg } else { Form::Text });

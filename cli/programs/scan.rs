@@ -9,7 +9,6 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 use understudy_executable::{Executable, Interface, Scratch, declared, digest};
 use understudy_interchange::{Source, USUAL_PERIOD, Wanted, no_program, read_source};
-use understudy_ladder::Program as Ladder;
 use understudy_text::{Diagnostic, Report, duration, has_errors};
 use understudy_typed::{Elementary, Fault, Point, Points, Program};
 
@@ -123,7 +122,7 @@ pub(crate) struct Subject {
     pub(crate) executable: Executable,
     pub(crate) interface: Interface,
     period: Duration,
-    pub(crate) typed: Option<std::sync::Arc<Program>>,
+    pub(crate) program: std::sync::Arc<Program>,
 }
 
 pub(crate) fn subject(
@@ -137,30 +136,12 @@ pub(crate) fn subject(
         read.diagnostics.push(no_program());
     }
     let reports = source.reports(read.diagnostics);
-    let (name, executable, interface, typed) = match read.source {
-        Some(Source::Ladder(program)) => {
-            let circuit = lowered(&program, period)?;
-            let name = program.name.to_string();
-            (name, (&circuit).into(), (&circuit).into(), None)
-        }
-        Some(Source::Typed(program)) => {
-            let executable = program.as_ref().into();
-            let name = program.name.clone();
-            (name, executable, program.as_ref().into(), Some(program))
-        }
-        Some(Source::Library(_)) | None => return Err(Answer::bad_files(reports)),
+    let Some(Source::Program(program)) = read.source else {
+        return Err(Answer::bad_files(reports));
     };
-    let subject = Subject { name, executable, interface, period, typed };
-    Ok((subject, reports))
-}
-
-fn lowered(
-    program: &Ladder,
-    period: Duration,
-) -> std::result::Result<understudy_logic::Circuit, Answer> {
-    program
-        .lower(period)
-        .map_err(|error| Answer::failed(Status::BadInput, "U0436", error.to_string()))
+    let (executable, interface) = (program.as_ref().into(), program.as_ref().into());
+    let name = program.name.clone();
+    Ok((Subject { name, executable, interface, period, program }, reports))
 }
 
 /// The stored values of each scan.
@@ -280,10 +261,7 @@ impl Subject {
             }
             self.executable.step(&mut scratch, &mut state, &read, &mut driven);
             let _ = writeln!(text, "{} -> {}", written(inputs, &read), written(outputs, &driven));
-            let found = self
-                .typed
-                .as_ref()
-                .and_then(|program| Some(Fault::read(&state)?.describe(program)));
+            let found = Fault::read(&state).map(|fault| fault.describe(&self.program));
             if fault.is_none() && found.is_some() {
                 fault = found.clone().map(|found| (scans.len() + 1, found));
             }

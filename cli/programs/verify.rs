@@ -118,16 +118,12 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     if file.report.has_errors() {
         return Err(Answer::bad_files(file.reports()));
     }
-    let (program, mut file, period) = match (source, file, period) {
-        (Source::Typed(program), mut file, period) => match file.rungs.take() {
-            Some(rungs) => (rungs, file, period),
-            None => return numbers::of_program(arguments, (&program, period), file, &patience),
-        },
-        (Source::Ladder(program), file, period) => (program, file, period),
-        (Source::Library(_), _, _) => {
-            let message = "the file has no PROGRAM: properties are of programs";
-            return Err(Answer::failed(Status::BadInput, "U0436", message));
-        }
+    let Source::Program(typed) = source else {
+        let message = "the file has no PROGRAM: properties are of programs";
+        return Err(Answer::failed(Status::BadInput, "U0436", message));
+    };
+    let Some(program) = file.rungs.take().map(|rungs| rungs.ladder) else {
+        return numbers::of_program(arguments, (&typed, period), file, &patience);
     };
     let texts = Texts::read(arguments, period)?;
     let subject = Subject::new(&program, period, &texts.asked()).map_err(not_lowered)?;

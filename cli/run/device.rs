@@ -39,7 +39,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let (subject, reports) = subject(&arguments.subject)?;
-    let Subject { executable, interface, typed, .. } = subject;
+    let Subject { executable, interface, program, .. } = subject;
     let equipment = Equipment::new(executable, interface.clone()).map_err(failed)?;
     if arguments.registers {
         return Ok(registers(&equipment).with_used(reports));
@@ -53,10 +53,8 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         let outputs = written(&interface.outputs, equipment.outputs());
         // The reader may have closed the pipe.
         let _ = writeln!(std::io::stdout(), "{inputs} -> {outputs}");
-        let fault = typed
-            .as_ref()
-            .and_then(|program| Some(Fault::read(equipment.state())?.describe(program)));
-        if let Some(fault) = fault {
+        if let Some(fault) = Fault::read(equipment.state()) {
+            let fault = fault.describe(&program);
             let _ = writeln!(std::io::stderr(), "the program has stopped: {fault}");
         }
     });

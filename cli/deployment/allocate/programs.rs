@@ -119,9 +119,11 @@ fn ladder(path: &Path, period: Duration) -> Result<(Member, Vec<Report>), Answer
     let (ladder, reports, _) = files::ladder_at(path, Some(period))?;
     let wanted = Wanted { program: None, period: Some(period) };
     let failed = |code, message: String| Answer::failed(Status::BadInput, code, message);
-    let typed = match files::program(path, wanted)?.0 {
-        Source::Typed(typed) => Some(typed),
-        Source::Ladder(_) | Source::Library(_) => None,
+    let (source, file, _) = files::program(path, wanted)?;
+    let is_ladder = file.rungs.is_some_and(|rungs| rungs.are_written);
+    let typed = match source {
+        Source::Program(typed) if !is_ladder => Some(typed),
+        _ => None,
     };
     let circuit = match &typed {
         Some(typed) => exact(typed).map_err(|inexact| failed("U0438", inexact.to_string())),

@@ -61,7 +61,7 @@ pub(crate) fn can_draft(folder: &Path, arguments: &[PathBuf], known: &[Known<'_>
 fn follows(known: &[Known<'_>]) -> Option<bool> {
     let mut found = Found::default();
     for Known { path, format, source, period } in known {
-        let is_one = !matches!(source, Source::Typed(typed) if typed.tasks.len() > 1);
+        let is_one = !matches!(source, Source::Program(typed) if typed.tasks.len() > 1);
         let is_ordinary = is_one && DraftProgram::is_ordinary(source, *period);
         if !is_ordinary || *period != known.first()?.period {
             return None;
@@ -119,13 +119,12 @@ impl<'a> Given<'a> {
         is_only: bool,
     ) -> Option<(String, String)> {
         let unit = match source {
-            Source::Ladder(ladder) => ladder.name.to_string(),
-            Source::Typed(typed) => typed.name.clone(),
+            Source::Program(typed) => typed.name.clone(),
             Source::Library(_) => return None,
         };
         // Digraphs are unnamed, and several programs have no common name.
         let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
-        let are_several = matches!(source, Source::Typed(typed) if typed.tasks.len() > 1);
+        let are_several = matches!(source, Source::Program(typed) if typed.tasks.len() > 1);
         let own = match format {
             Some(Format::Digraph) => stem,
             _ if are_several && is_name(&stem) => stem,
@@ -326,8 +325,7 @@ impl Found {
 /// A variable that is no input, of a program without outputs.
 fn memory(source: &Source) -> Option<&str> {
     match source {
-        Source::Ladder(ladder) => ladder.memory.first().map(|memory| memory.name.as_str()),
-        Source::Typed(typed) => {
+        Source::Program(typed) => {
             let mut variables = typed.variables.iter().map(|variable| variable.name.as_str());
             variables.find(|name| typed.inputs.find(name).is_none())
         }

@@ -107,7 +107,7 @@ impl Exact {
         let wide: Vec<(String, Term)> =
             wide.filter_map(|point| Some((point.name.clone(), value(&point.name)?))).collect();
         let kept: Vec<u32> = match shown.keeps_all {
-            true => system.read.iter().copied().filter(|&cell| system.is_written(cell)).collect(),
+            true => system.read.iter().copied().collect(),
             false => Vec::new(),
         };
         let derivation = Derivation::of(&system, &wide, &kept)?;

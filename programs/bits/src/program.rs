@@ -322,7 +322,8 @@ impl System {
                 self.cells[cell as usize].holds = Holds::Count(Box::new(counted.clone()));
             }
         }
-        self.read.extend(scan.read.iter().filter_map(|address| numbers.get(address)));
+        let read = scan.read.iter().filter(|address| scan.memory.contains_key(address));
+        self.read.extend(read.filter_map(|address| numbers.get(address)));
         let can_fault = scan.faulted;
         let resets = program.inputs.iter().zip(inputs);
         let mut reset = resets.filter(|(point, _)| point.slot == 0).map(|(_, &term)| term);

@@ -68,7 +68,7 @@ pub struct System {
     pub inputs: Vec<Input>,
     /// What scans keep.
     pub cells: Vec<Cell>,
-    /// Cells that a program reads before it writes them.
+    /// Cells that a scan reads and then writes.
     pub(crate) read: BTreeSet<u32>,
     /// BOOLs that properties can name.
     pub observed: Vec<(String, Term)>,
@@ -184,12 +184,6 @@ impl System {
         };
         self.inputs.push(Input { name, of, term, limits });
         term
-    }
-
-    /// Whether some scan gives a cell another value.
-    pub(crate) fn is_written(&self, cell: u32) -> bool {
-        let cell = &self.cells[cell as usize];
-        cell.next != cell.term
     }
 
     /// A cell that keeps its value until [`Cell::next`] is set.

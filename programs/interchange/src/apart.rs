@@ -12,7 +12,7 @@ use understudy_text::{Diagnostic, Severity, has_errors};
 
 use crate::format::Format;
 use crate::plcopen;
-use crate::source::{Source, SourceFile, Wanted, no_program, read_source};
+use crate::source::{Rungs, Source, SourceFile, Wanted, no_program, read_source};
 use crate::twincat;
 use crate::typed_text::{Bodies, parsed, typed_text_with};
 use crate::written::{WriteError, Written, write};
@@ -78,16 +78,17 @@ pub fn read_apart(name: &str, text: &str, copies: Copies) -> (Vec<Apart>, Vec<Di
     }
     for unit in &units {
         let wanted = Wanted { program: Some(unit), period: None };
-        let SourceFile { source, period, diagnostics: found, .. } = read_source(name, text, wanted);
+        let SourceFile { source, rungs, period, diagnostics: found } =
+            read_source(name, text, wanted);
         for finding in found {
             if !diagnostics.contains(&finding) {
                 diagnostics.push(finding);
             }
         }
-        let Some(source @ (Source::Ladder(_) | Source::Typed(_))) = source else {
+        let Some(source @ Source::Program(_)) = source else {
             continue;
         };
-        let (alone, is_read) = file.alone(source, period, Some(unit));
+        let (alone, is_read) = file.alone((source, rungs), period, Some(unit));
         // Where the programs cannot be written apart, one controller runs them all.
         if !is_read && whole.source.is_some() {
             return file.together(whole, copies);
@@ -126,7 +127,7 @@ impl Text<'_> {
     /// A program in a text of its own, and whether this could be read: what is drafted is what will be read of it.
     fn alone(
         &self,
-        source: Source,
+        (source, rungs): (Source, Option<Rungs>),
         period: Option<Duration>,
         program: Option<&str>,
     ) -> (Apart, bool) {
@@ -134,15 +135,16 @@ impl Text<'_> {
         let has_event = parsed.as_ref().is_some_and(|file| has_event(file, program));
         let is_document =
             Format::of(name, text) == Some(Format::PlcOpen) && twincat::read(text).is_none();
-        let to = match &source {
+        let ladder = rungs.filter(|rungs| rungs.are_written).map(|rungs| rungs.ladder);
+        let to = match &ladder {
             // A ladder states neither interval nor event.
-            Source::Ladder(_) if period.is_none() && !has_event => Format::Ladder,
-            Source::Ladder(_) if is_document => Format::PlcOpen,
+            Some(_) if period.is_none() && !has_event => Format::Ladder,
+            Some(_) if is_document => Format::PlcOpen,
             _ => Format::StructuredText,
         };
         let wanted = Wanted { program, period: None };
-        let written = match &source {
-            Source::Ladder(ladder) if to == Format::Ladder => write(to, ladder, None),
+        let written = match &ladder {
+            Some(ladder) if to == Format::Ladder => write(to, ladder, None),
             _ => match typed_text_with(name, text, wanted, (to, Bodies::AsRead), None) {
                 Ok((Some(written), _)) => Ok(written),
                 Ok((None, _)) => Err(WriteError::NotHeld("it has errors".to_owned())),
@@ -160,14 +162,14 @@ impl Text<'_> {
 
     /// One controller for all that the file runs.
     fn together(&self, whole: SourceFile, copies: Copies) -> (Vec<Apart>, Vec<Diagnostic>) {
-        let SourceFile { source, period, mut diagnostics, .. } = whole;
-        let is_program = matches!(source, Some(Source::Ladder(_) | Source::Typed(_)));
+        let SourceFile { source, rungs, period, mut diagnostics } = whole;
+        let is_program = matches!(source, Some(Source::Program(_)));
         if !is_program && !has_errors(&diagnostics) {
             diagnostics.push(no_program());
         }
         let apart = source.filter(|_| is_program).map(|source| match copies {
             Copies::AsRead => Apart { source, period, written: None },
-            Copies::Written => self.alone(source, period, None).0,
+            Copies::Written => self.alone((source, rungs), period, None).0,
         });
         (apart.into_iter().collect(), diagnostics)
     }

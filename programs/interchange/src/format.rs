@@ -192,11 +192,12 @@ pub(crate) fn stem(name: &str) -> &str {
 /// not drawn is that of its statements where its points are BOOLs and rungs hold them, else that of its circuit, where its values are finite; see
 /// [`exact`]. It is all that the file runs.
 pub fn read_ladder(name: &str, text: &str, period: Option<Duration>) -> Reading {
-    let SourceFile { source, period: stated, mut diagnostics, .. } =
+    let SourceFile { source, rungs, period: stated, mut diagnostics } =
         read_source(name, text, Wanted { program: None, period });
+    let written = rungs.filter(|rungs| rungs.are_written).map(|rungs| rungs.ladder);
     let program = match source {
-        Some(Source::Ladder(ladder)) => Some(ladder),
-        Some(Source::Typed(typed)) => {
+        Some(Source::Program(_)) if written.is_some() => written,
+        Some(Source::Program(typed)) => {
             of_statements(name, text, &typed).or_else(|| match exact(&typed) {
                 Ok(circuit) => Some(from_circuit(&circuit)),
                 Err(inexact) => {

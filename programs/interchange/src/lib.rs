@@ -17,7 +17,7 @@ mod written;
 pub use apart::{Apart, Copies, IDLE_PROGRAM, NOT_EXECUTED, read_apart};
 pub use diagrams::{DrawnBody, DrawnUnit, draw_typed, drawn_units, listing};
 pub use format::{Format, Reading, read, read_ladder, unknown_form};
-pub use source::{Source, SourceFile, Wanted, no_program, read_source};
+pub use source::{Rungs, Source, SourceFile, Wanted, no_program, read_source};
 pub use twincat::{Joined, files_of_project, is_part};
 pub use typed_text::{Bodies, typed_text};
 pub use written::{Compared, USUAL_PERIOD, WriteError, Written, write};

@@ -1,11 +1,11 @@
-//! A program from any form of file: a ladder where it is drawn as one, else a typed program, whose points are those of its declarations.
+//! A program from any form of file: a typed program, whose points are those of its declarations, and the rungs of one that has them.
 
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_ladder::Program as Ladder;
+use understudy_ladder::{LowerError, Program as Ladder};
 use understudy_structured_text::lower::another_interval;
-use understudy_text::Diagnostic;
+use understudy_text::{Diagnostic, has_errors};
 use understudy_typed::Program as Typed;
 
 use crate::format::{Format, Reading, read, unknown_form};
@@ -13,14 +13,13 @@ use crate::plcopen;
 use crate::text::{Whole, whole};
 use crate::twincat;
 use crate::typed_text::parsed;
+use crate::written::USUAL_PERIOD;
 
 /// What a file holds.
 #[derive(Debug, Clone)]
 pub enum Source {
-    /// Rungs, or a network of bits and standard blocks.
-    Ladder(Ladder),
-    /// Statements, lists, charts and networks, for one period.
-    Typed(Arc<Typed>),
+    /// A program, for one period.
+    Program(Arc<Typed>),
     /// Function blocks and functions without a program, each checked: their names.
     Library(Vec<String>),
 }
@@ -39,12 +38,28 @@ pub struct Wanted<'a> {
 pub struct SourceFile {
     /// What it holds; nothing where there are errors.
     pub source: Option<Source>,
-    /// The rungs that the program is drawn as, where it is drawn as a ladder and has no more than rungs hold.
-    pub rungs: Option<Ladder>,
+    /// The rungs of the program, where it is written or drawn as a ladder and has no more than rungs hold.
+    pub rungs: Option<Rungs>,
     /// The period of the intervals that the file states.
     pub period: Option<Duration>,
     /// Everything that is wrong or odd, with its place.
     pub diagnostics: Vec<Diagnostic>,
+}
+
+/// The rungs of a program.
+#[derive(Debug, Clone)]
+pub struct Rungs {
+    /// They.
+    pub ladder: Ladder,
+    /// The program is written in them; it is drawn as them, and written in statements, otherwise.
+    pub are_written: bool,
+}
+
+impl SourceFile {
+    /// The rungs that the program is written in.
+    pub fn ladder(&self) -> Option<&Ladder> {
+        self.rungs.as_ref().filter(|rungs| rungs.are_written).map(|rungs| &rungs.ladder)
+    }
 }
 
 /// Reads the program of the file `name`, and everything that is wrong with it.
@@ -58,13 +73,25 @@ pub fn read_source(name: &str, text: &str, wanted: Wanted<'_>) -> SourceFile {
     };
     if let Some(parsed) = statements {
         let mut read = whole(text, parsed, wanted.program, wanted.period);
-        let rungs = if format == Format::PlcOpen { read.remark_on_rungs(text) } else { None };
+        let drawn = if format == Format::PlcOpen { read.remark_on_rungs(text) } else { None };
+        let rungs = drawn.map(|ladder| Rungs { ladder, are_written: false });
         return SourceFile { rungs, ..source(read) };
     }
     let Reading { program, period, mut diagnostics, .. } = read(format, name, text, wanted.program);
     let other = program.as_ref().and_then(|it| another_period(it, period, wanted.period));
     diagnostics.extend(other);
-    SourceFile { source: program.map(Source::Ladder), rungs: None, period, diagnostics }
+    let typed = program.as_ref().filter(|_| !has_errors(&diagnostics)).and_then(|ladder| {
+        let typed = ladder.typed(wanted.period.or(period).unwrap_or(USUAL_PERIOD));
+        typed.map_err(|error| diagnostics.push(not_run(&error))).ok()
+    });
+    let source = typed.map(|typed| Source::Program(Arc::new(typed)));
+    let rungs = program.map(|ladder| Rungs { ladder, are_written: true });
+    SourceFile { source, rungs, period, diagnostics }
+}
+
+/// The error on rungs that cannot be executed.
+fn not_run(error: &LowerError) -> Diagnostic {
+    Diagnostic::error("U0436", error.to_string(), 0..0)
 }
 
 /// The warning on a ladder whose file states another interval than the period at which it runs: it runs in every scan.
@@ -85,7 +112,7 @@ fn source(whole: Whole) -> SourceFile {
     let library = (!whole.checked.is_empty()).then_some(Source::Library(whole.checked));
     diagnostics.extend(whole.not_kept);
     diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
-    let source = whole.typed.map(|typed| Source::Typed(Arc::new(typed))).or(library);
+    let source = whole.typed.map(|typed| Source::Program(Arc::new(typed))).or(library);
     SourceFile { source, rungs: None, period: whole.period, diagnostics }
 }
 

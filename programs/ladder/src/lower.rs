@@ -8,7 +8,7 @@
 
 mod writes;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
@@ -117,6 +117,12 @@ impl Program {
         typed.inputs.put_first(self.inputs.iter().map(|signal| signal.name.as_str()));
         typed.outputs.put_first(self.outputs.iter().map(|signal| signal.name.as_str()));
         self.name.as_str().clone_into(&mut typed.name);
+        let signals = self.inputs.iter().chain(self.writable());
+        let about: HashMap<&str, Option<&String>> =
+            signals.map(|signal| (signal.name.as_str(), signal.description.as_ref())).collect();
+        for variable in &mut typed.variables {
+            variable.description = about.get(variable.name.as_str()).copied().flatten().cloned();
+        }
         Ok(typed)
     }
 

@@ -30,12 +30,16 @@ enum Body {
 }
 
 impl Code {
-    /// A ladder, for the period of the cluster.
+    /// The program of a ladder, for the period of the cluster.
     ///
     /// # Errors
     /// Those of [`LadderProgram::lower`].
-    pub fn of_ladder(ladder: LadderProgram, period: Duration) -> Result<Self, LowerError> {
-        let (typed, circuit) = (Arc::new(ladder.typed(period)?), ladder.lower(period)?);
+    pub fn of_ladder(
+        typed: Arc<TypedProgram>,
+        ladder: LadderProgram,
+        period: Duration,
+    ) -> Result<Self, LowerError> {
+        let circuit = ladder.lower(period)?;
         Ok(Self { typed, body: Body::Rungs(Box::new(ladder), circuit) })
     }
 

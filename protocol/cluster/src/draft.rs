@@ -33,9 +33,6 @@ const MAXIMUM_COMMENT: usize = 70;
 /// Bits of inputs or of outputs with which frames are far from full.
 const ORDINARY_BITS: usize = 2048;
 
-/// More than the state of any block of a ladder.
-const BLOCK_BITS: usize = 128;
-
 /// Parts of an interval that are tried as the period of a cluster.
 const MAXIMUM_PARTS: usize = 100_000;
 
@@ -68,14 +65,10 @@ impl DraftProgram {
     /// Whether a program is so far from every bound that its draft has no error, if its names and its outputs are those that a draft needs:
     /// less than what is drafted, and known without reading the draft.
     pub fn is_ordinary(source: &Source, interval: Option<Duration>) -> bool {
-        let state = match source {
-            Source::Ladder(ladder) => {
-                let bits = [&ladder.inputs, &ladder.outputs].map(Vec::len).iter().sum::<usize>();
-                bits + ladder.memory.len() + ladder.blocks().len() * BLOCK_BITS
-            }
-            Source::Typed(program) => program.state as usize * 64,
-            Source::Library(_) => return false,
+        let Source::Program(program) = source else {
+            return false;
         };
+        let state = program.state as usize * 64;
         let Signals { inputs, outputs } = Signals::of(source);
         let fits = |signals: &[Signal]| {
             let bits = signals.iter().map(|signal| signal.declared.of.bits() as usize);

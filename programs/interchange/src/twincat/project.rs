@@ -187,7 +187,7 @@ mod tests {
             let joined = Joined::of(files).expect("files of TwinCAT");
             let read = read_source("project.plcproj", &joined.text, Wanted::default());
             assert!(!has_errors(&read.diagnostics), "{:#?}", read.diagnostics);
-            assert!(matches!(read.source, Some(Source::Typed(_))));
+            assert!(matches!(read.source, Some(Source::Program(_))));
             assert_eq!(read.period, Some(std::time::Duration::from_millis(20)));
         }
     }

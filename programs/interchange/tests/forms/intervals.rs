@@ -173,13 +173,9 @@ fn milliseconds(period: u64) -> Option<Duration> {
 }
 
 /// The outputs of 40 scans, by their names; the input `go` is on in every third one.
-fn outputs(source: &Source, period: Duration) -> Vec<Vec<(String, u64)>> {
+fn outputs(source: &Source) -> Vec<Vec<(String, u64)>> {
     let (executable, interface): (Executable, Interface) = match source {
-        Source::Ladder(ladder) => {
-            let circuit = ladder.lower(period).expect("a circuit");
-            ((&circuit).into(), (&circuit).into())
-        }
-        Source::Typed(program) => (program.as_ref().into(), program.as_ref().into()),
+        Source::Program(program) => (program.as_ref().into(), program.as_ref().into()),
         Source::Library(units) => panic!("a library: {units:?}"),
     };
     let mut state = executable.initial().to_vec();
@@ -198,8 +194,8 @@ fn outputs(source: &Source, period: Duration) -> Vec<Vec<(String, u64)>> {
 }
 
 /// Checks that the outputs of a source are those of programs that run so often.
-fn check(source: &Source, period: Duration, runs: &[(Runs, u64, &str)], about: &str) {
-    for (scan, found) in (0_u64..).zip(outputs(source, period)) {
+fn check(source: &Source, runs: &[(Runs, u64, &str)], about: &str) {
+    for (scan, found) in (0_u64..).zip(outputs(source)) {
         for (run, every, output) in runs {
             let count = match run {
                 // On in the scans 1, 4, 7 …
@@ -215,8 +211,7 @@ fn check(source: &Source, period: Duration, runs: &[(Runs, u64, &str)], about: &
 
 fn named(source: &Source) -> &str {
     match source {
-        Source::Ladder(ladder) => ladder.name.as_str(),
-        Source::Typed(program) => &program.name,
+        Source::Program(program) => &program.name,
         Source::Library(_) => "",
     }
 }
@@ -243,10 +238,9 @@ fn the_interval_of_a_task_is_kept_or_told() {
                 assert_eq!(told(&read.diagnostics), !is_kept, "{about}: {:?}", read.diagnostics);
                 assert_eq!(read.period, common.and_then(milliseconds), "{about}");
                 let source = read.source.expect("a program");
-                let period = wanted.period.or(read.period).unwrap_or(Duration::from_millis(10));
                 let each = runs.iter().zip(every).zip(["y", "z"]);
                 let each: Vec<_> = each.map(|((run, every), name)| (*run, every, name)).collect();
-                check(&source, period, &each, &about);
+                check(&source, &each, &about);
                 checked += 1;
             }
         }
@@ -291,9 +285,8 @@ fn a_program_alone_keeps_its_interval() {
                         assert!(!has_errors(&diagnostics), "{about}: {diagnostics:#?}");
                         assert_eq!(told(&diagnostics), !is_kept, "{about}: {diagnostics:?}");
                         assert_eq!(period, common.and_then(milliseconds), "{about}");
-                        let period = wanted.or(period).unwrap_or(Duration::from_millis(10));
                         let one = (*run, every[0], ["y", "z"][at]);
-                        check(&source.expect("a program"), period, &[one], &about);
+                        check(&source.expect("a program"), &[one], &about);
                     }
                 }
             }
@@ -319,8 +312,7 @@ fn another_form_has_the_same_intervals() {
                 assert_eq!(read.period, common.and_then(milliseconds), "{about}");
                 let each = runs.iter().zip(every).zip(["y", "z"]);
                 let each: Vec<_> = each.map(|((run, every), name)| (*run, every, name)).collect();
-                let period = read.period.unwrap_or(Duration::from_millis(10));
-                check(&read.source.expect("a program"), period, &each, &about);
+                check(&read.source.expect("a program"), &each, &about);
             }
         }
     }
@@ -390,7 +382,7 @@ fn every_language_is_a_typed_program_and_has_a_ladder() {
     for language in LANGUAGES {
         let (name, text) = file(language, &[Every(20)]).expect("a file");
         let source = read_source(&name, &text, Wanted::default()).source;
-        assert!(matches!(source, Some(Source::Typed(_))), "{language:?}");
+        assert!(matches!(source, Some(Source::Program(_))), "{language:?}");
         let read = read_ladder(&name, &text, None);
         assert!(read.program.is_some(), "{language:?}: {:?}", read.diagnostics);
     }

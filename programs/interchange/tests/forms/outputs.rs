@@ -2,7 +2,6 @@
 //! whatever the form.
 
 use understudy_interchange::{Source, Wanted, read_source};
-use understudy_ladder::Signal;
 use understudy_text::{Severity, has_errors};
 use understudy_typed::Points;
 
@@ -16,19 +15,11 @@ struct Seen {
 fn seen(name: &str, text: &str) -> Seen {
     let read = read_source(name, text, Wanted::default());
     assert!(!has_errors(&read.diagnostics), "{text}\n{:#?}", read.diagnostics);
-    let bits = |signals: &[Signal]| {
-        signals.iter().map(|signal| (signal.name.to_string(), "BOOL")).collect()
-    };
     let points = |points: &Points| {
         points.iter().map(|point| (point.name.clone(), point.of.name())).collect()
     };
     match read.source.expect("a program") {
-        Source::Ladder(ladder) => Seen {
-            inputs: bits(&ladder.inputs),
-            outputs: bits(&ladder.outputs),
-            memory: ladder.memory.iter().map(|signal| signal.name.to_string()).collect(),
-        },
-        Source::Typed(program) => Seen {
+        Source::Program(program) => Seen {
             inputs: points(&program.inputs),
             outputs: points(&program.outputs),
             memory: program.variables.iter().map(|variable| variable.name.clone()).collect(),
@@ -313,10 +304,7 @@ fn an_output_that_cannot_be_a_point_is_said() {
             found.severity >= Severity::Warning && found.message.contains("`n`")
         };
         let is_point = match &read.source {
-            Some(Source::Ladder(ladder)) => {
-                ladder.outputs.iter().any(|signal| signal.name.starts_with('n'))
-            }
-            Some(Source::Typed(program)) => {
+            Some(Source::Program(program)) => {
                 program.outputs.iter().any(|point| point.name.starts_with('n'))
             }
             _ => false,

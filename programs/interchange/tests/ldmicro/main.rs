@@ -22,7 +22,7 @@ pub(crate) fn read(name: &str, text: &str) -> SourceFile {
 pub(crate) fn program(text: &str) -> Arc<Program> {
     let found = read("program", text);
     match found.source {
-        Some(Source::Typed(program)) => program,
+        Some(Source::Program(program)) => program,
         _ => panic!("{:#?}\n{text}", found.diagnostics),
     }
 }

@@ -61,8 +61,8 @@ fn outcome(path: &Path) -> (String, Vec<String>) {
             format!("{place}: {} {}", found.code, found.message)
         }));
         what.push(match file.source {
-            Some(Source::Ladder(_)) => "ladder",
-            Some(Source::Typed(_)) => "program",
+            Some(Source::Program(_)) if file.ladder().is_some() => "ladder",
+            Some(Source::Program(_)) => "program",
             Some(Source::Library(_)) => "library",
             None => "refused",
         });

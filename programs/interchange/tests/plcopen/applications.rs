@@ -74,7 +74,7 @@ fn the_program_of_an_application_is_read_with_its_task() {
         let text = project(place, &[main_unit("q := NOT a;", "")], "");
         let found = read_source("export.xml", &text, Wanted::default());
         assert!(!has_errors(&found.diagnostics), "{place:?}: {:#?}", found.diagnostics);
-        assert!(matches!(found.source, Some(Source::Typed(_))), "{place:?}");
+        assert!(matches!(found.source, Some(Source::Program(_))), "{place:?}");
         assert_eq!(read(&text, None).period, Some(std::time::Duration::from_millis(10)));
         let mut scans = Scans::new(typed(&text, PERIOD).expect("a program"));
         assert_eq!([scans.scan(&[0]), scans.scan(&[1])], [[1], [0]], "{place:?}");

@@ -366,7 +366,7 @@ fn all_programs_of_the_tasks_run() {
 <pouInstance name="i" typeName="first"/><pouInstance name="j" typeName="second"/></task></resource></configuration></configurations></instances></project>"#
     );
     let read = understudy_interchange::read_source("two.xml", &text, Default::default());
-    let Some(understudy_interchange::Source::Typed(program)) = read.source else {
+    let Some(understudy_interchange::Source::Program(program)) = read.source else {
         panic!("{:#?}", read.diagnostics);
     };
     assert_eq!(program.tasks.len(), 2);
@@ -377,7 +377,7 @@ fn all_programs_of_the_tasks_run() {
     let read = understudy_interchange::read_source("two.xml", &text, wanted);
     assert!(matches!(
         read.source,
-        Some(understudy_interchange::Source::Typed(typed)) if typed.name == "second"
+        Some(understudy_interchange::Source::Program(typed)) if typed.name == "second"
     ));
     // The circuit of a file is that of all that runs; a conversion says what it leaves out.
     let read = understudy_interchange::read_ladder("two.xml", &text, None);

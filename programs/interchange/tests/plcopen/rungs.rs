@@ -37,7 +37,7 @@ fn ladder() -> String {
 fn rungs_are_those_of_the_drawing() {
     let read = read_at(&ladder(), 10);
     let rungs = read.rungs.unwrap_or_else(|| panic!("{:?}", read.diagnostics));
-    insta::assert_snapshot!(print(&rungs));
+    insta::assert_snapshot!(print(&rungs.ladder));
     // Networks are no rungs.
     let network = ladder().replace("<LD>", "<FBD>").replace("</LD>", "</FBD>");
     let network = network.replace(RAIL, "");
@@ -95,5 +95,5 @@ fn numbers_of_rungs_that_are_not_of_the_schema() {
                 <coil variable=\"y\"/></rung>";
     let read = read_at(&file(&declared, rung), 10);
     let rungs = read.rungs.unwrap_or_else(|| panic!("{:?}", read.diagnostics));
-    insta::assert_snapshot!(print(&rungs));
+    insta::assert_snapshot!(print(&rungs.ladder));
 }

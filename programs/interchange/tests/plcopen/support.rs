@@ -53,8 +53,7 @@ pub(crate) fn circuit(text: &str) -> Circuit {
     let wanted = Wanted { period: Some(PERIOD), program: None };
     let SourceFile { source, diagnostics, .. } = read_source("file.xml", text, wanted);
     match source {
-        Some(Source::Ladder(ladder)) => ladder.lower(PERIOD).expect("it was checked"),
-        Some(Source::Typed(program)) => exact(&program).expect("a circuit"),
+        Some(Source::Program(program)) => exact(&program).expect("a circuit"),
         other => panic!("no program: {other:?} {diagnostics:#?}\n{text}"),
     }
 }

@@ -21,10 +21,12 @@ fn name(format: Format) -> &'static str {
 
 /// What a reading is, but for the places in the file.
 pub(crate) fn reading(format: Format, text: &str) -> String {
-    let SourceFile { source, period, diagnostics, .. } = source(format, text);
+    let file = source(format, text);
+    let ladder = file.ladder().map(print);
+    let SourceFile { source, period, diagnostics, .. } = file;
     let program = match source {
-        Some(Source::Ladder(ladder)) => print(&ladder),
-        Some(Source::Typed(program)) => {
+        Some(Source::Program(_)) if ladder.is_some() => ladder.unwrap_or_default(),
+        Some(Source::Program(program)) => {
             // Comments stand in what is written of it.
             let form = Format::StructuredText;
             let written = typed_text(name(format), text, Wanted::default(), form, Bodies::AsRead);

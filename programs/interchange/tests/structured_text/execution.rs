@@ -211,7 +211,7 @@ fn outputs_are_driven(text: &str) {
     }
     let wanted = Wanted { period: Some(PERIOD), program: None };
     let source = understudy_interchange::read_source("p.st", text, wanted).source;
-    let Some(understudy_interchange::Source::Typed(program)) = source else {
+    let Some(understudy_interchange::Source::Program(program)) = source else {
         panic!("read as {source:?}: {text}");
     };
     let names = |program: &Program| {

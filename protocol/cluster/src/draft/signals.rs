@@ -2,7 +2,6 @@
 
 use understudy_executable::declared;
 use understudy_interchange::Source;
-use understudy_ladder::Signal as LadderSignal;
 use understudy_typed::{Declared, Elementary, Points, Program, Type};
 
 use super::comment;
@@ -28,11 +27,7 @@ pub(super) struct Signal {
 impl Signals {
     pub(super) fn of(source: &Source) -> Self {
         match source {
-            Source::Ladder(ladder) => {
-                let of_all = |signals: &[LadderSignal]| signals.iter().map(Signal::bit).collect();
-                Self { inputs: of_all(&ladder.inputs), outputs: of_all(&ladder.outputs) }
-            }
-            Source::Typed(program) => {
+            Source::Program(program) => {
                 let of_all = |points: &Points| {
                     declared(points)
                         .map(|point| Signal::point(&point.name, point.declared(), program))
@@ -51,16 +46,6 @@ impl Signals {
 }
 
 impl Signal {
-    fn bit(signal: &LadderSignal) -> Self {
-        let address = signal.address.as_ref().map(ToString::to_string);
-        Self {
-            name: signal.name.to_string(),
-            declared: Declared { of: Elementary::Bool, range: None },
-            limits: (0, 1),
-            note: note(address.as_deref(), signal.description.as_deref()),
-        }
-    }
-
     fn point(name: &str, declared: Declared, program: &Program) -> Self {
         let variable = program.variables.iter().find(|variable| variable.name == name);
         let enumeration = variable.and_then(|variable| match variable.of {

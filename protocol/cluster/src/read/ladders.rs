@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_interchange::{Source, SourceFile, Wanted, no_program, read_source};
+use understudy_ladder::Program as Ladder;
 use understudy_logic::Circuit;
 use understudy_text::{Diagnostic, Report};
 
@@ -19,6 +20,8 @@ struct File {
     name: String,
     text: String,
     source: Option<Source>,
+    /// The rungs that it is written in.
+    ladder: Option<Ladder>,
     diagnostics: Vec<Diagnostic>,
 }
 
@@ -54,23 +57,22 @@ impl<'a> Ladders<'a> {
             }
         };
         let read = &mut self.read[place];
-        let program = match read.source.as_ref()? {
-            Source::Ladder(program) => program,
-            Source::Typed(program) => {
-                let text = Arc::from(read.text.as_str());
-                return Some(Code::of_text(Arc::clone(program), text));
-            }
-            Source::Library(_) => return None,
+        let Some(Source::Program(typed)) = &read.source else {
+            return None;
+        };
+        let typed = Arc::clone(typed);
+        let Some(ladder) = &read.ladder else {
+            return Some(Code::of_text(typed, Arc::from(read.text.as_str())));
         };
         // Several controllers may run one ladder.
-        for warning in program.preset_warnings(period) {
+        for warning in ladder.preset_warnings(period) {
             if !read.diagnostics.contains(&warning) {
                 read.diagnostics.push(warning);
             }
         }
-        let mut program = program.clone();
-        program.name = name.into();
-        match Code::of_ladder(program, period) {
+        let mut ladder = ladder.clone();
+        ladder.name = name.into();
+        match Code::of_ladder(typed, ladder, period) {
             Ok(code) => Some(code),
             Err(error) => {
                 let message = format!("`{}`: {error}", file.value);
@@ -105,11 +107,13 @@ impl<'a> Ladders<'a> {
         }
         let place = (self.open)(file).map(|text| {
             let wanted = Wanted { period: Some(period), program: None };
-            let SourceFile { source, mut diagnostics, .. } = read_source(file, &text, wanted);
+            let SourceFile { source, rungs, mut diagnostics, .. } =
+                read_source(file, &text, wanted);
+            let ladder = rungs.filter(|rungs| rungs.are_written).map(|rungs| rungs.ladder);
             if let Some(Source::Library(_)) = source {
                 diagnostics.push(no_program());
             }
-            self.read.push(File { name: file.to_owned(), text, source, diagnostics });
+            self.read.push(File { name: file.to_owned(), text, source, ladder, diagnostics });
             self.read.len() - 1
         });
         self.places.insert(file.to_owned(), place.clone());
