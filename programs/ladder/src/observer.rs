@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use understudy_bits::Layout;
 use understudy_logic::unpack;
-use understudy_typed::{Interpreter as Execution, Point, Program as Typed};
+use understudy_typed::{Machine, Point, Program as Typed, Scratch};
 
 use crate::flow::{ElementFlow, Evaluation, Reading, RungFlow};
 use crate::lower::{LowerError, of_text, validate};
@@ -25,7 +25,7 @@ struct Watched {
     program: Program,
     names: StandardNames,
     typed: Typed,
-    execution: Execution,
+    machine: Machine,
     /// Points of what is kept, in the order of the scan.
     taps: Vec<Point>,
     outputs: Vec<Point>,
@@ -43,15 +43,15 @@ impl Watched {
         let outputs = program.outputs.iter().filter_map(|signal| point(names.signal(&signal.name)));
         let outputs = outputs.collect();
         let taps = written.taps.iter().filter_map(|name| point(name)).collect();
-        let execution = Execution::new(&typed);
-        Ok(Self { program: program.clone(), names, execution, taps, outputs, typed })
+        let machine = Machine::new(&typed);
+        Ok(Self { program: program.clone(), names, machine, taps, outputs, typed })
     }
 
     /// The scan from `state`, which becomes the state after it.
     fn scan(&self, state: &mut Vec<u64>, inputs: &[u64]) -> Evaluation {
         state.resize(self.typed.state as usize, 0);
         let mut image = vec![0; self.typed.outputs.width().div_ceil(64)];
-        self.execution.step(state, inputs, &mut image);
+        self.machine.step(&mut Scratch::default(), state, inputs, &mut image);
         let mut flow = Flow { image: &image, taps: self.taps.iter(), elements: Vec::new() };
         let rungs = self.program.rungs.iter().map(|rung| flow.rung(rung)).collect();
         let memory = self.program.memory.iter().map(|_| flow.bit()).collect();

@@ -35,7 +35,7 @@ impl Execution<'_> {
         Ok(self.one_of(condition, left))
     }
 
-    /// Reads what statements that are never executed would assign: it has its value from before the scan.
+    /// Assigns its value from before the scan to what statements that are never executed would assign: it is kept like what they assign elsewhere.
     fn keep(&mut self, context: Context, statements: &[Statement]) -> Result<()> {
         for statement in statements {
             if let StatementKind::Assign(place, _) = &statement.kind
@@ -43,7 +43,8 @@ impl Execution<'_> {
                 && place.indices.is_empty()
             {
                 for (_, address) in self.places(context, place)? {
-                    self.get(address, of);
+                    let value = self.get(address, of);
+                    self.set(address, value);
                 }
             }
         }
