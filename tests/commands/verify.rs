@@ -5,7 +5,7 @@ use std::fs;
 use insta::assert_snapshot;
 use serde_json::json;
 
-use crate::{empty_folder, understudy};
+use crate::{empty_folder, understudy, understudy_in};
 
 const PRESS: &str = "examples/press-cell/press.ladder";
 
@@ -379,4 +379,27 @@ fn counts_and_blocks_of_ladders_in_a_cluster_have_names() {
         "packer.parts.CV = 2 can be reached",
     ];
     assert_eq!(verdicts(&asked), ["holds"; 3]);
+}
+
+#[test]
+fn a_count_is_compared_with_what_it_can_be() {
+    let folder = empty_folder("verify-counts");
+    let reset = "program p\ninput a\noutput y\nrung a {CTU c 2 R=a} ( y )\n";
+    let held = "program p\ninput a\noutput y\nrung a {CTU c 3 R=[ a | /a ]} ( y )\n";
+    for (name, text) in [("reset", reset), ("held", held)] {
+        let file = format!("{name}.ladder");
+        fs::write(folder.join(&file), text).expect("written");
+        let ask =
+            |property: &str| understudy_in(&folder, &["verify", &file, "--property", property]);
+        // An INT has no such value, whatever the counter does.
+        for property in ["never c.CV >= 40000", "c.CV >= 32768 can be reached"] {
+            let answer = ask(property);
+            assert_eq!(answer.status, 2, "{}", answer.shown());
+            assert!(answer.errors.contains("U0435"), "{}", answer.shown());
+        }
+        for property in ["never c.CV > 3", "always c.CV < 32767"] {
+            let answer = ask(property);
+            assert_eq!(answer.status, 0, "{}", answer.shown());
+        }
+    }
 }

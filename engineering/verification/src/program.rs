@@ -11,7 +11,7 @@ mod unasked;
 use std::cell::OnceCell;
 use std::time::Duration;
 
-use understudy_ladder::{Block, Comparison, LowerError, Program};
+use understudy_ladder::{Block, Comparison, LowerError, MAXIMUM_PRESET_VALUE, Program};
 use understudy_logic::Circuit;
 use understudy_logic::bdd::Diagrams;
 use understudy_text::Diagnostic;
@@ -57,7 +57,9 @@ fn compared_count(program: &Program, named: &Named) -> Option<(String, Compariso
     let is_counter =
         |block: &&Block| block.name.as_str() == counter && block.kind.preset_value().is_some();
     let counter = blocks.find(is_counter)?.name.clone();
-    let (relation, value) = (compared.comparison, compared.with.parse().ok()?);
+    let relation = compared.comparison;
+    // A count is an INT.
+    let value = compared.with.parse().ok().filter(|value| *value <= MAXIMUM_PRESET_VALUE)?;
     Some((named.to_string(), Comparison { counter, relation, value }))
 }
 
@@ -167,7 +169,7 @@ impl Subject {
             let program = self.circuit.name();
             let message = format!("`{named}` is no comparison of a number of `{program}`");
             let help =
-                "the numbers of a ladder are its counts, from 0 to 65535, such as `parts.CV >= 3`";
+                "the numbers of a ladder are its counts, from 0 to 32767, such as `parts.CV >= 3`";
             return Diagnostic::error("U0435", message, named.span.clone()).with_help(help);
         }
         let outputs = self.circuit.outputs().iter().map(|output| &output.name);

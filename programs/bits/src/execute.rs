@@ -340,6 +340,9 @@ impl<'a> Execution<'a> {
         let routine = program.routine(routine);
         let frames = u64::from(program.state);
         let (first, count) = (u64::from(routine.frame.0), u64::from(routine.frame.1));
+        if count == 0 {
+            return;
+        }
         let range = 64 * (frames + first)..64 * (frames + first + count);
         let held: Vec<u64> = self.memory.keys().copied().collect();
         for address in held {

@@ -124,6 +124,12 @@ impl System {
         for address in bool_variables(program, &parts).into_iter().filter(kept) {
             cells.number(&mut self.terms, address, Elementary::Bool);
         }
+        let wanted = self.wanted.iter().filter_map(|name| program.part(name.strip_prefix(prefix)?));
+        for part in wanted {
+            if let Some(of) = part.of.elementary() {
+                cells.number(&mut self.terms, part.address, of);
+            }
+        }
         let mut execution = Execution::new(program, &mut self.terms, &mut cells, elapsed, timers);
         for (point, &input) in program.inputs.iter().zip(inputs) {
             if point.slot != 0 {

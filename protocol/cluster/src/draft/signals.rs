@@ -1,8 +1,10 @@
 //! The inputs and outputs of a drafted program, whatever it was written in.
 
+use std::collections::HashMap;
+
 use understudy_executable::declared;
 use understudy_interchange::Source;
-use understudy_typed::{Declared, Elementary, Points, Program, Type};
+use understudy_typed::{Declared, Elementary, Point, Points, Program, Type, Variable};
 
 use super::comment;
 
@@ -28,10 +30,15 @@ impl Signals {
     pub(super) fn of(source: &Source) -> Self {
         match source {
             Source::Program(program) => {
+                let variables = program.variables.iter().rev();
+                let variables: HashMap<&str, &Variable> =
+                    variables.map(|variable| (variable.name.as_str(), variable)).collect();
                 let of_all = |points: &Points| {
-                    declared(points)
-                        .map(|point| Signal::point(&point.name, point.declared(), program))
-                        .collect()
+                    let signal = |point: &Point| {
+                        let variable = variables.get(point.name.as_str()).copied();
+                        Signal::point(&point.name, point.declared(), (variable, program))
+                    };
+                    declared(points).map(signal).collect()
                 };
                 Self { inputs: of_all(&program.inputs), outputs: of_all(&program.outputs) }
             }
@@ -46,8 +53,11 @@ impl Signals {
 }
 
 impl Signal {
-    fn point(name: &str, declared: Declared, program: &Program) -> Self {
-        let variable = program.variables.iter().find(|variable| variable.name == name);
+    fn point(
+        name: &str,
+        declared: Declared,
+        (variable, program): (Option<&Variable>, &Program),
+    ) -> Self {
         let enumeration = variable.and_then(|variable| match variable.of {
             Type::Enumeration(id, _) => program.enumerations.get(id.0 as usize),
             _ => None,
