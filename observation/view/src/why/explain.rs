@@ -302,7 +302,8 @@ impl<'m> Explainer<'m> {
         match node.element {
             Element::Contact(contact) => {
                 let value = node.flow.reading == Reading::Bit(true);
-                let mut reason = self.operand(&contact.operand, value, rung, place, depth);
+                let read = (contact.operand.as_str(), value);
+                let mut reason = self.operand(read, (rung, node.element), place, depth);
                 let edge = match (contact.kind, node.flow.passes) {
                     (ContactKind::Rising, true) => "has a rising edge; ",
                     (ContactKind::Rising, false) => "has no rising edge; ",
@@ -322,8 +323,9 @@ impl<'m> Explainer<'m> {
                 let signal = format!("{}.CV {relation} {}", comparison.counter, comparison.value);
                 let mut reason =
                     self.leaf(&signal, node.flow.passes, place, format!("CV is {number}"));
-                reason.because =
-                    self.block(&comparison.counter, rung, place, depth + 1).into_iter().collect();
+                let counter = comparison.counter.as_str();
+                let found = self.block(counter, (rung, node.element), place, depth + 1);
+                reason.because = found.into_iter().collect();
                 reason
             }
             Element::Block(block) => {
@@ -336,14 +338,14 @@ impl<'m> Explainer<'m> {
 
     fn operand(
         &mut self,
-        operand: &str,
-        value: bool,
-        rung: usize,
+        (operand, value): (&str, bool),
+        (rung, element): (usize, &Element),
         place: usize,
         depth: usize,
     ) -> Reason {
-        let block = operand.split_once('.').map(|(block, _)| block);
-        let explained = block.and_then(|block| self.block(block, rung, place, depth));
+        let block = operand.rsplit_once('.').map(|(block, _)| block);
+        let at = (rung, element);
+        let explained = block.and_then(|block| self.block(block, at, place, depth));
         match explained {
             Some(reason) => Reason { signal: operand.to_owned(), value: value.into(), ..reason },
             None => self.signal(operand, value, place, rung, depth + 1),

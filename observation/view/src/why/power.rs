@@ -1,6 +1,6 @@
 //! Which elements of a rung let power through, and which hold it back.
 
-use understudy_ladder::{Block, Element, ElementFlow, Series};
+use understudy_ladder::{Block, BlockKind, Element, ElementFlow, Series};
 
 /// An element with what the power did in it, and what is inside of it.
 pub(super) struct Node<'e> {
@@ -34,8 +34,26 @@ pub(super) fn nodes<'e>(
     found
 }
 
-/// A way through a series that has power behind it: one branch of each.
+impl Node<'_> {
+    /// Whether it may have power behind it that does not come to it: a block that is on without power at its wire, or branches with one.
+    fn holds(&self) -> bool {
+        match self.element {
+            Element::Block(block) => !matches!(block.kind, BlockKind::Ton(_) | BlockKind::RTrig),
+            Element::Branches(_) => self.parts.iter().any(|branch| has_holder(branch)),
+            Element::Contact(_) | Element::Comparison(_) => false,
+        }
+    }
+}
+
+fn has_holder(series: &[Node<'_>]) -> bool {
+    series.iter().any(Node::holds)
+}
+
+/// A way through a series that has power behind it: one branch of each. What has no power in front of a block that is on all the same is no cause.
 pub(super) fn conducting<'n, 'e>(series: &'n [Node<'e>]) -> Vec<&'n Node<'e>> {
+    let last = series.iter().rposition(Node::holds);
+    let is_fed = last.is_none_or(|last| series[last].flow.enters);
+    let series = if is_fed { series } else { &series[last.unwrap_or_default()..] };
     let mut way = Vec::new();
     for node in series {
         match node.element {
@@ -54,6 +72,28 @@ pub(super) fn conducting<'n, 'e>(series: &'n [Node<'e>]) -> Vec<&'n Node<'e>> {
 
 /// The elements at which all the power of a series ends: in each branch the first that does not pass it.
 pub(super) fn blocking<'n, 'e>(series: &'n [Node<'e>]) -> Vec<&'n Node<'e>> {
+    let last = series.iter().rposition(Node::holds);
+    let Some(last) = last else {
+        return ends(series);
+    };
+    let node = &series[last];
+    if node.flow.leaves {
+        return ends(&series[last + 1..]);
+    }
+    let Element::Branches(_) = node.element else {
+        return vec![node];
+    };
+    let is_open = |branch: &&Vec<Node<'e>>| has_holder(branch) || node.flow.enters;
+    let mut found = Vec::new();
+    if !node.parts.iter().all(|branch| is_open(&branch)) {
+        found.extend(blocking(&series[..last]));
+    }
+    found.extend(node.parts.iter().filter(is_open).flat_map(|branch| blocking(branch)));
+    found
+}
+
+/// As [`blocking`], of a series without a block that is on without power.
+fn ends<'n, 'e>(series: &'n [Node<'e>]) -> Vec<&'n Node<'e>> {
     let Some(node) = series.iter().find(|node| node.flow.enters && !node.flow.leaves) else {
         return Vec::new();
     };

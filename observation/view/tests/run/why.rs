@@ -140,3 +140,71 @@ fn a_value_that_was_assigned_long_ago_is_not_its_initial_value() {
         }
     }
 }
+
+const CLUSTER: &str = "\
+[cluster]
+name = \"blocks\"
+period = \"10ms\"
+[[controller]]
+name = \"own\"
+ladder = \"own.ladder\"
+[[controller]]
+name = \"other\"
+ladder = \"other.ladder\"
+[[remote_io]]
+controller = \"own\"
+[[plant]]
+controller = \"own\"
+ladder = \"plant.ladder\"
+";
+
+/// All reasons of `y` in a cycle, each as `signal = value: text`, where the inputs of `rungs` are set in some cycles.
+fn reasons(rungs: &str, sets: &[(i64, &str, bool)], cycle: i64) -> Vec<String> {
+    let own = format!("program own\ninput a\ninput b\noutput y\n{rungs}\n");
+    let loaded = read_with("cluster.toml", CLUSTER, Overrides::default(), &mut |name| match name {
+        "own.ladder" => Ok(own.clone()),
+        "other.ladder" => Ok("program other\ninput u\noutput v\nrung u ( v )\n".to_owned()),
+        "plant.ladder" => {
+            Ok("program plant\ninput y\noutput a\noutput b\nmemory k\nrung k ( k )\n".to_owned())
+        }
+        _ => Err("no such file".to_owned()),
+    });
+    let cluster = loaded.cluster.unwrap_or_else(|| panic!("{:?}", loaded.reports));
+    let mut text = String::from("title = \"blocks\"\ncycles = 60\n");
+    for (at, input, value) in sets {
+        text += &format!(
+            "[[step]]\nat = {at}\naction = \"set\"\nstation = \"own-io\"\ninput = \"{input}\"\nvalue = {value}\n"
+        );
+    }
+    let model = model(&cluster, &scenario(&cluster, &text), 1);
+    let why = model.why("own.y", Some(cycle)).expect("it is known");
+    let mut found = Vec::new();
+    let mut open = vec![why.because.expect("nothing is fail-safe")];
+    while let Some(reason) = open.pop() {
+        found.push(format!("{} = {}: {}", reason.signal, reason.value, reason.text));
+        open.extend(reason.because);
+    }
+    found
+}
+
+/// A block is explained by the input that decided, also where it is on without power, and by what it was where it is read before its call.
+#[test]
+fn a_block_is_explained_by_the_input_that_decided() {
+    let pulse = [(10, "a", true), (20, "a", false), (30, "b", true), (40, "b", false)];
+    for (rungs, cycle, wanted, is_there) in [
+        ("rung a {RS s R1=b} ( y )", 33, "b = true", true),
+        ("rung a {SR s R=b} ( y )", 33, "b = true", true),
+        ("rung a {TOF t 50ms} ( y )", 27, "TOF: ", true),
+        ("rung a {TOF t 50ms} ( y )", 22, "TOF: ", true),
+        ("rung a {CTU c 2 R=b}\nrung c.CV < 1 ( y )", 33, "b = true", true),
+        ("rung a {CTU c 1 R=b}\nrung c.Q ( y )", 15, "a = true", true),
+        ("rung a {CTD c 2 LD=b}\nrung c.CV = 2 ( y )", 33, "b = true", true),
+        ("rung a {CTUD c 2 CD=b}\nrung c.CV < 1 ( y )", 33, "b = true", true),
+        ("rung a /t.Q {TON t 50ms} ( y )", 17, "explained above", false),
+        ("rung /e.Q a {R_TRIG e} ( y )", 12, "has just changed", true),
+    ] {
+        let found = reasons(rungs, &pulse, cycle);
+        let is_found = found.iter().any(|reason| reason.contains(wanted));
+        assert_eq!(is_found, is_there, "{rungs} at {cycle}: {found:#?}");
+    }
+}

@@ -3,15 +3,15 @@
 use understudy_ladder::{BlockKind, Element, ElementFlow, Reading, visit};
 
 use super::super::Reason;
-use super::super::power::{AtBlock, at_block, nodes};
+use super::super::power::{AtBlock, Node, at_block, nodes};
 use super::{DEEPEST, Explainer, FARTHEST, MOST};
 
 impl Explainer<'_> {
-    /// A block as the rung `below` sees it: of this scan where it is above, of the one before otherwise.
+    /// A block as an element of the rung `below` sees it: of this scan where the block is in front of the element, of the one before otherwise.
     pub(super) fn block(
         &mut self,
         name: &str,
-        below: usize,
+        (below, element): (usize, &Element),
         place: usize,
         depth: usize,
     ) -> Option<Reason> {
@@ -22,8 +22,21 @@ impl Explainer<'_> {
             });
             found
         })?;
-        let place = if rung <= below { place } else { self.history.before(place)? };
+        let is_before = rung < below || rung == below && self.is_before(rung, name, element);
+        let place = if is_before { place } else { self.history.before(place)? };
         self.block_at(name, rung, place, depth)
+    }
+
+    /// Whether a block of a rung is called before an element of it is looked at.
+    fn is_before(&self, rung: usize, name: &str, element: &Element) -> bool {
+        let (mut is_called, mut found) = (false, false);
+        visit(&self.program.rungs[rung].network, &mut |seen| {
+            if std::ptr::eq(seen, element) {
+                found = is_called;
+            }
+            is_called |= matches!(seen, Element::Block(block) if block.name.as_str() == name);
+        });
+        found
     }
 
     pub(super) fn block_at(
@@ -54,31 +67,38 @@ impl Explainer<'_> {
         let (text, at) = self.block_text(&found, rung, place);
         reason.text = format!("{word}: {text}");
         reason.because = match at {
-            Some(at) if at != place => self.wire_at(name, rung, at, depth),
+            Some(at) if at != place => self.inputs_at(name, rung, at, depth),
             _ => {
-                let reset = match kind {
-                    BlockKind::Sr => found.feed("R"),
-                    BlockKind::Rs => found.feed("R1"),
-                    _ => (false, Vec::new()),
-                };
-                let elements =
-                    if reset.0 && !found.node.flow.leaves { reset.1 } else { found.wire.clone() };
+                let was = self.count_before(name, rung, place);
+                let elements = deciding(&found, was);
                 self.elements(&elements, rung, place, depth + 1)
             }
         };
         Some(reason)
     }
 
-    /// Why there was power at the wire of a block in an earlier scan, or why not.
-    fn wire_at(&mut self, name: &str, rung: usize, place: usize, depth: usize) -> Vec<Reason> {
+    /// Why a block did what it did in an earlier scan: the input that decided.
+    fn inputs_at(&mut self, name: &str, rung: usize, place: usize, depth: usize) -> Vec<Reason> {
         let Some(evaluation) = self.evaluation(place) else {
             return Vec::new();
         };
         let flows = &evaluation.rungs[rung].elements;
         let network = nodes(&self.program.rungs[rung].network, &mut flows.iter());
+        let was = self.count_before(name, rung, place);
         match at_block(&network, name) {
-            Some(found) => self.elements(&found.wire, rung, place, depth + 1),
+            Some(found) => self.elements(&deciding(&found, was), rung, place, depth + 1),
             None => Vec::new(),
+        }
+    }
+
+    /// CV of a counter after the scan before that of a step.
+    fn count_before(&mut self, name: &str, rung: usize, place: usize) -> Option<u16> {
+        let element = self.place_of_block(name, rung)?;
+        let before = self.history.before(place)?;
+        let evaluation = self.evaluation(before)?;
+        match evaluation.rungs[rung].elements.get(element)?.reading {
+            Reading::Number(count) => Some(count),
+            _ => None,
         }
     }
 
@@ -220,4 +240,23 @@ impl Explainer<'_> {
         });
         found
     }
+}
+
+/// Why the input of a block that decided in a scan has power, or has none; `was` is CV of a counter before it.
+fn deciding<'n, 'e>(found: &'n AtBlock<'n, 'e>, was: Option<u16>) -> Vec<&'n Node<'e>> {
+    let is_off = !found.node.flow.leaves;
+    let fallen = match (found.node.flow.reading, was) {
+        (Reading::Number(count), Some(was)) => count < was,
+        _ => false,
+    };
+    let pins: &[(&str, bool)] = match found.block.kind {
+        BlockKind::Sr => &[("R", is_off)],
+        BlockKind::Rs => &[("R1", is_off)],
+        BlockKind::Ctu(_) => &[("R", true)],
+        BlockKind::Ctd(_) => &[("LD", true)],
+        BlockKind::Ctud(_) => &[("R", true), ("LD", true), ("CD", fallen)],
+        _ => &[],
+    };
+    let mut pins = pins.iter().filter(|(_, decides)| *decides).map(|(pin, _)| found.feed(pin));
+    pins.find(|(power, _)| *power).map_or_else(|| found.wire.clone(), |(_, elements)| elements)
 }
