@@ -1,7 +1,7 @@
 //! The version of a journal: the first record of each of its files says it.
 //!
 //! ```text
-//! {"at_ns":0,"name":"laboratory","member":null,"event":{"event":"journal","version":2}}
+//! {"at_ns":0,"name":"laboratory","member":null,"event":{"event":"journal","version":4}}
 //! ```
 //!
 //! Invariant: no record of another version is read. Journals that were written before they had a version have other events and keys, and
@@ -22,13 +22,10 @@ use crate::segments::segments_of;
 /// Bytes of the first line, at most.
 pub(crate) const LONGEST_HEADER: u64 = 4096;
 
-/// The oldest version of which files are read: its records are the same, and its closed segments were not packed.
-const OLDEST_READ: u32 = 2;
-
 /// A journal that this program does not read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the journal has version {found}{}, and this program reads versions {OLDEST_READ} to {JOURNAL_VERSION}: read it with the understudy that wrote it, or repeat the run",
+    "the journal has version {found}{}, and this program reads version {JOURNAL_VERSION}: read it with the understudy that wrote it, or repeat the run",
     if *.found == 1 { " (it does not say one)" } else { "" }
 )]
 pub struct WrongVersion {
@@ -74,11 +71,8 @@ pub fn check_header(line: &[u8]) -> Result<Option<u64>, JournalError> {
     let header = Header::deserialize(first.event).ok();
     let header = header.filter(|header| header.event == "journal");
     let found = header.as_ref().map_or(1, |header| header.version);
-    if (OLDEST_READ..=JOURNAL_VERSION).contains(&found) {
-        Ok(header.and_then(|header| header.segment))
-    } else {
-        Err(WrongVersion { found }.into())
-    }
+    check_version(found)?;
+    Ok(header.and_then(|header| header.segment))
 }
 
 /// Whether the records of a member that says its version can be taken: only those of this one.

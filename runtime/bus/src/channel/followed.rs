@@ -4,7 +4,7 @@
 //! the configuration of the process that tells them: a member may start again with another one while it is followed.
 //!
 //! ```text
-//!   {"lines":{"first":1234,"count":17},"reporter":{"configuration":"0123456789abcdef","version":3}}
+//!   {"lines":{"first":1234,"count":17},"reporter":{"configuration":"0123456789abcdef","version":4}}
 //! ```
 
 use std::io::{self, Write};
