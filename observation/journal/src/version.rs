@@ -120,9 +120,11 @@ mod tests {
         };
         let header = String::from_utf8(journal_header(7)).expect("text");
         check(&header, Ok(Some(7)));
-        let of = |version: u32| header.replace(":3,\"segment\":7}", &format!(":{version}}}"));
-        check(&of(2), Ok(None));
-        check(&of(4), Err(Some(4)));
+        let of = |version: u32| header.replace(":4,\"segment\":7}", &format!(":{version}}}"));
+        check(&of(4), Ok(None));
+        for other in [2, 3, 5] {
+            check(&of(other), Err(Some(other)));
+        }
         check(
             r#"{"at_ns":1,"name":"laboratory","party":null,"event":{"event":"started","party":{"station":0}}}"#,
             Err(Some(1)),
