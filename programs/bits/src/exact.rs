@@ -185,13 +185,10 @@ fn gap(meaning: &Meaning) -> Option<Term> {
 }
 
 /// Inputs and registers that the roots and some registers depend on, those among them.
-fn live(circuit: &Circuit, mut roots: Vec<Expression>, registers: BTreeSet<Bit>) -> BTreeSet<Bit> {
-    let next = |register: u32| circuit.registers()[register as usize].next;
-    roots.extend(registers.iter().filter_map(|variable| match variable {
-        Bit::Register(register) => Some(next(*register)),
-        Bit::Input(_) => None,
-    }));
-    let mut live = registers;
+fn live(circuit: &Circuit, mut roots: Vec<Expression>, kept: BTreeSet<Bit>) -> BTreeSet<Bit> {
+    let next = |register: usize| circuit.registers()[register].next;
+    roots.extend(registers(&kept).map(next));
+    let mut live = kept;
     loop {
         let reached = circuit.graph().reached(&roots);
         let operations = circuit.graph().operations().iter().zip(reached);
@@ -201,7 +198,7 @@ fn live(circuit: &Circuit, mut roots: Vec<Expression>, registers: BTreeSet<Bit>)
                 && live.insert(*variable)
                 && let Bit::Register(register) = variable
             {
-                more.push(next(*register));
+                more.push(next(*register as usize));
             }
         }
         if more.is_empty() {

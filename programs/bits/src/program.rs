@@ -43,7 +43,7 @@ impl System {
     /// # Errors
     /// What of the program cannot be followed.
     pub fn of_program(program: &Program) -> Result<Self, Unsupported> {
-        Self::alone(program, |_| Source::Any(None), BTreeSet::new())
+        Self::comparing(program, BTreeSet::new())
     }
 
     /// One program, whose inputs are within their subranges; see [`Source::declared`]. Its properties compare the numbers `compared` too.
@@ -298,7 +298,7 @@ impl System {
             clock: None,
         };
         let mut numbers = HashMap::new();
-        let mut timers = Timers::default();
+        let mut timers = Timers::new(program);
         let mut scan = self.scan(&how, &mut numbers, &mut timers)?;
         let wanted = self.wanted.iter().filter_map(|name| name.strip_prefix(prefix));
         let wanted = wanted.filter_map(|name| Some(program.part(name)?.address)).collect();

@@ -97,6 +97,22 @@ pub(crate) fn of_text(
     })
 }
 
+fn exact(typed: &Typed, shown: Shown<'_>) -> Result<Exact, LowerError> {
+    let shown = Shown { keeps_all: true, ..shown };
+    Exact::new(typed, shown).map_err(|inexact| LowerError::NoCircuit {
+        program: typed.name.clone(),
+        reason: inexact.to_string(),
+    })
+}
+
+/// The circuit of the typed program of a ladder, as [`Program::lower`] gives it.
+///
+/// # Errors
+/// A program that is too large.
+pub fn circuit(typed: &Typed) -> Result<Circuit, LowerError> {
+    Ok(exact(typed, Shown::default())?.circuit)
+}
+
 impl Program {
     /// The typed program that does what the scan of this program does, one scan a step, with `period` from one to the next. Its points and
     /// variables have the names of the ladder; what sees the edges of `a` is named `a.rising` or `a.falling`.
@@ -184,12 +200,7 @@ impl Program {
     }
 
     fn exact(&self, period: Duration, shown: Shown<'_>) -> Result<Exact, LowerError> {
-        let typed = self.typed_without_check(period)?;
-        let shown = Shown { keeps_all: true, ..shown };
-        Exact::new(&typed, shown).map_err(|inexact| LowerError::NoCircuit {
-            program: self.name.to_string(),
-            reason: inexact.to_string(),
-        })
+        exact(&self.typed_without_check(period)?, shown)
     }
 
     /// A warning for each timer whose preset is not a multiple of `period`.

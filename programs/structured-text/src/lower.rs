@@ -61,7 +61,7 @@ use self::types::{StructureInfo, TypeState};
 /// The state of a program takes at most so many slots: 256 KiB.
 pub const MAXIMUM_SLOTS: u32 = 256 * 1024 / 8;
 
-/// The memory of a program that becomes a circuit takes at most so many slots: 128 MiB.
+/// Slots that the memory of a program that becomes a circuit takes at most: 128 MiB.
 const MAXIMUM_CIRCUIT: u64 = 128 * 1024 * 1024 / 8;
 
 /// The frames of all routines of a program together take at most so many slots: 1 MiB.

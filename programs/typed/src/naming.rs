@@ -147,7 +147,7 @@ pub struct Parts<'p> {
 }
 
 impl<'p> Parts<'p> {
-    /// Of a program.
+    /// An index of the slots of a program.
     pub fn new(program: &'p Program) -> Self {
         let mut holders = vec![None; program.state as usize];
         // Of several that share a slot, the first one.

@@ -2,11 +2,10 @@
 
 use std::borrow::Cow;
 use std::sync::Arc;
-use std::time::Duration;
 
 use understudy_bits::{Inexact, exact};
 use understudy_executable::{Executable, Interface};
-use understudy_ladder::{LowerError, Program as LadderProgram};
+use understudy_ladder::{LowerError, Program as LadderProgram, circuit};
 use understudy_logic::Circuit;
 use understudy_typed::Program as TypedProgram;
 use understudy_wire::ProgramHash;
@@ -33,13 +32,9 @@ impl Code {
     /// The program of a ladder, for the period of the cluster.
     ///
     /// # Errors
-    /// Those of [`LadderProgram::lower`].
-    pub fn of_ladder(
-        typed: Arc<TypedProgram>,
-        ladder: LadderProgram,
-        period: Duration,
-    ) -> Result<Self, LowerError> {
-        let circuit = ladder.lower(period)?;
+    /// A ladder that is too large for a circuit.
+    pub fn of_ladder(typed: Arc<TypedProgram>, ladder: LadderProgram) -> Result<Self, LowerError> {
+        let circuit = circuit(&typed)?.named(ladder.name.as_str());
         Ok(Self { typed, body: Body::Rungs(Box::new(ladder), circuit) })
     }
 

@@ -15,17 +15,24 @@ use crate::term::Term;
 const MOST: i64 = u32::MAX as i64;
 
 /// The timers of a program.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Timers {
     /// Those that are counted, by address.
     pub(crate) counted: BTreeMap<u64, Counted>,
     /// What they do not keep then, by address.
     pub(crate) dropped: BTreeSet<u64>,
+    /// What a scan does with them, until it is decided which are counted.
+    watched: Option<Watched>,
+    /// Bodies of timers that are being executed.
+    pub(super) inside: u32,
+}
+
+/// What a scan does with timers, and what of memory it reads and writes outside of their bodies, by address.
+#[derive(Debug, Default)]
+struct Watched {
     uses: BTreeMap<u64, Use>,
     read: BTreeSet<u64>,
     written: BTreeSet<u64>,
-    /// Bodies of timers that are being executed.
-    pub(super) inside: u32,
 }
 
 /// A timer, and the slots of its variables in an instance.
@@ -112,38 +119,48 @@ struct Use {
 }
 
 impl Timers {
+    /// Of a program, before its first scan is executed.
+    pub(crate) fn new(program: &Program) -> Self {
+        let has_timers = program.routines.iter().any(|routine| routine.timer.is_some());
+        let watched = has_timers.then(Watched::default);
+        Self { counted: BTreeMap::new(), dropped: BTreeSet::new(), watched, inside: 0 }
+    }
+
     pub(super) fn read(&mut self, address: u64) {
-        if self.inside == 0 {
-            self.read.insert(address);
+        if let (0, Some(watched)) = (self.inside, &mut self.watched) {
+            watched.read.insert(address);
         }
     }
 
     pub(super) fn written(&mut self, address: u64) {
-        if self.inside == 0 {
-            self.written.insert(address);
+        if let (0, Some(watched)) = (self.inside, &mut self.watched) {
+            watched.written.insert(address);
         }
     }
 
-    /// Counts the timers that can be counted, after a scan was executed; `wanted` are addresses that somebody asks for.
+    /// Counts the timers that can be counted, after a scan was executed; `wanted` are addresses whose values are asked for.
     pub(crate) fn choose(&mut self, program: &Program, wanted: &BTreeSet<u64>) {
-        for (&address, used) in &self.uses {
+        let Some(Watched { uses, read, written }) = self.watched.take() else {
+            return;
+        };
+        for (address, used) in uses {
             let Use { variables, calls: 1, preset: Some(preset) } = used else {
                 continue;
             };
-            let mut own = variables.own().into_iter().map(|slot| address + 64 * slot);
-            let is_read = |of: &u64| self.read.contains(of) || wanted.contains(of);
-            let is_used = own.any(|of| is_read(&of) || self.written.contains(&of))
-                || self.written.contains(&(address + 64 * variables.output));
+            let at = |slot: u64| address + 64 * slot;
+            let own = variables.own().map(at);
+            let is_used = written.contains(&at(variables.output))
+                || own
+                    .iter()
+                    .any(|of| [&read, &written, wanted].iter().any(|all| all.contains(of)));
             let period = program.period.max(1);
-            let scans = (*preset).max(1).checked_add(period - 1).map(|time| time / period);
+            let scans = preset.max(1).checked_add(period - 1).map(|time| time / period);
             if let (false, Some(scans @ ..=MOST)) = (is_used, scans) {
-                let (scans, preset) = (scans as u64, *preset);
-                let counted = Counted { address, variables: *variables, scans, preset };
-                self.counted.insert(address, counted);
-                self.dropped.extend(variables.own().map(|slot| address + 64 * slot));
+                let scans = scans as u64;
+                self.counted.insert(address, Counted { address, variables, scans, preset });
+                self.dropped.extend(own);
             }
         }
-        (self.uses, self.read, self.written) = Default::default();
     }
 }
 
@@ -169,17 +186,19 @@ impl Execution<'_> {
         })
     }
 
-    /// Notes a call of a timer that is not counted.
+    /// Notes a call of a timer.
     pub(super) fn watch(&mut self, variables: &Variables, address: u64, is_only: bool) {
+        if self.timers.watched.is_none() {
+            return;
+        }
         let preset = self.get(address + 64 * variables.preset, Elementary::Time);
         let is_certain = is_only && self.terms.is(self.path, true);
         let preset = self.terms.value(preset).filter(|_| is_certain);
-        let used = self.timers.uses.entry(address).or_insert_with(|| Use {
-            variables: *variables,
-            calls: 0,
-            preset: preset.map(|stored| stored as i64),
-        });
-        used.calls += 1;
+        let preset = preset.map(|stored| stored as i64);
+        if let Some(watched) = &mut self.timers.watched {
+            let first = Use { variables: *variables, calls: 0, preset };
+            watched.uses.entry(address).or_insert(first).calls += 1;
+        }
     }
 
     /// A call of a timer that is counted.

@@ -3,7 +3,7 @@
 /// The power at a place of a rung, as an expression.
 #[derive(Clone)]
 pub(super) enum Power {
-    /// Of the left rail.
+    /// The power of the left rail.
     On,
     /// One word: a variable, an output of a block, FALSE.
     Word(String),
