@@ -12,6 +12,7 @@ use understudy_wire::{Member, ProgramId};
 
 use crate::describe::program_name;
 use concerns::Concerns;
+pub(crate) use concerns::listed;
 
 /// Alarms that are kept, at most; the oldest that are over and acknowledged go first.
 const MOST: usize = 1000;

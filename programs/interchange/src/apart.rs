@@ -135,7 +135,7 @@ impl Text<'_> {
         let has_event = parsed.as_ref().is_some_and(|file| has_event(file, program));
         let is_document =
             Format::of(name, text) == Some(Format::PlcOpen) && twincat::read(text).is_none();
-        let ladder = rungs.filter(|rungs| rungs.are_written).map(|rungs| rungs.ladder);
+        let ladder = rungs.and_then(Rungs::written);
         let to = match &ladder {
             // A ladder states neither interval nor event.
             Some(_) if period.is_none() && !has_event => Format::Ladder,

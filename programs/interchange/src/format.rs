@@ -9,7 +9,7 @@ use understudy_text::{Diagnostic, Lines, has_errors};
 use understudy_typed::{Elementary, Program as Typed};
 
 use crate::plcopen::Fidelity;
-use crate::source::{Source, SourceFile, Wanted, no_program, read_source};
+use crate::source::{Rungs, Source, SourceFile, Wanted, no_program, read_source};
 use crate::text::whole;
 use crate::{digraph, ldmicro, plcopen, text as written, twincat};
 
@@ -194,7 +194,7 @@ pub(crate) fn stem(name: &str) -> &str {
 pub fn read_ladder(name: &str, text: &str, period: Option<Duration>) -> Reading {
     let SourceFile { source, rungs, period: stated, mut diagnostics } =
         read_source(name, text, Wanted { program: None, period });
-    let written = rungs.filter(|rungs| rungs.are_written).map(|rungs| rungs.ladder);
+    let written = rungs.and_then(Rungs::written);
     let program = match source {
         Some(Source::Program(_)) if written.is_some() => written,
         Some(Source::Program(typed)) => {

@@ -55,6 +55,13 @@ pub struct Rungs {
     pub are_written: bool,
 }
 
+impl Rungs {
+    /// The rungs, where the program is written in them.
+    pub fn written(self) -> Option<Ladder> {
+        self.are_written.then_some(self.ladder)
+    }
+}
+
 impl SourceFile {
     /// The rungs that the program is written in.
     pub fn ladder(&self) -> Option<&Ladder> {

@@ -3,28 +3,18 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
+use understudy_text::words;
 use understudy_view::{Alarm, AlarmState, ProcessAlarm};
 
-/// What has happened to an alarm.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Change {
-    /// It was raised, or lasts when the gateway begins.
-    Raised,
-    /// An operator has acknowledged it.
-    Acknowledged,
-    /// What it is about is over.
-    Returned,
-}
-
-impl Change {
-    /// In one word.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Raised => "raised",
-            Self::Acknowledged => "acknowledged",
-            Self::Returned => "returned",
-        }
+words! {
+    /// What has happened to an alarm.
+    pub enum Change by word {
+        /// It was raised, or lasts when the gateway begins.
+        Raised = "raised",
+        /// An operator has acknowledged it.
+        Acknowledged = "acknowledged",
+        /// What it is about is over.
+        Returned = "returned",
     }
 }
 

@@ -12,7 +12,7 @@ use tokio::process::Command;
 use understudy_cluster::Notify;
 use understudy_text::duration;
 
-use super::Notification;
+use super::{MOST_WAITING, Notification};
 
 /// Bytes of the standard error of the command that are reported, at most.
 const MOST_SAID: u64 = 400;
@@ -59,7 +59,7 @@ pub enum NotifyError {
     },
     /// More notifications wait than are kept.
     #[error(
-        "U0587: alarm `{alarm}`: not passed on, because 500 notifications wait for the command"
+        "U0587: alarm `{alarm}`: not passed on, because {MOST_WAITING} notifications wait for the command"
     )]
     Full {
         /// Name of the alarm.

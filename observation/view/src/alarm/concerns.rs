@@ -152,8 +152,13 @@ impl Concerns {
         if names.len() == self.programs && names.len() >= ALL_FROM {
             return format!("all {} programs", names.len());
         }
-        let more = names.len().saturating_sub(MOST_NAMES);
-        let listed = names[..names.len() - more].join(", ");
-        if more == 0 { listed } else { format!("{listed} and {more} more") }
+        listed(names)
     }
+}
+
+/// Some names, and how many more there are.
+pub(crate) fn listed(names: &[&str]) -> String {
+    let more = names.len().saturating_sub(MOST_NAMES);
+    let listed = names[..names.len() - more].join(", ");
+    if more == 0 { listed } else { format!("{listed} and {more} more") }
 }

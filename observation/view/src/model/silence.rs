@@ -12,7 +12,7 @@ use std::ops::RangeInclusive;
 use understudy_wire::{Member, ProgramId, StationId};
 
 use super::Model;
-use crate::alarm::{Subject, UNPROTECTED};
+use crate::alarm::{Subject, UNPROTECTED, listed};
 use crate::protection::LackingStation;
 use crate::station::StationState;
 
@@ -21,9 +21,6 @@ pub(super) const NOT_RECEIVED: &str = "not-received";
 
 /// Name of the alarm of the network that all remote I/Os share.
 const NETWORK: &str = "network";
-
-/// Stations that a text lists, at most.
-const MOST_NAMES: usize = 8;
 
 /// Where no station is received.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -107,10 +104,4 @@ impl Model {
         let names: Vec<&str> = names.collect();
         (names.len() > 1).then_some(names)
     }
-}
-
-fn listed(names: &[&str]) -> String {
-    let more = names.len().saturating_sub(MOST_NAMES);
-    let listed = names[..names.len() - more].join(", ");
-    if more == 0 { listed } else { format!("{listed} and {more} more") }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_interchange::{Source, SourceFile, Wanted, no_program, read_source};
+use understudy_interchange::{Rungs, Source, SourceFile, Wanted, no_program, read_source};
 use understudy_ladder::Program as Ladder;
 use understudy_logic::Circuit;
 use understudy_text::{Diagnostic, Report};
@@ -72,7 +72,7 @@ impl<'a> Ladders<'a> {
         }
         let mut ladder = ladder.clone();
         ladder.name = name.into();
-        match Code::of_ladder(typed, ladder, period) {
+        match Code::of_ladder(typed, ladder) {
             Ok(code) => Some(code),
             Err(error) => {
                 let message = format!("`{}`: {error}", file.value);
@@ -109,7 +109,7 @@ impl<'a> Ladders<'a> {
             let wanted = Wanted { period: Some(period), program: None };
             let SourceFile { source, rungs, mut diagnostics, .. } =
                 read_source(file, &text, wanted);
-            let ladder = rungs.filter(|rungs| rungs.are_written).map(|rungs| rungs.ladder);
+            let ladder = rungs.and_then(Rungs::written);
             if let Some(Source::Library(_)) = source {
                 diagnostics.push(no_program());
             }

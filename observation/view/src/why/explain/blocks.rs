@@ -66,14 +66,7 @@ impl Explainer<'_> {
         let word = kind.word();
         let (text, at) = self.block_text(&found, rung, place);
         reason.text = format!("{word}: {text}");
-        reason.because = match at {
-            Some(at) if at != place => self.inputs_at(name, rung, at, depth),
-            _ => {
-                let was = self.count_before(name, rung, place);
-                let elements = deciding(&found, was);
-                self.elements(&elements, rung, place, depth + 1)
-            }
-        };
+        reason.because = self.inputs_at(name, rung, at.unwrap_or(place), depth);
         Some(reason)
     }
 
