@@ -41,6 +41,9 @@ pub struct Arguments {
     /// Folder of the keys of this member; required unless the cluster file has `security = "off"`
     #[arg(long, value_name = "DIR")]
     keys: Option<PathBuf>,
+    /// Folder for what is needed after a power failure: retentive values, and the newest applied output of a remote I/O
+    #[arg(long, value_name = "DIR")]
+    retain: Option<PathBuf>,
     /// Exit when standard input is closed or the parent process ends
     #[arg(long)]
     in_laboratory: bool,
@@ -132,6 +135,7 @@ impl Arguments {
             keys: self.keys.clone(),
             in_laboratory: self.in_laboratory,
             real_time: !self.no_real_time,
+            retain: self.retain.clone(),
             journal: self.journal.clone(),
             journal_limit: self.journal_limit,
         })

@@ -2,11 +2,12 @@
 //!
 //! A lineage identifies the state of a replica. Each sample carries the lineages of the last few cycles, so a replica
 //! finds its own in that history and replays the samples that it missed. A replica that is not in the history goes back
-//! to a state that it had a few steps ago, or starts from the initial state where the history does; otherwise it is
+//! to a state that it had a few steps ago, or starts where the history does, cold or warm; otherwise it is
 //! [`Standing::Lost`] until another station transfers a state. It never steps on a guess.
 
 mod log;
 mod remembered;
+mod retaining;
 mod transfer;
 
 use std::collections::VecDeque;
@@ -20,6 +21,7 @@ use understudy_wire::{
 
 use self::log::Log;
 use self::remembered::Remembered;
+use self::retaining::Retaining;
 pub(crate) use self::transfer::SEGMENTS_A_CYCLE;
 use self::transfer::{Joining, Snapshot};
 
@@ -54,6 +56,7 @@ pub(crate) struct Replica {
     /// For other stations, of a state of several segments.
     snapshots: Vec<Snapshot>,
     remembered: Remembered,
+    retaining: Retaining,
     /// Stations that were accounted for when this one gave them its state, and that may prove outputs with it from then on.
     given: StationSet,
     /// Stations that are accounted for by what they reported to this one since the newest sample.
@@ -89,12 +92,19 @@ struct Held {
     state: State,
 }
 
+impl Held {
+    fn holding(&self, program: ProgramId) -> Holding {
+        let State { lineage, stepped, digest, .. } = self.state;
+        Holding { program, born: self.born, lineage, stepped, digest }
+    }
+}
+
 /// Effect of a sample on a replica.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Followed {
     /// It is current.
     Synchronised,
-    /// It is current, because the history starts from the initial state.
+    /// It is current, because the history starts from the initial state, or from a retained state that it has.
     FromGenesis(Lineage),
     /// It is current, with the state of that station.
     CaughtUp(StationId),
@@ -120,6 +130,7 @@ impl Replica {
             joining: Joining::default(),
             snapshots: Vec::new(),
             remembered: Remembered::Nothing,
+            retaining: Retaining::default(),
             given: StationSet::EMPTY,
             witnessed: StationSet::EMPTY,
             history,
@@ -170,13 +181,7 @@ impl Replica {
 
     /// The state that it reports to hold; also that of a lost replica, which may be the newest available one.
     pub(crate) fn holding(&self) -> Option<Holding> {
-        self.held.as_ref().map(|held| Holding {
-            program: self.id,
-            born: held.born,
-            lineage: held.state.lineage,
-            stepped: held.state.stepped,
-            digest: held.state.digest,
-        })
+        self.held.as_ref().map(|held| held.holding(self.id))
     }
 
     /// Follows the sample of `moment`, a frame whose body is `sample`.
@@ -218,20 +223,14 @@ impl Replica {
             self.replay(program, scratch, sample, place, moment);
             return self.synchronised(shadow_cycles);
         }
-        let genesis = Lineage::genesis(program.hash, sample.born);
-        if let Some(place) = lineages.iter().position(|&lineage| lineage == genesis) {
-            let initial =
-                Image::from_words(program.executable.state_count(), program.executable.initial());
+        if let Some(place) = self.take_up_retained(&lineages) {
+            self.replay(program, scratch, sample, place, moment);
+            return self.synchronised(shadow_cycles);
+        }
+        if let Some((place, start)) = self.start_in(program, sample, &lineages) {
+            let genesis = start.lineage;
             self.past.clear();
-            self.held = Some(Held {
-                born: sample.born,
-                state: State {
-                    bits: initial.expect("a circuit packs its initial state"),
-                    lineage: genesis,
-                    stepped: sample.born,
-                    digest: Digest::default(),
-                },
-            });
+            self.held = Some(Held { born: sample.born, state: start });
             self.replay(program, scratch, sample, place, moment);
             self.standing = Standing::Proven;
             self.joining = Joining::default();
@@ -271,6 +270,7 @@ impl Replica {
     /// Discards the state, which differs from that of another station.
     pub(crate) fn discard(&mut self) {
         self.held = None;
+        self.forget_retained();
         self.past.clear();
         self.standing = Standing::Lost;
         self.joining = Joining::default();
@@ -372,6 +372,7 @@ impl Replica {
         held.state.lineage = held.state.lineage.after(inputs);
         held.state.stepped = moment;
         self.step.after = Some(held.state.lineage);
+        self.retaining.stepped(self.id, program, held, inputs);
     }
 }
 

@@ -27,7 +27,7 @@ use understudy_cycle::{Arrival, Input, Machine, Output, Outvoted, Participant};
 use understudy_executable::Scratch;
 use understudy_wire::{
     Body, ConfigurationHash, Digest, Frame, Holding, Image, Lineage, Member, Moment, ProgramId,
-    ProgramSet, Recalled, Sample, SamplesReceived, StationId, StationSet, Time,
+    ProgramSet, Recalled, RetainedRun, Sample, SamplesReceived, StationId, StationSet, Time,
 };
 
 use crate::event::Event;
@@ -186,6 +186,28 @@ impl Station {
         station
     }
 
+    /// Keeps the states of programs with retentive variables: whole after every `every` steps, and each step in between
+    /// ([`Output::Retain`]). It starts with what it has kept before, `runs`.
+    #[must_use]
+    pub fn retaining(mut self, every: u32, runs: &[RetainedRun]) -> Self {
+        let cluster = self.settings.agreement.cluster;
+        for replica in &mut self.replicas {
+            let program = &self.settings.programs[replica.id().index()];
+            if !program.executable.is_retentive() {
+                continue;
+            }
+            replica.retain(cluster, every);
+            let own = |run: &&RetainedRun| {
+                run.state.cluster == cluster && run.state.program == replica.id()
+            };
+            let own: Vec<_> = runs.iter().filter(own).collect();
+            for run in own {
+                replica.find_retained(program, &mut self.scratch, run);
+            }
+        }
+        self
+    }
+
     /// Flips one bit of x(i), modulo its width, as a memory fault does; no effect without x(i).
     pub fn flip_state(&mut self, program: ProgramId, bit: usize) {
         if let Some(replica) = replica_mut(&mut self.replicas, program) {
@@ -281,6 +303,7 @@ impl Station {
             frame,
             self.settings.agreement.shadow_cycles,
         );
+        self.hand_over_retained(program);
         let adopted = match followed {
             Followed::FromGenesis(lineage) => Some((lineage, None)),
             Followed::CaughtUp(from) => Some((sample.after, Some(from))),
@@ -288,6 +311,15 @@ impl Station {
         };
         if let Some((lineage, from)) = adopted {
             self.report(Event::Adopted { moment, program, lineage, from });
+        }
+    }
+
+    /// Hands over what a program keeps of the steps that it has just taken, before their outputs are published.
+    fn hand_over_retained(&mut self, program: ProgramId) {
+        if let Some(replica) = replica_mut(&mut self.replicas, program) {
+            for record in replica.take_records() {
+                self.member.put(Output::Retain(record));
+            }
         }
     }
 

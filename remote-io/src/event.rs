@@ -59,6 +59,21 @@ pub enum Event {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         lost: Option<Moment>,
     },
+    /// The program starts after a power failure, from its initial state with the retentive values that a station has kept.
+    StartedWarm {
+        /// Current cycle.
+        born: Moment,
+        /// The station.
+        from: StationId,
+        /// Cycle of the state whose values were kept.
+        retained: Moment,
+        /// Cycles with applied outputs after that state: their changes of retentive values are lost. Not known without a note of
+        /// the newest applied output.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        lost: Option<u64>,
+        /// Whether the operator has to release the outputs.
+        awaits_release: bool,
+    },
     /// After a restart, or when no living station is on this remote I/O's history: it continues from a lineage that a
     /// station holds.
     AdoptedLineage {
@@ -95,10 +110,12 @@ pub enum Event {
         moment: Moment,
         /// The cycle of the newest sample whose outputs were applied; not known after a restart.
         applied: Option<Moment>,
-        /// Cycle of the newest state that a living station holds.
-        newest: Moment,
-        /// The station that holds it.
-        holder: StationId,
+        /// Cycle of the newest state that a living station holds, or has kept over a power failure.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        newest: Option<Moment>,
+        /// The station that has it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        holder: Option<StationId>,
         /// Whether the operator is asked; the program starts cold otherwise.
         asks: bool,
     },

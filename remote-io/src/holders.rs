@@ -26,6 +26,8 @@ pub(crate) struct Holders {
 struct Holder {
     station: StationId,
     holding: Option<Holding>,
+    /// The state that it has kept over a power failure, while it holds none.
+    retained: Option<Holding>,
     /// What it recalls of this remote I/O's last sample.
     recalled: Option<Recalled>,
     /// Cycles since it was received; `u32::MAX` for never.
@@ -52,6 +54,7 @@ impl Holders {
             .map(|station| Holder {
                 station,
                 holding: None,
+                retained: None,
                 recalled: None,
                 silent: u32::MAX,
                 unheard: u32::MAX,
@@ -85,6 +88,13 @@ impl Holders {
                 entry.absent = 0;
                 self.recalled_gone.remove(station);
             }
+        }
+    }
+
+    /// Takes the state that a station has kept over a power failure, while it holds none.
+    pub(crate) fn note_retained(&mut self, station: StationId, retained: Option<&Holding>) {
+        if let Some(entry) = self.entries.iter_mut().find(|entry| entry.station == station) {
+            entry.retained = retained.copied();
         }
     }
 
@@ -234,6 +244,40 @@ impl Holders {
                 if other.1.stepped > best.1.stepped { other } else { best }
             },
         )
+    }
+
+    /// States that living stations have retained, but for those of `excluded`.
+    fn retained(&self, excluded: StationSet) -> impl Iterator<Item = (StationId, &Holding)> {
+        self.entries
+            .iter()
+            .filter(move |entry| self.lives(entry) && !excluded.contains(entry.station))
+            .filter_map(|entry| Some((entry.station, entry.retained.as_ref()?)))
+    }
+
+    /// The retained state that was stepped last; the first of equals.
+    pub(crate) fn newest_retained(&self, excluded: StationSet) -> Option<(StationId, &Holding)> {
+        self.retained(excluded).reduce(
+            |best, other| {
+                if other.1.stepped > best.1.stepped { other } else { best }
+            },
+        )
+    }
+
+    /// Stations that have retained the newest state, where they have different ones.
+    pub(crate) fn disputed_retained(
+        &self,
+        excluded: StationSet,
+        newest: &Holding,
+    ) -> Option<StationSet> {
+        let equal = || self.retained(excluded).filter(|(_, it)| it.stepped == newest.stepped);
+        let differ = equal().any(|(_, other)| other.lineage != newest.lineage);
+        differ.then(|| equal().map(|(station, _)| station).collect())
+    }
+
+    /// The newest applied sample that living stations recall.
+    pub(crate) fn newest_recalled(&self) -> Option<Moment> {
+        let living = self.entries.iter().filter(|entry| self.lives(entry));
+        living.filter_map(|entry| entry.recalled.as_ref()?.applied).max()
     }
 
     fn lives(&self, entry: &Holder) -> bool {

@@ -11,6 +11,7 @@
 //!
 //! ```text
 //!   Listening ── a living station holds a state ──────────────► Running from its lineage
+//!           ├─── stations have retained one ──────────────────► Running from its retentive values (warm start)
 //!           ├─── no living station holds one ─────────────────► Running from the initial state (cold start)
 //!           ├─── no living station holds one, and other members have another configuration ── the operator decides ──► Running
 //!           └─── different ones of one cycle, or a stale one ── the operator decides ──► Running
@@ -30,6 +31,7 @@ mod sampling;
 mod signals;
 #[cfg(test)]
 mod states;
+mod warm;
 mod writing;
 
 use std::hash::{Hash, Hasher};
@@ -38,7 +40,7 @@ use std::time::Duration;
 
 use understudy_cycle::{Arrival, Input, Machine, Output, Outvoted, Participant, RemoteIoInput};
 use understudy_wire::{
-    Body, ConfigurationHash, Frame, Holding, Image, Member, Moment, OrderRefusal, ProgramId,
+    Body, ConfigurationHash, Frame, Holding, Image, Join, Member, Moment, OrderRefusal, ProgramId,
     Recalled, Source, StateChoice, StationId, StationSet, Time,
 };
 
@@ -54,6 +56,7 @@ use forcing::Forcing;
 use knowledge::Knowledge;
 use protection::Protection;
 use signals::Signals;
+use warm::Noting;
 use writing::Writing;
 
 /// One remote I/O. See [`Machine`] for how it is driven.
@@ -81,6 +84,7 @@ pub struct RemoteIo {
     forcing: Forcing,
     writing: Writing,
     signals: Signals,
+    noting: Noting,
     /// The turns of this cycle, by rank.
     turns: Vec<Option<Arc<Frame>>>,
     deadline: Deadline,
@@ -186,6 +190,7 @@ impl RemoteIo {
             forcing: Forcing::default(),
             writing: Writing::new(&settings.operator_inputs),
             signals: Signals::new(&settings),
+            noting: Noting::default(),
             turns: vec![None; stations],
             deadline: Deadline::Passed { idle: 0 },
             missed: 0,
@@ -251,12 +256,13 @@ impl RemoteIo {
         self.holders.hear(station, None);
         match &frame.body {
             Body::Turn(turn) if self.member.attendance.receive_turn(station) => {
-                self.note(station, &turn.holdings, &turn.recalled, frame.header.alone);
+                self.note(station, &turn.holdings, &[], &turn.recalled, frame.header.alone);
                 self.holders.hear_of(turn.heard);
                 self.turns[station.index()] = Some(Arc::clone(frame));
             }
             Body::Join(join) => {
-                self.note(station, &join.holdings, &join.recalled, frame.header.alone);
+                let Join { holdings, retained, recalled, .. } = join;
+                self.note(station, holdings, retained, recalled, frame.header.alone);
             }
             _ => {}
         }
@@ -303,11 +309,13 @@ impl RemoteIo {
         &mut self,
         station: StationId,
         holdings: &[Holding],
+        retained: &[Holding],
         recalled: &[Recalled],
         alone: bool,
     ) {
         let program = self.settings.program;
         let own = Holding::of(holdings, program);
+        self.holders.note_retained(station, Holding::of(retained, program));
         let recalled = recalled.iter().find(|recalled| {
             recalled.program == program && recalled.inputs.width() == self.settings.undriven.width()
         });
@@ -425,6 +433,7 @@ impl Hash for RemoteIo {
             forcing,
             writing,
             signals,
+            noting,
             turns,
             deadline,
             missed,
@@ -437,7 +446,7 @@ impl Hash for RemoteIo {
         } = self;
         (member, holders, knowledge, question, authority).hash(hasher);
         (sensors, field, diagnosing, diagnosed, forcing).hash(hasher);
-        (writing, signals).hash(hasher);
+        (writing, signals, noting).hash(hasher);
         (looked, resumed, protection, turns, deadline, missed, applied).hash(hasher);
         (last_true, descent, program, trust, differed).hash(hasher);
     }

@@ -50,6 +50,8 @@ pub struct Settings {
     pub value_fault: ValueFault,
     /// Reaction to a lost state.
     pub stale_state: StaleState,
+    /// Start after a power failure; `None` of a program that has no retentive variables.
+    pub restart: Option<Restart>,
 }
 
 impl Settings {
@@ -85,6 +87,19 @@ pub enum StaleState {
     Operator,
     /// The program starts cold.
     Cold,
+}
+
+/// Start of a program with retentive variables after a power failure, where no station holds its state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Restart {
+    /// From the initial state with the retentive values of the newest retained state.
+    #[default]
+    Warm,
+    /// From the initial state.
+    Cold,
+    /// The operator chooses between the two.
+    Operator,
 }
 
 /// Reaction where two stations publish different outputs of one history, and no third one makes a majority.

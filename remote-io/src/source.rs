@@ -59,6 +59,8 @@ pub struct OperatorInput {
     pub initial: u64,
     /// Lowest role that may write it.
     pub role: Role,
+    /// Whether it keeps its value over a power failure: a level or a setpoint.
+    pub retains: bool,
 }
 
 /// Behaviour of a value that an operator writes.

@@ -27,7 +27,7 @@ pub struct Fault {
 pub enum Action {
     /// It is gone, with all that it knew (kill -9).
     Crash,
-    /// It starts again, knowing nothing.
+    /// It starts again, knowing only what its disk has.
     Restart,
     /// It starts again on a host whose wall clock has jumped: the epoch that it founds where nobody is there is this one.
     RestartInEpoch {

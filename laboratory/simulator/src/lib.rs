@@ -4,6 +4,7 @@
 //! duplicates, delays and reorders as its seed says. Equal parts, faults and seed give equal runs, bit for bit. A
 //! [`Referee`] for each remote I/O recomputes what was true from the samples alone.
 
+mod disk;
 mod fault;
 mod field;
 mod links;

@@ -78,6 +78,7 @@ pub struct Referee {
     /// Samples for which the program may go on from a state that the operator has chosen.
     choice: u32,
     cold_starts: u64,
+    warm_starts: u64,
     /// Whether outputs were applied since the last cold start.
     applied: bool,
 }
@@ -129,6 +130,7 @@ impl Referee {
             unrecorded: Unrecorded::new(settings.sourced_bits()),
             choice: 0,
             cold_starts: 0,
+            warm_starts: 0,
             applied: false,
         }
     }
@@ -214,6 +216,11 @@ impl Referee {
     /// Starts from the initial state, the first one included.
     pub fn cold_starts(&self) -> u64 {
         self.cold_starts
+    }
+
+    /// Starts after a power failure, from the initial state with retentive values.
+    pub fn warm_starts(&self) -> u64 {
+        self.warm_starts
     }
 
     /// Takes one report of the remote I/O, in the order in which they were made; samples and applied outputs count.
@@ -302,6 +309,9 @@ impl Referee {
             self.remember(born, before, initial);
             return Ok(());
         }
+        if let Some(from) = self.warm_start_from(born, before) {
+            return self.start_warm(moment, born, before, from);
+        }
         if self.is_new && self.recover(before) || self.blind {
             return Ok(());
         }
@@ -311,6 +321,33 @@ impl Referee {
             return Ok(());
         }
         Err(Violation::UnknownHistory { moment, lineage: before })
+    }
+
+    /// The place of the state whose retentive values a history begins with.
+    fn warm_start_from(&self, born: Moment, start: Lineage) -> Option<usize> {
+        self.states.iter().rposition(|state| Lineage::warm(self.hash, born, state.lineage) == start)
+    }
+
+    /// The program starts from its initial state with the retentive values of the state at `from`.
+    fn start_warm(
+        &mut self,
+        moment: Moment,
+        born: Moment,
+        start: Lineage,
+        from: usize,
+    ) -> Result<(), Violation> {
+        let chosen = std::mem::take(&mut self.choice) > 0;
+        let state = &self.states[from];
+        let (stepped, applied) = (state.stepped, self.states[self.floor].stepped);
+        let bits = self.executable.restarted(state.bits.words());
+        let bits = Image::from_words(self.executable.state_count(), &bits);
+        self.last_true = None;
+        self.warm_starts += 1;
+        self.remember(born, start, bits.expect("a state of this program is packed"));
+        if from >= self.floor || chosen {
+            return Ok(());
+        }
+        Err(Violation::WentBack { moment, from: stepped, applied })
     }
 
     /// Finds the samples without a record that lead to a lineage from a state that may be continued from, and goes there.

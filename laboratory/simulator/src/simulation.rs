@@ -19,6 +19,7 @@ use understudy_wire::{
     Write,
 };
 
+use crate::disk::Disks;
 use crate::fault::{Action, Fault};
 use crate::field::Plants;
 use crate::links::{Links, Metered};
@@ -74,6 +75,7 @@ pub struct Simulation {
     remote_ios: Vec<Slot<RemoteIo>>,
     wakeups: Wakeups,
     plants: Plants,
+    disks: Disks,
     referees: Vec<Referee>,
     signals: SignalReferee,
     tallies: Vec<Tally>,
@@ -112,15 +114,16 @@ impl Simulation {
                 Referee::new(settings, programs[settings.program.index()].executable.clone())
             })
             .collect();
+        let disks = Disks::new(parts.stations.len(), parts.remote_ios.len());
         let stations = parts.stations.iter().enumerate().map(|(rank, settings)| {
             let mut settings = settings.clone();
             settings.epoch = Epoch(1 + rank as u64);
-            Slot::new(Station::new(now, settings))
+            Slot::new(disks.station(now, settings))
         });
         let stations: Vec<_> = stations.collect();
         let remote_ios = parts.remote_ios.iter();
         let remote_ios: Vec<_> =
-            remote_ios.map(|settings| Slot::new(RemoteIo::new(now, settings.clone()))).collect();
+            remote_ios.map(|settings| Slot::new(disks.remote_io(now, settings.clone()))).collect();
         let due = stations.iter().map(Slot::due);
         let due = due.chain(remote_ios.iter().map(Slot::due)).collect();
         let mut simulation = Self {
@@ -135,6 +138,7 @@ impl Simulation {
             stations,
             remote_ios,
             plants: Plants::new(&parts),
+            disks,
             referees,
             signals: SignalReferee::new(&parts.remote_ios),
             tallies: vec![Tally::default(); parts.remote_ios.len()],
@@ -178,6 +182,11 @@ impl Simulation {
     pub fn write(&mut self, program: ProgramId, write: &Write, observe: &mut Observe<'_>) {
         let input = Input::RemoteIo(RemoteIoInput::Write(write));
         self.give(Member::RemoteIo(program), input, observe);
+    }
+
+    /// The last `steps` of each program that a station has kept are not on its disk, as where the power fails before they are written.
+    pub fn lose_steps(&mut self, station: StationId, steps: usize) {
+        self.disks.lose(station, steps);
     }
 
     /// The network is another one while `disturbance` lasts; a later one takes its place.
@@ -412,6 +421,7 @@ impl Simulation {
                 Output::Report(event) => {
                     observe(self.now, self.pace.cycle(), member, Record::Station(&event));
                 }
+                Output::Retain(record) => self.disks.write(member, record),
                 Output::Drive(_) | Output::Answer(_) | Output::Obeyed(_) => {}
             }
         }
@@ -438,6 +448,7 @@ impl Simulation {
                     self.judge(program, &event, observe);
                     observe(self.now, self.pace.cycle(), member, Record::RemoteIo(&event));
                 }
+                Output::Retain(record) => self.disks.write(member, record),
                 // The event says the same.
                 Output::Answer(_) | Output::Obeyed(_) => {}
             }

@@ -230,6 +230,7 @@ impl Seen {
             }
             Event::StateLost { newest, applied, .. } => {
                 let applied = applied.map(|applied| applied.cycle.0);
+                let newest = newest.expect("a station holds a state");
                 self.lost.push((cycle, newest.cycle.0, applied));
             }
             Event::Applied { source, .. } => self.sources.push((cycle, *source)),

@@ -57,6 +57,7 @@ impl Station {
             };
             self.report(event);
         }
+        self.hand_over_retained(transfer.program);
     }
 
     pub(super) fn ask(&mut self) {
@@ -79,6 +80,7 @@ impl Station {
             self.member.send(Body::Join(Join {
                 wants,
                 holdings,
+                retained: self.replicas.iter().filter_map(Replica::retained).collect(),
                 recalled,
                 lacks: self.lacks(),
                 partial,

@@ -147,6 +147,7 @@ fn sent(what: Sent, cycle: u64, to: u8) -> Option<(Member, Body)> {
         }
         Join(rank, program) => {
             let join = understudy_wire::Join {
+                retained: Default::default(),
                 wants: ProgramSet::only(ProgramId(program)),
                 holdings: Default::default(),
                 recalled: Vec::new(),

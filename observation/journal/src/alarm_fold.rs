@@ -160,7 +160,9 @@ impl AlarmFold {
         };
         let (sampled, missing) = match event {
             RemoteIoEvent::Applied { sampled, missing, .. } => (sampled, missing),
-            RemoteIoEvent::StartedCold { .. } if !track.begun => {
+            RemoteIoEvent::StartedCold { .. } | RemoteIoEvent::StartedWarm { .. }
+                if !track.begun =>
+            {
                 track.begun = true;
                 return self.set(program, Condition::OVER);
             }

@@ -145,6 +145,7 @@ fn effect(record: &Record) -> Option<Effect> {
             HostEvent::DuplicateGone { member } => {
                 return Some(Effect::Ends(about("duplicate", member)));
             }
+            HostEvent::RetainFailed { .. } | HostEvent::RetainRegained => of("retain"),
             HostEvent::LinkFailed { .. } | HostEvent::LinkReopened { .. } => of("link"),
             HostEvent::WallClock { .. } | HostEvent::WallClockStepped { .. } => of("wall-clock"),
             _ => return None,
@@ -159,6 +160,7 @@ fn of_remote_io(record: &Record, event: &RemoteIo) -> Option<Effect> {
     let about = |kind, subject: &dyn std::fmt::Debug| (record.member, kind, format!("{subject:?}"));
     let replaces = match event {
         RemoteIo::StartedCold { .. } => of("started-cold"),
+        RemoteIo::StartedWarm { .. } => of("started-warm"),
         RemoteIo::AdoptedLineage { .. } => of("adopted-lineage"),
         RemoteIo::Disputed { .. } => of("disputed"),
         RemoteIo::ConfigurationDisputed { .. } => of("configuration-disputed"),
@@ -233,7 +235,12 @@ fn ends(later: &Record, earlier: &Record) -> bool {
     match (&later.event, &earlier.event) {
         (Happening::RemoteIo(later), Happening::RemoteIo(earlier)) => {
             let starts = |event: &RemoteIo| {
-                matches!(event, RemoteIo::StartedCold { .. } | RemoteIo::AdoptedLineage { .. })
+                matches!(
+                    event,
+                    RemoteIo::StartedCold { .. }
+                        | RemoteIo::StartedWarm { .. }
+                        | RemoteIo::AdoptedLineage { .. }
+                )
             };
             match earlier {
                 RemoteIo::StateLost { .. }
@@ -243,6 +250,7 @@ fn ends(later: &Record, earlier: &Record) -> bool {
                     starts(later) || matches!(later, RemoteIo::StateRecovered { .. })
                 }
                 RemoteIo::StartedCold { .. }
+                | RemoteIo::StartedWarm { .. }
                 | RemoteIo::AdoptedLineage { .. }
                 | RemoteIo::StateRecovered { .. } => starts(later),
                 RemoteIo::ValueFault { .. } | RemoteIo::RecalledExclusion { .. } => {

@@ -216,7 +216,7 @@ pub fn moment(event: &Happening) -> Option<Moment> {
             | RemoteIo::Disputed { moment, .. }
             | RemoteIo::ConfigurationDisputed { moment, .. }
             | RemoteIo::Stalled { moment, .. } => Some(*moment),
-            RemoteIo::StartedCold { born, .. } => Some(*born),
+            RemoteIo::StartedCold { born, .. } | RemoteIo::StartedWarm { born, .. } => Some(*born),
             RemoteIo::Refused { .. }
             | RemoteIo::RefusalEnded { .. }
             | RemoteIo::Outvoted { .. } => None,

@@ -331,7 +331,7 @@ impl Tree {
                 let lost = program.lost.as_ref().map(understudy_view::LostState::text);
                 Some(text(&lost.unwrap_or_default()))
             });
-            "LostStateCycle" UInt64 "the cycle of that state, as the operator's choice names it; 0 where no state is lost" => of(|program| Some(program.lost.as_ref().map_or(0, |lost| lost.newest).into()));
+            "LostStateCycle" UInt64 "the cycle of that state, as the operator's choice names it; 0 where no state is lost, or none is available" => of(|program| Some(program.lost.as_ref().and_then(|lost| lost.newest).unwrap_or(0).into()));
             "LostStateAge" UInt64 "age of that state in cycles; 0 where no state is lost" => of(|program| {
                 let age = program.lost.as_ref().map_or(Some(0), |lost| lost.age_cycles);
                 age.map(Variant::from)

@@ -32,10 +32,10 @@ pub struct LackingStation {
 pub struct LostState {
     /// The first cycle, from the origin.
     pub since: i64,
-    /// The cycle of the newest available state, as the cluster counts: the operator's choice names it.
-    pub newest: u64,
-    /// The station that holds it.
-    pub holder: String,
+    /// The cycle of the newest available state, as the cluster counts: the operator's choice names it. Nothing where no station has one.
+    pub newest: Option<u64>,
+    /// The station that holds it, or has kept it over a power failure.
+    pub holder: Option<String>,
     /// Its age in cycles, compared with the newest applied output, when the state was lost; nothing where that is not known.
     pub age_cycles: Option<u64>,
     /// Whether the operator is asked.
@@ -60,9 +60,12 @@ impl LostState {
         let age = self
             .age_cycles
             .map_or_else(|| "of unknown age".to_owned(), |age| format!("{age} cycles old"));
-        format!(
-            "STATE LOST since cycle {}: the newest available state is of cycle {} of the cluster, {age}, in {}",
-            self.since, self.newest, self.holder
-        )
+        let since = self.since;
+        match (self.newest, &self.holder) {
+            (Some(newest), Some(holder)) => format!(
+                "STATE LOST since cycle {since}: the newest available state is of cycle {newest} of the cluster, {age}, in {holder}"
+            ),
+            _ => format!("STATE LOST since cycle {since}: no station has a state of the program"),
+        }
     }
 }

@@ -112,7 +112,9 @@ function protection(programs) {
       const asks = Boolean(program.lost?.asks) && !run.commands.why;
       line.querySelector(".choices").hidden = !asks;
       if (asks) {
-        setText(line.querySelector("[data-choice=newest]"), `${continueWords(program.lost)} …`);
+        const newest = line.querySelector("[data-choice=newest]");
+        newest.hidden = program.lost.newest === null;
+        setText(newest, `${continueWords(program.lost)} …`);
       }
     },
   );

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::net::{SocketAddr, SocketAddrV4};
 use std::sync::Arc;
+use std::time::Duration;
 
 use crate::alarm::AlarmDeclaration;
 use crate::code::Code;
@@ -21,7 +22,7 @@ use understudy_node::Program;
 use understudy_parity::ParityController;
 use understudy_plant::{Followed, Plant};
 use understudy_remote_io::{
-    Diagnosis, PointPlace, Ramp, Release, SignalSource, StaleState, StopPoints, ValueFault,
+    Diagnosis, PointPlace, Ramp, Release, Restart, SignalSource, StaleState, StopPoints, ValueFault,
 };
 use understudy_typed::{Points, Program as TypedProgram};
 use understudy_wire::{Epoch, Image, Member, ProgramHash, ProgramId, Roster, StationId};
@@ -158,6 +159,8 @@ pub struct RemoteIo {
     pub value_fault: ValueFault,
     /// What follows where living stations hold only states that are older than the newest applied output.
     pub stale_state: StaleState,
+    /// How its program starts after a power failure, where that has retentive variables.
+    pub restart: Restart,
     /// What finds failed channels that do not say so.
     pub diagnosis: Option<DiagnosisPlace>,
     /// Where it listens, if the file says so.
@@ -203,6 +206,7 @@ pub struct PlantPlace {
 pub struct Cluster {
     pub(crate) name: String,
     pub(crate) link: Link,
+    pub(crate) retain_every: Duration,
     pub(crate) multicast: Option<SocketAddrV4>,
     pub(crate) security: Security,
     pub(crate) agreement: Arc<Agreement>,
@@ -226,6 +230,17 @@ impl Cluster {
     /// What carries the frames.
     pub fn link(&self) -> Link {
         self.link
+    }
+
+    /// Whether a program of it has retentive variables.
+    pub fn is_retentive(&self) -> bool {
+        self.programs.iter().any(|program| program.executable.is_retentive())
+    }
+
+    /// Steps of a program with retentive variables after which a station writes its whole state to disk.
+    pub fn retain_every(&self) -> u32 {
+        let period = self.agreement.schedule.period().as_nanos().max(1);
+        u32::try_from(self.retain_every.as_nanos().div_ceil(period)).unwrap_or(u32::MAX).max(1)
     }
 
     /// The first multicast group of its frames, where the network has multicast; only for UDP.
@@ -427,6 +442,10 @@ impl Cluster {
             release: remote_io.release,
             value_fault: remote_io.value_fault,
             stale_state: remote_io.stale_state,
+            restart: self.programs[program.index()]
+                .executable
+                .is_retentive()
+                .then_some(remote_io.restart),
         })
     }
 

@@ -52,6 +52,9 @@ pub(crate) fn configuration_text(cluster: &Cluster, plants: &[String]) -> String
         line(format_args!("  release {:?}", remote_io.release));
         line(format_args!("  value fault {:?}", remote_io.value_fault));
         line(format_args!("  stale state {:?}", remote_io.stale_state));
+        if controller.code.executable().is_retentive() {
+            line(format_args!("  restart {:?}", remote_io.restart));
+        }
         for source in &remote_io.inputs {
             line(format_args!("  input {}", source_text(source)));
         }

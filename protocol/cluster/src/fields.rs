@@ -70,6 +70,7 @@ pub(crate) struct OperatorText {
     /// Index into [`crate::format::ROLES`].
     pub(crate) role: usize,
     pub(crate) confirm: bool,
+    pub(crate) retain: bool,
     pub(crate) duration: Duration,
     pub(crate) low: Option<Placed<Constant>>,
     pub(crate) high: Option<Placed<Constant>>,
@@ -405,7 +406,7 @@ fn source(table: Placed<&DeTable<'_>>, diagnostics: &mut Vec<Diagnostic>) -> Sou
     let kind = fields.word("operator", diagnostics);
     let is_known = fields.has("operator") && diagnostics.len() == before;
     let text = |text: Option<Placed<String>>| text.map(|text| text.value);
-    let special = ["duration", "low", "high", "unit"].into_iter();
+    let special = ["duration", "low", "high", "unit", "retain"].into_iter();
     let special = special.filter_map(|value| {
         let span = fields.place_of(value)?;
         Some(Placed { value, span })
@@ -415,6 +416,7 @@ fn source(table: Placed<&DeTable<'_>>, diagnostics: &mut Vec<Diagnostic>) -> Sou
         title: text(fields.text("title", diagnostics)),
         role: fields.word("role", diagnostics),
         confirm: fields.flag("confirm", diagnostics),
+        retain: fields.flag("retain", diagnostics),
         duration: fields.time("duration", diagnostics),
         low: fields.constant("low", diagnostics),
         high: fields.constant("high", diagnostics),

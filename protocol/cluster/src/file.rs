@@ -61,6 +61,7 @@ pub(crate) struct ClusterSection {
     pub(crate) flag_after: u32,
     pub(crate) shadow_cycles: u32,
     pub(crate) listen_cycles: u32,
+    pub(crate) retain_every: Duration,
     /// Index into [`crate::format::LINKS`].
     pub(crate) link: usize,
     pub(crate) multicast: Option<SocketAddrV4>,
@@ -95,6 +96,8 @@ pub(crate) struct RemoteIoSection {
     pub(crate) value_fault: usize,
     /// Index into [`crate::format::STALE_STATES`].
     pub(crate) stale_state: usize,
+    /// Index into [`crate::format::RESTARTS`].
+    pub(crate) restart: usize,
     pub(crate) diagnosis: Option<Placed<String>>,
     pub(crate) inputs: Vec<SourceEntry>,
     pub(crate) field: Option<FieldSection>,
@@ -180,6 +183,7 @@ pub(crate) fn read(text: &str, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
             release: fields.word("release", diagnostics),
             value_fault: fields.word("value_fault", diagnostics),
             stale_state: fields.word("stale_state", diagnostics),
+            restart: fields.word("restart", diagnostics),
             diagnosis: fields.text("diagnosis", diagnostics),
             inputs: fields.sources("inputs", diagnostics),
             field: field(fields, &empty, diagnostics),
@@ -262,6 +266,7 @@ fn cluster(root: &DeTable<'_>, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
         flag_after: fields.count("flag_after", diagnostics),
         shadow_cycles: fields.count("shadow_cycles", diagnostics),
         listen_cycles: fields.count("listen_cycles", diagnostics),
+        retain_every: fields.time("retain_every", diagnostics),
         link: fields.word("link", diagnostics),
         multicast: fields.multicast("multicast", diagnostics),
         security: fields.word("security", diagnostics),

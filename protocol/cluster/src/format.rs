@@ -112,6 +112,7 @@ pub(crate) const SECURITIES: [&str; 2] = ["keys", "off"];
 pub(crate) const RELEASES: [&str; 2] = ["automatic", "operator"];
 pub(crate) const VALUE_FAULTS: [&str; 3] = ["hold", "alarm", "fail-safe"];
 pub(crate) const STALE_STATES: [&str; 2] = ["operator", "cold"];
+pub(crate) const RESTARTS: [&str; 3] = ["warm", "cold", "operator"];
 pub(crate) const OPERATOR_INPUTS: [&str; 3] = ["level", "pulse", "setpoint"];
 pub(crate) const ROLES: [&str; 2] = ["operator", "engineer"];
 pub(crate) const PRIORITIES: [&str; 4] = ["low", "medium", "high", "critical"];
@@ -131,6 +132,7 @@ pub(crate) static CLUSTER: Section = Section {
         key flag_after: count(1, MANY_CYCLES, 3), "cycles without a turn after which a station is flagged, and its slot is closed";
         key shadow_cycles: count(0, MANY_CYCLES, 3), "cycles for which a repaired station computes in shadow mode before it publishes";
         key listen_cycles: count(1, MANY_CYCLES, 4), "cycles for which a starting station listens before it founds an epoch of its own";
+        key retain_every: time(SHORTEST_PERIOD, Duration::from_secs(3600), Duration::from_secs(1)), "how often a station writes the whole state of a program with retentive variables to its disk, and makes sure that it is there; each cycle in between is written too, and may be lost with the power";
         key link: word(&LINKS), "the transport of the frames";
         key multicast: Kind::Text, "with `link = \"udp\"`: the first of 33 IPv4 multicast groups and their port, such as `239.192.0.0:7600`, in a network that delivers multicast between all members; each frame is then sent once for all its receivers. Other clusters on the network need other groups or another port";
         key security: word(&SECURITIES), "whose frames are accepted: `keys`, those of members with keys of this cluster, see `understudy keys`; `off`, all frames on the network. The laboratory makes keys of its own for each run";
@@ -171,6 +173,7 @@ pub(crate) static REMOTE_IO: Section = Section {
         key release: word(&RELEASES), "how the outputs are released after a cold start of the program";
         key value_fault: word(&VALUE_FAULTS), "the applied outputs while two stations publish different outputs of one history and there is no majority: `hold`, the last proven outputs and then the fail-safe ones, until the stations agree or the operator releases them; `alarm`, the outputs of the controller itself; `fail-safe`, the fail-safe outputs at once, until the operator releases them";
         key stale_state: word(&STALE_STATES), "reaction when living stations hold only states that are older than the newest applied output: `operator`, the outputs are held, then fail-safe, until the operator chooses the older state or a cold start; `cold`, the program starts from its initial state";
+        key restart: word(&RESTARTS), "how a program with retentive variables starts after a power failure, where no station holds its state: `warm`, from its initial state with the values that a station has kept; `cold`, from its initial state; `operator`, the operator chooses";
         key diagnosis: Kind::Text, "the file of a ladder that detects failed input channels, relative to the cluster file, see [reconfiguration](reconfiguration.md)";
         key inputs: Kind::Sources, "inputs that do not come from the field: operators write them, or another program computes them, see below";
         key field: Kind::Device, "real equipment behind it, see below; without it its plant is simulated";
@@ -222,6 +225,7 @@ pub(crate) static OPERATOR_INPUT: Section = Section {
         key high: Kind::Value, "highest value of a setpoint; required there";
         key unit: Kind::Text, "unit of a setpoint, such as `mm/s`";
         key initial: Kind::Value, "value before the first write; `false`, or the lowest value of a setpoint where absent";
+        key retain: Kind::Flag, "whether a level or a setpoint keeps its value over a power failure; the initial value otherwise";
     },
 };
 

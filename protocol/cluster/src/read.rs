@@ -54,7 +54,7 @@ use understudy_cycle::{Agreement, Mode, Schedule};
 use understudy_executable::Interface;
 use understudy_logic::Circuit;
 use understudy_node::Program;
-use understudy_remote_io::{Release, StaleState, ValueFault};
+use understudy_remote_io::{Release, Restart, StaleState, ValueFault};
 use understudy_text::{Diagnostic, Report};
 use understudy_wire::{ClusterHash, ConfigurationHash, MAXIMUM_PROGRAMS};
 
@@ -207,6 +207,7 @@ fn build(
     let mut cluster = Cluster {
         name,
         link,
+        retain_every: cluster.retain_every,
         multicast: cluster.multicast,
         security: overrides.security.unwrap_or([Security::Keys, Security::Off][cluster.security]),
         agreement: Arc::new(agreement.clone()),
@@ -346,6 +347,7 @@ fn remote_ios(
             value_fault: [ValueFault::Hold, ValueFault::Alarm, ValueFault::FailSafe]
                 [section.value_fault],
             stale_state: [StaleState::Operator, StaleState::Cold][section.stale_state],
+            restart: [Restart::Warm, Restart::Cold, Restart::Operator][section.restart],
             diagnosis: section
                 .diagnosis
                 .as_ref()
@@ -374,6 +376,7 @@ fn remote_ios(
                 field: None,
                 value_fault: ValueFault::default(),
                 stale_state: StaleState::default(),
+                restart: Restart::default(),
                 diagnosis: None,
                 address: None,
             }

@@ -8,8 +8,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_wire::{
-    ConfigurationHash, Force, Frame, Image, OrderRefusal, SignalPlace, StateChoice, Time, Write,
-    WriteAnswer,
+    ConfigurationHash, Force, Frame, Image, OrderRefusal, Retained, SignalPlace, StateChoice, Time,
+    Write, WriteAnswer,
 };
 
 /// An input of a member.
@@ -51,6 +51,8 @@ pub enum Output<Event> {
     Drive(Image),
     /// An event for the journal.
     Report(Event),
+    /// A record for the disk, for the time after a power failure.
+    Retain(Retained),
     /// The answer to a write.
     Answer(WriteAnswer),
     /// What became of the release, the choice, the force or the end of a force that was given last; once for each.

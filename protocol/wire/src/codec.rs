@@ -22,7 +22,7 @@ use crate::write::{MAXIMUM_PULSES, MAXIMUM_SESSIONS, Pulse, WriteId};
 pub const MAXIMUM_FRAME_BYTES: usize = 32 * 1024;
 
 const MAGIC: [u8; 4] = *b"UNDR";
-const VERSION: u8 = 8;
+const VERSION: u8 = 9;
 const PREFIX_BYTES: usize = 5;
 const CHECKSUM_BYTES: usize = 4;
 /// Maximum number of positions that a plant shows.
@@ -167,6 +167,7 @@ fn keeps_promises(frame: &Frame) -> Result<(), FrameError> {
                 programs.len() == join.partial.len() && programs.without(join.wants).is_empty(),
                 "a station has segments of a state that it wants, once for each program",
             )?;
+            kept_holdings(&join.retained)?;
             kept_holdings(&join.holdings).map(|_| ())
         }
         Body::Transfer(transfer) => {

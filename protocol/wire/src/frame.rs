@@ -71,7 +71,7 @@ pub enum Body {
 /// u(i) of this and of the last few cycles, with the lineage before the oldest of them.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Sample {
-    /// Moment of the last cold start of this program; its genesis lineage is a function of it.
+    /// Moment of the last start of this program, cold or warm; the lineage that it started with is a function of it.
     pub born: Moment,
     /// The lineage before the oldest sample of `history`.
     pub base: Lineage,
@@ -191,6 +191,8 @@ pub struct Join {
     pub wants: ProgramSet,
     /// States that it holds.
     pub holdings: SmallVec<[Holding; 2]>,
+    /// States that it has kept on disk, of programs whose state it does not hold: they can start warm from these.
+    pub retained: SmallVec<[Holding; 1]>,
     /// As in a [`Turn`].
     pub recalled: Vec<Recalled>,
     /// As in a [`Turn`].

@@ -10,6 +10,7 @@ mod frame;
 mod identifier;
 mod image;
 mod lineage;
+mod retained;
 mod segment;
 mod set;
 mod state_choice;
@@ -32,6 +33,7 @@ pub use identifier::{
 };
 pub use image::{Image, ImageError, MAXIMUM_IMAGE_BITS, MAXIMUM_STATE_BITS};
 pub use lineage::{Digest, Lineage};
+pub use retained::{Note, Retained, RetainedError, RetainedRun, RetainedState, RetainedStep};
 pub use segment::{MAXIMUM_SEGMENTS, Segment, SegmentMask};
 pub use set::{Element, ProgramSet, Set, StationSet};
 pub use state_choice::StateChoice;

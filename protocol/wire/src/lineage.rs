@@ -1,8 +1,9 @@
 //! Equality of states, without sending or hashing a state.
 //!
-//! L(i)(0) = H(program, birth), L(i)(t+1) = H(L(i)(t), u(i)(t)). A state is a function of its first state and of the
-//! inputs since, so equal lineages mean equal states, up to a collision of 64 bits and to a value fault; a [`Digest`]
-//! of the state itself is sent with it, and differs between replicas of equal lineage only after a value fault.
+//! L(i)(0) = H(program, birth), or H(program, birth, retained lineage) of a warm start; L(i)(t+1) = H(L(i)(t), u(i)(t)).
+//! A state is a function of its first state and of the inputs since, so equal lineages mean equal states, up to a
+//! collision of 64 bits and to a value fault; a [`Digest`] of the state itself is sent with it, and differs between
+//! replicas of equal lineage only after a value fault.
 
 use std::fmt;
 
@@ -17,10 +18,19 @@ use crate::image::Image;
 #[serde(transparent)]
 pub struct Lineage(pub u64);
 
+/// What a warm start adds to its genesis: "warm" in ASCII, and no width of an image.
+const WARM: u64 = 0x7761_726d_0000_0000;
+
 impl Lineage {
     /// L(i)(0): the initial state of a program that its remote I/O started cold at `born`.
     pub fn genesis(program: ProgramHash, born: Moment) -> Self {
         [program.0, born.epoch.0, born.cycle.0].into_iter().fold(Self(0), Self::fold)
+    }
+
+    /// L(i)(0) of a warm start: the initial state with the retentive values of the state of lineage `retained`.
+    pub fn warm(program: ProgramHash, born: Moment, retained: Self) -> Self {
+        // A constant tells it from every lineage of samples and of cold starts.
+        [WARM, retained.0].into_iter().fold(Self::genesis(program, born), Self::fold)
     }
 
     /// L(i)(t+1), from L(i)(t) and u(i)(t).

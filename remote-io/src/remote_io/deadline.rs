@@ -175,6 +175,7 @@ impl RemoteIo {
             self.descent = None;
             self.last_true = Some(outputs.clone());
             self.knowledge.applied(moment);
+            self.note_applied(moment);
             self.report_in_effect(moment);
         }
         self.applied = Some(Applied { source, outputs: outputs.clone(), missing });

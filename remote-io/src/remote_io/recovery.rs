@@ -6,6 +6,7 @@
 //!   too late in each cycle ────────────────────────────── cold start
 //!   the same, and as many members have another
 //!   configuration as stations have this one ───────────── the operator chooses, whatever `release` says
+//!   the same, and a station has retained one ───────────── warm start, or as for a state that is lost
 //!   a state at the floor, or one that covers it ────────── adopted
 //!   different states of one cycle after a restart ──────── the operator chooses (`release`)
 //!   only states before the floor, or none that provably
@@ -18,15 +19,19 @@ use super::knowledge::{Floor, Knowledge, Run};
 use super::{Authority, Question, RemoteIo};
 use crate::event::Event;
 use crate::history::History;
-use crate::settings::{Release, StaleState};
+use crate::settings::{Release, Restart, StaleState};
 use crate::trust::Trust;
 
 /// What the states of the living stations allow.
-enum Verdict {
+pub(super) enum Verdict {
     Cold,
+    /// From a state that was kept over a power failure.
+    Warm(StationId, Holding),
     Adopt(StationId, Holding),
     Disputed(StationSet),
     Stale(StationId, Holding),
+    /// Outputs were applied, and no station holds a state or has kept one.
+    Lost,
 }
 
 impl RemoteIo {
@@ -82,7 +87,9 @@ impl RemoteIo {
         let verdict = self.verdict();
         if let Knowledge::Listening { unproved, .. } = &mut self.knowledge {
             match verdict {
-                Verdict::Stale(..) => *unproved = unproved.saturating_add(u32::from(counted)),
+                Verdict::Stale(..) | Verdict::Lost => {
+                    *unproved = unproved.saturating_add(u32::from(counted))
+                }
                 _ => *unproved = 0,
             }
             if (1..listen_cycles).contains(unproved) && self.question.is_none() {
@@ -91,20 +98,24 @@ impl RemoteIo {
         }
         match verdict {
             // The operator has been asked: a state that is not received for a moment is no reason to start cold.
-            Verdict::Cold if self.question == Some(Question::StateLost) => {}
+            Verdict::Cold | Verdict::Lost if self.question == Some(Question::StateLost) => {}
             // Nor is one whose station is received too late in each cycle.
-            Verdict::Cold if self.holders.may_hold() => {}
-            Verdict::Cold if self.may_have_the_wrong_program() => {
+            Verdict::Cold | Verdict::Warm(..) | Verdict::Lost if self.holders.may_hold() => {}
+            Verdict::Cold | Verdict::Warm(..) if self.may_have_the_wrong_program() => {
                 let (stations, others) = (self.own_stations() as u32, self.member.refused() as u32);
                 let asks = Event::ConfigurationDisputed { moment, stations, others };
                 self.ask(Question::ConfigurationDisputed, asks);
             }
             Verdict::Cold => self.start_cold(moment, self.newest_applied()),
+            Verdict::Warm(from, retained) => self.start_warm(moment, (from, retained)),
+            Verdict::Lost => self.lose_state(moment, None),
             Verdict::Adopt(from, holding) => self.start(moment, (from, holding)),
             Verdict::Disputed(stations) => {
                 self.ask(Question::Disputed, Event::Disputed { moment, stations });
             }
-            Verdict::Stale(holder, holding) => self.lose_state(moment, holder, &holding),
+            Verdict::Stale(holder, holding) => {
+                self.lose_state(moment, Some((holder, holding.stepped)))
+            }
         }
     }
 
@@ -127,12 +138,12 @@ impl RemoteIo {
     /// next to the right one.
     fn may_have_the_wrong_program(&self) -> bool {
         let others = self.member.refused();
-        others > 0 && self.own_stations() <= others
+        others > 0 && (self.own_stations() <= others || self.has_another_configuration())
     }
 
     fn verdict(&self) -> Verdict {
         let Some((from, newest)) = self.holders.newest() else {
-            return Verdict::Cold;
+            return self.warm_verdict();
         };
         let proved = match &self.knowledge {
             Knowledge::Known { floor, .. } => {
@@ -142,7 +153,10 @@ impl RemoteIo {
                     None => Verdict::Stale(from, *newest),
                 };
             }
-            Knowledge::Listening { .. } => self.holders.covers_all_applied(newest),
+            Knowledge::Listening { .. } => {
+                self.newest_applied().is_none_or(|applied| applied <= newest.stepped)
+                    && self.holders.covers_all_applied(newest)
+            }
             // Outputs applied before the cold start are not known, and none was applied since.
             Knowledge::ColdStarted { run, .. } => newest.born == run.history.born(),
         };
@@ -153,29 +167,31 @@ impl RemoteIo {
         }
     }
 
-    fn lose_state(&mut self, moment: Moment, holder: StationId, newest: &Holding) {
+    /// The state that the newest applied output came from is lost; `newest` is the newest one that a station has, held or retained.
+    fn lose_state(&mut self, moment: Moment, newest: Option<(StationId, Moment)>) {
         if self.question == Some(Question::StateLost) {
             return;
         }
         self.question = Some(Question::StateLost);
         let applied = self.newest_applied();
-        let asks =
-            self.settings.stale_state == StaleState::Operator || self.may_have_the_wrong_program();
-        self.report(Event::StateLost { moment, applied, newest: newest.stepped, holder, asks });
+        let asks = self.settings.stale_state == StaleState::Operator
+            || self.settings.restart == Some(Restart::Operator)
+            || self.may_have_the_wrong_program();
+        let (holder, newest) = newest.unzip();
+        self.report(Event::StateLost { moment, applied, newest, holder, asks });
         if !asks {
             self.start_cold(moment, applied);
         }
     }
 
-    /// The cycle of the newest applied output.
-    fn newest_applied(&self) -> Option<Moment> {
-        self.knowledge.floor().map(|floor| floor.moment)
-    }
-
     /// Applies the operator's choice.
     pub(super) fn choose(&mut self, choice: StateChoice) {
         let moment = self.moment();
-        let newest = self.holders.newest().map(|(from, newest)| (from, *newest));
+        let owned = |(from, newest): (StationId, &Holding)| (from, *newest);
+        let held = self.holders.newest().map(owned);
+        let retained = self.holders.newest_retained(StationSet::EMPTY).map(owned);
+        let retained = retained.filter(|_| held.is_none() && self.settings.restart.is_some());
+        let newest = held.or(retained);
         match (self.question, choice, newest) {
             (Some(Question::StateLost | Question::ConfigurationDisputed), StateChoice::Cold, _) => {
                 self.start_cold(moment, None)
@@ -183,7 +199,10 @@ impl RemoteIo {
             (Some(_), StateChoice::Newest { cycle }, Some((from, newest)))
                 if cycle.is_none_or(|cycle| cycle == newest.stepped.cycle) =>
             {
-                self.start(moment, (from, newest));
+                match held {
+                    Some(_) => self.start(moment, (from, newest)),
+                    None => self.start_warm(moment, (from, newest)),
+                }
             }
             (question, ..) => {
                 let newest = newest.filter(|_| question.is_some());
@@ -214,7 +233,7 @@ impl RemoteIo {
         self.sample_from(moment, history, None);
     }
 
-    fn sample_from(
+    pub(super) fn sample_from(
         &mut self,
         moment: Moment,
         history: History,

@@ -82,13 +82,15 @@ impl RemoteIo {
         void_writes.extend(self.writing.sampled(operator_inputs, moment, history, &forced));
         self.writing.put_forced(operator_inputs, &forced, &mut unforced);
         let base = history.base();
-        let (born, before) = (history.born(), history.before());
+        let (born, before, after) = (history.born(), history.before(), history.head());
+        let samples = history.samples();
+        let noted = unforced.clone();
         let body = Body::Sample(Sample {
             born,
             base,
             before,
-            after: history.head(),
-            history: history.samples(),
+            after,
+            history: samples,
             applied: floor.map(|floor| floor.moment),
             excluded: self.trust.excluded(),
             gone: self.holders.gone(),
@@ -102,6 +104,7 @@ impl RemoteIo {
         if void > 0 {
             self.report(Event::Voided { moment, samples: void, lineage: base });
         }
+        self.prepare_note(moment, after, noted);
         self.report(Event::Sampled { moment, inputs, born, before });
         self.report_void(&void_writes);
         self.report_validity(&validity);

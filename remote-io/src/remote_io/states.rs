@@ -101,6 +101,7 @@ impl Bench {
             release: Release::Operator,
             value_fault: ValueFault::FailSafe,
             stale_state: StaleState::Operator,
+            restart: None,
         };
         Self { remote_io: RemoteIo::new(Time(0), settings), cycle: 100 }
     }
@@ -202,6 +203,7 @@ impl Bench {
         Body::Join(Join {
             wants: ProgramSet::EMPTY,
             holdings: held.into_iter().collect(),
+            retained: Default::default(),
             recalled: vec![recalled],
             lacks: ProgramSet::EMPTY,
             partial: Vec::new(),

@@ -347,6 +347,20 @@ impl Writing {
     }
 }
 
+impl Writing {
+    /// After a power failure: takes up the writes that were in effect, and the values of the inputs that keep theirs.
+    pub(super) fn start_warm(&mut self, inputs: &[OperatorInput], recalled: &Recalled) {
+        *self = Self::new(inputs);
+        for (input, written) in inputs.iter().zip(&mut self.values) {
+            if input.retains {
+                written.stored = input.place.get(&recalled.inputs);
+                written.in_effect = written.stored;
+            }
+        }
+        self.sessions = Sessions::recalled(recalled.writes.iter().copied());
+    }
+}
+
 impl Written {
     /// Counts a sample with the value.
     fn advance(&mut self, input: &OperatorInput) {

@@ -52,6 +52,7 @@ pub(crate) fn settings(understudies: usize) -> Settings {
         release: Release::Automatic,
         value_fault: ValueFault::Hold,
         stale_state: StaleState::Operator,
+        restart: None,
     }
 }
 
@@ -118,6 +119,7 @@ pub(crate) fn join(holding: Option<Holding>, recalled: Option<Recalled>) -> Body
     Body::Join(Join {
         wants: ProgramSet::EMPTY,
         holdings: holding.into_iter().collect(),
+        retained: Default::default(),
         recalled: recalled.into_iter().collect(),
         lacks: ProgramSet::EMPTY,
         partial: Vec::new(),

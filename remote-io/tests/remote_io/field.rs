@@ -172,6 +172,7 @@ fn a_write_is_refused_while_no_station_computes_the_program() {
         kind: OperatorInputKind::Level,
         initial: 0,
         role: Role::Operator,
+        retains: false,
     };
     let settings = Settings { operator_inputs: vec![level], ..settings(1) };
     let mut bench = bench(settings);

@@ -105,7 +105,13 @@ impl Operated {
         let settings = Settings {
             undriven: Image::zero(32),
             input_points: vec![place],
-            operator_inputs: vec![OperatorInput { place, kind, initial, role: Role::Operator }],
+            operator_inputs: vec![OperatorInput {
+                place,
+                kind,
+                initial,
+                role: Role::Operator,
+                retains: false,
+            }],
             // Writes are taken while outputs are held.
             hold_cycles: 1000,
             ..settings(1)

@@ -23,6 +23,7 @@ use crate::guard::Guard;
 use crate::journal::{EventSink, HostEvent, Noted};
 use crate::link::{Link, LinkCounters, Reopening};
 use crate::orders::{Obeyed, Order, Orders};
+use crate::retained::Retainer;
 use crate::trouble::{Duplicates, Refusals};
 use crate::unreceived::Unreceived;
 use crate::watchdog::Watchdog;
@@ -63,6 +64,8 @@ pub struct Host<'a, M: Machine> {
     pub guard: &'a mut Guard,
     /// Its sensors and actuators.
     pub field: &'a mut dyn FieldDriver,
+    /// Writes what it keeps for the time after a power failure; nothing where no folder is given.
+    pub retainer: Option<Retainer>,
     /// Takes what it reports.
     pub sink: &'a mut dyn EventSink<M::Event>,
     /// Signs of life for systemd, where systemd asks for them.
@@ -196,6 +199,9 @@ impl<M: Machine> Host<'_, M> {
         self.report_trouble(now, Duration::ZERO, &mut round);
         if let Some(watchdog) = &self.watchdog {
             watchdog.stopping();
+        }
+        if let Some(retainer) = self.retainer.take() {
+            retainer.finish();
         }
         round.summary.link = self.link.counters();
         let stopped = HostEvent::Stopped(round.summary);
@@ -343,6 +349,11 @@ impl<M: Machine> Host<'_, M> {
                     }
                 }
                 Output::Report(event) => self.sink.record(now, Noted::Member(event)),
+                Output::Retain(record) => {
+                    if let Some(retainer) = &self.retainer {
+                        retainer.keep(record);
+                    }
+                }
                 Output::Answer(answer) => self.orders.answer(answer),
                 Output::Obeyed(obeyed) => round.obeyed = Some(obeyed),
             }
@@ -411,6 +422,14 @@ impl<M: Machine> Host<'_, M> {
         }
         if now.since(round.reported) < period {
             return;
+        }
+        if let Some(change) = self.retainer.as_mut().and_then(Retainer::take_change) {
+            round.reported = now;
+            let event = match change {
+                Some(reason) => HostEvent::RetainFailed { reason },
+                None => HostEvent::RetainRegained,
+            };
+            self.sink.record(now, Noted::Host(event));
         }
         let writes = self.orders.take_refused_writes();
         if writes > 0 {

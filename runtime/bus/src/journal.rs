@@ -110,6 +110,20 @@ pub enum HostEvent {
         /// Why.
         reason: String,
     },
+    /// What it keeps for the time after a power failure is not written to its disk.
+    RetainFailed {
+        /// Why.
+        reason: String,
+    },
+    /// That is written again.
+    RetainRegained,
+    /// A file that it has kept is not used, or not to its end.
+    RetainedRefused {
+        /// The file.
+        file: String,
+        /// Why.
+        reason: String,
+    },
     /// Frames of two lives of a member arrive in turn: two processes run with its keys, for example one of an old disk image.
     DuplicateFound {
         /// Whose keys they have.

@@ -22,6 +22,7 @@ use crate::host::{Host, Summary};
 use crate::journal::{EventSink, HostEvent, JOURNAL_RECORDS, JOURNAL_VERSION, Journal, Noted};
 use crate::link::LinkKind;
 use crate::orders::{Order, orders};
+use crate::retained::{FoundFile, Retainer, Retention};
 use crate::rights::{Rights, keep_times};
 use crate::watchdog::Watchdog;
 
@@ -35,6 +36,8 @@ pub struct MemberSettings {
     pub guard: Guard,
     /// Where operators can call; nowhere without it.
     pub channel: Option<ChannelSettings>,
+    /// What it keeps for the time after a power failure.
+    pub retention: Retention,
     /// Sensors and actuators.
     pub field: Box<dyn FieldDriver>,
     /// Whether commands are read from standard input.
@@ -69,6 +72,7 @@ where
         link: kind,
         mut guard,
         channel,
+        retention,
         mut field,
         commands,
         ends_with_parent,
@@ -95,6 +99,11 @@ where
     // The journal's thread starts before the rights are claimed, so that it inherits none.
     let (mut sink, journal) =
         Journal::start::<M::Event>(JOURNAL_RECORDS, clock, own.member, own.name, output)?;
+    let Retention { files, found, is_missing } = retention;
+    let retainer = match files.is_empty() {
+        true => None,
+        false => Some(Retainer::start(files)?),
+    };
     let mut rights = if real_time { Rights::claim() } else { Rights::unclaimed() };
     let raises = rights.real_time;
     let mut link = kind.open(&endpoints)?;
@@ -114,6 +123,16 @@ where
     }
     let status = serde_json::to_string(&ready).unwrap_or_default();
     sink.record(clock.now(), Noted::Host(ready));
+    if is_missing {
+        let reason = "no folder was given for it (--retain)".to_owned();
+        sink.record(clock.now(), Noted::Host(HostEvent::RetainFailed { reason }));
+    }
+    for FoundFile { path, problem, .. } in found {
+        if let Some(reason) = problem {
+            let file = path.display().to_string();
+            sink.record(clock.now(), Noted::Host(HostEvent::RetainedRefused { file, reason }));
+        }
+    }
     let (control, orders) = orders()?;
     let channel = telemetry.map(|(settings, telemetry)| {
         let (control, sink) = (control.clone(), sink.clone());
@@ -134,6 +153,7 @@ where
                     link: link.as_mut(),
                     guard: &mut guard,
                     field: field.as_mut(),
+                    retainer,
                     sink: &mut sink,
                     watchdog,
                     orders: &orders,

@@ -101,6 +101,7 @@ fn member_with(
 ) -> JoinHandle<Result<Summary, BusError>> {
     spawn(move || {
         let settings = MemberSettings {
+            retention: Default::default(),
             endpoints,
             link: LinkKind::Udp,
             guard: Guard::Off,

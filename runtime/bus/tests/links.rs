@@ -83,6 +83,7 @@ impl Running {
                 guard: &mut guard,
                 field: field.as_mut(),
                 sink: &mut sink,
+                retainer: None,
                 watchdog: None,
                 orders: &orders,
                 clock: Clock::start(),

@@ -74,6 +74,7 @@ fn act(part: &Part) -> ExitCode {
         _ => Box::new(NoField),
     };
     let settings = MemberSettings {
+        retention: Default::default(),
         guard: Guard::Off,
         channel: None,
         endpoints: endpoints(part.own, &part.peers),

@@ -9,16 +9,16 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::Serialize;
 use understudy_bus::{
-    Commands, Endpoints, FieldDriver, LinkKind, MemberSettings, NoField, Peer, SimulatedField,
-    ZENOH_RUNTIME, run_member,
+    Commands, Endpoints, FieldDriver, LinkKind, MemberSettings, NoField, Peer, RetainedFiles,
+    Retention, SimulatedField, ZENOH_RUNTIME, newest_note, run_member,
 };
 use understudy_cluster::{Cluster, Link};
 use understudy_cycle::Machine;
 use understudy_journal::Segments;
-use understudy_node::Station;
+use understudy_node::{Program, Station};
 use understudy_plant::PlantMachine;
 use understudy_remote_io::RemoteIo;
-use understudy_wire::{Epoch, Image, Member, ProgramId, Time};
+use understudy_wire::{Epoch, Image, Member, ProgramId, RetainedRun, Time};
 
 use crate::error::MemberError;
 use crate::field::Equipment;
@@ -40,6 +40,8 @@ pub struct MemberOptions {
     pub in_laboratory: bool,
     /// Whether it asks for real-time rights.
     pub real_time: bool,
+    /// The folder of what it keeps for the time after a power failure; nothing is kept without one.
+    pub retain: Option<PathBuf>,
     /// The file of its journal in place of standard output.
     pub journal: Option<PathBuf>,
     /// Bytes of that file and its segments, at most.
@@ -57,8 +59,11 @@ pub fn run_station(cluster: &Cluster, options: &MemberOptions) -> Result<(), Mem
         return Err(wrong());
     };
     let settings = cluster.station_settings(station, epoch_of_the_clock());
-    let machine = Station::new(Time::default(), settings.ok_or_else(wrong)?);
-    run(cluster, options, member, machine, Box::new(NoField))
+    let settings = settings.ok_or_else(wrong)?;
+    let (runs, retention) = retained_runs(cluster, options, &settings);
+    let settings = later_than_retained(settings, &runs);
+    let machine = Station::new(Time::default(), settings).retaining(cluster.retain_every(), &runs);
+    run(cluster, options, member, machine, Box::new(NoField), retention)
 }
 
 /// Runs a remote I/O until it is told to end.
@@ -73,8 +78,23 @@ pub fn run_remote_io(cluster: &Cluster, options: &MemberOptions) -> Result<(), M
     };
     let settings = cluster.remote_io_settings(program).ok_or_else(wrong)?;
     let field = field_of(options, cluster, program, settings.fail_safe.clone())?;
+    let is_retentive = settings.restart.is_some();
     let machine = RemoteIo::new(Time::default(), settings);
-    run(cluster, options, member, machine, field)
+    let Some(folder) = &options.retain else {
+        let retention = Retention { is_missing: is_retentive, ..Retention::default() };
+        return run(cluster, options, member, machine, field, retention);
+    };
+    let files = RetainedFiles::new(folder, options.name.clone());
+    let (notes, found) = files.notes(cluster.agreement().cluster);
+    let machine = machine.noting(newest_note(notes));
+    run(
+        cluster,
+        options,
+        member,
+        machine,
+        field,
+        Retention { files: vec![(None, files)], found, is_missing: false },
+    )
 }
 
 /// Runs a simulated plant until it is told to end.
@@ -89,7 +109,7 @@ pub fn run_plant(cluster: &Cluster, options: &MemberOptions) -> Result<(), Membe
     };
     let settings = cluster.plant_settings(program).ok_or_else(wrong)?;
     let machine = PlantMachine::new(settings, Time::default());
-    run(cluster, options, member, machine, Box::new(NoField))
+    run(cluster, options, member, machine, Box::new(NoField), Retention::default())
 }
 
 fn wrong_kind(options: &MemberOptions, wanted: &'static str, command: &'static str) -> MemberError {
@@ -121,6 +141,7 @@ fn run<M>(
     member: Member,
     machine: M,
     field: Box<dyn FieldDriver>,
+    retention: Retention,
 ) -> Result<(), MemberError>
 where
     M: Machine + Send,
@@ -136,6 +157,7 @@ where
         link: link_kind(cluster),
         guard: keys.guard,
         channel: keys.channel,
+        retention,
         field,
         commands: if options.in_laboratory {
             Commands::ReadAndEndWithInput
@@ -180,6 +202,43 @@ pub fn restart_for_zenoh(link: LinkKind) {
         let error = Command::new(program).args(arguments).env(variable, value).exec();
         tracing::warn!(%error, "the program was not started again with fewer threads for Zenoh");
     }
+}
+
+/// What a station has kept of each program with retentive variables that it runs, and the files.
+fn retained_runs(
+    cluster: &Cluster,
+    options: &MemberOptions,
+    settings: &understudy_node::Settings,
+) -> (Vec<RetainedRun>, Retention) {
+    let (mut runs, mut retention) = (Vec::new(), Retention::default());
+    let is_retentive =
+        |program: &ProgramId| settings.programs[program.index()].executable.is_retentive();
+    let mut retentive = settings.runs().filter(is_retentive);
+    let Some(folder) = &options.retain else {
+        retention.is_missing = retentive.next().is_some();
+        return (runs, retention);
+    };
+    for program in retentive {
+        let Program { hash, .. } = &settings.programs[program.index()];
+        let name = format!("{}.{}", options.name, cluster.controllers()[program.index()].name);
+        let files = RetainedFiles::new(folder, name);
+        let (found_runs, found) = files.runs(cluster.agreement().cluster, *hash);
+        runs.extend(found_runs);
+        retention.found.extend(found);
+        retention.files.push((Some(program), files));
+    }
+    (runs, retention)
+}
+
+/// A station founds an epoch that is later than those of what it has kept, whatever its clock shows after the power failure.
+fn later_than_retained(
+    mut settings: understudy_node::Settings,
+    runs: &[RetainedRun],
+) -> understudy_node::Settings {
+    let newest = runs.iter().map(|run| run.stepped().epoch.0).max();
+    let after = newest.map_or(0, |newest| newest.saturating_add(1));
+    settings.epoch = Epoch(settings.epoch.0.max(after));
+    settings
 }
 
 /// Later than any epoch that the cluster has had.

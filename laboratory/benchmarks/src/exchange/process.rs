@@ -147,6 +147,7 @@ fn play_part(part: Part) -> Result<(), BusError> {
         Carrier::Raw => run_raw(&endpoints, settings, meter),
         Carrier::Link(link) => {
             let member_settings = MemberSettings {
+                retention: Default::default(),
                 guard: guard(&endpoints),
                 endpoints,
                 link,

@@ -87,6 +87,7 @@ pub(crate) fn parts(understudies: usize) -> Parts {
         release: Release::Automatic,
         value_fault: ValueFault::Hold,
         stale_state: StaleState::Operator,
+        restart: None,
     });
     let plants = circuits.iter().map(|circuit| {
         let kind = ModelKind::Program(Box::new((&plant()).into()));

@@ -49,6 +49,7 @@ fn referee() -> Referee {
         release: Release::Automatic,
         value_fault: ValueFault::Hold,
         stale_state: StaleState::Operator,
+        restart: None,
     };
     Referee::new(&settings, (&circuit).into())
 }

@@ -4,8 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use understudy_cycle::{Agreement, Input, Machine, RemoteIoInput};
-use understudy_node::{Program, Station};
-use understudy_remote_io::RemoteIo;
+use understudy_node::Program;
 use understudy_wire::{ConfigurationHash, Epoch, Frame, Member, ProgramHash, SignalPlace};
 
 use super::{Observe, Record, Simulation};
@@ -106,7 +105,7 @@ impl Simulation {
                     self.note_crash(station);
                 }
                 let slot = &mut self.stations[station.index()];
-                slot.restart(Station::new(self.now, settings));
+                slot.restart(self.disks.station(self.now, settings));
                 self.wakeups.set(member, slot.due());
             }
             Member::RemoteIo(program) => {
@@ -119,7 +118,7 @@ impl Simulation {
                 // It may go on with what its stations have started with it before.
                 *misled = has_wrong_programs.then(|| misled.unwrap_or_default());
                 let slot = &mut self.remote_ios[program.index()];
-                slot.restart(RemoteIo::new(self.now, settings));
+                slot.restart(self.disks.remote_io(self.now, settings));
                 self.wakeups.set(member, slot.due());
                 self.show_field(program);
             }

@@ -16,6 +16,7 @@ impl Hash for Simulation {
             // It is what the slots say.
             wakeups: _,
             plants,
+            disks,
             referees,
             // They only judge.
             signals: _,
@@ -31,7 +32,7 @@ impl Hash for Simulation {
             pace,
             founded,
         } = self;
-        (links, stations, remote_ios, plants, referees).hash(hasher);
+        (links, stations, remote_ios, plants, disks, referees).hash(hasher);
         (ready, arrived, holders, misled, unannounced).hash(hasher);
         (violations.len(), pace, founded).hash(hasher);
         for fault in faults {

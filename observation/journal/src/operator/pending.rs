@@ -133,7 +133,7 @@ fn outcome(
         (Command::Choose { choice: StateChoice::Cold }, RemoteIoEvent::StartedCold { .. })
         | (
             Command::Choose { choice: StateChoice::Newest { .. } },
-            RemoteIoEvent::AdoptedLineage { .. },
+            RemoteIoEvent::StartedWarm { .. } | RemoteIoEvent::AdoptedLineage { .. },
         ) => Some(Ok(Done::default())),
         (Command::Choose { .. }, RemoteIoEvent::ChoiceRefused { newest, .. }) => {
             refused(OrderRefusal::of_choice(*newest))

@@ -267,8 +267,8 @@ impl Dice<'_> {
             6 => RemoteIoEvent::StateLost {
                 moment,
                 applied: Some(moment),
-                newest: moment,
-                holder: station,
+                newest: Some(moment),
+                holder: Some(station),
                 asks: true,
             },
             7 => RemoteIoEvent::StateRecovered { moment, from: station },

@@ -65,6 +65,10 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
             lost.cycle.0
         )
     };
+    StartedWarm { from, retained, lost: Some(0), awaits_release, .. } => "started-warm" Notice
+        started_warm_text(name(*from, members), *retained, Some(0), *awaits_release);
+    StartedWarm { from, retained, lost, awaits_release, .. } => "started-warm" Alarm
+        started_warm_text(name(*from, members), *retained, *lost, *awaits_release);
     AdoptedLineage { lineage, from, .. } => "adopted-lineage" Notice
         format!("continues from the state of {}, at lineage {lineage}", name(*from, members));
     Disputed { stations: who, .. } => "disputed" Alarm format!(
@@ -76,7 +80,7 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
          correct the configuration, or order a cold start"
     );
     StateLost { applied, newest, holder, asks, .. } => "state-lost" Alarm
-        state_lost_text(*applied, *newest, name(*holder, members), *asks);
+        state_lost_text(*applied, newest.zip(*holder).map(|(newest, holder)| (newest, name(holder, members))), *asks);
     StateRecovered { from, .. } => "state-recovered" Notice
         format!("{} has returned with the state of its program", name(*from, members));
     ChoiceRefused { newest: Some(newest), .. } => "choice-refused" Warning format!(
@@ -174,20 +178,51 @@ fn joins_text(wants: ProgramSet, members: &Members) -> String {
     format!("listens and requests the state of {whose}")
 }
 
-fn state_lost_text(applied: Option<Moment>, newest: Moment, holder: &str, asks: bool) -> String {
+/// How a program starts after a power failure, and what it lost.
+fn started_warm_text(
+    from: &str,
+    retained: Moment,
+    lost: Option<u64>,
+    awaits_release: bool,
+) -> String {
+    let kept = retained.cycle.0;
+    let lost = match lost {
+        Some(0) => "no cycle with applied outputs is lost".to_owned(),
+        Some(1) => "the retentive values of 1 cycle with applied outputs are lost".to_owned(),
+        Some(lost) => {
+            format!("the retentive values of {lost} cycles with applied outputs are lost")
+        }
+        None => "it is not known how many cycles with applied outputs are lost".to_owned(),
+    };
+    let release = if awaits_release { "; the operator has to release its outputs" } else { "" };
+    format!(
+        "starts its program warm, with the retentive values of cycle {kept} that {from} has kept; {lost}{release}"
+    )
+}
+
+/// `newest` is the newest available state, with the station that has it.
+fn state_lost_text(applied: Option<Moment>, newest: Option<(Moment, &str)>, asks: bool) -> String {
     let behind = applied.map_or_else(
         || "it is not known whether newer outputs were applied".to_owned(),
         |applied| format!("outputs of cycle {} were applied", applied.cycle.0),
     );
-    let next = if asks {
-        "the operator chooses this state (accept-state) or a cold start (cold-start)"
-    } else {
-        "the program starts cold, as configured"
+    let next = match (asks, newest) {
+        (true, Some(_)) => {
+            "the operator chooses this state (accept-state) or a cold start (cold-start)"
+        }
+        (true, None) => {
+            "a station returns with it, or the operator orders a cold start (cold-start)"
+        }
+        (false, _) => "the program starts cold, as configured",
     };
-    format!(
-        "the state of its program is lost: the newest available state, of {holder}, is from cycle {} of the cluster, and {behind}; {next}",
-        newest.cycle.0
-    )
+    let available = match newest {
+        Some((newest, holder)) => format!(
+            "the newest available state, of {holder}, is from cycle {} of the cluster, and",
+            newest.cycle.0
+        ),
+        None => "no station has one, and".to_owned(),
+    };
+    format!("the state of its program is lost: {available} {behind}; {next}")
 }
 
 fn value_fault_text(

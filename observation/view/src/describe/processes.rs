@@ -40,6 +40,13 @@ descriptions! { host: HostEvent, members: Members;
     LinkFailed { silence_ms, peer, reason } => "link-failed" Alarm format!(
         "received {} for {silence_ms} ms and cannot reopen its link: {reason}", nothing_of(*peer, members)
     );
+    RetainFailed { reason } => "retain-failed" Alarm format!(
+        "what it keeps for the time after a power failure is not written to its disk: {reason}"
+    );
+    RetainRegained => "retain-regained" Notice
+        "what it keeps for the time after a power failure is written to its disk again";
+    RetainedRefused { file, reason } => "retained-refused" Alarm
+        format!("does not use, or not to its end, what it has kept in {file}: {reason}");
     FieldLost { reason } => "field-lost" Alarm format!("its equipment cannot be read or written: {reason}");
     FieldRegained => "field-regained" Notice "its equipment is read and written again";
     FieldContested => "field-contested" Alarm "another master writes the outputs of its equipment";

@@ -22,6 +22,7 @@ const FORCED: &str = "forced";
 
 /// The alarm of a program that was started from its initial state because its state is lost.
 const STARTED_COLD: &str = "started-cold";
+const STARTED_WARM: &str = "started-warm";
 
 /// The alarm of fail-safe outputs.
 pub(super) const FAIL_SAFE: &str = "fail-safe";
@@ -127,7 +128,15 @@ impl Model {
                     let text = describe(record, &self.members, &self.writes).text;
                     self.alarms.occurred(subject(STARTED_COLD), cycle, text);
                 }
-                own(ProgramChange::StartedCold { awaits_release: *awaits_release })
+                own(ProgramChange::Started { awaits_release: *awaits_release })
+            }
+            RemoteIoEvent::StartedWarm { awaits_release, lost, .. } => {
+                self.alarms.all_over(&record.name, &QUESTIONS, cycle);
+                if *lost != Some(0) {
+                    let text = describe(record, &self.members, &self.writes).text;
+                    self.alarms.occurred(subject(STARTED_WARM), cycle, text);
+                }
+                own(ProgramChange::Started { awaits_release: *awaits_release })
             }
             RemoteIoEvent::Released { .. } => {
                 self.alarms.all_over(&record.name, &["disputed", PROGRAM_FAULT], cycle);

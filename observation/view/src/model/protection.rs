@@ -87,11 +87,12 @@ impl Model {
             RemoteIoEvent::StateLost { applied, newest, holder, asks, .. } => {
                 let known = |moment| self.cycles.of_known(moment);
                 let until = applied.map_or(Some(cycle), known);
-                let age = until.zip(known(*newest)).map(|(until, newest)| until - newest);
+                let age = until.zip(newest.and_then(known)).map(|(until, newest)| until - newest);
                 let lost = LostState {
                     since: cycle,
-                    newest: newest.cycle.0,
-                    holder: self.members.name(Member::Station(*holder)).to_owned(),
+                    newest: newest.map(|newest| newest.cycle.0),
+                    holder: holder
+                        .map(|holder| self.members.name(Member::Station(holder)).to_owned()),
                     age_cycles: age.and_then(|age| u64::try_from(age).ok()),
                     asks: *asks,
                 };
@@ -102,15 +103,17 @@ impl Model {
             RemoteIoEvent::ChoiceRefused { newest: Some(newest), .. } => {
                 let standing = self.changes.now().program(program);
                 if let Some(mut lost) = standing.and_then(|own| own.lost.clone()) {
-                    let newer = newest.cycle.0.saturating_sub(lost.newest);
-                    lost.age_cycles = lost.age_cycles.map(|age| age.saturating_sub(newer));
-                    lost.newest = newest.cycle.0;
+                    let newer = lost.newest.map(|known| newest.cycle.0.saturating_sub(known));
+                    let age = lost.age_cycles.zip(newer);
+                    lost.age_cycles = age.map(|(age, newer)| age.saturating_sub(newer));
+                    lost.newest = Some(newest.cycle.0);
                     self.lost_is(program, cycle, Some(lost));
                 }
             }
             RemoteIoEvent::StateRecovered { .. }
             | RemoteIoEvent::AdoptedLineage { .. }
-            | RemoteIoEvent::StartedCold { .. } => {
+            | RemoteIoEvent::StartedCold { .. }
+            | RemoteIoEvent::StartedWarm { .. } => {
                 let standing = self.changes.now().program(program);
                 if standing.is_some_and(|own| own.lost.is_some()) {
                     self.lost_is(program, cycle, None);

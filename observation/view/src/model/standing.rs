@@ -294,7 +294,7 @@ impl StationChange {
 /// A change of a program at its remote I/O.
 #[derive(Debug, Clone)]
 pub(super) enum ProgramChange {
-    StartedCold { awaits_release: bool },
+    Started { awaits_release: bool },
     Released,
     Excluded(StationSet),
     Readmitted(StationId),
@@ -309,7 +309,7 @@ pub(super) enum ProgramChange {
 impl ProgramChange {
     fn apply(&self, own: &mut ProgramStanding, cycle: i64) {
         match self {
-            Self::StartedCold { awaits_release } => {
+            Self::Started { awaits_release } => {
                 own.awaits_release = *awaits_release;
                 own.excluded = StationSet::EMPTY;
             }

@@ -136,12 +136,14 @@ fn operator(
     for key in &text.special {
         let fits = matches!(
             (word, key.value),
-            ("pulse", "duration") | ("setpoint", "low" | "high" | "unit")
+            ("pulse", "duration")
+                | ("setpoint", "low" | "high" | "unit" | "retain")
+                | ("level", "retain")
         );
         if !fits {
             let message = format!("`{}` does not belong to a {word}", key.value);
             diagnostics.push(Diagnostic::error("U0202", message, key.span.clone()).with_help(
-                "`duration` belongs to a pulse; `low`, `high` and `unit` belong to a setpoint",
+                "`duration` belongs to a pulse; `low`, `high` and `unit` belong to a setpoint; `retain` belongs to a level or a setpoint",
             ));
         }
     }
@@ -187,6 +189,7 @@ fn operator(
         kind,
         initial: initial.or(low).unwrap_or(0),
         role: [Role::Operator, Role::Engineer][text.role],
+        retains: text.retain,
     };
     if let OperatorInputKind::Setpoint { low, high } = kind
         && in_order(point.of, low, high)
@@ -279,6 +282,7 @@ impl Signal<'_> {
                 kind: OperatorInputKind::Group { stale_after: self.stale_after, valid },
                 initial: default?,
                 role: Role::Operator,
+                retains: false,
             },
             title: None,
             unit: None,

@@ -92,12 +92,14 @@ ready = { from = "right.done", default = true, stale_after = 7 }
         kind: OperatorInputKind::Pulse(3),
         initial: 0,
         role: Role::Engineer,
+        retains: false,
     };
     let speed = OperatorInput {
         place: place(32, Elementary::Real),
         kind: OperatorInputKind::Setpoint { low: bits(-5.0), high: bits(12.5) },
         initial: bits(-5.0),
         role: Role::Operator,
+        retains: false,
     };
     assert_eq!(settings.operator_inputs, [start, speed]);
     let ready = SignalInput {

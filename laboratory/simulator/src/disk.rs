@@ -1,0 +1,65 @@
+//! What the members keep on their disks.
+
+use understudy_node::{Settings, Station};
+use understudy_remote_io::RemoteIo;
+use understudy_wire::{Member, Note, Retained, RetainedRun, StationId, Time};
+
+/// Steps after which a station keeps the whole state again.
+const RETAIN_EVERY: u32 = 8;
+
+/// The disks of all members; they outlive the members.
+#[derive(Debug, Clone, Hash)]
+pub(crate) struct Disks {
+    stations: Vec<Vec<RetainedRun>>,
+    remote_ios: Vec<Option<Note>>,
+}
+
+impl Disks {
+    pub(crate) fn new(stations: usize, remote_ios: usize) -> Self {
+        Self { stations: vec![Vec::new(); stations], remote_ios: vec![None; remote_ios] }
+    }
+
+    /// A station that starts with what its disk has.
+    pub(crate) fn station(&self, now: Time, settings: Settings) -> Station {
+        let runs = &self.stations[settings.station.index()];
+        Station::new(now, settings).retaining(RETAIN_EVERY, runs)
+    }
+
+    /// A remote I/O that starts with what its disk has.
+    pub(crate) fn remote_io(
+        &self,
+        now: Time,
+        settings: understudy_remote_io::Settings,
+    ) -> RemoteIo {
+        let note = self.remote_ios[settings.program.index()].clone();
+        RemoteIo::new(now, settings).noting(note)
+    }
+
+    /// A member keeps a record.
+    pub(crate) fn write(&mut self, member: Member, record: Retained) {
+        match (member, record) {
+            (Member::Station(station), Retained::State(state)) => {
+                let runs = &mut self.stations[station.index()];
+                runs.retain(|run| run.state.program != state.program);
+                runs.push(RetainedRun { state, steps: Vec::new() });
+            }
+            (Member::Station(station), Retained::Step(step)) => {
+                let runs = &mut self.stations[station.index()];
+                if let Some(run) = runs.iter_mut().find(|run| run.state.program == step.program) {
+                    run.steps.push(step);
+                }
+            }
+            (Member::RemoteIo(program), Retained::Note(note)) => {
+                self.remote_ios[program.index()] = Some(note);
+            }
+            _ => {}
+        }
+    }
+
+    /// The last `steps` of each program that a station kept are not on its disk.
+    pub(crate) fn lose(&mut self, station: StationId, steps: usize) {
+        for run in &mut self.stations[station.index()] {
+            run.steps.truncate(run.steps.len().saturating_sub(steps));
+        }
+    }
+}

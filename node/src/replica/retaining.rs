@@ -1,0 +1,176 @@
+//! States that are kept over a power failure.
+//!
+//! ```text
+//!   every step ──► a record: the step, or the state after `every` steps and where a step leads on from another state
+//!   start      ──► the newest state and the steps since are replayed: the retained state
+//!                  it is in the history ──────────── the replica goes on from it, as from one that it held
+//!                  the history starts warm from it ─ the initial state with its retentive values
+//! ```
+
+use understudy_executable::Scratch;
+use understudy_wire::{
+    ClusterHash, Digest, Holding, Image, Lineage, ProgramId, Retained, RetainedRun, RetainedState,
+    RetainedStep, Sample,
+};
+
+use super::{Held, Replica, State};
+use crate::settings::Program;
+
+/// What a replica keeps on disk, and what it has found there.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
+pub(super) struct Retaining {
+    keeps: Option<Keeps>,
+    /// The state that was found at the start; none any more once a state is held.
+    found: Option<Held>,
+    /// Records that are not taken yet.
+    records: Vec<Retained>,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+struct Keeps {
+    cluster: ClusterHash,
+    /// Steps after which a state is kept again.
+    every: u32,
+    /// The state that the records lead to.
+    at: Option<Lineage>,
+    /// Steps since the last state.
+    steps: u32,
+}
+
+impl Retaining {
+    /// Keeps a step that led to `held`.
+    pub(super) fn stepped(
+        &mut self,
+        id: ProgramId,
+        program: &Program,
+        held: &Held,
+        inputs: &Image,
+    ) {
+        self.found = None;
+        let Some(keeps) = &mut self.keeps else {
+            return;
+        };
+        let State { bits, lineage, stepped, digest } = &held.state;
+        let leads_on = keeps.at.is_some_and(|at| at.after(inputs) == *lineage);
+        keeps.at = Some(*lineage);
+        keeps.steps += 1;
+        self.records.push(if leads_on && keeps.steps < keeps.every {
+            Retained::Step(RetainedStep {
+                program: id,
+                stepped: *stepped,
+                inputs: inputs.clone(),
+                after: *lineage,
+            })
+        } else {
+            keeps.steps = 0;
+            Retained::State(RetainedState {
+                cluster: keeps.cluster,
+                program: id,
+                hash: program.hash,
+                born: held.born,
+                lineage: *lineage,
+                stepped: *stepped,
+                digest: *digest,
+                state: bits.clone(),
+            })
+        });
+    }
+}
+
+impl Replica {
+    /// From now on it keeps its state: whole after every `every` steps, and each step in between.
+    pub(crate) fn retain(&mut self, cluster: ClusterHash, every: u32) {
+        self.retaining.keeps = Some(Keeps { cluster, every, at: None, steps: 0 });
+    }
+
+    /// Takes what was kept before the power failed; of another program it takes nothing.
+    pub(crate) fn find_retained(
+        &mut self,
+        program: &Program,
+        scratch: &mut Scratch,
+        run: &RetainedRun,
+    ) {
+        let kept = &run.state;
+        let inputs = program.executable.input_count();
+        if kept.hash != program.hash
+            || kept.state.width() != program.executable.state_count()
+            || run.steps.iter().any(|step| step.inputs.width() != inputs)
+        {
+            return;
+        }
+        let mut state = State {
+            bits: kept.state.clone(),
+            lineage: kept.lineage,
+            stepped: kept.stepped,
+            digest: kept.digest,
+        };
+        let mut outputs = Image::zero(program.executable.output_count());
+        for step in &run.steps {
+            state.digest = Digest::of(&state.bits);
+            program.executable.step(
+                scratch,
+                state.bits.words_mut(),
+                step.inputs.words(),
+                outputs.words_mut(),
+            );
+            state.lineage = step.after;
+            state.stepped = step.stepped;
+        }
+        let newest = self.retaining.found.as_ref().map(|found| found.state.stepped);
+        if newest.is_none_or(|newest| newest < state.stepped) {
+            self.retaining.found = Some(Held { born: kept.born, state });
+        }
+    }
+
+    /// The retained state that it reports, while it holds none.
+    pub(crate) fn retained(&self) -> Option<Holding> {
+        let found = self.retaining.found.as_ref().filter(|_| self.held.is_none())?;
+        Some(found.holding(self.id))
+    }
+
+    /// Forgets the retained state.
+    pub(super) fn forget_retained(&mut self) {
+        self.retaining.found = None;
+    }
+
+    /// Records for the disk, since they were taken last.
+    pub(crate) fn take_records(&mut self) -> Vec<Retained> {
+        std::mem::take(&mut self.retaining.records)
+    }
+
+    /// Goes on from the retained state where that is in the history: its place there.
+    pub(super) fn take_up_retained(&mut self, lineages: &[Lineage]) -> Option<usize> {
+        let found = self.retaining.found.as_ref().filter(|_| self.held.is_none())?;
+        let place = lineages.iter().rposition(|&known| known == found.state.lineage)?;
+        self.past.clear();
+        self.held = self.retaining.found.take();
+        Some(place)
+    }
+
+    /// The state that the history starts from, with its place, where this replica has it: the initial state, or that with the retentive values of
+    /// the retained one.
+    pub(super) fn start_in(
+        &self,
+        program: &Program,
+        sample: &Sample,
+        lineages: &[Lineage],
+    ) -> Option<(usize, State)> {
+        let place_of = |start| lineages.iter().position(|&lineage| lineage == start);
+        let executable = &program.executable;
+        let state = |lineage, words: &[u64]| State {
+            bits: Image::from_words(executable.state_count(), words)
+                .expect("a state of this program is packed"),
+            lineage,
+            stepped: sample.born,
+            digest: Digest::default(),
+        };
+        let genesis = Lineage::genesis(program.hash, sample.born);
+        if let Some(place) = place_of(genesis) {
+            return Some((place, state(genesis, executable.initial())));
+        }
+        let found = self.retaining.found.as_ref()?;
+        let warm = Lineage::warm(program.hash, sample.born, found.state.lineage);
+        let place = place_of(warm)?;
+        Some((place, state(warm, &executable.restarted(found.state.bits.words()))))
+    }
+}

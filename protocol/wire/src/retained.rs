@@ -1,0 +1,303 @@
+//! What a member keeps on disk for the time after a power failure, and its bytes.
+//!
+//! A station keeps the state of each program that has retentive variables, and the steps since, so that it can come to the
+//! state after any of them. A remote I/O keeps a note of the newest sample whose outputs it applied.
+//!
+//! ```text
+//!   length │ CRC-32 │ record      a file is one record after another; what follows a torn one is not read
+//! ```
+
+use bincode::config::{Configuration, Limit, LittleEndian, Varint};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::frame::Recalled;
+use crate::identifier::{ClusterHash, ConfigurationHash, Moment, ProgramHash, ProgramId};
+use crate::image::{Image, MAXIMUM_STATE_BITS};
+use crate::lineage::{Digest, Lineage};
+
+/// Bytes before the content of a record: its length and its checksum.
+const PREFIX_BYTES: usize = 8;
+
+/// Bytes of a record, at most: the widest state, each of its words with its length, and what names it.
+const MAXIMUM_RECORD_BYTES: usize = MAXIMUM_STATE_BITS / 64 * 9 + 4096;
+
+/// Version of the records.
+const VERSION: u8 = 1;
+
+type Layout = Configuration<LittleEndian, Varint, Limit<MAXIMUM_RECORD_BYTES>>;
+
+fn layout() -> Layout {
+    bincode::config::standard().with_limit::<MAXIMUM_RECORD_BYTES>()
+}
+
+/// One record of what a member keeps.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Retained {
+    /// A station: a state of a program, from which later steps go on.
+    State(RetainedState),
+    /// A station: a step of a program.
+    Step(RetainedStep),
+    /// A remote I/O: the newest sample whose outputs were applied.
+    Note(Note),
+}
+
+/// State of a program.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct RetainedState {
+    /// Its cluster.
+    pub cluster: ClusterHash,
+    /// Its program.
+    pub program: ProgramId,
+    /// Hash of that program.
+    pub hash: ProgramHash,
+    /// Moment of the start of that program.
+    pub born: Moment,
+    /// Lineage of the state.
+    pub lineage: Lineage,
+    /// Cycle of the last sample in it.
+    pub stepped: Moment,
+    /// Digest of the state before that sample.
+    pub digest: Digest,
+    /// x(i).
+    pub state: Image,
+}
+
+/// Step of a program.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct RetainedStep {
+    /// Its program.
+    pub program: ProgramId,
+    /// Cycle of the sample.
+    pub stepped: Moment,
+    /// u(i).
+    pub inputs: Image,
+    /// Lineage after it: a step that does not lead there is not of this state.
+    pub after: Lineage,
+}
+
+/// What a remote I/O notes of the newest sample whose outputs it applied.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Note {
+    /// Its cluster.
+    pub cluster: ClusterHash,
+    /// The configuration that it ran.
+    pub configuration: ConfigurationHash,
+    /// Hash of its program.
+    pub hash: ProgramHash,
+    /// Lineage after the sample.
+    pub lineage: Lineage,
+    /// The sample, as stations recall it.
+    pub recalled: Recalled,
+}
+
+impl Note {
+    /// The cycle of the sample.
+    pub fn applied(&self) -> Moment {
+        self.recalled.sampled
+    }
+}
+
+/// A state of a program with the steps since, as a station has kept them.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct RetainedRun {
+    /// The state.
+    pub state: RetainedState,
+    /// Steps from it, in their order.
+    pub steps: Vec<RetainedStep>,
+}
+
+impl RetainedRun {
+    /// The cycle of the last step.
+    pub fn stepped(&self) -> Moment {
+        self.steps.last().map_or(self.state.stepped, |step| step.stepped)
+    }
+
+    /// The runs of a file, in its order; steps that lead on from no state are left out.
+    pub fn of_records(records: impl IntoIterator<Item = Retained>) -> Vec<Self> {
+        let mut runs: Vec<Self> = Vec::new();
+        for record in records {
+            match record {
+                Retained::State(state) => runs.push(Self { state, steps: Vec::new() }),
+                Retained::Step(step) => {
+                    if let Some(run) = runs.last_mut()
+                        && run.leads_to(&step)
+                    {
+                        run.steps.push(step);
+                    }
+                }
+                Retained::Note(_) => {}
+            }
+        }
+        runs
+    }
+
+    fn lineage(&self) -> Lineage {
+        self.steps.last().map_or(self.state.lineage, |step| step.after)
+    }
+
+    fn leads_to(&self, step: &RetainedStep) -> bool {
+        step.program == self.state.program && self.lineage().after(&step.inputs) == step.after
+    }
+}
+
+/// Why the rest of a file of records is not read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum RetainedError {
+    /// It ends within a record: the power failed while that was written.
+    #[error("it ends within a record, after byte {0}")]
+    Torn(usize),
+    /// A record differs from its checksum, or is none.
+    #[error("the record at byte {0} is damaged")]
+    Damaged(usize),
+    /// A record of another version.
+    #[error("the record at byte {at} has version {found}; this program reads version {VERSION}")]
+    Version {
+        /// Where it begins.
+        at: usize,
+        /// Its version.
+        found: u8,
+    },
+}
+
+impl Retained {
+    /// Appends its bytes to `bytes`; nothing where it is wider than a state may be.
+    pub fn write(&self, bytes: &mut Vec<u8>) {
+        let start = bytes.len();
+        bytes.extend_from_slice(&[0; PREFIX_BYTES]);
+        bytes.push(VERSION);
+        let written = bincode::serde::encode_into_std_write(self, bytes, layout());
+        let length = bytes.len() - start - PREFIX_BYTES;
+        if written.is_err() || length > MAXIMUM_RECORD_BYTES {
+            bytes.truncate(start);
+            return;
+        }
+        let checksum = crc32fast::hash(&bytes[start + PREFIX_BYTES..]);
+        let length = u32::try_from(length).unwrap_or(u32::MAX);
+        bytes[start..start + 4].copy_from_slice(&length.to_le_bytes());
+        bytes[start + 4..start + PREFIX_BYTES].copy_from_slice(&checksum.to_le_bytes());
+    }
+
+    /// The records of a file up to the first that cannot be read, and why the rest is not read.
+    pub fn read(bytes: &[u8]) -> (Vec<Self>, Option<RetainedError>) {
+        let mut records = Vec::new();
+        let mut at = 0;
+        while at < bytes.len() {
+            match Self::read_one(&bytes[at..], at) {
+                Ok((record, length)) => {
+                    records.push(record);
+                    at += length;
+                }
+                Err(error) => return (records, Some(error)),
+            }
+        }
+        (records, None)
+    }
+
+    fn read_one(bytes: &[u8], at: usize) -> Result<(Self, usize), RetainedError> {
+        let word = |place: usize| {
+            let word = bytes.get(place..place + 4).ok_or(RetainedError::Torn(at))?;
+            Ok(u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
+        };
+        let (length, checksum) = (word(0)? as usize, word(4)?);
+        if !(1..=MAXIMUM_RECORD_BYTES).contains(&length) {
+            return Err(RetainedError::Damaged(at));
+        }
+        let content = bytes.get(PREFIX_BYTES..PREFIX_BYTES + length);
+        let content = content.ok_or(RetainedError::Torn(at))?;
+        if crc32fast::hash(content) != checksum {
+            return Err(RetainedError::Damaged(at));
+        }
+        if content[0] != VERSION {
+            return Err(RetainedError::Version { at, found: content[0] });
+        }
+        let decoded = bincode::serde::decode_from_slice::<Self, _>(&content[1..], layout());
+        match decoded {
+            Ok((record, read)) if read + 1 == length => Ok((record, PREFIX_BYTES + length)),
+            _ => Err(RetainedError::Damaged(at)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identifier::{Cycle, Epoch};
+
+    fn state(width: usize) -> Retained {
+        Retained::State(RetainedState {
+            cluster: ClusterHash(1),
+            program: ProgramId(2),
+            hash: ProgramHash(3),
+            born: Moment { epoch: Epoch(4), cycle: Cycle(5) },
+            lineage: Lineage(6),
+            stepped: Moment { epoch: Epoch(4), cycle: Cycle(7) },
+            digest: Digest(8),
+            state: Image::from_bits((0..width).map(|_| true)),
+        })
+    }
+
+    fn step(before: Lineage, cycle: u64) -> RetainedStep {
+        let inputs = Image::from_bits([cycle % 2 == 0, true]);
+        RetainedStep {
+            program: ProgramId(2),
+            stepped: Moment { epoch: Epoch(4), cycle: Cycle(cycle) },
+            after: before.after(&inputs),
+            inputs,
+        }
+    }
+
+    /// The widest state too: a bound that wraps at a power of two saves nothing.
+    #[test]
+    fn records_come_back_up_to_the_widest_state() {
+        for width in [0, 1, 64, 65, 524_288, MAXIMUM_STATE_BITS - 1, MAXIMUM_STATE_BITS] {
+            let mut bytes = Vec::new();
+            state(width).write(&mut bytes);
+            state(3).write(&mut bytes);
+            assert_eq!(Retained::read(&bytes), (vec![state(width), state(3)], None), "{width}");
+        }
+    }
+
+    #[test]
+    fn every_cut_and_every_flipped_byte_is_found() {
+        let mut bytes = Vec::new();
+        let first = step(Lineage(6), 8);
+        let records = [state(9), Retained::Step(first.clone())];
+        let mut ends = vec![0];
+        for record in &records {
+            record.write(&mut bytes);
+            ends.push(bytes.len());
+        }
+        for length in 0..bytes.len() {
+            let (read, error) = Retained::read(&bytes[..length]);
+            let whole = ends.iter().filter(|end| **end <= length).count() - 1;
+            assert_eq!(read, records[..whole], "{length}");
+            let torn = RetainedError::Torn(ends[whole]);
+            assert_eq!(error, (!ends.contains(&length)).then_some(torn), "{length}");
+        }
+        for place in 0..bytes.len() {
+            let mut damaged = bytes.clone();
+            damaged[place] ^= 0x10;
+            let (read, error) = Retained::read(&damaged);
+            assert!(error.is_some() && read.len() < 2, "{place}");
+        }
+    }
+
+    #[test]
+    fn steps_that_do_not_lead_on_are_left_out() {
+        let first = step(Lineage(6), 8);
+        let second = step(first.after, 9);
+        let foreign = step(Lineage(77), 9);
+        let records = [
+            Retained::Step(first.clone()),
+            state(9),
+            Retained::Step(first.clone()),
+            Retained::Step(foreign),
+            Retained::Step(second.clone()),
+        ];
+        let runs = RetainedRun::of_records(records);
+        assert_eq!(runs.len(), 1);
+        assert_eq!(runs[0].steps, [first, second.clone()]);
+        assert_eq!(runs[0].stepped(), second.stepped);
+    }
+}

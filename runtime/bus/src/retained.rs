@@ -1,0 +1,332 @@
+//! What a member keeps on disk for the time after a power failure: files, and the threads that write them.
+//!
+//! ```text
+//!   cycle ──► queue ──► writer: a state or a full file of notes begins the other file of two, the rest is appended
+//!                          └──► syncer: what begins a file is on the disk before the older file is begun again
+//! ```
+//!
+//! The cycle never waits for the disk: where the queue is full, or the disk is, records are left out, and that is reported. A file
+//! that is being written is never the only one: the other one has the state before.
+
+use std::fs::{File, OpenOptions, create_dir_all};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{Builder, JoinHandle};
+
+use understudy_wire::{
+    ClusterHash, Moment, Note, ProgramHash, ProgramId, Retained, RetainedError, RetainedRun,
+};
+
+use crate::error::BusError;
+
+/// Records that wait for the disk, at most.
+const WAITING_RECORDS: usize = 1024;
+
+/// Notes in one file.
+const NOTES_IN_A_FILE: u32 = 4096;
+
+/// Bytes of a file that are read, at most: a state, and the steps of an hour.
+const MAXIMUM_FILE_BYTES: u64 = 64 << 20;
+
+/// Two files that are written in turn.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RetainedFiles {
+    folder: PathBuf,
+    name: String,
+}
+
+/// What was found in one file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FoundFile {
+    /// The file.
+    pub path: PathBuf,
+    /// The newest cycle that it has.
+    pub newest: Option<Moment>,
+    /// What is wrong with it, in words; nothing where it was read to its end.
+    pub problem: Option<String>,
+}
+
+/// What a member keeps for the time after a power failure.
+#[derive(Debug, Clone, Default)]
+pub struct Retention {
+    /// The pair of files of each program of a station, or that of a remote I/O, which has no program; nothing is kept without any.
+    pub files: Vec<(Option<ProgramId>, RetainedFiles)>,
+    /// What was found there at the start.
+    pub found: Vec<FoundFile>,
+    /// Whether a program has retentive variables, and no folder was given.
+    pub is_missing: bool,
+}
+
+impl RetainedFiles {
+    /// Those of `name` in `folder`: a remote I/O, or a station and a program of it.
+    pub fn new(folder: &Path, name: String) -> Self {
+        Self { folder: folder.to_owned(), name }
+    }
+
+    fn paths(&self) -> [PathBuf; 2] {
+        ["1", "2"].map(|which| self.folder.join(format!("{}.{which}.retained", self.name)))
+    }
+
+    /// The states that a station has kept of a program.
+    pub fn runs(
+        &self,
+        cluster: ClusterHash,
+        hash: ProgramHash,
+    ) -> (Vec<RetainedRun>, Vec<FoundFile>) {
+        let of_file = |records| {
+            let mut runs = RetainedRun::of_records(records);
+            let all = runs.len();
+            runs.retain(|run| run.state.cluster == cluster && run.state.hash == hash);
+            let foreign = (runs.len() < all).then(|| "it is of another program".to_owned());
+            let newest = runs.iter().map(RetainedRun::stepped).max();
+            (runs, newest, foreign)
+        };
+        self.read(of_file)
+    }
+
+    /// The notes that a remote I/O has made.
+    pub fn notes(&self, cluster: ClusterHash) -> (Vec<Note>, Vec<FoundFile>) {
+        let of_file = |records: Vec<Retained>| {
+            let notes = records.into_iter().filter_map(|record| match record {
+                Retained::Note(note) => Some(note),
+                Retained::State(_) | Retained::Step(_) => None,
+            });
+            let newest = notes.max_by_key(Note::applied);
+            let foreign = newest.as_ref().is_some_and(|note| note.cluster != cluster);
+            let newest = newest.filter(|_| !foreign);
+            let applied = newest.as_ref().map(Note::applied);
+            (
+                newest.into_iter().collect(),
+                applied,
+                foreign.then(|| "it is of another cluster".to_owned()),
+            )
+        };
+        self.read(of_file)
+    }
+
+    fn read<T>(
+        &self,
+        of_file: impl Fn(Vec<Retained>) -> (Vec<T>, Option<Moment>, Option<String>),
+    ) -> (Vec<T>, Vec<FoundFile>) {
+        let (mut all, mut files) = (Vec::new(), Vec::new());
+        for path in self.paths() {
+            let bytes = match read_bounded(&path) {
+                Ok(bytes) => bytes,
+                Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+                Err(error) => {
+                    files.push(FoundFile { path, newest: None, problem: Some(error.to_string()) });
+                    continue;
+                }
+            };
+            let (records, error) = Retained::read(&bytes);
+            let (found, newest, foreign) = of_file(records);
+            // A process that is killed leaves a torn record behind its last one: the state before it is complete.
+            let damage =
+                error.filter(|error| newest.is_none() || !matches!(error, RetainedError::Torn(_)));
+            let problem = foreign.or(damage.map(|error| error.to_string()));
+            all.extend(found);
+            files.push(FoundFile { path, newest, problem });
+        }
+        (all, files)
+    }
+}
+
+fn read_bounded(path: &Path) -> io::Result<Vec<u8>> {
+    let length = std::fs::metadata(path)?.len();
+    if length > MAXIMUM_FILE_BYTES {
+        return Err(io::Error::other(format!("it has {length} bytes")));
+    }
+    std::fs::read(path)
+}
+
+/// The newest of several notes.
+pub fn newest_note(notes: Vec<Note>) -> Option<Note> {
+    notes.into_iter().max_by_key(Note::applied)
+}
+
+/// Why the disk takes nothing, since when it does not; shared with the writer.
+type Failure = Arc<Mutex<Option<String>>>;
+
+/// What begins a file, and whether it is on the disk.
+type Begun = (File, Arc<AtomicBool>);
+
+/// Hands records of a member to the threads that write them.
+pub struct Retainer {
+    queue: Option<SyncSender<Retained>>,
+    failure: Failure,
+    reported: bool,
+    writer: Option<JoinHandle<()>>,
+}
+
+impl Retainer {
+    /// Starts the threads. `files` are those of each program of a station, in the order of `programs`, or the one pair of a remote I/O.
+    ///
+    /// # Errors
+    /// [`BusError::Retain`] where the folder cannot be made or written; [`BusError::System`] without a thread.
+    pub fn start(files: Vec<(Option<ProgramId>, RetainedFiles)>) -> Result<Self, BusError> {
+        for (_, files) in &files {
+            let failed = |source| BusError::Retain { path: files.folder.clone(), source };
+            create_dir_all(&files.folder).map_err(failed)?;
+            let probe = files.folder.join(format!("{}.probe", files.name));
+            File::create(&probe).and_then(|_| std::fs::remove_file(&probe)).map_err(failed)?;
+        }
+        let (queue, records) = sync_channel(WAITING_RECORDS);
+        let failure = Failure::default();
+        let of_writer = Arc::clone(&failure);
+        let (sync, to_sync) = sync_channel::<Begun>(files.len().max(1) * 2);
+        let thread = |what| move |source| BusError::System { what, source };
+        let syncer = Builder::new()
+            .name("retain-sync".into())
+            .spawn(move || {
+                for (file, is_synced) in to_sync {
+                    is_synced.store(file.sync_data().is_ok(), Ordering::Release);
+                }
+            })
+            .map_err(thread("a thread that waits for the disk"))?;
+        let writer = Builder::new()
+            .name("retain".into())
+            .spawn(move || {
+                let turns = files.into_iter().map(|(of, files)| Turn::new(of, files)).collect();
+                Writer { turns, sync, failure: of_writer }.run(&records);
+                // Its channel is closed: what was given to it is on the disk then.
+                let _ = syncer.join();
+            })
+            .map_err(thread("a thread that writes retained states"))?;
+        Ok(Self { queue: Some(queue), failure, reported: false, writer: Some(writer) })
+    }
+
+    /// Keeps a record, where the queue has room.
+    pub(crate) fn keep(&self, record: Retained) {
+        if let Some(queue) = &self.queue
+            && let Err(TrySendError::Full(_)) = queue.try_send(record)
+        {
+            let mut failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
+            failure.get_or_insert_with(|| {
+                format!("more than {WAITING_RECORDS} records wait for the disk")
+            });
+        }
+    }
+
+    /// What has changed since it was asked last: the reason where the disk takes nothing any more, and `None` in it where it does again.
+    pub(crate) fn take_change(&mut self) -> Option<Option<String>> {
+        let failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let changed = failure.is_some() != self.reported;
+        self.reported = failure.is_some();
+        changed.then_some(failure)
+    }
+
+    /// Ends the threads, once all that waits is written.
+    pub(crate) fn finish(mut self) {
+        self.queue = None;
+        if let Some(writer) = self.writer.take() {
+            // It has ended either way.
+            let _ = writer.join();
+        }
+    }
+}
+
+/// Two files of one program, or of the notes.
+struct Turn {
+    of: Option<ProgramId>,
+    files: RetainedFiles,
+    /// Which of the two is begun next.
+    next: usize,
+    current: Option<File>,
+    /// Whether what begins the current file is on the disk: until then the other one is needed.
+    is_synced: Arc<AtomicBool>,
+    notes: u32,
+}
+
+impl Turn {
+    fn new(of: Option<ProgramId>, files: RetainedFiles) -> Self {
+        // The older one of an earlier life is begun first.
+        let newest = |path: &PathBuf| std::fs::metadata(path).and_then(|of| of.modified()).ok();
+        let [first, second] = files.paths();
+        let next = usize::from(newest(&first) > newest(&second));
+        Self { of, files, next, current: None, is_synced: Arc::default(), notes: 0 }
+    }
+
+    /// Begins the other file with a record; the one before stays as it is where that fails.
+    fn begin(&mut self, bytes: &[u8]) -> io::Result<Begun> {
+        let path = &self.files.paths()[self.next];
+        let mut file = OpenOptions::new().create(true).write(true).truncate(true).open(path)?;
+        file.write_all(bytes)?;
+        let synced = file.try_clone()?;
+        self.current = Some(file);
+        self.next = 1 - self.next;
+        self.is_synced = Arc::default();
+        Ok((synced, Arc::clone(&self.is_synced)))
+    }
+
+    fn append(&mut self, bytes: &[u8]) -> io::Result<()> {
+        match &mut self.current {
+            Some(file) => file.write_all(bytes),
+            // No state was kept yet.
+            None => Ok(()),
+        }
+    }
+}
+
+struct Writer {
+    turns: Vec<Turn>,
+    sync: SyncSender<Begun>,
+    failure: Failure,
+}
+
+impl Writer {
+    fn run(mut self, records: &Receiver<Retained>) {
+        let mut bytes = Vec::new();
+        for record in records {
+            bytes.clear();
+            record.write(&mut bytes);
+            let written = self.write(&record, &bytes);
+            let mut failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
+            match written {
+                // A step behind a gap is not read: only a whole record shows that the disk takes states again.
+                Ok(true) => *failure = None,
+                Ok(false) => {}
+                Err(error) => *failure = Some(error.to_string()),
+            }
+        }
+    }
+
+    /// Whether the record is whole: a state, or a note that begins a file.
+    fn write(&mut self, record: &Retained, bytes: &[u8]) -> io::Result<bool> {
+        let of = match record {
+            Retained::State(state) => Some(state.program),
+            Retained::Step(step) => Some(step.program),
+            Retained::Note(_) => None,
+        };
+        let Some(turn) = self.turns.iter_mut().find(|turn| turn.of == of) else {
+            return Ok(false);
+        };
+        let is_whole = match record {
+            Retained::State(_) => true,
+            Retained::Step(_) => false,
+            Retained::Note(_) => {
+                turn.notes = if turn.current.is_none() { 0 } else { turn.notes + 1 };
+                turn.notes.is_multiple_of(NOTES_IN_A_FILE)
+            }
+        };
+        let may_begin = turn.current.is_none() || turn.is_synced.load(Ordering::Acquire);
+        let written = if is_whole && may_begin {
+            turn.begin(bytes).map(Some)
+        } else {
+            turn.append(bytes).map(|()| None)
+        };
+        match written {
+            Ok(None) => {}
+            // Where the disk is slow, the next record waits here, and the cycle does not.
+            Ok(Some(begun)) => drop(self.sync.send(begun)),
+            Err(error) => {
+                // Behind a torn record, or a gap in the steps, nothing would be read.
+                turn.current = None;
+                return Err(error);
+            }
+        }
+        Ok(is_whole)
+    }
+}
