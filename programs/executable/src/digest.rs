@@ -5,6 +5,9 @@ use understudy_typed::{Elementary, Point, Program};
 
 use crate::{Executable, Interface, Scratch};
 
+/// Scans from one warm start to the next, of a program with retentive variables.
+const RESTART: u64 = 97;
+
 /// Outputs of many scans as one number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Digest {
@@ -14,7 +17,8 @@ pub struct Digest {
     pub faults: u64,
 }
 
-/// Executes a program from its initial state. An input keeps its value in three of four scans, so that timers and integrals move.
+/// Executes a program from its initial state. An input keeps its value in three of four scans, so that timers and integrals move; one with
+/// retentive variables is restarted warm now and then.
 pub fn digest(executable: &Executable, interface: &Interface, scans: u64) -> Digest {
     let Interface { inputs, outputs } = interface;
     let mut scratch = Scratch::default();
@@ -24,7 +28,10 @@ pub fn digest(executable: &Executable, interface: &Interface, scans: u64) -> Dig
     let (reset, fault) = (inputs.find(Program::RESET), outputs.find(Program::FAULT));
     let mut random = Random(0);
     let mut digest = Digest { outputs: 0xcbf2_9ce4_8422_2325, faults: 0 };
-    for _ in 0..scans {
+    for scan in 0..scans {
+        if executable.is_retentive() && scan % RESTART == RESTART - 1 {
+            state = executable.restarted(&state);
+        }
         let stopped = fault.is_some_and(|fault| fault.get(&driven) == 1);
         for point in inputs.iter() {
             if Some(point) == reset {

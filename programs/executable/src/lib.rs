@@ -3,6 +3,8 @@
 mod digest;
 mod value;
 
+use std::sync::Arc;
+
 use understudy_logic::{Circuit, Scan};
 
 use understudy_typed::{Elementary, Machine, Point, Points, Program};
@@ -12,7 +14,11 @@ pub use self::value::{stored_value, typed_value, value_text, whole_number};
 
 /// A compiled program; cheap to share, it holds no state.
 #[derive(Debug, Clone)]
-pub struct Executable(Engine);
+pub struct Executable {
+    engine: Engine,
+    /// The bits of the state that a warm start keeps, of a program with retentive variables.
+    retentive: Option<Arc<[u64]>>,
+}
 
 /// What executes it.
 #[derive(Debug, Clone)]
@@ -30,20 +36,44 @@ pub struct Scratch {
 
 impl From<&Circuit> for Executable {
     fn from(circuit: &Circuit) -> Self {
-        Self(Engine::Circuit(Scan::new(circuit)))
+        Self { engine: Engine::Circuit(Scan::new(circuit)), retentive: None }
     }
 }
 
 impl From<&Program> for Executable {
     fn from(program: &Program) -> Self {
-        Self(Engine::Machine(Machine::new(program)))
+        Self { engine: Engine::Machine(Machine::new(program)), retentive: None }
+            .keeping(program.retentive_mask())
     }
 }
 
 impl Executable {
+    /// The same program, of whose state a warm start keeps the bits of a mask.
+    #[must_use]
+    pub fn keeping(mut self, mask: Vec<u64>) -> Self {
+        self.retentive = mask.iter().any(|word| *word != 0).then(|| mask.into());
+        self
+    }
+
+    /// Whether any part of the state is kept over a restart.
+    pub fn is_retentive(&self) -> bool {
+        self.retentive.is_some()
+    }
+
+    /// The state of a warm start: the initial state with the retentive parts of `state`, packed as `state`. A program fault is not among them.
+    pub fn restarted(&self, state: &[u64]) -> Vec<u64> {
+        let mut restarted = self.initial().to_vec();
+        if let Some(mask) = &self.retentive {
+            for ((word, &kept), &mask) in restarted.iter_mut().zip(state).zip(&**mask) {
+                *word = *word & !mask | kept & mask;
+            }
+        }
+        restarted
+    }
+
     /// Width of u in bits.
     pub fn input_count(&self) -> usize {
-        match &self.0 {
+        match &self.engine {
             Engine::Circuit(scan) => scan.input_count(),
             Engine::Machine(machine) => machine.input_count(),
         }
@@ -51,7 +81,7 @@ impl Executable {
 
     /// Width of x in bits.
     pub fn state_count(&self) -> usize {
-        match &self.0 {
+        match &self.engine {
             Engine::Circuit(scan) => scan.register_count(),
             Engine::Machine(machine) => machine.state_words() * 64,
         }
@@ -59,7 +89,7 @@ impl Executable {
 
     /// Width of y in bits.
     pub fn output_count(&self) -> usize {
-        match &self.0 {
+        match &self.engine {
             Engine::Circuit(scan) => scan.output_count(),
             Engine::Machine(machine) => machine.output_count(),
         }
@@ -67,7 +97,7 @@ impl Executable {
 
     /// x(0), packed.
     pub fn initial(&self) -> &[u64] {
-        match &self.0 {
+        match &self.engine {
             Engine::Circuit(scan) => scan.initial(),
             Engine::Machine(machine) => machine.initial(),
         }
@@ -84,7 +114,7 @@ impl Executable {
         inputs: &[u64],
         outputs: &mut [u64],
     ) {
-        match &self.0 {
+        match &self.engine {
             Engine::Circuit(scan) => scan.step(&mut scratch.circuit, state, inputs, outputs),
             Engine::Machine(machine) => machine.step(&mut scratch.machine, state, inputs, outputs),
         }

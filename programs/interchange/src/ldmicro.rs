@@ -26,7 +26,7 @@ mod statements;
 use std::time::Duration;
 
 use understudy_structured_text::parser::parse_at;
-use understudy_structured_text::syntax::{File, Name, ProgramInstance, Task};
+use understudy_structured_text::syntax::{File, Name, ProgramInstance, Retention, Task};
 use understudy_text::{Diagnostic, has_errors};
 
 /// Reads a file under the name `name`, which its format does not hold: one program, run at the cycle time of the file, and everything that was
@@ -56,6 +56,7 @@ fn run(file: &mut File, interval: Option<Duration>) {
         let of = unit.name.clone();
         let task = Name::new("cycle", of.span());
         file.instances.push(ProgramInstance {
+            retention: Retention::Unstated,
             name: of.clone(),
             task: Some(task.clone()),
             of,

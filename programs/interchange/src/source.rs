@@ -115,10 +115,8 @@ pub(crate) fn another_period(
 }
 
 fn source(whole: Whole) -> SourceFile {
-    let mut diagnostics = whole.diagnostics;
+    let diagnostics = whole.diagnostics;
     let library = (!whole.checked.is_empty()).then_some(Source::Library(whole.checked));
-    diagnostics.extend(whole.not_kept);
-    diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
     let source = whole.typed.map(|typed| Source::Program(Arc::new(typed))).or(library);
     SourceFile { source, rungs: None, period: whole.period, diagnostics }
 }

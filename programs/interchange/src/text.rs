@@ -33,8 +33,6 @@ pub(crate) struct Whole {
     pub(crate) period: Option<Duration>,
     /// What was found of the program.
     pub(crate) diagnostics: Vec<Diagnostic>,
-    /// Warnings of what a written text keeps and a station does not.
-    pub(crate) not_kept: Vec<Diagnostic>,
 }
 
 /// Lowers the program of a file.
@@ -60,14 +58,12 @@ pub(crate) fn whole(
     diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
     let is_right = !has_errors(&diagnostics);
     let typed = typed.filter(|_| is_right);
-    let not_kept = typed.iter().flat_map(|typed| not_kept(&file, typed)).collect();
     Whole {
         typed,
         file,
         checked: if is_right { checked } else { Vec::new() },
         period: period.map(|interval| Duration::from_nanos(interval.unsigned_abs())),
         diagnostics,
-        not_kept,
     }
 }
 
@@ -96,28 +92,6 @@ fn too_long(program: &Typed) -> Option<Diagnostic> {
         );
         Diagnostic::error("U1048", message, 0..0).with_help("call functions and blocks fewer times")
     })
-}
-
-/// Warnings of retention.
-fn not_kept(file: &File, program: &Typed) -> Vec<Diagnostic> {
-    let programs = file.units.iter().filter(|unit| unit.kind == UnitKind::Program);
-    let declared = programs.flat_map(|unit| &unit.declarations).chain(&file.globals);
-    let is_variable = |name: &str| {
-        let mut variables = program.variables.iter();
-        variables.any(|variable| {
-            let own = variable.name.rsplit('.').next().unwrap_or_default();
-            own.eq_ignore_ascii_case(name)
-        })
-    };
-    let retained = declared.filter(|it| it.retained && is_variable(it.name.as_str()));
-    let warnings = retained.map(|found| {
-        let message = format!(
-            "that `{}` is retained over a loss of power is not kept: the state of a program is kept by its replicas",
-            found.name
-        );
-        Diagnostic::warning("U1055", message, found.name.span())
-    });
-    warnings.collect()
 }
 
 /// The findings on intervals of tasks that no station has.
@@ -197,7 +171,6 @@ impl Whole {
             diagnostics.push(no_program());
         }
         diagnostics.extend(reasons);
-        diagnostics.extend(self.not_kept);
         diagnostics.sort_by_key(|found| (found.span.start, found.span.end));
         Reading { program: ladder, period: self.period, diagnostics, ..Reading::default() }
     }

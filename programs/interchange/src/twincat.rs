@@ -8,7 +8,9 @@ use roxmltree::Node;
 use understudy_structured_text::parser::{
     parse_body_at, parse_declarations_at, parse_statements_at,
 };
-use understudy_structured_text::syntax::{Body, File, Name, ProgramInstance, Task, Unit, UnitKind};
+use understudy_structured_text::syntax::{
+    Body, File, Name, ProgramInstance, Retention, Task, Unit, UnitKind,
+};
 use understudy_text::Diagnostic;
 
 pub use self::project::{Joined, files_of_project, is_part};
@@ -106,7 +108,9 @@ impl Reader {
             let of = word(called);
             let of = Name::new(of.as_str(), of.span());
             let task = Some(name.clone());
-            let instance = ProgramInstance { name: of.clone(), task, of, connections: Vec::new() };
+            let retention = Retention::Unstated;
+            let instance =
+                ProgramInstance { name: of.clone(), retention, task, of, connections: Vec::new() };
             self.file.instances.push(instance);
         }
     }

@@ -8,7 +8,8 @@ use std::time::Duration;
 use understudy_executable::{Executable, Interface, digest};
 use understudy_structured_text::lower::{event, intervals};
 use understudy_structured_text::syntax::{
-    Body, Declaration, File, Name, ProgramInstance, Task, TypeKind, TypeName, Unit, UnitKind,
+    Body, Declaration, File, Name, ProgramInstance, Retention, Task, TypeKind, TypeName, Unit,
+    UnitKind,
 };
 use understudy_structured_text::{control_blocks, parse, print};
 use understudy_text::{Diagnostic, Severity, has_errors};
@@ -230,6 +231,7 @@ fn configure(file: &mut File, wanted: Wanted<'_>, interval: Option<Duration>) {
     // The points of several programs have the names of the programs in front.
     let are_several = chosen.len() > 1;
     let instances = chosen.into_iter().map(|of| ProgramInstance {
+        retention: Retention::Unstated,
         name: if are_several { of.clone() } else { name("Instance0") },
         task: Some(name("Task0")),
         of,

@@ -105,12 +105,12 @@ fn exact(typed: &Typed, shown: Shown<'_>) -> Result<Exact, LowerError> {
     })
 }
 
-/// The circuit of the typed program of a ladder, as [`Program::lower`] gives it.
+/// The circuit of the typed program of a ladder, as [`Program::lower`] gives it, with its layout.
 ///
 /// # Errors
 /// A program that is too large.
-pub fn circuit(typed: &Typed) -> Result<Circuit, LowerError> {
-    Ok(exact(typed, Shown::default())?.circuit)
+pub fn circuit(typed: &Typed) -> Result<Exact, LowerError> {
+    exact(typed, Shown::default())
 }
 
 impl Program {

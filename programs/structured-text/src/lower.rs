@@ -29,6 +29,7 @@ mod places;
 mod programs;
 mod promotion;
 mod ranges;
+mod retention;
 mod routines;
 mod standard;
 mod standard_blocks;

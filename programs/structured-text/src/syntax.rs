@@ -159,6 +159,18 @@ pub enum Class {
     Global,
 }
 
+/// What a block of declarations says of the restart after a loss of power.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Retention {
+    /// Nothing: a variable of an instance is kept where its instance is, any other is not kept.
+    #[default]
+    Unstated,
+    /// `RETAIN` or `PERSISTENT`: it is kept.
+    Retained,
+    /// `NON_RETAIN`: it begins with its initial value.
+    NotRetained,
+}
+
 /// One variable.
 #[derive(Debug, Clone)]
 pub struct Declaration {
@@ -168,8 +180,8 @@ pub struct Declaration {
     pub class: Class,
     /// `CONSTANT`
     pub constant: bool,
-    /// `RETAIN` or `PERSISTENT`
-    pub retained: bool,
+    /// `RETAIN`, `PERSISTENT` or `NON_RETAIN`
+    pub retention: Retention,
     /// `R_EDGE` (true) or `F_EDGE` (false).
     pub edge: Option<bool>,
     /// With its `%`, in capitals.
@@ -257,6 +269,8 @@ pub struct Task {
 pub struct ProgramInstance {
     /// Its name.
     pub name: Name,
+    /// What is said of all its variables.
+    pub retention: Retention,
     /// Its task.
     pub task: Option<Name>,
     /// The PROGRAM that it is one of.

@@ -50,6 +50,8 @@ pub struct Program {
     pub frames: u32,
     /// What of the state is not 0 at the start, in order of slots.
     pub initial: Vec<Initial>,
+    /// Slots of retentive variables, in order and apart; see [`Program::retain`].
+    pub retained: Vec<Range<u32>>,
 }
 
 impl Program {
@@ -146,8 +148,6 @@ pub struct Variable {
     pub address: Option<String>,
     /// Its description.
     pub description: Option<String>,
-    /// Kept over a loss of power.
-    pub is_retained: bool,
 }
 
 /// What a routine is.

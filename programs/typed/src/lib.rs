@@ -17,6 +17,7 @@ mod machine;
 mod naming;
 mod notation;
 mod operation;
+mod retention;
 mod row;
 mod scan;
 mod stops;

@@ -169,7 +169,7 @@ impl<'p> Parts<'p> {
 }
 
 /// The indices of an element, `[3]` or `[1,2]`.
-fn indices(array: &Array, element: u64) -> Option<String> {
+pub(crate) fn indices(array: &Array, element: u64) -> Option<String> {
     if element >= array.length() {
         return None;
     }

@@ -101,6 +101,12 @@ impl<'a> Check<'a> {
         self.expect(fit && program.state >= Program::HEADER, || {
             format!("state and frames have {slots:?} slots")
         });
+        for kept in &program.retained {
+            let fits = !kept.is_empty() && self.is_state(kept.start.into(), kept.len() as u64);
+            self.expect(fits, || format!("the slots {kept:?} are retentive"));
+        }
+        let is_apart = program.retained.windows(2).all(|pair| pair[0].end < pair[1].start);
+        self.expect(is_apart, || "the retentive slots are not in order".to_owned());
         for points in [&program.inputs, &program.outputs] {
             for point in points {
                 let is_own = point.slot == 0 && point.of == Elementary::Bool;

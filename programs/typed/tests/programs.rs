@@ -142,7 +142,6 @@ fn validation_names_what_is_wrong() {
             slot: Program::HEADER,
             address: None,
             description: None,
-            is_retained: false,
         });
         assert_eq!(program.validate(), Ok(()));
         breaks(&mut program);

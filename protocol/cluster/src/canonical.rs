@@ -6,11 +6,12 @@ use std::fmt::Write;
 use understudy_logic::{Circuit, Expression, Operation, Variable};
 use understudy_typed::Program as TypedProgram;
 
-/// A circuit, line by line: its inputs, registers with initial values, outputs, and the operations that they reach.
+/// A circuit, line by line: its inputs, registers with initial values, outputs, and the operations that they reach; and the registers that a warm
+/// start keeps, `retentive`, where there are any.
 ///
 /// Operations are numbered in the order in which a depth-first walk from the roots leaves them, so that the order in which
 /// they were made does not matter.
-pub(crate) fn circuit_text(circuit: &Circuit) -> String {
+pub(crate) fn circuit_text(circuit: &Circuit, retentive: &[u64]) -> String {
     let mut walk = Walk {
         circuit,
         numbers: vec![None; circuit.graph().operations().len()],
@@ -32,6 +33,11 @@ pub(crate) fn circuit_text(circuit: &Circuit) -> String {
         let number = walk.number(output.value);
         walk.line(format_args!("output {} {number}", output.name));
     }
+    for register in 0..circuit.registers().len() {
+        if retentive.get(register / 64).is_some_and(|word| word >> (register % 64) & 1 == 1) {
+            walk.line(format_args!("retained {register}"));
+        }
+    }
     walk.text
 }
 
@@ -52,9 +58,15 @@ pub(crate) fn typed_text(program: &TypedProgram) -> String {
         state,
         frames,
         initial,
+        retained,
     } = program;
+    // A program that keeps nothing has the text that it always had.
+    let kept = match retained.is_empty() {
+        true => String::new(),
+        false => format!("retained {retained:?}\n"),
+    };
     format!(
-        "typed program\nperiod {period}\nbudget {budget}\nmemory {state} {frames}\n{inputs:#?}\n{outputs:#?}\n{tasks:#?}\n{initial:?}\n{routines:#?}\n"
+        "typed program\nperiod {period}\nbudget {budget}\nmemory {state} {frames}\n{inputs:#?}\n{outputs:#?}\n{tasks:#?}\n{initial:?}\n{routines:#?}\n{kept}"
     )
 }
 
@@ -144,9 +156,12 @@ mod tests {
 
     #[test]
     fn the_text_depends_on_behaviour_alone() {
+        let circuit_text = |circuit: &Circuit| circuit_text(circuit, &[0]);
         let text = circuit_text(&circuit(false, true));
         assert_eq!(text, "input a\nregister x 1\nu 0\nx 0\nnot 1\nand 0 2\nnext 3\noutput y 1\n");
         assert_eq!(circuit_text(&circuit(true, true)), text);
         assert_ne!(circuit_text(&circuit(true, false)), text);
+        let kept = super::circuit_text(&circuit(true, true), &[1]);
+        assert_eq!(kept, format!("{text}retained 0\n"));
     }
 }

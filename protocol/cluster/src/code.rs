@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use understudy_bits::{Inexact, exact};
+use understudy_bits::{Exact, Inexact, exact};
 use understudy_executable::{Executable, Interface};
 use understudy_ladder::{LowerError, Program as LadderProgram, circuit};
 use understudy_logic::Circuit;
@@ -23,9 +23,18 @@ pub struct Code {
 #[derive(Debug, Clone)]
 enum Body {
     /// Rungs. They are executed as the circuit for the period of the cluster, and what is proved is proved of it.
-    Rungs(Box<LadderProgram>, Circuit),
+    Rungs(Box<Rungs>),
     /// The text of its file, whose lines a program fault names.
     Text(Arc<str>),
+}
+
+/// Rungs and their circuit.
+#[derive(Debug, Clone)]
+struct Rungs {
+    ladder: LadderProgram,
+    circuit: Circuit,
+    /// The registers that a warm start keeps, packed.
+    retentive: Vec<u64>,
 }
 
 impl Code {
@@ -34,8 +43,11 @@ impl Code {
     /// # Errors
     /// A ladder that is too large for a circuit.
     pub fn of_ladder(typed: Arc<TypedProgram>, ladder: LadderProgram) -> Result<Self, LowerError> {
-        let circuit = circuit(&typed)?.named(ladder.name.as_str());
-        Ok(Self { typed, body: Body::Rungs(Box::new(ladder), circuit) })
+        let Exact { circuit, layout } = circuit(&typed)?;
+        let circuit = circuit.named(ladder.name.as_str());
+        let retentive = layout.retentive_mask(&typed);
+        let rungs = Rungs { ladder, circuit, retentive };
+        Ok(Self { typed, body: Body::Rungs(Box::new(rungs)) })
     }
 
     /// A program of a text.
@@ -51,7 +63,7 @@ impl Code {
     /// Its rungs, of one that is written in rungs.
     pub fn ladder(&self) -> Option<&LadderProgram> {
         match &self.body {
-            Body::Rungs(ladder, _) => Some(ladder.as_ref()),
+            Body::Rungs(rungs) => Some(&rungs.ladder),
             Body::Text(_) => None,
         }
     }
@@ -59,7 +71,7 @@ impl Code {
     /// The circuit that stations execute, of one that is written in rungs.
     pub fn circuit(&self) -> Option<&Circuit> {
         match &self.body {
-            Body::Rungs(_, circuit) => Some(circuit),
+            Body::Rungs(rungs) => Some(&rungs.circuit),
             Body::Text(_) => None,
         }
     }
@@ -90,15 +102,18 @@ impl Code {
 
     /// As stations execute it.
     pub fn executable(&self) -> Executable {
-        match self.circuit() {
-            Some(circuit) => circuit.into(),
-            None => self.typed.as_ref().into(),
+        match &self.body {
+            Body::Rungs(rungs) => Executable::from(&rungs.circuit).keeping(rungs.retentive.clone()),
+            Body::Text(_) => self.typed.as_ref().into(),
         }
     }
 
     /// The canonical text that its hash is of: equal texts mean equal behaviour, and equal states.
     pub(crate) fn text(&self) -> String {
-        self.circuit().map_or_else(|| typed_text(&self.typed), circuit_text)
+        match &self.body {
+            Body::Rungs(rungs) => circuit_text(&rungs.circuit, &rungs.retentive),
+            Body::Text(_) => typed_text(&self.typed),
+        }
     }
 
     /// Of the canonical text; the program's own name is not in it, its role is the cluster's affair.

@@ -60,7 +60,7 @@ pub(crate) fn configuration_text(cluster: &Cluster, plants: &[String]) -> String
         }
         if let Some(diagnosis) = &remote_io.diagnosis {
             line(format_args!("diagnosis"));
-            let text = circuit_text(&diagnosis.circuit);
+            let text = circuit_text(&diagnosis.circuit, &[]);
             line(format_args!("{}", indented(&text)));
         }
         if let Some(plant) = plant {

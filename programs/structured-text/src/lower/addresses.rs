@@ -79,7 +79,13 @@ pub(super) struct Extent {
 impl Lowering<'_> {
     /// A variable at an address: `%I` is an input point, `%Q` an output point, `%M` memory.
     pub(super) fn located(&mut self, declaration: &Declaration, resolved: &Resolved) -> Symbol {
-        self.located_at(declaration, resolved).unwrap_or(Symbol::Faulty)
+        let symbol = self.located_at(declaration, resolved).unwrap_or(Symbol::Faulty);
+        if let Symbol::Variable(variable) = &symbol
+            && let (Root::Global(slot), false) = (variable.root, variable.is_point)
+        {
+            self.keep(declaration.retention, &variable.of.clone(), slot);
+        }
+        symbol
     }
 
     fn located_at(&mut self, declaration: &Declaration, resolved: &Resolved) -> Option<Symbol> {

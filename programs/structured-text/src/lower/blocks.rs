@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use understudy_typed::{Array, Field, Place, Root, RoutineId, Structure, Type};
 
-use crate::syntax::{Class, Declaration, Span, TypeKind, TypeName, UnitKind};
+use crate::syntax::{Class, Declaration, Retention, Span, TypeKind, TypeName, UnitKind};
 
 use super::images::{Builder, Image};
 use super::names::{Owner, Symbol, Variable};
@@ -56,7 +56,6 @@ impl Parameter {
 #[derive(Clone)]
 pub(super) struct Member {
     pub(super) class: Class,
-    pub(super) is_retained: bool,
     pub(super) description: Option<String>,
     pub(super) address: Option<String>,
     pub(super) symbol: Symbol,
@@ -91,6 +90,8 @@ struct Layout {
     image: Builder,
     /// Bounds of the fields that are subranges, by their slots.
     ranges: HashMap<u32, (i128, i128)>,
+    /// What is said of the fields' retention, by their slots.
+    retention: HashMap<u32, Retention>,
     slots: u64,
     /// Slots that it may take.
     most: u64,
@@ -162,6 +163,7 @@ impl<'a> Lowering<'a> {
             fields: Vec::new(),
             image: Builder::default(),
             ranges: HashMap::new(),
+            retention: HashMap::new(),
             slots: 0,
             most: self.most,
             block: Block {
@@ -187,6 +189,7 @@ impl<'a> Lowering<'a> {
             };
             layout.fields = self.program.structures[id.0 as usize].fields.clone();
             layout.ranges = self.structures[id.0 as usize].ranges.clone();
+            layout.retention = self.structures[id.0 as usize].retention.clone();
             layout.image = Builder::of(&base.image);
             layout.slots = u64::from(slots);
             layout.block = (*base).clone();
@@ -203,8 +206,13 @@ impl<'a> Lowering<'a> {
         let fields = layout.fields.iter().enumerate();
         let fields = fields.map(|(at, field)| (field.name.to_ascii_uppercase(), at));
         let image = layout.image.done();
-        let info =
-            StructureInfo { fields: fields.collect(), ranges: layout.ranges, unit: Some(unit) };
+        let info = StructureInfo {
+            fields: fields.collect(),
+            ranges: layout.ranges,
+            retention: layout.retention,
+            is_mixed: false,
+            unit: Some(unit),
+        };
         let structure = Structure { name: found.name.as_str().to_owned(), fields: layout.fields };
         let id = self.add_structure(structure, info);
         Some(Block { of: Type::Structure(id, layout.slots as u32), image, ..layout.block })
@@ -229,7 +237,6 @@ impl<'a> Lowering<'a> {
         let symbol = self.member_symbol(unit, declaration, layout);
         let member = Member {
             class: declaration.class,
-            is_retained: declaration.retained,
             description: declaration.description.clone(),
             address: declaration.address.as_ref().map(|found| found.as_str().to_owned()),
             symbol,
@@ -280,6 +287,14 @@ impl<'a> Lowering<'a> {
         }
         let name = declaration.name.as_str();
         let slot = layout.add(name, &resolved, is_reference);
+        let retention = match declaration.class {
+            // A scan samples it.
+            Class::Input if is_program => Retention::NotRetained,
+            _ => declaration.retention,
+        };
+        if retention != Retention::Unstated {
+            layout.retention.insert(slot, retention);
+        }
         let mut root = if is_reference { Root::OwnReference(slot) } else { Root::Own(slot) };
         if let Some(is_rising) = declaration.edge {
             let hidden: Resolved = Type::Elementary(understudy_typed::Elementary::Bool).into();

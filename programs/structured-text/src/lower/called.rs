@@ -5,7 +5,7 @@ use std::rc::Rc;
 
 use understudy_typed::{Root, Type, Variable as Shown};
 
-use crate::syntax::{Body, Class, File, Name, Statement, StatementKind, Unit, UnitKind};
+use crate::syntax::{Body, Class, File, Name, Retention, Statement, StatementKind, Unit, UnitKind};
 
 use super::Lowering;
 use super::images::initial;
@@ -92,13 +92,13 @@ impl<'a> Lowering<'a> {
         let symbol = match self.block(unit, &name.span()) {
             Some(block) => self.state(block.of.slots(), &name.span()).map(|slot| {
                 self.program.initial.extend(initial(&block.image, slot));
+                self.keep(Retention::Unstated, &block.of, slot);
                 self.program.variables.push(Shown {
                     name: name.as_str().to_owned(),
                     of: block.of.clone(),
                     slot,
                     address: None,
                     description: None,
-                    is_retained: false,
                 });
                 self.program_variable(unit, slot, &block.of)
             }),

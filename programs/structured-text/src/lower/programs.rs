@@ -6,7 +6,9 @@ use std::rc::Rc;
 use understudy_text::spelling;
 use understudy_typed::{Root, Task, Type, Variable as Shown};
 
-use crate::syntax::{Argument, Class, Declaration, Expression, File, Name, Span, Unit, UnitKind};
+use crate::syntax::{
+    Argument, Class, Declaration, Expression, File, Name, Retention, Span, Unit, UnitKind,
+};
 
 use super::blocks::{Block, Key, Parameter};
 use super::called::roots;
@@ -25,6 +27,8 @@ pub(super) struct Instance<'a> {
     priority: i64,
     /// What its inputs and outputs are connected to.
     pub(super) connections: &'a [Argument],
+    /// What is said of all its variables.
+    retention: Retention,
     /// The event that runs it, SINGLE.
     pub(super) event: Option<&'a Expression>,
 }
@@ -65,6 +69,7 @@ impl<'a> Lowering<'a> {
         for declaration in &file.globals {
             self.global_variable(declaration);
         }
+        self.check_retention(file);
     }
 
     fn global_variable(&mut self, declaration: &'a Declaration) {
@@ -90,6 +95,7 @@ impl<'a> Lowering<'a> {
         }
         let slot = self.state(resolved.of.slots(), &declaration.name.span())?;
         self.program.initial.extend(initial(&resolved.image, slot));
+        self.keep(declaration.retention, &resolved.of, slot);
         let symbol = variable(declaration, Root::Global(slot), &resolved);
         self.publish(declaration.name.as_str(), declaration, &symbol);
         Some(symbol)
@@ -106,7 +112,6 @@ impl<'a> Lowering<'a> {
                 slot,
                 address: declaration.address.as_ref().map(|found| found.as_str().to_owned()),
                 description: declaration.description.clone(),
-                is_retained: declaration.retained,
             });
         }
     }
@@ -170,6 +175,7 @@ impl<'a> Lowering<'a> {
             interval: alone,
             priority: 0,
             connections: &[],
+            retention: Retention::Unstated,
             event: None,
         };
         if let Some(chosen) = options.program {
@@ -212,6 +218,7 @@ impl<'a> Lowering<'a> {
             let mut instance = whole(unit, self.unit_names[&unit.name.key()]);
             instance.name = &declared.name;
             instance.connections = &declared.connections;
+            instance.retention = declared.retention;
             instance.priority = i64::MAX;
             if let Some(name) = &declared.task
                 && !self.give_task(file, name, &mut instance)
@@ -261,6 +268,7 @@ impl<'a> Lowering<'a> {
             return;
         };
         self.program.initial.extend(initial(&block.image, own));
+        self.keep(instance.retention, &block.of, own);
         if is_only {
             self.name_program(instance.unit, own, &block.of);
         }
@@ -325,7 +333,6 @@ impl<'a> Lowering<'a> {
                 slot,
                 address: member.address.clone(),
                 description: member.description.clone(),
-                is_retained: member.is_retained,
             });
         }
     }

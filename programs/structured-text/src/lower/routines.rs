@@ -186,6 +186,7 @@ impl<'a> Lowering<'a> {
         } else if declaration.class == Class::Static {
             let slot = self.state(resolved.of.slots(), &name.span())?;
             self.program.initial.extend(initial(&resolved.image, slot));
+            self.keep(declaration.retention, &resolved.of, slot);
             Root::Global(slot)
         } else {
             Root::Frame(self.take(frame, &resolved, &name.span())?)

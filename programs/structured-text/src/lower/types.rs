@@ -9,7 +9,7 @@ use understudy_typed::{
     Array, Elementary, Enumeration, EnumerationId, Field, Structure, StructureId, Type,
 };
 
-use crate::syntax::{self, Expression, Name, Span, TypeDefinition, TypeKind, TypeName};
+use crate::syntax::{self, Expression, Name, Retention, Span, TypeDefinition, TypeKind, TypeName};
 
 use super::images::{Builder, Image, zero};
 use super::{Lowering, MAXIMUM_SLOTS};
@@ -51,6 +51,10 @@ pub(super) struct StructureInfo {
     pub(super) fields: HashMap<String, usize>,
     /// Bounds of the fields that are subranges, by their slots.
     pub(super) ranges: HashMap<u32, (i128, i128)>,
+    /// What the declarations of its fields say of a loss of power, by their slots, where they say something.
+    pub(super) retention: HashMap<u32, Retention>,
+    /// Whether parts of it have a retention of their own.
+    pub(super) is_mixed: bool,
     /// The unit whose memory it is.
     pub(super) unit: Option<usize>,
 }
@@ -334,7 +338,13 @@ impl<'a> Lowering<'a> {
         let image = image.done();
         let id = self.add_structure(
             Structure { name: name.to_owned(), fields },
-            StructureInfo { fields: known, ranges, unit: None },
+            StructureInfo {
+                fields: known,
+                ranges,
+                retention: HashMap::new(),
+                is_mixed: false,
+                unit: None,
+            },
         );
         Some(Resolved::new(Type::Structure(id, slots as u32), image))
     }
@@ -342,8 +352,9 @@ impl<'a> Lowering<'a> {
     pub(super) fn add_structure(
         &mut self,
         structure: Structure,
-        info: StructureInfo,
+        mut info: StructureInfo,
     ) -> StructureId {
+        info.is_mixed = !info.retention.is_empty() || self.has_mixed(&structure);
         let id = StructureId(self.structures.len() as u32);
         self.program.structures.push(structure);
         self.structures.push(Rc::new(info));

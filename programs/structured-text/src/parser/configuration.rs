@@ -4,7 +4,9 @@ use understudy_text::Diagnostic;
 
 use super::Parser;
 use crate::lexer::Lexeme;
-use crate::syntax::{Argument, Class, ExpressionKind, File, Literal, ProgramInstance, Task};
+use crate::syntax::{
+    Argument, Class, ExpressionKind, File, Literal, ProgramInstance, Retention, Task,
+};
 
 /// Words at which a part of a configuration begins or ends.
 const PARTS: [&str; 10] = [
@@ -113,12 +115,11 @@ impl Parser<'_> {
 
     /// `name WITH task : type (in := a, q => b);`
     fn instance(&mut self) -> Option<ProgramInstance> {
-        let of_retention = self.at_any(&["RETAIN", "NON_RETAIN"]);
-        if of_retention && matches!(self.ahead(1), Lexeme::Word(_)) {
-            if self.at_word("RETAIN") {
-                let message = "RETAIN of a program is not kept: declare its variables RETAIN";
-                self.read_past(message, self.span());
-            }
+        let mut retention = Retention::Unstated;
+        if let Some(found) = self.retention()
+            && matches!(self.ahead(1), Lexeme::Word(_))
+        {
+            retention = found;
             self.skip();
         }
         let name = self.name("the name of a program")?;
@@ -136,7 +137,7 @@ impl Parser<'_> {
             false => Vec::new(),
         };
         self.need_semicolon(&PARTS);
-        Some(ProgramInstance { name, task, of, connections })
+        Some(ProgramInstance { name, retention, task, of, connections })
     }
 
     /// What a program is connected to. The tasks of its blocks are read past.

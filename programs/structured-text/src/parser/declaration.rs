@@ -4,7 +4,7 @@ use understudy_text::Diagnostic;
 
 use super::Parser;
 use crate::lexer::Lexeme;
-use crate::syntax::{Class, Declaration, Name};
+use crate::syntax::{Class, Declaration, Name, Retention};
 
 /// Words that begin a block of variables.
 const BLOCKS: [(&str, Class); 10] = [
@@ -55,7 +55,7 @@ const MAXIMUM_DECLARED_BYTES: usize = 1 << 24;
 pub(super) struct Block {
     pub(super) class: Class,
     pub(super) constant: bool,
-    pub(super) retained: bool,
+    pub(super) retention: Retention,
 }
 
 impl Parser<'_> {
@@ -98,11 +98,13 @@ impl Parser<'_> {
 
     /// The content between `VAR…` and `END_VAR`.
     pub(super) fn variables(&mut self, class: Class, into: &mut Vec<Declaration>) {
-        let mut block = Block { class, constant: false, retained: false };
+        let mut block = Block { class, constant: false, retention: Retention::Unstated };
         // A variable may be called so.
         while self.at_any(&QUALIFIERS) && !matches!(self.ahead(1), Lexeme::Sign(":" | ",")) {
             block.constant |= self.at_word("CONSTANT");
-            block.retained |= self.at_any(&["RETAIN", "PERSISTENT"]);
+            if let Some(retention) = self.retention() {
+                block.retention = retention;
+            }
             self.skip();
         }
         self.fields(block, into);
@@ -110,6 +112,14 @@ impl Parser<'_> {
             self.expected("`END_VAR`");
         }
         self.take_sign(";");
+    }
+
+    /// What the qualifier that is here says of a loss of power.
+    pub(super) fn retention(&self) -> Option<Retention> {
+        if self.at_any(&["RETAIN", "PERSISTENT"]) {
+            return Some(Retention::Retained);
+        }
+        self.at_word("NON_RETAIN").then_some(Retention::NotRetained)
     }
 
     /// Declarations up to a word that ends them.
@@ -185,7 +195,7 @@ impl Parser<'_> {
             name,
             class: block.class,
             constant: block.constant,
-            retained: block.retained,
+            retention: block.retention,
             edge,
             address,
             of: of.clone(),

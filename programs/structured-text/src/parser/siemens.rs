@@ -4,7 +4,7 @@ use understudy_text::Diagnostic;
 
 use super::Parser;
 use crate::lexer::{Lexeme, Placed};
-use crate::syntax::{Class, Declaration, File, Literal, Name, TypeKind, TypeName};
+use crate::syntax::{Class, Declaration, File, Literal, Name, Retention, TypeKind, TypeName};
 
 /// Words that begin a unit or a type, which has a quoted name in SCL.
 const NAMED: [&str; 5] = ["FUNCTION", "FUNCTION_BLOCK", "ORGANIZATION_BLOCK", "DATA_BLOCK", "TYPE"];
@@ -73,9 +73,9 @@ impl Parser<'_> {
         self.skip();
         let name = self.name("the name of a data block");
         self.siemens_header();
-        let mut retained = true;
-        while self.at_any(&["NON_RETAIN", "RETAIN"]) {
-            retained = self.at_word("RETAIN");
+        let mut retention = Retention::Retained;
+        while let Some(found) = self.retention() {
+            retention = found;
             self.skip();
         }
         self.siemens_header();
@@ -108,7 +108,7 @@ impl Parser<'_> {
                 name,
                 class: Class::Global,
                 constant: false,
-                retained,
+                retention,
                 edge: None,
                 address: None,
                 of,

@@ -1,6 +1,6 @@
 use super::*;
 use crate::print;
-use crate::syntax::{Class, StatementKind, UnitKind};
+use crate::syntax::{Class, Retention, StatementKind, UnitKind};
 
 fn whole(text: &str) -> File {
     let (file, found) = parse(text);
@@ -76,7 +76,7 @@ fn variables_and_types() {
     assert!(diagnostics.is_empty(), "{diagnostics:?}");
     assert_eq!(found.len(), 12);
     assert_eq!(found[2].edge, Some(true));
-    assert!(found[3].retained && !found[3].constant && found[4].constant);
+    assert!(found[3].retention == Retention::Retained && !found[3].constant && found[4].constant);
     assert_eq!(found[3].address.as_ref().map(Name::as_str), Some("%MW3"));
     assert_eq!(found[6].class, Class::Static);
     let printed = print::declarations(&found);

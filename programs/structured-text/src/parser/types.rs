@@ -3,7 +3,7 @@
 use super::Parser;
 use super::declaration::Block;
 use crate::lexer::Lexeme;
-use crate::syntax::{Class, Expression, Name, TypeDefinition, TypeKind, TypeName};
+use crate::syntax::{Class, Expression, Name, Retention, TypeDefinition, TypeKind, TypeName};
 
 /// Types of which an enumeration can be.
 const INTEGERS: [&str; 12] = [
@@ -141,7 +141,7 @@ impl Parser<'_> {
             self.refuse("`OVERLAP` is", self.span(), Some("use parts of words, such as `.%B1`"));
             self.skip();
         }
-        let block = Block { class: Class::Local, constant: false, retained: false };
+        let block = Block { class: Class::Local, constant: false, retention: Retention::Unstated };
         let mut fields = Vec::new();
         self.fields(block, &mut fields);
         self.need_word("END_STRUCT");

@@ -2,7 +2,7 @@
 
 use super::expression::{expression, initializer, list, type_name};
 use super::{Printer, block_word, harmless};
-use crate::syntax::{Declaration, File, TypeDefinition, TypeKind};
+use crate::syntax::{Declaration, File, Retention, TypeDefinition, TypeKind};
 
 /// `name AT %IX0.0 : type := value;`
 pub(super) fn declared(of: &Declaration) -> String {
@@ -23,19 +23,26 @@ pub(super) fn declared(of: &Declaration) -> String {
     text
 }
 
+/// The qualifier of a block, with a space before it.
+pub(super) fn retention_word(retention: Retention) -> &'static str {
+    match retention {
+        Retention::Unstated => "",
+        Retention::Retained => " RETAIN",
+        Retention::NotRetained => " NON_RETAIN",
+    }
+}
+
 impl Printer {
     /// Blocks of variables: a new one wherever class or qualifiers change, since the order counts.
     pub(super) fn declarations(&mut self, declarations: &[Declaration]) {
-        let like = |of: &Declaration| (of.class, of.constant, of.retained);
+        let like = |of: &Declaration| (of.class, of.constant, of.retention);
         for block in declarations.chunk_by(|first, second| like(first) == like(second)) {
-            let (class, constant, retained) = like(&block[0]);
+            let (class, constant, retention) = like(&block[0]);
             let mut header = block_word(class).to_owned();
             if constant {
                 header += " CONSTANT";
             }
-            if retained {
-                header += " RETAIN";
-            }
+            header += retention_word(retention);
             self.line(&header);
             self.within(|printer| block.iter().for_each(|of| printer.declaration(of)));
             self.line("END_VAR");

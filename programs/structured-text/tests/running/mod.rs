@@ -87,6 +87,12 @@ impl Running {
         points.iter().map(|point| point.get(&self.outputs)).collect()
     }
 
+    /// A warm start before the next scan.
+    pub(crate) fn restart(&mut self) {
+        self.state = self.program.restarted(&self.state);
+        self.reference.clone_from(&self.state);
+    }
+
     /// What stopped the program.
     pub(crate) fn fault(&self) -> Option<String> {
         Fault::read(&self.state).map(|fault| fault.describe(&self.program))

@@ -174,14 +174,7 @@ impl Generator {
         let slot = self.program.state;
         self.program.state += of.slots() as u32;
         self.globals.push(Known { root: Root::Global(slot), of: of.clone(), is_constant: false });
-        self.program.variables.push(Variable {
-            name,
-            of,
-            slot,
-            address: None,
-            description: None,
-            is_retained: false,
-        });
+        self.program.variables.push(Variable { name, of, slot, address: None, description: None });
         slot
     }
 

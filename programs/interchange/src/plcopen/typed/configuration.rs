@@ -2,7 +2,7 @@
 
 use roxmltree::Node;
 use understudy_structured_text::parser::{Places, parse_expression_at};
-use understudy_structured_text::syntax::{Class, ProgramInstance, Task};
+use understudy_structured_text::syntax::{Class, ProgramInstance, Retention, Task};
 
 use super::Typed;
 use super::make::name;
@@ -79,6 +79,7 @@ impl Typed {
                 continue;
             }
             self.file.instances.push(ProgramInstance {
+                retention: Retention::Unstated,
                 name: name(&called),
                 task: None,
                 of: name(&of),

@@ -3,7 +3,8 @@
 use roxmltree::Node;
 use understudy_structured_text::parser::{Places, parse_expression_at, parse_initializer_at};
 use understudy_structured_text::syntax::{
-    Class, Declaration, Expression, Initializer, Name, TypeDefinition, TypeKind, TypeName,
+    Class, Declaration, Expression, Initializer, Name, Retention, TypeDefinition, TypeKind,
+    TypeName,
 };
 
 use super::make;
@@ -47,9 +48,6 @@ impl Typed {
         class: Class,
         into: &mut Vec<Declaration>,
     ) {
-        let is = |of: Node<'_, '_>, name: &str| {
-            attribute(of, name).is_some_and(|value| matches!(value.as_str(), "true" | "1"))
-        };
         for node in children(list, "variable") {
             let Some(written) = self.needed(node, "name") else {
                 continue;
@@ -66,7 +64,7 @@ impl Typed {
                 name: name(&written),
                 class,
                 constant: is(list, "constant"),
-                retained: is(list, "retain") || is(list, "persistent"),
+                retention: retention(list),
                 edge: None,
                 address: address
                     .map(|address| Name::new(address.to_ascii_uppercase(), address.span())),
@@ -291,4 +289,20 @@ pub(super) fn comments(node: Node<'_, '_>) -> Vec<String> {
     let lines = whole.as_str().lines().map(str::trim);
     let lines = lines.filter(|line| !line.is_empty());
     lines.map(str::to_owned).collect()
+}
+
+/// Whether an attribute is true.
+fn is(of: Node<'_, '_>, name: &str) -> bool {
+    attribute(of, name).is_some_and(|value| matches!(value.as_str(), "true" | "1"))
+}
+
+/// What the attributes of a list of variables say of a loss of power.
+fn retention(list: Node<'_, '_>) -> Retention {
+    if is(list, "retain") || is(list, "persistent") {
+        return Retention::Retained;
+    }
+    match is(list, "nonretain") {
+        true => Retention::NotRetained,
+        false => Retention::Unstated,
+    }
 }

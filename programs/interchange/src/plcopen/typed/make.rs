@@ -2,8 +2,8 @@
 
 use understudy_ladder::Name as Written;
 use understudy_structured_text::syntax::{
-    Argument, Class, Declaration, Expression, ExpressionKind, Literal, Name, Operator, Path, Span,
-    Statement, StatementKind, Step, TypeKind, TypeName,
+    Argument, Class, Declaration, Expression, ExpressionKind, Literal, Name, Operator, Path,
+    Retention, Span, Statement, StatementKind, Step, TypeKind, TypeName,
 };
 
 /// A name of the document.
@@ -83,7 +83,7 @@ pub(crate) fn declare(name: &str, class: Class, of: TypeName, span: &Span) -> De
         name: Name::new(name, span.clone()),
         class,
         constant: false,
-        retained: false,
+        retention: Retention::Unstated,
         edge: None,
         address: None,
         of,

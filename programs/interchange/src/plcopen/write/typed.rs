@@ -2,7 +2,8 @@
 
 use understudy_structured_text::print;
 use understudy_structured_text::syntax::{
-    Body, Class, Declaration, File, Initializer, TypeDefinition, TypeKind, TypeName, Unit, UnitKind,
+    Body, Class, Declaration, File, Initializer, Retention, TypeDefinition, TypeKind, TypeName,
+    Unit, UnitKind,
 };
 
 use super::tree::Tree;
@@ -113,7 +114,7 @@ fn pou(
         tree.close("returnType");
     }
     let blocks = unit.declarations.chunk_by(|one, other| {
-        let key = |of: &Declaration| (of.class, of.constant, of.retained);
+        let key = |of: &Declaration| (of.class, of.constant, of.retention);
         key(one) == key(other)
     });
     for block in blocks {
@@ -175,8 +176,10 @@ fn variables(tree: &mut Tree, block: &[Declaration]) -> Result<(), String> {
     if first.constant {
         attributes.push(("constant", "true"));
     }
-    if first.retained {
-        attributes.push(("retain", "true"));
+    match first.retention {
+        Retention::Unstated => {}
+        Retention::Retained => attributes.push(("retain", "true")),
+        Retention::NotRetained => attributes.push(("nonretain", "true")),
     }
     tree.open(list, &attributes);
     for variable in block {
@@ -354,7 +357,7 @@ fn instances(tree: &mut Tree, file: &File) -> Result<(), String> {
             tree.close("task");
         }
         let blocks = file.globals.chunk_by(|one, other| {
-            (one.constant, one.retained) == (other.constant, other.retained)
+            (one.constant, one.retention) == (other.constant, other.retention)
         });
         for block in blocks {
             variables(tree, block)?;

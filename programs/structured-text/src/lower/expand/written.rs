@@ -4,7 +4,7 @@ use understudy_typed::Elementary;
 
 use crate::syntax::{
     Argument, Class, Declaration, Expression, ExpressionKind, Initializer, Literal, Name, Operator,
-    Path, Span, Statement, StatementKind, Step, TypeKind, TypeName,
+    Path, Retention, Span, Statement, StatementKind, Step, TypeKind, TypeName,
 };
 
 pub(super) fn path(name: &str, part: Option<&str>, span: &Span) -> Path {
@@ -150,7 +150,7 @@ pub(super) fn declare(
         name: Name::new(name, span.clone()),
         class,
         constant: false,
-        retained: false,
+        retention: Retention::Unstated,
         edge: None,
         address: None,
         of,
