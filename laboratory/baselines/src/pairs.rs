@@ -229,7 +229,7 @@ impl Pairs {
                             account.two_masters += u64::from(standby && deadline.drivers > 1);
                             account.differing += u64::from(deadline.differ);
                         }
-                        Output::Answer(_) | Output::Obeyed(_) => {}
+                        Output::Retain(_) | Output::Answer(_) | Output::Obeyed(_) => {}
                     }
                 }
             }
@@ -249,7 +249,8 @@ impl Pairs {
                         Output::Report(Event::SteppedDown)
                         | Output::Drive(_)
                         | Output::Answer(_)
-                        | Output::Obeyed(_) => {}
+                        | Output::Obeyed(_)
+                        | Output::Retain(_) => {}
                     }
                 }
             }

@@ -26,7 +26,7 @@ use tokio::sync::mpsc::{Receiver, Sender, channel};
 use understudy_bus::{Cuts, LinkKind, RefusedOrders, WRITES_PER_SECOND, WriteLimiter};
 use understudy_cluster::Cluster;
 use understudy_journal::{
-    Commands, Journal, JournalState, KEYS, PendingOrders, Record, RunDirectory, RunEvent,
+    Commands, Journal, JournalState, KEYS, PendingOrders, RETAINED, Record, RunDirectory, RunEvent,
     RunSocket, commands as queue_of_commands, keep_cluster, monotonic_ns,
 };
 use understudy_simulator::Action;
@@ -199,6 +199,7 @@ fn run(
     let (sender, receiver) = channel(UNREAD_LINES);
     let laboratory = Laboratory {
         settings,
+        retained: directory.file(RETAINED),
         keys,
         site,
         account: Account::new(Terms::of(cluster), scenario, OriginRule::Found),
@@ -257,6 +258,8 @@ fn refuse_what_is_simulated(scenario: &Scenario) -> Result<(), LaboratoryError> 
 
 struct Laboratory<'w> {
     settings: LaboratorySettings,
+    /// The folder of what the members keep for the time after a power failure.
+    retained: PathBuf,
     keys: RunKeys,
     site: Site,
     account: Account,

@@ -36,6 +36,8 @@ impl Laboratory<'_> {
             .arg("--endpoints")
             .args(self.site.endpoints(member))
             .args(["--multicast", &multicast])
+            .arg("--retain")
+            .arg(&self.retained)
             .arg("--in-laboratory")
             .args(self.keys.arguments(&name))
             .args(&self.settings.arguments)

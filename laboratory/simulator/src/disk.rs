@@ -56,6 +56,11 @@ impl Disks {
         }
     }
 
+    /// A station gets another disk, with nothing on it.
+    pub(crate) fn empty(&mut self, station: StationId) {
+        self.stations[station.index()].clear();
+    }
+
     /// The last `steps` of each program that a station kept are not on its disk.
     pub(crate) fn lose(&mut self, station: StationId, steps: usize) {
         for run in &mut self.stations[station.index()] {

@@ -189,6 +189,11 @@ impl Simulation {
         self.disks.lose(station, steps);
     }
 
+    /// A station gets an empty disk.
+    pub fn lose_disk(&mut self, station: StationId) {
+        self.disks.empty(station);
+    }
+
     /// The network is another one while `disturbance` lasts; a later one takes its place.
     pub fn disturb(&mut self, disturbance: Disturbance) {
         self.links.alter(disturbance);

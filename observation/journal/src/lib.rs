@@ -50,7 +50,7 @@ pub use place::{CheckpointPlace, Place, continuation_before, place_before};
 pub use record::{Happening, LABORATORY, Record, RunEvent, moment};
 pub use repeated::{RecordsInEffect, repeated};
 pub use rules::{Process, SourceCounts, is_blocked, is_provable};
-pub use run_directory::{KEYS, RunDirectory, RunDirectoryError, time_name, time_text};
+pub use run_directory::{KEYS, RETAINED, RunDirectory, RunDirectoryError, time_name, time_text};
 pub use segments::{Segments, closed_segments, segments_of};
 pub use source::{SOURCES, source_word};
 pub use tally::{Deadlines, Tally};

@@ -12,6 +12,8 @@ use crate::writer::WriterLock;
 
 /// The folder of a run's keys, which goes when the run ends.
 pub const KEYS: &str = "keys";
+/// The folder of what the members of a run keep for the time after a power failure.
+pub const RETAINED: &str = "retained";
 
 /// Directories with one name and a number, at most; then something is wrong.
 const MAXIMUM_TRIES: u32 = 1000;

@@ -192,10 +192,7 @@ impl Model {
     pub(super) fn host(&mut self, record: &Record, member: Member, event: &HostEvent) {
         let cycle = self.cycles.of(None);
         match event {
-            HostEvent::Ready { .. } => {
-                self.alarms.over(&own("retain-failed"), cycle);
-                self.ready(member, cycle);
-            }
+            HostEvent::Ready { .. } => self.ready(member, cycle),
             HostEvent::JournalLost { .. } => {
                 if let Member::RemoteIo(program) = member {
                     self.misses_records(program);
@@ -252,7 +249,9 @@ impl Model {
             HostEvent::RetainedRefused { file, reason } => {
                 self.alarms.occurred(own("retained-refused"), cycle, format!("{file}: {reason}"));
             }
-            HostEvent::RetainRegained => self.alarms.over(&own("retain-failed"), cycle),
+            HostEvent::Ready { .. } | HostEvent::RetainRegained => {
+                self.alarms.over(&own("retain-failed"), cycle)
+            }
             HostEvent::LinkReopened { .. } => self.alarms.over(&own("link-failed"), cycle),
             _ => {}
         }

@@ -308,6 +308,7 @@ mod tests {
                 kind: OperatorInputKind::Setpoint { low: (-5i16) as u16 as u64, high: 7 },
                 initial: 0,
                 role: Role::Engineer,
+                retains: false,
             },
             title: None,
             unit: Some("mm".to_owned()),
