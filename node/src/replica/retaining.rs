@@ -7,6 +7,8 @@
 //!                  the history starts warm from it ─ the initial state with its retentive values
 //! ```
 
+use std::collections::VecDeque;
+
 use understudy_executable::Scratch;
 use understudy_wire::{
     ClusterHash, Digest, Holding, Image, Lineage, ProgramId, Retained, RetainedRun, RetainedState,
@@ -22,6 +24,8 @@ pub(super) struct Retaining {
     keeps: Option<Keeps>,
     /// The state that was found at the start; none any more once a state is held.
     found: Option<Held>,
+    /// The states before it, oldest first: its last samples may be void.
+    before: VecDeque<State>,
     /// Records that are not taken yet.
     records: Vec<Retained>,
 }
@@ -47,6 +51,7 @@ impl Retaining {
         inputs: &Image,
     ) {
         self.found = None;
+        self.before.clear();
         let Some(keeps) = &mut self.keeps else {
             return;
         };
@@ -105,7 +110,11 @@ impl Replica {
             digest: kept.digest,
         };
         let mut outputs = Image::zero(program.executable.output_count());
-        for step in &run.steps {
+        let mut before = VecDeque::new();
+        for (steps_left, step) in (1..=run.steps.len()).rev().zip(&run.steps) {
+            if steps_left <= self.history {
+                before.push_back(state.clone());
+            }
             state.digest = Digest::of(&state.bits);
             program.executable.step(
                 scratch,
@@ -119,6 +128,7 @@ impl Replica {
         let newest = self.retaining.found.as_ref().map(|found| found.state.stepped);
         if newest.is_none_or(|newest| newest < state.stepped) {
             self.retaining.found = Some(Held { born: kept.born, state });
+            self.retaining.before = before;
         }
     }
 
@@ -131,6 +141,7 @@ impl Replica {
     /// Forgets the retained state.
     pub(super) fn forget_retained(&mut self) {
         self.retaining.found = None;
+        self.retaining.before.clear();
     }
 
     /// Records for the disk, since they were taken last.
@@ -138,13 +149,19 @@ impl Replica {
         std::mem::take(&mut self.retaining.records)
     }
 
-    /// Goes on from the retained state where that is in the history: its place there.
+    /// Goes on from the retained state, or from one before it, where that is in the history: its place there.
     pub(super) fn take_up_retained(&mut self, lineages: &[Lineage]) -> Option<usize> {
-        let found = self.retaining.found.as_ref().filter(|_| self.held.is_none())?;
-        let place = lineages.iter().rposition(|&known| known == found.state.lineage)?;
-        self.past.clear();
-        self.held = self.retaining.found.take();
-        Some(place)
+        self.retaining.found.as_ref().filter(|_| self.held.is_none())?;
+        // From here on it is a state that the replica held.
+        let found = self.retaining.found.take();
+        let past = std::mem::replace(&mut self.past, std::mem::take(&mut self.retaining.before));
+        self.held = found;
+        let place = self.find(lineages);
+        if place.is_none() {
+            self.retaining.found = self.held.take();
+            self.retaining.before = std::mem::replace(&mut self.past, past);
+        }
+        place
     }
 
     /// The state that the history starts from, with its place, where this replica has it: the initial state, or that with the retentive values of

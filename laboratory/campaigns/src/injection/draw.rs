@@ -187,6 +187,22 @@ impl Draw<'_> {
                     at(to + apart, station, Action::Restart),
                 ]
             }
+            Kind::PowerFailure => {
+                let last = self.cycles.end - 1;
+                let mut all = vec![member];
+                all.extend(self.others(member));
+                let mut steps = Vec::new();
+                for member in all {
+                    let mut at = |cycle: u64, action| {
+                        let cycle = (cycle + self.random.random_range(0..2)).min(last);
+                        let phase = f64::from(self.random.random_range(0..1000)) / 1000.0;
+                        steps.push(Fault { at_cycle: cycle, phase, member, action });
+                    };
+                    at(from, Action::Crash);
+                    at(to + 2, Action::Restart);
+                }
+                steps
+            }
             Kind::Slow => {
                 let by = schedule.period() / 20 * self.random.random_range(1..=40);
                 lasting(Action::Slow { by }, Action::Slow { by: Duration::ZERO })

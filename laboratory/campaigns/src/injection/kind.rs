@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use understudy_cycle::Schedule;
 use understudy_wire::{Member, StationId};
 
-/// What is injected. Every kind but the last four strikes one member.
+/// What is injected. Every kind but the last five strikes one member.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
@@ -49,6 +49,8 @@ pub enum Kind {
     FlippedSample,
     /// A bit of an output word flips on its way out.
     FlippedWord,
+    /// Everybody is gone within two cycles, and starts again later, in any order.
+    PowerFailure,
     /// Frames of everybody are lost for a while.
     Loss,
     /// Frames of everybody arrive twice.
@@ -61,7 +63,7 @@ pub enum Kind {
 
 impl Kind {
     /// In the order in which they are explained.
-    pub const ALL: [Self; 23] = [
+    pub const ALL: [Self; 24] = [
         Self::Write,
         Self::Crash,
         Self::RestartStorm,
@@ -81,6 +83,7 @@ impl Kind {
         Self::FlippedState,
         Self::FlippedSample,
         Self::FlippedWord,
+        Self::PowerFailure,
         Self::Loss,
         Self::Duplication,
         Self::Jitter,
@@ -109,6 +112,7 @@ impl Kind {
             Self::FlippedState => "flipped-state",
             Self::FlippedSample => "flipped-sample",
             Self::FlippedWord => "flipped-word",
+            Self::PowerFailure => "power-failure",
             Self::Loss => "loss",
             Self::Duplication => "duplication",
             Self::Jitter => "jitter",
