@@ -15,6 +15,7 @@ mod field;
 mod gates;
 mod handshake;
 mod hosts;
+mod power;
 mod set_inputs;
 #[allow(dead_code, reason = "each test uses its part")]
 #[path = "../shared/mod.rs"]

@@ -106,7 +106,7 @@ impl RemoteIo {
                 let asks = Event::ConfigurationDisputed { moment, stations, others };
                 self.ask(Question::ConfigurationDisputed, asks);
             }
-            Verdict::Cold => self.start_cold(moment, self.newest_applied()),
+            Verdict::Cold => self.start_cold(moment, self.lost_by_cold_start()),
             Verdict::Warm(from, retained) => self.start_warm(moment, (from, retained)),
             Verdict::Lost => self.lose_state(moment, None),
             Verdict::Adopt(from, holding) => self.start(moment, (from, holding)),

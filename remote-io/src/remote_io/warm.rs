@@ -59,6 +59,12 @@ impl RemoteIo {
         floor.max(self.noted().map(Note::applied))
     }
 
+    /// The newest applied output whose state a cold start loses. A program that retains nothing loses nothing with the power of the whole plant.
+    pub(super) fn lost_by_cold_start(&self) -> Option<Moment> {
+        let floor = self.knowledge.floor().map(|floor| floor.moment);
+        floor.or(self.newest_applied().filter(|_| self.settings.restart.is_some()))
+    }
+
     /// Whether it ran another configuration before it was started.
     pub(super) fn has_another_configuration(&self) -> bool {
         let configuration = self.settings.agreement.configuration;

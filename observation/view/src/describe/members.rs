@@ -18,7 +18,7 @@ descriptions! { station: StationEvent, members: Members;
     Cleared { station, .. } => "cleared" Notice cleared_text(*station, members);
     Joins { wants, .. } => "joins" Notice joins_text(*wants, members);
     Adopted { program, from: None, .. } => "adopted" Notice
-        format!("starts {} from its initial state", program_name(*program, members));
+        format!("starts {} where its remote I/O starts it", program_name(*program, members));
     Adopted { program, from: Some(from), lineage, .. } => "adopted" Notice {
         let (whose, from) = (program_name(*program, members), name(*from, members));
         format!("has received the state of {whose} from {from}, at lineage {lineage}")
