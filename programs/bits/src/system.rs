@@ -74,6 +74,8 @@ pub struct System {
     pub observed: Vec<(String, Term)>,
     /// Values that a run shows beside them.
     pub shown: Vec<(String, Term)>,
+    /// Whether programs with retentive variables are restarted.
+    pub(crate) restarts: bool,
     /// Names of numbers that properties compare.
     pub(crate) wanted: BTreeSet<String>,
     /// Numbers that properties compare: after the scan, an input in the scan.
@@ -129,6 +131,7 @@ impl System {
             read: BTreeSet::new(),
             observed: Vec::new(),
             shown: Vec::new(),
+            restarts: false,
             wanted: BTreeSet::new(),
             numbers: Vec::new(),
             values: HashMap::new(),
