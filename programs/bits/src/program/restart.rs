@@ -73,6 +73,7 @@ impl System {
     pub(super) fn let_restart(&mut self, restart: &Restart<'_>, roots: &mut [&mut Term]) {
         let Restart { prefix, program, cells, ages, time } = restart;
         let name = self.restart_name(prefix, program);
+        self.restarting.push(self.inputs.len() as u32);
         let restarts = self.input(name, Elementary::Bool, None);
         let most: HashMap<u32, i64> = ages.iter().map(|age| (age.cell, age.most)).collect();
         let time = time.map(|time| (time.cell, self.cells[time.cell as usize].term));
