@@ -85,6 +85,100 @@ proptest! {
     }
 }
 
+/// Blocks, structures and instances of instances with retentive parts at random, in Structured Text and in PLCopen XML and back: the same parts are
+/// retentive.
+#[test]
+fn retentive_parts_come_back_from_every_form() {
+    use understudy_interchange::{Bodies, Format, Source, Wanted, read_source, typed_text};
+
+    let names = |name: &str, text: &str| {
+        let found = read_source(name, text, Wanted::default());
+        match found.source {
+            Some(Source::Program(program)) => {
+                let mut names = program.retentive_names();
+                names.sort_unstable();
+                names
+            }
+            other => panic!("{other:?} {:?}\n{text}", found.diagnostics),
+        }
+    };
+    let mut different = std::collections::BTreeSet::new();
+    for seed in 0..60 {
+        let mut dice = Dice::new(seed);
+        let word = |dice: &mut Dice| dice.pick(&["", " RETAIN", " NON_RETAIN", " PERSISTENT"]);
+        let [a, b, c, d, e, f, g, h] = std::array::from_fn(|_| word(&mut dice));
+        let text = format!(
+            "TYPE pair : STRUCT x : REAL; z : BOOL; END_STRUCT; END_TYPE
+             FUNCTION_BLOCK inner VAR_INPUT i : BOOL; END_VAR VAR_OUTPUT{a} o : REAL; END_VAR
+               VAR{b} t : TON; END_VAR VAR{c} n : INT; END_VAR
+               t(IN := i, PT := T#1s); n := n + 1; o := INT_TO_REAL(n); END_FUNCTION_BLOCK
+             FUNCTION_BLOCK outer VAR_INPUT i : BOOL; END_VAR VAR{d} one, two : inner; END_VAR
+               one(i := i); two(i := NOT i); END_FUNCTION_BLOCK
+             PROGRAM p VAR_INPUT i : BOOL; END_VAR VAR_OUTPUT{e} y : REAL; END_VAR
+               VAR{f} all : outer; s : pair; END_VAR VAR{g} k : ARRAY [1..2] OF INT; END_VAR
+               VAR_EXTERNAL w : INT; END_VAR
+               all(i := i); k[1] := k[1] + 1; w := w + k[1]; s.x := s.x + 1.0;
+               y := all.one.o + s.x + INT_TO_REAL(w); END_PROGRAM
+             CONFIGURATION q VAR_GLOBAL{h} w : INT; END_VAR
+               RESOURCE r ON plc TASK t(INTERVAL := T#10ms, PRIORITY := 0); PROGRAM p1 WITH t : p;
+               END_RESOURCE END_CONFIGURATION"
+        );
+        let wanted = names("p.st", &text);
+        let mut now = ("p.st", text);
+        for (to, name) in [
+            (Format::PlcOpen, "p.xml"),
+            (Format::StructuredText, "p.st"),
+            (Format::StructuredText, "p.st"),
+            (Format::PlcOpen, "p.xml"),
+        ] {
+            let written = typed_text(now.0, &now.1, Wanted::default(), to, Bodies::AsRead);
+            let (written, found) = written.unwrap_or_else(|error| panic!("{error}\n{}", now.1));
+            now = (name, written.unwrap_or_else(|| panic!("{found:?}\n{}", now.1)).text);
+            assert_eq!(names(now.0, &now.1), wanted, "{}", now.1);
+        }
+        different.insert(wanted);
+    }
+    assert!(different.len() > 40, "{}", different.len());
+}
+
+/// What files of TwinCAT declare.
+#[test]
+fn files_of_twincat_say_what_is_retentive() {
+    use understudy_interchange::{Joined, Source, Wanted, read_source};
+
+    let object = |kind: &str, name: &str, declaration: &str, body: &str| {
+        format!(
+            "<TcPlcObject><{kind} Name=\"{name}\"><Declaration><![CDATA[{declaration}]]></Declaration>\
+             <Implementation><ST><![CDATA[{body}]]></ST></Implementation></{kind}></TcPlcObject>"
+        )
+    };
+    let files = vec![
+        (
+            "MAIN.TcPOU".to_owned(),
+            object(
+                "POU",
+                "MAIN",
+                "PROGRAM MAIN\nVAR RETAIN\n a : INT;\nEND_VAR\nVAR PERSISTENT\n b : INT;\nEND_VAR\nVAR\n c : INT;\nEND_VAR",
+                "a := a + 1; b := b + 1; c := c + 1; GVL.g := a; GVL.h := b;",
+            ),
+        ),
+        (
+            "GVL.TcGVL".to_owned(),
+            "<TcPlcObject><GVL Name=\"GVL\"><Declaration><![CDATA[VAR_GLOBAL PERSISTENT RETAIN\n g : INT;\nEND_VAR\n\
+             VAR_GLOBAL\n h : INT;\nEND_VAR]]></Declaration></GVL></TcPlcObject>"
+                .to_owned(),
+        ),
+    ];
+    let joined = Joined::of(files).expect("files of TwinCAT");
+    let found = read_source("plant.plcproj", &joined.text, Wanted::default());
+    let Some(Source::Program(program)) = found.source else {
+        panic!("{:?}", found.diagnostics);
+    };
+    let mut names = program.retentive_names();
+    names.sort_unstable();
+    assert_eq!(names, ["a", "b", "g"]);
+}
+
 /// Timers and moments that are and are not retentive, in one program.
 #[test]
 fn times_go_on_over_a_restart() {
