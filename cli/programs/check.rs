@@ -2,6 +2,7 @@
 
 mod next;
 mod remarks;
+mod retained;
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -29,6 +30,7 @@ use crate::programs::init::from::Known;
 use crate::supervisors::automata;
 use crate::supervisors::reconfigure::read_project;
 use remarks::{Looking, RungSize};
+use retained::Retained;
 
 /// Check files and report all errors and warnings
 #[derive(Debug, Args)]
@@ -77,6 +79,9 @@ struct CheckedFile {
     /// Memory and time of a program with numbers.
     #[serde(skip_serializing_if = "Option::is_none")]
     size: Option<Size>,
+    /// What a warm start keeps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    retained: Option<Retained>,
     /// Function blocks and functions of a text without a program.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     units: Vec<String>,
@@ -116,6 +121,7 @@ struct Found<'a> {
     given: Vec<(Kind, &'a Path)>,
     cut_short: Vec<String>,
     sizes: Vec<(String, Size)>,
+    retained: Vec<(String, Retained)>,
     libraries: Vec<(String, Vec<String>)>,
     /// Programs of one file each.
     known: Vec<Known<'a>>,
@@ -235,6 +241,10 @@ impl Found<'_> {
         if ladder.is_some_and(|ladder| looking.at_rungs(ladder, every, &mut diagnostics)) {
             self.cut_short.push(shown.clone());
         }
+        if let Some(Source::Program(program)) = &source {
+            let retained = Retained::of(program, is_ladder);
+            self.retained.extend(retained.map(|retained| (shown.clone(), retained)));
+        }
         match &source {
             Some(Source::Program(_)) if is_ladder => {}
             Some(Source::Program(program)) => self.sizes.push((shown, Size::of(program))),
@@ -283,6 +293,8 @@ impl Found<'_> {
             };
             let known = seen.contains(&report.name) || has_errors(&report.diagnostics);
             seen.push(report.name.clone());
+            let retained = Retained::of(controller.code.typed(), controller.ladder().is_some());
+            self.retained.extend(retained.map(|retained| (report.name.clone(), retained)));
             if controller.ladder().is_none() {
                 self.sizes.push((report.name.clone(), Size::of(controller.code.typed())));
             }
@@ -358,6 +370,7 @@ impl Found<'_> {
             warnings: count(report, Severity::Warning),
             cut_short: self.cut_short.contains(&report.name),
             size: found_of(&self.sizes, &report.name),
+            retained: found_of(&self.retained, &report.name),
             units: found_of(&self.libraries, &report.name).unwrap_or_default(),
         });
         let unreadable = self.unreadable.into_iter().map(|name| CheckedFile {
@@ -367,6 +380,7 @@ impl Found<'_> {
             warnings: 0,
             cut_short: false,
             size: None,
+            retained: None,
             units: Vec::new(),
         });
         let files: Vec<CheckedFile> = checked.chain(unreadable).collect();
@@ -397,6 +411,7 @@ impl Found<'_> {
                 more += &format!("; a library without a program: {units} checked");
             }
             more += &file.size.map(Size::text).unwrap_or_default();
+            more += &file.retained.as_ref().map(Retained::text).unwrap_or_default();
             let _ = writeln!(text, "{:width$}  {kind:8}  {verdict}{more}", file.name);
         }
         let status = if errors == 0 { Status::Done } else { Status::BadInput };

@@ -125,6 +125,10 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     let Some(program) = file.rungs.take().map(|rungs| rungs.ladder) else {
         return numbers::of_program(arguments, (&typed, period), file, &patience);
     };
+    if arguments.smv == Some(Smv::Rungs) && !program.retained.is_empty() {
+        let message = "--smv rungs has no warm starts, and the program has retentive variables; use --smv scan";
+        return Err(Answer::failed(Status::BadInput, "U0438", message));
+    }
     let texts = Texts::read(arguments, period)?;
     let subject = Subject::new(&program, period, &texts.asked()).map_err(not_lowered)?;
     let wrong = |assumed: &Property| subject.wrong_assumption(assumed);

@@ -63,6 +63,8 @@ pub(crate) struct ProgramAnswer {
     registers: usize,
     /// Inputs that are assumed to be finite numbers.
     finite_inputs: Vec<String>,
+    /// Inputs that are 1 in the first scan of a warm start, of programs with retentive variables.
+    restarted_by: Vec<String>,
     /// For each output of a ladder program, whether it can always be switched on and off again.
     switches: Vec<Switch>,
     /// Remarks on the order and the effect of its rungs; they do not affect the verdict.
@@ -174,6 +176,7 @@ impl ProgramAnswer {
             name: name.to_owned(),
             registers: model.circuit().registers().len(),
             finite_inputs: model.finite_inputs().map(str::to_owned).collect(),
+            restarted_by: model.restarting().map(str::to_owned).collect(),
             switches: Vec::new(),
             remarks: Vec::new(),
             undecided_remarks: 0,
@@ -194,6 +197,7 @@ impl ProgramAnswer {
             name: circuit.name().to_owned(),
             registers: circuit.registers().len(),
             finite_inputs: Vec::new(),
+            restarted_by: subject.restarting().map(str::to_owned).collect(),
             switches: switches.map(|(signal, finding)| switch(circuit, signal, &finding)).collect(),
             remarks: remarked.collect(),
             undecided_remarks: remarks.undecided,
@@ -249,6 +253,11 @@ impl ProgramAnswer {
         if !self.finite_inputs.is_empty() {
             let names = listed(&self.finite_inputs);
             let _ = writeln!(text, "  {:<9} finite: {names}", "assumed");
+        }
+        if !self.restarted_by.is_empty() {
+            let names = listed(&self.restarted_by);
+            let what = "the power may return in any scan, as a warm start";
+            let _ = writeln!(text, "  {:<9} {what}: {names}", "assumed");
         }
         for finding in &self.properties {
             let name = finding.name.as_ref().map(|name| format!("{name}: "));

@@ -89,7 +89,16 @@ impl Model {
         let refused = compared::add(&mut system, &asked.compared);
         let assumed = compared::assume(&mut system, &asked.assumed);
         let derivation = Derivation::new(&system)?;
-        let subject = Subject::of(derivation.circuit.clone(), outputs).with_assumed(assumed);
+        let is_restart = |meaning: &Meaning| match *meaning {
+            Meaning::Bit(input, _) => system.restarting.contains(&input),
+            _ => false,
+        };
+        let restarting = derivation.meanings.iter().enumerate();
+        let restarting = restarting.filter(|(_, meaning)| is_restart(meaning));
+        let restarting = restarting.map(|(place, _)| place).collect();
+        let subject = Subject::of(derivation.circuit.clone(), outputs)
+            .with_assumed(assumed)
+            .with_restarts(restarting);
         Ok(Self { system, derivation, subject, refused })
     }
 
@@ -117,6 +126,11 @@ impl Model {
             return Vec::new();
         }
         self.subject.switches(bounds)
+    }
+
+    /// As [`Subject::restarting`].
+    pub fn restarting(&self) -> impl Iterator<Item = &str> {
+        self.subject.restarting()
     }
 
     /// The circuit that stands for the programs.

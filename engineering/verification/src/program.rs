@@ -101,6 +101,8 @@ pub struct Subject {
     outputs: usize,
     /// Whether the assumptions have held so far.
     assumed: Option<Signal>,
+    /// The inputs that restart a program.
+    restarting: Vec<usize>,
     /// All reachable states, computed on first use.
     listed: OnceCell<Explicit>,
 }
@@ -115,7 +117,11 @@ impl Subject {
         let compared = asked.compared.iter();
         let compared = compared.filter_map(|named| compared_count(program, named)).collect();
         let circuit = program.lower_comparing(period, &compared)?;
+        let last = circuit.inputs().len().saturating_sub(1);
         let mut subject = Self::of(circuit, program.outputs.len());
+        if !program.retained.is_empty() {
+            subject.restarting.push(last);
+        }
         let right = asked.assumed.iter().filter(|it| subject.wrong_assumption(it).is_empty());
         let assumed: Vec<Resolved> = right.filter_map(|it| subject.resolve(it).ok()).collect();
         if !assumed.is_empty() {
@@ -127,7 +133,17 @@ impl Subject {
 
     /// A circuit as it is, of which the first outputs are the program's own.
     pub(crate) fn of(circuit: Circuit, outputs: usize) -> Self {
-        Self { outputs, circuit, assumed: None, listed: OnceCell::new() }
+        Self { outputs, circuit, assumed: None, restarting: Vec::new(), listed: OnceCell::new() }
+    }
+
+    /// The same where these inputs restart a program.
+    pub(crate) fn with_restarts(self, restarting: Vec<usize>) -> Self {
+        Self { restarting, ..self }
+    }
+
+    /// The inputs that are TRUE in the first scan of a warm start, of programs with retentive variables.
+    pub fn restarting(&self) -> impl Iterator<Item = &str> {
+        self.restarting.iter().map(|&input| self.circuit.inputs()[input].as_str())
     }
 
     /// The same where an output of the circuit says whether the assumptions have held so far.

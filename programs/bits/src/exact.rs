@@ -50,6 +50,9 @@ pub struct Shown<'a> {
     pub compared: &'a [Compared],
     /// It keeps all that the program keeps: what no output depends on too.
     pub keeps_all: bool,
+    /// Where the program has retentive variables, it is restarted warm in any scans, by the input [`POWER_RETURNS`](crate::POWER_RETURNS) behind all
+    /// others.
+    pub restarts: bool,
 }
 
 /// A number of a program, compared with a value.
@@ -92,7 +95,7 @@ impl Exact {
     /// What of the program is not followed, or not bit by bit.
     pub fn new(program: &Program, shown: Shown<'_>) -> Result<Self, Inexact> {
         let numbers = shown.compared.iter().map(|compared| compared.number.clone());
-        let mut system = System::comparing(program, numbers.collect())?;
+        let mut system = System::comparing(program, numbers.collect(), shown.restarts)?;
         for Compared { name, number, comparison, stored } in shown.compared {
             if let Some(number) = system.number(number) {
                 system.compare_with_value(name, number, *comparison, *stored);

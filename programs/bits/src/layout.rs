@@ -51,14 +51,7 @@ impl Layout {
 
     /// The registers that a warm start keeps, packed; see [`Program::retentive_mask`].
     pub fn retentive_mask(&self, program: &Program) -> Vec<u64> {
-        let retains = |address: u64| program.retains((address / 64) as u32);
-        let is_kept = |holds: &Holds| match holds {
-            Holds::Value(address, _) | Holds::Age(address) => retains(*address),
-            Holds::Count(counted) => retains(counted.start()),
-            Holds::Clock | Holds::Scans | Holds::Phase => program.is_retentive(),
-            Holds::Other => false,
-        };
-        let kept: Vec<bool> = self.cells.iter().map(is_kept).collect();
+        let kept: Vec<bool> = self.cells.iter().map(|holds| holds.is_retentive(program)).collect();
         let mut mask = vec![0; self.registers.len().div_ceil(64)];
         for (place, &(cell, _)) in self.registers.iter().enumerate() {
             mask[place / 64] |= u64::from(kept[cell]) << (place % 64);

@@ -8,6 +8,7 @@
 //! In every cycle each sample may be missing, and each signal may be lost: what is proved holds whatever fails.
 
 mod moments;
+mod restart;
 mod scan;
 
 use std::collections::{BTreeSet, HashMap, HashSet};
@@ -18,6 +19,9 @@ use crate::execute::Unsupported;
 use crate::execute::timers::Timers;
 use crate::system::{Holds, Source, System};
 use crate::term::Term;
+use moments::Age;
+pub use restart::POWER_RETURNS;
+use restart::Restart;
 use scan::Scan;
 
 /// A program, its name and what its inputs are.
@@ -43,10 +47,11 @@ impl System {
     /// # Errors
     /// What of the program cannot be followed.
     pub fn of_program(program: &Program) -> Result<Self, Unsupported> {
-        Self::comparing(program, BTreeSet::new())
+        Self::comparing(program, BTreeSet::new(), false)
     }
 
-    /// One program, whose inputs are within their subranges; see [`Source::declared`]. Its properties compare the numbers `compared` too.
+    /// One program, whose inputs are within their subranges; see [`Source::declared`]. Its properties compare the numbers `compared` too. One with
+    /// retentive variables is restarted warm in any scans: where the input [`POWER_RETURNS`] is TRUE.
     ///
     /// # Errors
     /// What of the program cannot be followed.
@@ -54,23 +59,24 @@ impl System {
         program: &Program,
         compared: BTreeSet<String>,
     ) -> Result<Self, Unsupported> {
-        Self::alone(program, Source::declared, compared)
+        Self::alone(program, Source::declared, (compared, true))
     }
 
-    /// As [`Self::of_program`]; properties compare the numbers `compared` too.
+    /// As [`Self::of_program`]; properties compare the numbers `compared` too, and the program is restarted warm in any scans where it `restarts`.
     pub(crate) fn comparing(
         program: &Program,
         compared: BTreeSet<String>,
+        restarts: bool,
     ) -> Result<Self, Unsupported> {
-        Self::alone(program, |_| Source::Any(None), compared)
+        Self::alone(program, |_| Source::Any(None), (compared, restarts))
     }
 
     fn alone(
         program: &Program,
         source: fn(&Point) -> Source,
-        compared: BTreeSet<String>,
+        (wanted, restarts): (BTreeSet<String>, bool),
     ) -> Result<Self, Unsupported> {
-        let mut system = Self { wanted: compared, ..System::new(&program.name) };
+        let mut system = Self { wanted, restarts, ..System::new(&program.name) };
         let points = program.inputs.iter().filter(|point| point.slot != 0);
         let sources: Vec<Source> = points.map(source).collect();
         let runs = system.terms.boolean(true);
@@ -80,6 +86,7 @@ impl System {
     }
 
     /// All programs of a cluster; their signals stand behind the names of their controllers and a dot. Properties compare the numbers `compared` too.
+    /// Those with retentive variables are restarted warm in any cycles, as in [`Self::within_subranges`].
     ///
     /// # Errors
     /// What of a program cannot be followed.
@@ -88,7 +95,7 @@ impl System {
         members: &[Member<'_>],
         compared: BTreeSet<String>,
     ) -> Result<Self, Unsupported> {
-        let mut system = Self { wanted: compared, ..System::new(name) };
+        let mut system = Self { wanted: compared, restarts: true, ..System::new(name) };
         // Outputs in the cycle before are cells, so that the order of the programs does not matter.
         let mut before = Vec::with_capacity(members.len());
         for member in members {
@@ -315,6 +322,8 @@ impl System {
         let (scan, ages) = self.scan_with_ages(&how, scan, &mut numbers, &mut timers)?;
         let (scan, clock) = self.scan_with_clock(&how, scan, &ages, &mut numbers, &mut timers)?;
         let sums = self.sums(&how, &scan, &ages, &numbers);
+        let can_restart = self.restarts && program.is_retentive();
+        let time = if can_restart { self.restart_time(prefix, program, &ages) } else { None };
         self.cells[scans as usize].holds = Holds::Scans;
         self.cells[phase as usize].holds = Holds::Phase;
         for counted in timers.counted.values() {
@@ -333,8 +342,9 @@ impl System {
         let begins = self.terms.and(runs, begins);
         // What a fault leaves: the state before the scan.
         let is_restart = self.terms.and(was_stopped, reset);
+        let times: Vec<Age> = ages.values().copied().collect();
         let ages = ages.into_iter().map(|(address, age)| (Some(address), age));
-        for (address, age) in ages.chain(clock.map(|clock| (None, clock))) {
+        for (address, age) in ages.chain(clock.into_iter().chain(time).map(|time| (None, time))) {
             let new = self.next_age(program, &scan, age, address, how.stopped);
             let cell = self.cells[age.cell as usize].term;
             let left = self.age(age, how.stopped);
@@ -361,7 +371,7 @@ impl System {
             self.cells[cell as usize].next = next;
             after.insert(address, next);
         }
-        let faulted = self.terms.choose(begins, can_fault, was_stopped);
+        let mut faulted = self.terms.choose(begins, can_fault, was_stopped);
         self.cells[stopped as usize].next = faulted;
         let one = self.terms.constant(Elementary::Ulint, 1);
         let zero = self.terms.constant(Elementary::Ulint, 0);
@@ -376,6 +386,15 @@ impl System {
             }
             let counted = self.terms.choose(can_fault, begun, more);
             self.cells[counter as usize].next = self.terms.choose(begins, counted, was);
+        }
+        if can_restart {
+            let cells = [stopped, scans, phase].into_iter().chain(numbers.values().copied());
+            let cells = cells.chain(times.iter().chain(&clock).chain(&time).map(|age| age.cell));
+            let mut cells: Vec<u32> = cells.collect();
+            cells.sort_unstable();
+            let restart = Restart { prefix, program, cells, ages: times, time };
+            let roots = after.values_mut().chain([&mut faulted]);
+            self.let_restart(&restart, &mut roots.collect::<Vec<_>>());
         }
         Ok(self.observe(prefix, program, &after, faulted))
     }

@@ -74,6 +74,10 @@ pub struct System {
     pub observed: Vec<(String, Term)>,
     /// Values that a run shows beside them.
     pub shown: Vec<(String, Term)>,
+    /// Whether programs with retentive variables are restarted.
+    pub(crate) restarts: bool,
+    /// The inputs that restart programs, by their numbers.
+    pub restarting: Vec<u32>,
     /// Names of numbers that properties compare.
     pub(crate) wanted: BTreeSet<String>,
     /// Numbers that properties compare: after the scan, an input in the scan.
@@ -129,6 +133,8 @@ impl System {
             read: BTreeSet::new(),
             observed: Vec::new(),
             shown: Vec::new(),
+            restarts: false,
+            restarting: Vec::new(),
             wanted: BTreeSet::new(),
             numbers: Vec::new(),
             values: HashMap::new(),

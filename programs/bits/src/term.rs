@@ -327,6 +327,37 @@ impl Terms {
         self.intern(of, Node::Choose([condition, then, otherwise]))
     }
 
+    /// Terms with others in place of the variables that they depend on.
+    pub(crate) fn replaced(
+        &mut self,
+        roots: &[Term],
+        with: impl Fn(Variable, Term) -> Term,
+    ) -> Vec<Term> {
+        let Some(&first) = roots.first() else {
+            return Vec::new();
+        };
+        let mut images: Vec<Option<Term>> = vec![None; self.nodes.len()];
+        // Of this scan alone; operands stand first, so each has its image.
+        for term in self.reached(roots.to_vec(), |_| first) {
+            let image = |of: &Term| images[of.0 as usize].unwrap_or(*of);
+            let (of, node) = self.nodes[term.0 as usize].clone();
+            let made = match &node {
+                Node::Constant(_) | Node::Unknown(_) => term,
+                Node::Variable(variable) => with(*variable, term),
+                Node::Apply(operation, operands) => {
+                    let new: Vec<Term> = operands.iter().map(image).collect();
+                    if new[..] == **operands { term } else { self.apply(*operation, of, &new) }
+                }
+                Node::Choose(parts) => {
+                    let new = [0, 1, 2].map(|part| image(&parts[part]));
+                    if new == *parts { term } else { self.choose(new[0], new[1], new[2]) }
+                }
+            };
+            images[term.0 as usize] = Some(made);
+        }
+        roots.iter().map(|root| images[root.0 as usize].unwrap_or(*root)).collect()
+    }
+
     /// The values of all terms, for values of the variables. Where an unknown value is reached it is 0.
     pub fn evaluate(&self, variable: impl Fn(Variable) -> u64) -> Vec<u64> {
         let mut values: Vec<u64> = Vec::with_capacity(self.nodes.len());

@@ -279,7 +279,6 @@ fn translate(text: &str, project: &Project, pou: &Pou, reading: &mut Reading) {
         seen.push(found.clone());
         is_new
     });
-    reading.fidelity.ignored(units::lost(project, pou));
     if let Some(mut program) = found.program {
         program.description.clone_from(&pou.documentation);
         reading.fidelity.count(project, pou, &program);

@@ -117,6 +117,8 @@ struct Writer<'f> {
     read: Vec<(String, Span)>,
     /// Inputs and outputs of the program, in capitals.
     points: Points,
+    /// Retentive variables, in capitals.
+    retained: HashSet<String>,
     lost: Lost<'f>,
     /// For the next rung.
     comments: Vec<String>,
@@ -298,6 +300,7 @@ impl<'f> Writer<'f> {
         self.points_are_signals();
         self.drop_unused_globals();
         self.drop_shared_powers();
+        self.declare_retained();
         if self.ladder.rungs.len() > MAXIMUM_RUNGS {
             let what = format!("it has more than {MAXIMUM_RUNGS} rungs");
             let error = Refused { what, span: self.unit.name.span() };

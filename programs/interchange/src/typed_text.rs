@@ -351,10 +351,22 @@ fn compare(read: &Whole, again: &Whole) -> Result<usize, WriteError> {
             if digested(before) != digested(after) {
                 return different("its outputs differ in scans with random inputs".to_owned());
             }
+            if retentive(before) != retentive(after) {
+                return different("other variables are retentive".to_owned());
+            }
             Ok(SCANS)
         }
         _ => different(format!("it has {} in place of {}", named(again), named(read))),
     }
+}
+
+/// The retentive variables, without regard to what a form changes in names.
+fn retentive(program: &Program) -> Vec<String> {
+    let names = program.retentive_names().into_iter();
+    let mut names: Vec<String> =
+        names.map(|name| name.to_ascii_uppercase().replace('.', "_")).collect();
+    names.sort_unstable();
+    names
 }
 
 /// What a file has, for a message.

@@ -9,7 +9,8 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::time::Duration;
 
 use understudy_ladder::{
-    Block, LowerError, PERIODS, Program, Signal, StandardNames, edge_names, print, structured_text,
+    Block, LowerError, Name, PERIODS, Program, Signal, StandardNames, edge_names, print,
+    structured_text,
 };
 use understudy_logic::Circuit;
 use understudy_text::{Diagnostic, Severity};
@@ -105,6 +106,7 @@ fn compare(
     comparison.period(period, reading.period);
     comparison.signals();
     comparison.blocks();
+    comparison.retained();
     comparison.comments();
     comparison.behaviour(&before, interval)?;
     Ok((comparison.losses, comparison.compared))
@@ -147,7 +149,7 @@ impl<'a> Comparison<'a> {
     fn new(format: Format, program: &'a Program, again: &'a Program) -> Self {
         let standard = StandardNames::of(program);
         let is_standard = matches!(format, Format::PlcOpen | Format::StructuredText);
-        let name = |name: &'a understudy_ladder::Name| {
+        let name = |name: &'a Name| {
             let written =
                 if is_standard { standard.signal(name).to_owned() } else { name.to_string() };
             (name.as_str(), written)
@@ -273,6 +275,24 @@ impl<'a> Comparison<'a> {
         }
         self.lost("does not keep these blocks as they are", &missing, "");
         self.lost("has these names of blocks otherwise", &renamed, "");
+    }
+
+    fn retained(&mut self) {
+        let (program, again) = (self.program, self.again);
+        let shown = |name: &Name| format!("`{name}`");
+        let is_kept =
+            |name: &&Name| self.names.get(name.as_str()).is_some_and(|it| again.retains(it));
+        let lost = program.retained.iter().filter(|name| !is_kept(name));
+        let lost: Vec<String> = lost.map(shown).collect();
+        let kept: HashSet<&str> = program
+            .retained
+            .iter()
+            .filter_map(|name| Some(self.names.get(name.as_str())?.as_str()))
+            .collect();
+        let more = again.retained.iter().filter(|name| !kept.contains(name.as_str()));
+        let more: Vec<String> = more.map(shown).collect();
+        self.lost("does not keep that these are retentive", &lost, "");
+        self.lost("makes these retentive", &more, "");
     }
 
     fn comments(&mut self) {

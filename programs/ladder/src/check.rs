@@ -5,6 +5,7 @@
 //! (a latch lasts over scans), and where its declaration gives an initial value (`memory step = 0`: a state).
 
 mod report;
+mod retention;
 mod size;
 
 use std::collections::HashMap;
@@ -27,6 +28,7 @@ pub fn check(program: &Program) -> Vec<Diagnostic> {
             checker.write(&coil.target, coil.kind, rung);
         }
     }
+    checker.retained(&program.retained);
     checker.report_undefined();
     checker.report_use();
     checker.diagnostics

@@ -41,8 +41,8 @@ pub(crate) struct Placed {
 }
 
 /// The longer of two signs that begin alike comes first.
-const SIGNS: [&str; 15] =
-    ["<>", "<=", ">=", "[", "]", "|", "(", ")", "{", "}", "/", "+", "=", "<", ">"];
+const SIGNS: [&str; 16] =
+    ["<>", "<=", ">=", "[", "]", "|", "(", ")", "{", "}", "/", "+", "=", "<", ">", ","];
 
 /// All lexemes of `text` with an [`Lexeme::End`] last, and what was wrong.
 pub(crate) fn lex(text: &str) -> (Vec<Placed>, Vec<Diagnostic>) {

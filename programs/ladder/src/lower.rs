@@ -159,10 +159,11 @@ impl Program {
     /// # Errors
     /// As [`Self::lower`].
     pub fn lower_observed(&self, period: Duration) -> Result<Circuit, LowerError> {
-        self.lower_comparing(period, &BTreeMap::new())
+        self.lower_showing(period, &BTreeMap::new(), false)
     }
 
-    /// [`Self::lower_observed`], with comparisons of counters of the program as further outputs, each under its name and as it is after the scan.
+    /// [`Self::lower_observed`], with comparisons of counters of the program as further outputs, each under its name and as it is after the scan. A
+    /// program with retentive parts is restarted warm in any scans: where [`POWER_RETURNS`](understudy_bits::POWER_RETURNS), the last input, is TRUE.
     ///
     /// # Errors
     /// As [`Self::lower`].
@@ -170,6 +171,15 @@ impl Program {
         &self,
         period: Duration,
         compared: &BTreeMap<String, Comparison>,
+    ) -> Result<Circuit, LowerError> {
+        self.lower_showing(period, compared, true)
+    }
+
+    fn lower_showing(
+        &self,
+        period: Duration,
+        compared: &BTreeMap<String, Comparison>,
+        restarts: bool,
     ) -> Result<Circuit, LowerError> {
         validate(self, period)?;
         let blocks = self.blocks();
@@ -186,7 +196,8 @@ impl Program {
             stored: comparison.value.into(),
         });
         let compared: Vec<Compared> = compared.collect();
-        let shown = Shown { variables: &variables, compared: &compared, ..Shown::default() };
+        let shown =
+            Shown { variables: &variables, compared: &compared, restarts, ..Shown::default() };
         Ok(self.exact(period, shown)?.circuit)
     }
 

@@ -27,7 +27,10 @@ pub const MAXIMUM_RUNGS: usize = 100_000;
 pub const MAXIMUM_NESTING: usize = 64;
 
 /// Reserved words; each begins a part of the program, `at` comes before an address.
-pub const KEYWORDS: [&str; 6] = ["program", "input", "output", "memory", "rung", "at"];
+pub const KEYWORDS: [&str; 7] = ["program", "input", "output", "memory", "retain", "rung", "at"];
+
+/// Those that begin a part of the program.
+const PARTS: [&str; 6] = ["program", "input", "output", "memory", "retain", "rung"];
 
 /// What a text says.
 #[derive(Debug, Clone)]
@@ -114,6 +117,7 @@ impl Parser {
                 "input" => program.inputs.extend(self.signal("input")),
                 "output" => program.outputs.extend(self.signal("output")),
                 "memory" => program.memory.extend(self.signal("memory")),
+                "retain" => self.retained(&mut program.retained),
                 "rung" => {
                     let rung = self.rung();
                     if program.rungs.len() == MAXIMUM_RUNGS {
@@ -142,9 +146,11 @@ impl Parser {
         if *self.lexeme() != Lexeme::Faulty {
             let mut diagnostic =
                 Diagnostic::error("U0102", format!("{} does not belong here", self.found()), span)
-                    .with_label("expected `program`, `input`, `output`, `memory` or `rung`");
+                    .with_label(
+                        "expected `program`, `input`, `output`, `memory`, `retain` or `rung`",
+                    );
             if let Lexeme::Word(word) = self.lexeme()
-                && let Some(keyword) = nearest(word, KEYWORDS[..5].iter().copied())
+                && let Some(keyword) = nearest(word, PARTS)
             {
                 diagnostic = diagnostic.with_help(format!("did you mean `{keyword}`?"));
             }
@@ -233,6 +239,30 @@ impl Parser {
         true
     }
 
+    /// retention = "retain", name, { ",", name };
+    fn retained(&mut self, retained: &mut Vec<Name>) {
+        self.advance();
+        loop {
+            let Some(name) = self.name("the name of an output, a memory bit or a block") else {
+                return self.pass_line();
+            };
+            retained.push(name);
+            if !self.is_sign(",") {
+                break;
+            }
+            self.advance();
+            self.pass_comments();
+        }
+        let line_goes_on = !self.at_part() && !self.placed().starts_line;
+        let is_comment = matches!(self.lexeme(), Lexeme::Comment(_));
+        if line_goes_on && !is_comment && *self.lexeme() != Lexeme::Faulty {
+            self.unexpected("`,` or the end of the line");
+        }
+        if !is_comment {
+            self.pass_line();
+        }
+    }
+
     /// rung = "rung", [ text ], series, { coil };
     fn rung(&mut self) -> Rung {
         let comments = std::mem::take(&mut self.comments);
@@ -288,7 +318,7 @@ impl Parser {
     /// At a word that begins a part of the program, or at the end.
     fn at_part(&self) -> bool {
         match self.lexeme() {
-            Lexeme::Word(word) => KEYWORDS[..5].contains(&word.as_str()),
+            Lexeme::Word(word) => PARTS.contains(&word.as_str()),
             Lexeme::End => true,
             _ => false,
         }
@@ -374,7 +404,7 @@ impl Parser {
                 return;
             }
             let ends = match &self.lexemes[ahead].lexeme {
-                Lexeme::Word(word) => KEYWORDS[..5].contains(&word.as_str()),
+                Lexeme::Word(word) => PARTS.contains(&word.as_str()),
                 lexeme => *lexeme == Lexeme::End,
             };
             if ends && self.placed().starts_line {

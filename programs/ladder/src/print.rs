@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use understudy_text::duration;
 
-use crate::program::{Block, Coil, CoilKind, Element, Program, Rung, Series, Signal};
+use crate::program::{Block, Coil, CoilKind, Element, Name, Program, Rung, Series, Signal};
 
 /// Characters of a line past which a series is broken between its elements.
 const LINE_WIDTH: usize = 100;
@@ -26,6 +26,7 @@ pub fn print(program: &Program) -> String {
             declarations(&mut text, keyword, signals);
         }
     }
+    retained(&mut text, &program.retained);
     for rung in &program.rungs {
         text.push('\n');
         print_rung(&mut text, rung);
@@ -35,6 +36,24 @@ pub fn print(program: &Program) -> String {
         comments(&mut text, &program.footer);
     }
     text
+}
+
+/// The declaration of what is retentive.
+fn retained(text: &mut String, names: &[Name]) {
+    let Some((first, rest)) = names.split_first() else {
+        return;
+    };
+    let mut line = format!("retain {first}");
+    text.push('\n');
+    for name in rest {
+        line.push(',');
+        if line.len() + 1 + name.len() > LINE_WIDTH {
+            let _ = writeln!(text, "{line}");
+            line = String::from("      ");
+        }
+        let _ = write!(line, " {name}");
+    }
+    let _ = writeln!(text, "{line}");
 }
 
 fn comments(text: &mut String, comments: &[String]) {

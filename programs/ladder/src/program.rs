@@ -28,6 +28,8 @@ pub struct Program {
     pub outputs: Vec<Signal>,
     /// Internal bits, in the order of their declaration.
     pub memory: Vec<Signal>,
+    /// What a warm start keeps: names of outputs, memory bits and blocks.
+    pub retained: Vec<Name>,
     /// In the order of the scan.
     pub rungs: Vec<Rung>,
     /// The comment lines below the last rung.
@@ -206,6 +208,11 @@ impl Program {
     /// One more rung behind the last, with what it is for.
     pub fn push_titled(&mut self, title: &str, network: Series, coils: Vec<Coil>) {
         self.rungs.push(Rung { title: Some(title.to_owned()), network, coils, ..Rung::default() });
+    }
+
+    /// Whether a warm start keeps an output, a memory bit or a block.
+    pub fn retains(&self, name: &str) -> bool {
+        self.retained.iter().any(|kept| kept.as_str() == name)
     }
 
     /// All blocks, in the order of the scan.

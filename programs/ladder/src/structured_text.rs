@@ -7,6 +7,7 @@
 mod circuit;
 mod power;
 mod program;
+mod sections;
 
 use std::fmt::Write;
 use std::time::Duration;

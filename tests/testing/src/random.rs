@@ -92,6 +92,12 @@ pub fn random_program(seed: u64, rungs: usize) -> Program {
     for rung in &mut program.rungs {
         fill(&mut dice, &mut rung.network, &readable, &counters);
     }
+    // Numbers of its own: what is retentive does not change the rest.
+    let mut dice = Dice::new(!seed);
+    let signals = program.writable().map(|signal| signal.name.clone());
+    let blocks = program.blocks().into_iter().map(|block| block.name.clone());
+    let retained = signals.chain(blocks).filter(|_| dice.rarely(3)).collect();
+    program.retained = retained;
     program
 }
 

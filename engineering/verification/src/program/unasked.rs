@@ -1,6 +1,8 @@
 //! What is asked of every ladder: each output can be switched on and off, again and again. The specification of the paper on the deployment
 //! of controllers (its section 4.3 and appendix 2) is `AG (EF y & EF !y)` for every output y.
 
+use understudy_logic::{CircuitBuilder, Expression, Variable};
+
 use super::{Answer, Bounds, Subject};
 use crate::property::Formula;
 use crate::symbolic::{Resolved, Signal, Trace};
@@ -31,18 +33,81 @@ impl Subject {
     /// Whether each output can always be switched on and off again.
     pub fn switches(&self, bounds: Bounds<'_>) -> Vec<(Signal, OutputFinding)> {
         let outputs: Vec<Signal> = self.outputs().collect();
+        let settling = (!self.restarting.is_empty()).then(|| self.settling());
+        let (subject, settled) = match &settling {
+            Some((subject, settled)) => (subject, Formula::Signal(*settled)),
+            None => (self, Formula::Constant(true)),
+        };
         let questions: Vec<Resolved> =
-            outputs.iter().flat_map(|&output| questions(output)).collect();
-        let answers = self.check(&questions, Vec::new(), bounds, &mut |_, _| {});
-        let found = answers.chunks(4).map(finding);
+            outputs.iter().flat_map(|&output| questions(output, &settled)).collect();
+        let answers = subject.check(&questions, Vec::new(), bounds, &mut |_, _| {});
+        let found = answers.chunks(4).map(|answers| self.told(finding(answers)));
         outputs.into_iter().zip(found).collect()
+    }
+
+    /// The same program, which is restarted no more from some scan on: in every scan in which the signal is TRUE. A restart is no way to switch an
+    /// output.
+    fn settling(&self) -> (Self, Signal) {
+        const SETTLED: &str = "no more restarts";
+        let circuit = &self.circuit;
+        let mut builder = CircuitBuilder::new(circuit.name());
+        let mut inputs: Vec<Expression> =
+            circuit.inputs().iter().map(|input| builder.input(input)).collect();
+        let settles = builder.input(SETTLED);
+        let registers = circuit.registers().iter();
+        let registers: Vec<_> =
+            registers.map(|register| builder.register(&register.name, register.initial)).collect();
+        let (settled, was_settled) = builder.register(SETTLED, false);
+        let graph = builder.graph();
+        let is_settled = graph.or(was_settled, settles);
+        let restarts = graph.not(is_settled);
+        for &input in &self.restarting {
+            inputs[input] = graph.and(inputs[input], restarts);
+        }
+        let roots = circuit.roots();
+        let copies = graph.import(circuit.graph(), &roots, |_, variable| match variable {
+            Variable::Input(input) => inputs[input as usize],
+            Variable::Register(register) => registers[register as usize].1,
+        });
+        let (next, values) = copies.split_at(registers.len());
+        for (&(register, _), &next) in registers.iter().zip(next) {
+            builder.set_next(register, next);
+        }
+        builder.set_next(settled, is_settled);
+        for (output, &value) in circuit.outputs().iter().zip(values) {
+            builder.output(&output.name, value);
+        }
+        builder.output(SETTLED, is_settled);
+        let circuit = builder.finish().expect("names are those of a circuit, and one with blanks");
+        let settled = Signal::Output(circuit.outputs().len() - 1);
+        (Self::of(circuit, self.outputs).with_assumed(self.assumed), settled)
+    }
+
+    /// A finding over the signals of the program alone.
+    fn told(&self, finding: OutputFinding) -> OutputFinding {
+        let is_own = |signal: &Signal| match *signal {
+            Signal::Input(input) => input < self.circuit.inputs().len(),
+            Signal::Output(output) => output < self.circuit.outputs().len(),
+        };
+        match finding {
+            OutputFinding::Stuck(lamp, mut trace) => {
+                trace.signals.retain(is_own);
+                OutputFinding::Stuck(lamp, trace)
+            }
+            finding => finding,
+        }
     }
 }
 
-fn questions(output: Signal) -> [Resolved; 4] {
+/// `settled`: the program is restarted no more.
+fn questions(output: Signal, settled: &Resolved) -> [Resolved; 4] {
     let on = Formula::Signal(output);
     let off = on.clone().negated();
-    [off.clone().always(), on.clone().always(), on.reachable().always(), off.reachable().always()]
+    let reached = |end: Resolved| match settled {
+        Formula::Constant(_) => end.reachable().always(),
+        _ => settled.clone().implies(end.reachable()).always(),
+    };
+    [off.clone().always(), on.clone().always(), reached(on), reached(off)]
 }
 
 fn finding(answers: &[Answer]) -> OutputFinding {

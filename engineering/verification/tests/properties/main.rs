@@ -8,3 +8,4 @@ mod remarks;
 mod replay;
 mod smv;
 mod timers;
+mod warm_starts;

@@ -26,7 +26,7 @@ pub(super) struct Age {
     /// Its cell.
     pub(super) cell: u32,
     /// Where it stops: past it no answer changes.
-    most: i64,
+    pub(super) most: i64,
 }
 
 impl System {

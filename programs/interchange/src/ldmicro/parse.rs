@@ -21,6 +21,8 @@ pub(super) struct File {
     /// Where each of them stands.
     pub(super) pin_places: Vec<Range<usize>>,
     pub(super) rungs: Vec<Vec<Element>>,
+    /// What PERSIST names, with its places.
+    pub(super) persistent: Vec<(String, Range<usize>)>,
 }
 
 /// An element with its line.
@@ -108,8 +110,14 @@ const CALCULATIONS: [(&str, char); 4] = [("ADD", '+'), ("SUB", '-'), ("MUL", '*'
 
 /// Everything that can be read, and everything that is wrong.
 pub(super) fn parse(text: &str) -> (File, Vec<Diagnostic>) {
-    let mut parser =
-        Parser { lines: Vec::new(), place: 0, depth: 0, elements: 0, diagnostics: Vec::new() };
+    let mut parser = Parser {
+        lines: Vec::new(),
+        place: 0,
+        depth: 0,
+        elements: 0,
+        persistent: Vec::new(),
+        diagnostics: Vec::new(),
+    };
     if text.len() > MAXIMUM_BYTES {
         let message =
             format!("the file has {} bytes; at most {MAXIMUM_BYTES} are read", text.len());
@@ -124,7 +132,8 @@ pub(super) fn parse(text: &str) -> (File, Vec<Diagnostic>) {
         }
         start += line.len();
     }
-    let file = parser.file();
+    let mut file = parser.file();
+    file.persistent = parser.persistent;
     (file, parser.diagnostics)
 }
 
@@ -134,6 +143,7 @@ struct Parser<'a> {
     place: usize,
     depth: usize,
     elements: usize,
+    persistent: Vec<(String, Range<usize>)>,
     diagnostics: Vec<Diagnostic>,
 }
 
@@ -350,12 +360,9 @@ impl<'a> Parser<'a> {
             "RES" => own(1).map(Kind::Reset),
             "MOVE" => own(1).zip(own(2)).map(|(to, from)| Kind::Move(to, from)),
             "PERSIST" => {
-                let what = words.get(1).copied().unwrap_or_default();
-                let message = format!(
-                    "PERSIST of `{}` is not kept: the state of a circuit is kept by its copies",
-                    shortened(what, 60)
-                );
-                self.diagnostics.push(Diagnostic::warning("U1075", message, span.clone()));
+                if let Some(what) = own(1) {
+                    self.persistent.push((what, span.clone()));
+                }
                 return None;
             }
             word => {

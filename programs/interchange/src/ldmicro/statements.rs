@@ -286,7 +286,11 @@ impl Writer {
         names.sort_by_key(|(name, _)| {
             (order.get(name.as_str()).copied().unwrap_or(usize::MAX), (*name).clone())
         });
+        let persistent: HashSet<&str> =
+            file.persistent.iter().map(|(name, _)| name.as_str()).collect();
+        let mut kept: HashSet<&str> = HashSet::new();
         for (section, first) in [("VAR_INPUT", "X"), ("VAR_OUTPUT", "Y"), ("VAR", "")] {
+            let mut is_retained = false;
             let _ = writeln!(head, "  {section}");
             for (name, made) in &names {
                 let use_of = self.uses.get(*made).copied().unwrap_or(Use::Bit);
@@ -302,7 +306,19 @@ impl Writer {
                 let pin = pins
                     .get(name.as_str())
                     .map(|pin| format!(" (* pin {} *)", pin.replace(['*', '(', ')'], " ")));
+                let is_kept = section != "VAR_INPUT" && persistent.contains(name.as_str());
+                if is_kept {
+                    kept.insert(name.as_str());
+                }
+                if is_kept != is_retained {
+                    is_retained = is_kept;
+                    let retain = if is_kept { " RETAIN" } else { "" };
+                    let _ = writeln!(head, "  END_VAR\n  {section}{retain}");
+                }
                 let _ = writeln!(head, "    {made} : {type_name};{}", pin.unwrap_or_default());
+            }
+            if is_retained {
+                let _ = writeln!(head, "  END_VAR\n  {section}");
             }
             if section == "VAR" {
                 for bit in &self.bits {
@@ -318,6 +334,14 @@ impl Writer {
         for ((name, _), place) in pins.filter(|((name, _), _)| !name.starts_with(['X', 'Y'])) {
             let message = format!(
                 "`{name}` of the list is neither an input (X) nor an output (Y), and is not kept"
+            );
+            diagnostics.push(Diagnostic::warning("U1075", message, place.clone()));
+        }
+        for (name, place) in
+            file.persistent.iter().filter(|(name, _)| !kept.contains(name.as_str()))
+        {
+            let message = format!(
+                "PERSIST of `{name}` has no effect: it is no output, bit or number that the program uses"
             );
             diagnostics.push(Diagnostic::warning("U1075", message, place.clone()));
         }

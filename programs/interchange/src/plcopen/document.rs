@@ -77,7 +77,6 @@ pub(crate) struct Part {
 pub(crate) struct Variable {
     pub(crate) name: Name,
     pub(crate) is_external: bool,
-    pub(crate) retain: bool,
     pub(crate) kind: VariableType,
 }
 

@@ -1,6 +1,6 @@
 //! The units of a file that a program uses.
 
-use super::document::{Body, Ignored, Pou, PouKind, Project, VariableType};
+use super::document::{Body, Pou, PouKind, Project, VariableType};
 
 /// The unit and all units that it uses, itself first.
 pub(crate) fn used<'a>(project: &'a Project, pou: &'a Pou) -> Vec<&'a Pou> {
@@ -35,19 +35,4 @@ fn mentions(pou: &Pou, name: &str) -> bool {
 
 fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split(|letter: char| !letter.is_alphanumeric() && letter != '_')
-}
-
-/// What of a unit and of those that it uses a ladder does not keep.
-pub(crate) fn lost(project: &Project, pou: &Pou) -> Vec<Ignored> {
-    let mut lost = Vec::new();
-    for unit in used(project, pou) {
-        for variable in unit.variables.iter().filter(|variable| variable.retain) {
-            let name = &variable.name;
-            lost.push(Ignored {
-                what: format!("the retention of `{name}` over a loss of power"),
-                span: name.span(),
-            });
-        }
-    }
-    lost
 }

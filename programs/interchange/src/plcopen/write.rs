@@ -12,11 +12,12 @@ mod sheet;
 mod tree;
 mod typed;
 
+use std::collections::HashSet;
 use std::time::Duration;
 
 use understudy_ladder::{
-    Coil, CoilKind, Contact, ContactKind, Element, Program, Rung, Series, Signal, StandardNames,
-    standard_time, visit,
+    Coil, CoilKind, Contact, ContactKind, Element, Name, Program, Rung, Series, Signal,
+    StandardNames, standard_time, visit,
 };
 
 pub(crate) use self::order::confirm as confirm_order;
@@ -94,40 +95,44 @@ fn header(tree: &mut Tree, name: &str) {
 /// Inputs and outputs with an address are local variables, as compilers want them.
 fn interface(tree: &mut Tree, program: &Program, names: &StandardNames, added: &[String]) {
     tree.open("interface", &[]);
-    let mut list: Option<&str> = None;
+    let retained: HashSet<&str> = program.retained.iter().map(Name::as_str).collect();
+    let mut list = None;
     let inputs = program.inputs.iter().map(|signal| ("inputVars", signal));
     let outputs = program.outputs.iter().map(|signal| ("outputVars", signal));
     let memory = program.memory.iter().map(|signal| ("localVars", signal));
     for (section, signal) in inputs.chain(outputs).chain(memory) {
         let section = if signal.address.is_some() { "localVars" } else { section };
-        enter(tree, &mut list, section);
+        enter(tree, &mut list, (section, retained.contains(signal.name.as_str())));
         variable(tree, signal, names.signal(&signal.name));
     }
     for name in added {
-        enter(tree, &mut list, "localVars");
+        enter(tree, &mut list, ("localVars", false));
         variable(tree, &Signal::default(), name);
     }
     for block in program.blocks() {
-        enter(tree, &mut list, "localVars");
+        enter(tree, &mut list, ("localVars", retained.contains(block.name.as_str())));
         tree.open("variable", &[("name", names.signal(&block.name))]);
         tree.open("type", &[]);
         tree.empty("derived", &[("name", block.kind.word())]);
         tree.close("type");
         tree.close("variable");
     }
-    if let Some(open) = list {
+    if let Some((open, _)) = list {
         tree.close(open);
     }
     tree.close("interface");
 }
 
-fn enter<'a>(tree: &mut Tree, list: &mut Option<&'a str>, section: &'a str) {
-    if *list != Some(section) {
-        if let Some(open) = *list {
+/// Begins a list of variables, of a name and retentive or not, unless it is open.
+fn enter<'a>(tree: &mut Tree, list: &mut Option<(&'a str, bool)>, wanted: (&'a str, bool)) {
+    if *list != Some(wanted) {
+        if let Some((open, _)) = *list {
             tree.close(open);
         }
-        tree.open(section, &[]);
-        *list = Some(section);
+        let (section, is_kept) = wanted;
+        let attributes: &[_] = if is_kept { &[("retain", "true")] } else { &[] };
+        tree.open(section, attributes);
+        *list = Some(wanted);
     }
 }
 

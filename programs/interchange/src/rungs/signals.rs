@@ -75,6 +75,7 @@ impl<'f> Writer<'f> {
             called: HashSet::new(),
             read: Vec::new(),
             points: Points::of(typed),
+            retained: typed.retentive_names().iter().map(|it| it.to_ascii_uppercase()).collect(),
             lost: Lost::default(),
             comments: Vec::new(),
             place: 0..0,
@@ -254,6 +255,23 @@ impl<'f> Writer<'f> {
         let signals = signals.chain(&self.ladder.memory);
         let kept: HashSet<&str> = signals.map(|signal| signal.name.as_str()).collect();
         self.lost.globals.retain(|(_, name)| kept.contains(name.as_str()));
+    }
+
+    /// Declares the retentive signals and blocks.
+    pub(super) fn declare_retained(&mut self) {
+        let signals = self.ladder.outputs.iter().chain(&self.ladder.memory);
+        let mut left: HashSet<&str> = signals.map(|signal| signal.name.as_str()).collect();
+        left.extend(self.called.iter().map(String::as_str));
+        let declared = self.unit.declarations.iter().chain(&self.file.globals);
+        let kept = declared.filter(|found| self.retained.contains(&found.name.key()));
+        let names = kept.filter_map(|found| match self.known.get(&found.name.key())? {
+            Known::Bit { name, .. } | Known::Block { name, .. } => {
+                let name = left.take(name.as_str())?;
+                Some(Name::at(name, found.name.span()))
+            }
+            Known::Edge { .. } | Known::Other(_) => None,
+        });
+        self.ladder.retained = names.collect();
     }
 
     /// What a path begins with.

@@ -93,6 +93,20 @@ fn a_retentive_timer_keeps_its_time() {
 }
 
 #[test]
+fn what_persist_names_is_retentive() {
+    let text = "LDmicro0.1\nCYCLE=10000\nIO LIST\nXrun at 1\nYdone at 3\nYmore at 4\nEND\nPROGRAM\n\
+                RUNG\nCONTACTS Xrun 0\nPERSIST Cn\nCOIL Rseen 0 1 0\nEND\nRUNG\nPERSIST Xrun\nCTU Cn 3\n\
+                COIL Ydone 0 0 0\nEND\nRUNG\nPERSIST Ymore\nCONTACTS Rseen 0\nCOIL Ymore 0 0 0\nEND\n\
+                RUNG\nPERSIST Rseen\nPERSIST Cx\nEND\n";
+    let reading = read("kept", text);
+    insta::assert_snapshot!(findings(text, reading.diagnostics), @r"
+    15:1: U1075 Warning: PERSIST of `Xrun` has no effect: it is no output, bit or number that the program uses
+    26:1: U1075 Warning: PERSIST of `Cx` has no effect: it is no output, bit or number that the program uses
+    ");
+    assert_eq!(program(text).retentive_names(), ["Ymore", "Cn", "Rseen"]);
+}
+
+#[test]
 fn hostile_files_end() {
     let deep = format!("LDmicro0.1\nPROGRAM\nRUNG\n{}", "PARALLEL\nSERIES\n".repeat(50_000));
     assert!(read("deep", &deep).source.is_none());

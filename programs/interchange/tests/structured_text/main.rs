@@ -5,6 +5,7 @@ mod execution;
 mod hostile;
 mod lowering;
 mod random;
+mod restart;
 mod round_trip;
 mod support;
 mod vectors;

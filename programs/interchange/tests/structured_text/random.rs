@@ -1,7 +1,7 @@
 //! Random texts: what their rungs and their circuits do is what their programs do.
 
 mod rungs;
-mod text;
+pub(crate) mod text;
 
 use proptest::prelude::*;
 use understudy_structured_text::parse;

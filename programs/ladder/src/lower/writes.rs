@@ -64,6 +64,6 @@ impl Program {
             }
             watched.rungs.extend(rungs);
         }
-        Ok((watched.exact(period, Shown::default())?.circuit, writes))
+        Ok((watched.exact(period, Shown { restarts: true, ..Shown::default() })?.circuit, writes))
     }
 }

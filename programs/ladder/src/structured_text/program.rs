@@ -7,11 +7,12 @@ use std::collections::{HashMap, HashSet};
 use std::time::Duration;
 
 use super::power::Power;
+use super::sections::Sections;
 use super::{broken, comment, configuration, section, standard_time, statement};
 use crate::names::StandardNames;
 use crate::program::{
-    Block, Coil, CoilKind, Contact, ContactKind, Element, Program, Relation, Rung, Series, Signal,
-    visit, visit_any,
+    Block, Coil, CoilKind, Contact, ContactKind, Element, Name, Program, Relation, Rung, Series,
+    Signal, visit, visit_any,
 };
 
 /// A PROGRAM whose execution is one scan of `program`, and the task that executes it every `period`.
@@ -414,27 +415,29 @@ impl<'a> Writer<'a> {
         let inputs = program.inputs.iter().map(|signal| ("VAR_INPUT", signal));
         let outputs = program.outputs.iter().map(|signal| ("VAR_OUTPUT", signal));
         let memory = program.memory.iter().map(|signal| ("VAR", signal));
-        let mut group = (("", false), Vec::new());
+        let retained: HashSet<&str> = program.retained.iter().map(Name::as_str).collect();
+        let mut sections = Sections::default();
         for (word, signal) in inputs.chain(outputs).chain(memory) {
             // Located variables have sections of their own.
             let is_located = signal.address.is_some();
             let key = (if is_located { "VAR" } else { word }, is_located);
-            if group.0 != key {
-                section(text, group.0.0, &group.1);
-                group = (key, Vec::new());
-            }
-            group.1.push(self.declaration(signal));
+            let is_kept = retained.contains(signal.name.as_str());
+            sections.add((key.0, key.1, is_kept), self.declaration(signal));
         }
-        section(text, group.0.0, &group.1);
-        let blocks = program.blocks().into_iter().map(|block| {
+        sections.end();
+        for block in program.blocks() {
             let name = self.names.signal(&block.name);
             let about = remark(&block.name, name, &Signal::default());
-            format!("{name} : {};{about}", block.kind.word())
-        });
+            let line = format!("{name} : {};{about}", block.kind.word());
+            sections.add(("VAR", false, retained.contains(block.name.as_str())), line);
+        }
         let edges = self.edges.iter().map(|edge| format!("{} : {};", edge.name, edge.block));
         let held = self.held.iter().map(|name| format!("{name} : BOOL;"));
-        let lines: Vec<String> = blocks.chain(edges).chain(held).collect();
-        section(text, "VAR", &lines);
+        for line in edges.chain(held) {
+            sections.add(("VAR", false, false), line);
+        }
+        sections.end();
+        text.push_str(&sections.text);
         // They come last, so that all others stand where they stand without them.
         let taps = self.taps.iter().flatten();
         let taps: Vec<String> = taps.map(|(name, of)| format!("{name} : {of};")).collect();

@@ -139,6 +139,18 @@ fn what_declarations_get_wrong() {
 }
 
 #[test]
+fn what_retain_gets_wrong() {
+    check(
+        "retain",
+        &[
+            "rung a {TON t 1s} {CTU c 3} (y)\nretain y, t,\n  m -- why\nretain c",
+            "rung a {TON t 1s} (y)\nretain y, a, t.Q, n, y",
+            "rung a (y)\nretain\nretain y m\nretain y,\nrung b (y)\nretain m, 5",
+        ],
+    );
+}
+
+#[test]
 fn every_bound_is_an_error() {
     let codes = |text: &str| -> Vec<&'static str> {
         let diagnostics = parse(text).diagnostics.into_iter();

@@ -52,6 +52,7 @@ fn the_document_lists_every_code() {
     let sources = [
         include_str!("../../src/check.rs"),
         include_str!("../../src/check/report.rs"),
+        include_str!("../../src/check/retention.rs"),
         include_str!("../../src/check/size.rs"),
         include_str!("../../src/lexer.rs"),
         include_str!("../../src/lower.rs"),

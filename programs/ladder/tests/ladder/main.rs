@@ -8,6 +8,7 @@ mod format;
 mod generated;
 mod lowering;
 mod printing;
+mod retention;
 mod semantics;
 mod structured_text_reader;
 mod support;

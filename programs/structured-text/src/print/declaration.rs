@@ -130,7 +130,8 @@ impl Printer {
                 false => format!(" ({})", list(&instance.connections)),
             };
             let (name, of) = (&instance.name, &instance.of);
-            self.line(&format!("PROGRAM {name}{task} : {of}{connections};"));
+            let retention = retention_word(instance.retention);
+            self.line(&format!("PROGRAM{retention} {name}{task} : {of}{connections};"));
         }
     }
 }

@@ -8,6 +8,7 @@ mod inputs;
 mod meeting;
 mod notify;
 mod press_cell;
+mod retention;
 mod schema;
 mod template;
 mod undriven;

@@ -207,9 +207,6 @@ impl Reader {
     }
 
     fn variables(&mut self, list: Node<'_, '_>, into: &mut Vec<Variable>) {
-        let flag = |name: &str| {
-            attribute(list, name).is_some_and(|value| matches!(value.as_str(), "true" | "1"))
-        };
         for node in children(list, "variable") {
             let Some(name) = attribute(node, "name") else {
                 continue;
@@ -220,7 +217,6 @@ impl Reader {
             into.push(Variable {
                 name,
                 is_external: list.tag_name().name() == "externalVars",
-                retain: flag("retain") || flag("persistent"),
                 kind: self.data_type(node),
             });
         }

@@ -118,7 +118,7 @@ const KNOWN: [(&str, &str); 98] = [
     ("documentation", "*"),
 ];
 
-const VARIABLES: &str = "constant retain persistent|nonretain nonpersistent name globalId";
+const VARIABLES: &str = "constant retain persistent nonretain|nonpersistent name globalId";
 const PLACED: &str = "localId|height width globalId executionOrderId";
 const SIGNED: &str = "localId executionOrderId negated edge storage|height width globalId";
 

@@ -333,6 +333,12 @@ fn initial_value(tree: &mut Tree, value: &Initializer) -> Result<(), String> {
 }
 
 fn instances(tree: &mut Tree, file: &File) -> Result<(), String> {
+    if let Some(found) = file.instances.iter().find(|it| it.retention != Retention::Unstated) {
+        return Err(format!(
+            "RETAIN of the whole program `{}`: declare its variables so",
+            found.name
+        ));
+    }
     tree.open("instances", &[]);
     tree.open("configurations", &[]);
     if !file.instances.is_empty() || !file.globals.is_empty() {

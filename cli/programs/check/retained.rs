@@ -1,0 +1,49 @@
+//! What a program keeps over a restart.
+
+use serde::Serialize;
+use understudy_bits::Exact;
+use understudy_ladder::circuit;
+use understudy_typed::Program;
+
+/// Names that a line lists.
+const LISTED: usize = 5;
+
+/// The retentive part of a program.
+#[derive(Clone, Serialize)]
+pub(super) struct Retained {
+    /// Retentive variables; of one that is retentive in part, each part that is.
+    variables: Vec<String>,
+    /// Bits of the state that a warm start keeps, with the count of scans where stations hold it.
+    kept_bits: usize,
+    /// Bits of the state.
+    state_bits: usize,
+}
+
+impl Retained {
+    /// Of a program with retentive variables; of one that is written in rungs, of the circuit that stations execute.
+    pub(super) fn of(program: &Program, is_ladder: bool) -> Option<Self> {
+        if !program.is_retentive() {
+            return None;
+        }
+        let (mask, state_bits) = match is_ladder {
+            true => {
+                let Exact { circuit, layout } = circuit(program).ok()?;
+                (layout.retentive_mask(program), circuit.registers().len())
+            }
+            false => (program.retentive_mask(), program.state as usize * 64),
+        };
+        let kept_bits = mask.iter().map(|word| word.count_ones() as usize).sum();
+        Some(Self { variables: program.retentive_names(), kept_bits, state_bits })
+    }
+
+    pub(super) fn text(&self) -> String {
+        let names = self.variables.iter().take(LISTED);
+        let names: Vec<&str> = names.map(String::as_str).collect();
+        let more = match self.variables.len() - names.len() {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        let (names, kept) = (names.join(", "), self.kept_bits);
+        format!("; retentive: {names}{more}, {kept} of {} state bits", self.state_bits)
+    }
+}

@@ -1,0 +1,94 @@
+//! A warm start of a ladder: its circuit goes on as its typed program does.
+
+use std::time::Duration;
+
+use proptest::prelude::*;
+use understudy_ladder::{circuit, print};
+use understudy_testing::random::{Dice, random_program};
+use understudy_typed::{Interpreter, Program};
+
+use crate::support::{PERIOD, program};
+use understudy_logic::{Scan, Scratch};
+
+/// Runs the circuit of a program and its interpreter, and restarts both warm in about one of eight scans.
+fn check(typed: &Program, seed: u64, about: &str) -> usize {
+    let exact = circuit(typed).expect("a sound program");
+    let mask = exact.layout.retentive_mask(typed);
+    let scan = Scan::new(&exact.circuit);
+    let interpreter = Interpreter::new(typed);
+    let mut scratch = Scratch::default();
+    let mut registers = scan.initial().to_vec();
+    let mut state = interpreter.initial().to_vec();
+    let mut dice = Dice::new(!seed);
+    let mut inputs = vec![0_u64; scan.input_count().div_ceil(64)];
+    let mut kept = 0;
+    for number in 0..80 {
+        if dice.rarely(8) {
+            let initial = scan.initial();
+            for (place, word) in registers.iter_mut().enumerate() {
+                *word = initial[place] & !mask[place] | *word & mask[place];
+            }
+            state = typed.restarted(&state);
+            kept += usize::from(registers != initial);
+        }
+        // Inputs that stay for a while let timers end.
+        if dice.rarely(2) {
+            let place = dice.below(scan.input_count());
+            inputs[place / 64] ^= 1 << (place % 64);
+        }
+        let [mut wanted, mut found] = [0; 2].map(|_| vec![0_u64; scan.output_count().div_ceil(64)]);
+        interpreter.step(&mut state, &inputs, &mut wanted);
+        scan.step(&mut scratch, &mut registers, &inputs, &mut found);
+        assert_eq!(found, wanted, "scan {number}\n{about}");
+        // The state that views show is the same program's, too.
+        let mut shown = exact.layout.state(&registers);
+        let mut go_on = registers.clone();
+        interpreter.step(&mut shown, &inputs, &mut wanted);
+        scan.step(&mut scratch, &mut go_on, &inputs, &mut found);
+        assert_eq!(found, wanted, "after the state of scan {number}\n{about}");
+    }
+    kept
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn random_programs_restart(seed: u64, milliseconds in 30_u64..300) {
+        let ladder = random_program(seed, 6);
+        let typed = ladder.typed(Duration::from_millis(milliseconds)).expect("a sound program");
+        check(&typed, seed, &print(&ladder));
+    }
+}
+
+#[test]
+fn warm_starts_of_random_programs_keep_something() {
+    let kept = |seed: u64| {
+        let ladder = random_program(seed, 6);
+        check(&ladder.typed(PERIOD).expect("a sound program"), seed, &print(&ladder))
+    };
+    let count = (0..60).filter(|&seed| kept(seed) > 0).count();
+    assert!(count > 20, "{count} of 60");
+}
+
+#[test]
+fn the_registers_of_what_is_retentive_are_kept() {
+    let ladder = program(
+        "program p\ninput a\noutput y\nmemory m = 0\nmemory n = 0\nretain m, t, c\n\
+         rung [ a | m ] ( m )\nrung [ a | n ] ( n )\nrung a {TON t 1s} {TON u 1s} ( y )\n\
+         rung a {CTU c 3}\nrung a {CTU d 3}",
+    );
+    let typed = ladder.typed(PERIOD).expect("a sound program");
+    assert_eq!(typed.retentive_names(), ["m", "t", "c"]);
+    let exact = circuit(&typed).expect("a sound program");
+    let mask = exact.layout.retentive_mask(&typed);
+    let registers = exact.circuit.registers().iter().enumerate();
+    let kept = registers.filter(|(place, _)| mask[0] >> place & 1 == 1);
+    let kept: Vec<&str> = kept.map(|(_, register)| register.name.as_str()).collect();
+    assert!(
+        kept.iter().all(|name| *name == "m" || name.starts_with("t.") || name.starts_with("c.")),
+        "{kept:?}"
+    );
+    let of = |block: &str| kept.iter().filter(|name| name.starts_with(block)).count();
+    assert_eq!((of("m"), of("t."), of("c.")), (1, 4, 3), "{kept:?}");
+}
