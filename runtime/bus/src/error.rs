@@ -2,7 +2,6 @@
 
 use std::io;
 use std::net::SocketAddr;
-use std::path::PathBuf;
 
 use understudy_cycle::Outvoted;
 use understudy_wire::{Member, ZENOH_PORT_OFFSET};
@@ -53,14 +52,6 @@ pub enum BusError {
         second: String,
         /// Of both.
         address: SocketAddr,
-    },
-    /// Nothing can be kept for the time after a power failure.
-    #[error("U0698: retentive values cannot be kept in {}: {source}", path.display())]
-    Retain {
-        /// The folder.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
     },
     /// The system refused something that every process needs.
     #[error("U0506: {what}: {source}")]
@@ -157,7 +148,6 @@ impl BusError {
             Self::Panicked { .. } => "U0507",
             Self::Uncalled { .. } => "U0509",
             Self::Unanswered { .. } => "U0510",
-            Self::Retain { .. } => "U0698",
             Self::Outvoted(_) => "U0598",
             Self::AnswerLost { .. } => "U0581",
             Self::ClockOutside { .. } => "U0582",

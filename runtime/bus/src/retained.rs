@@ -165,14 +165,8 @@ impl Retainer {
     /// Starts the threads. `files` are those of each program of a station, in the order of `programs`, or the one pair of a remote I/O.
     ///
     /// # Errors
-    /// [`BusError::Retain`] where the folder cannot be made or written; [`BusError::System`] without a thread.
+    /// [`BusError::System`] without a thread. A folder that cannot be made or written is no error: the member runs, and reports it.
     pub fn start(files: Vec<(Option<ProgramId>, RetainedFiles)>) -> Result<Self, BusError> {
-        for (_, files) in &files {
-            let failed = |source| BusError::Retain { path: files.folder.clone(), source };
-            create_dir_all(&files.folder).map_err(failed)?;
-            let probe = files.folder.join(format!("{}.probe", files.name));
-            File::create(&probe).and_then(|_| std::fs::remove_file(&probe)).map_err(failed)?;
-        }
         let (queue, records) = sync_channel(WAITING_RECORDS);
         let failure = Failure::default();
         let of_writer = Arc::clone(&failure);
@@ -252,6 +246,7 @@ impl Turn {
     /// Begins the other file with a record; the one before stays as it is where that fails.
     fn begin(&mut self, bytes: &[u8]) -> io::Result<Begun> {
         let path = &self.files.paths()[self.next];
+        create_dir_all(&self.files.folder)?;
         let mut file = OpenOptions::new().create(true).write(true).truncate(true).open(path)?;
         file.write_all(bytes)?;
         let synced = file.try_clone()?;
@@ -288,13 +283,13 @@ impl Writer {
                 // A step behind a gap is not read: only a whole record shows that the disk takes states again.
                 Ok(true) => *failure = None,
                 Ok(false) => {}
-                Err(error) => *failure = Some(error.to_string()),
+                Err((folder, error)) => *failure = Some(format!("{}: {error}", folder.display())),
             }
         }
     }
 
     /// Whether the record is whole: a state, or a note that begins a file.
-    fn write(&mut self, record: &Retained, bytes: &[u8]) -> io::Result<bool> {
+    fn write(&mut self, record: &Retained, bytes: &[u8]) -> Result<bool, (PathBuf, io::Error)> {
         let of = match record {
             Retained::State(state) => Some(state.program),
             Retained::Step(step) => Some(step.program),
@@ -324,7 +319,7 @@ impl Writer {
             Err(error) => {
                 // Behind a torn record, or a gap in the steps, nothing would be read.
                 turn.current = None;
-                return Err(error);
+                return Err((turn.files.folder.clone(), error));
             }
         }
         Ok(is_whole)
