@@ -1,11 +1,13 @@
 //! A scenario in virtual time: the same account as in the laboratory, from a seed.
 
+use std::cell::Cell;
+
 use understudy_cluster::Cluster;
 use understudy_journal::{Happening, Record, RunEvent};
 use understudy_plant::{Event as PlantEvent, Pace};
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_simulator::{Network, NotReady, Record as Simulated, Simulation};
-use understudy_wire::{Field, Image, Member, Moment};
+use understudy_wire::{Field, Image, Member, Moment, Time};
 
 use crate::account::{Account, OriginRule, Terms};
 use crate::scenario::Scenario;
@@ -41,9 +43,11 @@ pub fn simulate(
     }
     // What a plant shows is told just before the deadline that drives it is.
     let mut fields: Vec<Option<Field>> = vec![None; cluster.controllers().len()];
+    let told = Cell::new(None);
     let mut take = |record: &Record, origin: Option<(Moment, u64)>| {
         journal(record);
         account.observe(record);
+        told.set(account.cycle());
         if let Some((moment, cycle)) = origin
             && account.origin_is(moment, cycle)
         {
@@ -53,47 +57,53 @@ pub fn simulate(
             account.observe(&record);
         }
     };
-    let ran =
-        simulation.run(scenario.cycles, PATIENCE_CYCLES, &mut |now, cycle, member, record| {
-            let happening = match record {
-                Simulated::Station(event) => Happening::Station(event.clone()),
-                Simulated::RemoteIo(event) => Happening::RemoteIo(event.clone()),
-                Simulated::Fault(fault) => Happening::Run(RunEvent::Fault {
-                    action: fault.action,
-                    member,
-                    asked: fault.at_cycle,
-                }),
-                Simulated::Plant(field) => {
-                    if let Member::Plant(program) = member {
-                        fields[program.index()] = Some(field.clone());
-                    }
-                    return;
+    let mut observe = |now: Time, cycle: Option<u64>, member: Member, record: Simulated<'_>| {
+        let happening = match record {
+            Simulated::Station(event) => Happening::Station(event.clone()),
+            Simulated::RemoteIo(event) => Happening::RemoteIo(event.clone()),
+            Simulated::Fault(fault) => Happening::Run(RunEvent::Fault {
+                action: fault.action,
+                member,
+                asked: fault.at_cycle,
+            }),
+            Simulated::Plant(field) => {
+                if let Member::Plant(program) = member {
+                    fields[program.index()] = Some(field.clone());
                 }
-                // The account has referees of its own.
-                Simulated::Violation(_) => return,
-            };
-            let applied = applied(&happening);
-            let record = match happening {
-                Happening::Run(event) => Record::of_run(now.0, event),
-                happening => Record::of_member(now.0, member, &members, happening),
-            };
-            let moment = applied.as_ref().map(|(moment, _)| *moment);
-            take(&record, moment.zip(cycle));
-            let (Some((moment, outputs)), Member::RemoteIo(program)) = (applied, member) else {
                 return;
-            };
-            if let Some(field) = fields[program.index()].take() {
-                let event = Happening::Plant(PlantEvent::Stepped {
-                    moment,
-                    pace: Pace::Driven,
-                    outputs,
-                    field,
-                });
-                let plant = Member::Plant(program);
-                take(&Record::of_member(now.0, plant, &members, event), None);
             }
+            // The account has referees of its own.
+            Simulated::Violation(_) => return,
+        };
+        let applied = applied(&happening);
+        let record = match happening {
+            Happening::Run(event) => Record::of_run(now.0, event),
+            happening => Record::of_member(now.0, member, &members, happening),
+        };
+        let moment = applied.as_ref().map(|(moment, _)| *moment);
+        take(&record, moment.zip(cycle));
+        let (Some((moment, outputs)), Member::RemoteIo(program)) = (applied, member) else {
+            return;
+        };
+        if let Some(field) = fields[program.index()].take() {
+            let event = Happening::Plant(PlantEvent::Stepped {
+                moment,
+                pace: Pace::Driven,
+                outputs,
+                field,
+            });
+            let plant = Member::Plant(program);
+            take(&Record::of_member(now.0, plant, &members, event), None);
+        }
+    };
+    simulation.run(scenario.cycles, PATIENCE_CYCLES, &mut observe)?;
+    // Cycles in which no remote I/O runs are counted by nobody.
+    if !told.get().is_some_and(|cycle| cycle + 1 >= scenario.cycles) {
+        let most = scenario.cycles.saturating_mul(2).saturating_add(PATIENCE_CYCLES);
+        simulation.go_on(most, &mut observe, &mut || {
+            told.get().is_some_and(|cycle| cycle >= scenario.cycles)
         });
-    ran?;
+    }
     Ok(account)
 }
 
