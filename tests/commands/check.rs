@@ -64,3 +64,40 @@ fn a_scenario_is_checked_against_the_cluster_beside_it() {
     assert_eq!(answer.status, 2);
     assert!(answer.errors.contains("did you mean `tank`?"), "{}", answer.errors);
 }
+
+/// Names and bits of what a warm start keeps, of a ladder and of a program with numbers; a counterexample shows the restart.
+#[test]
+fn what_is_retentive_is_listed_and_proved_about() {
+    let folder = empty_folder("retentive");
+    let write = |name: &str, text: &str| fs::write(folder.join(name), text).expect("written");
+    write(
+        "latch.ladder",
+        "program latch\ninput a\noutput y\nmemory seen = 0\nmemory armed = 0\nretain seen\n\
+         rung [ a | seen ] ( seen )\nrung [ a | armed ] ( armed )\nrung seen /armed ( y )\n",
+    );
+    write(
+        "count.st",
+        "PROGRAM count VAR_INPUT a : BOOL; END_VAR VAR_OUTPUT RETAIN n : INT; END_VAR\n\
+         VAR RETAIN t : TON; END_VAR t(IN := a, PT := T#1s); IF t.Q THEN n := 1; END_IF; END_PROGRAM\n",
+    );
+    let files = ["check", "latch.ladder", "count.st"];
+    let answer = understudy_in(&folder, &files);
+    let line = |name: &str| {
+        let mut lines = answer.output.lines().filter(|line| line.starts_with(name));
+        lines.next().unwrap_or_default().to_owned()
+    };
+    let latch = line("latch.ladder");
+    assert!(latch.ends_with("right; retentive: seen, 1 of 2 state bits"), "{latch}");
+    assert!(line("count.st").contains("; retentive: n, t, "), "{}", line("count.st"));
+    let json = understudy_in(&folder, &[&files[..], &["--json"]].concat()).json();
+    assert_eq!(json["result"]["files"][0]["retained"]["variables"][0], "seen");
+    assert_eq!(json["result"]["files"][0]["retained"]["kept_bits"], 1);
+    assert_eq!(json["result"]["files"][1]["retained"]["variables"][1], "t");
+    let proof = ["verify", "latch.ladder", "--property", "never y", "--json"];
+    let proved = understudy_in(&folder, &proof).json();
+    let program = &proved["result"]["programs"][0];
+    assert_eq!(program["restarted_by"][0], "power.returns");
+    let property = &program["properties"][0];
+    assert_eq!(property["verdict"], "fails");
+    assert_eq!(property["scans"]["signals"]["power.returns"], serde_json::json!([0, 1]));
+}

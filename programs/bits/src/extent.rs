@@ -1,15 +1,18 @@
 //! Between which numbers each value of a system lies, and of which number it is a multiple.
 //!
 //! The extents of cells grow from their initial values until no scan leaves them; a bound that keeps growing goes to the next constant of
-//! the programs, then to the end of its type. A selection restricts what stands behind its condition: `IF n < 5 THEN n := n + 1` keeps `n` within 5.
+//! the programs, then to the end of its type. No extent says how two cells are related, so they hold for every mixture of states that occur, as a warm
+//! start makes one. A selection restricts what stands behind its condition: `IF n < 5 THEN n := n + 1` keeps `n` within 5.
 
 mod applied;
+mod changes;
 
 use std::collections::BTreeSet;
 
 use understudy_typed::{Comparison, Elementary, Operation};
 
 use self::applied::applied;
+use self::changes::Changes;
 use crate::System;
 use crate::system::Cell;
 use crate::term::{Node, Term, Terms, Variable};
@@ -98,6 +101,11 @@ pub(crate) struct Extents(Vec<Extent>);
 impl Extents {
     /// The cells `whole` have all bits below their highest, and a BOOL among them its bit; of a time the bits of its multiples of a period.
     pub(crate) fn new(system: &System, whole: &[u32]) -> Self {
+        Self::found(system, whole, Some(Changes::new(&system.terms, system.cells.len())))
+    }
+
+    /// Without `changes` every term is evaluated for each scan.
+    fn found(system: &System, whole: &[u32], mut changes: Option<Changes>) -> Self {
         let first = |cell: &Cell| {
             if cell.of.is_real() {
                 return Extent::of(cell.of);
@@ -123,8 +131,17 @@ impl Extents {
             follows: system.terms.len() <= MANY,
         };
         let ends = search.ends();
+        search.evaluate();
         let mut round = 0;
-        while search.grow(round, &ends) {
+        loop {
+            let grown = search.grow(round, &ends);
+            if grown.is_empty() {
+                break;
+            }
+            match &mut changes {
+                Some(changes) => search.evaluate_changed(changes, &grown),
+                None => search.evaluate(),
+            }
             round += 1;
         }
         // Bounds that grew too far come back, as far as a scan from them allows.
@@ -145,6 +162,9 @@ impl Extents {
         self.0[Terms::index(term)]
     }
 }
+
+#[cfg(test)]
+mod tests;
 
 struct Search<'s> {
     system: &'s System,
@@ -189,17 +209,16 @@ impl Search<'_> {
         }
     }
 
-    /// One scan more; whether a cell has left its extent.
-    fn grow(&mut self, round: usize, ends: &BTreeSet<i128>) -> bool {
-        self.evaluate();
-        let mut grew = false;
+    /// One scan more; the cells that have left their extents.
+    fn grow(&mut self, round: usize, ends: &BTreeSet<i128>) -> Vec<usize> {
+        let mut grew = Vec::new();
         for (place, cell) in self.system.cells.iter().enumerate() {
             let known = self.cells[place];
             let mut next = known.joined(self.terms[Terms::index(cell.next)]);
             if next == known {
                 continue;
             }
-            grew = true;
+            grew.push(place);
             let full = Extent::of(cell.of);
             let times = self.grown[place];
             self.grown[place] += 1;

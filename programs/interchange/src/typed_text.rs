@@ -8,8 +8,7 @@ use std::time::Duration;
 use understudy_executable::{Executable, Interface, digest};
 use understudy_structured_text::lower::{event, intervals};
 use understudy_structured_text::syntax::{
-    Body, Declaration, File, Name, ProgramInstance, Retention, Task, TypeKind, TypeName, Unit,
-    UnitKind,
+    Body, Declaration, File, Name, ProgramInstance, Task, TypeKind, TypeName, Unit, UnitKind,
 };
 use understudy_structured_text::{control_blocks, parse, print};
 use understudy_text::{Diagnostic, Severity, has_errors};
@@ -224,6 +223,7 @@ fn configure(file: &mut File, wanted: Wanted<'_>, interval: Option<Duration>) {
     let name = |text: &str| Name::new(text, 0..0);
     let mut runs = file.instances.iter();
     let runs = runs.find(|run| wanted.program.is_some_and(|program| run.of.is(program)));
+    let retention = runs.map(|run| run.retention).unwrap_or_default();
     let single = runs.and_then(|run| event(file, run).cloned());
     let interval = interval.filter(|_| single.is_none());
     let interval = interval.and_then(|interval| i64::try_from(interval.as_nanos()).ok());
@@ -231,7 +231,7 @@ fn configure(file: &mut File, wanted: Wanted<'_>, interval: Option<Duration>) {
     // The points of several programs have the names of the programs in front.
     let are_several = chosen.len() > 1;
     let instances = chosen.into_iter().map(|of| ProgramInstance {
-        retention: Retention::Unstated,
+        retention,
         name: if are_several { of.clone() } else { name("Instance0") },
         task: Some(name("Task0")),
         of,

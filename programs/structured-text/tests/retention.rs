@@ -60,6 +60,8 @@ fn global_variables_and_whole_programs_are_retentive() {
         RESOURCE r ON plc TASK t(INTERVAL := T#10ms, PRIORITY := 0);
         PROGRAM RETAIN p WITH t : one; PROGRAM q WITH t : one; END_RESOURCE END_CONFIGURATION";
     assert_eq!(program(text).retentive_names(), ["g", "p.a"]);
+    let alone = read(text, Some("one")).0.program.expect("a program");
+    assert_eq!(alone.retentive_names(), ["g", "a"]);
 }
 
 #[test]

@@ -188,6 +188,7 @@ impl<'a> Lowering<'a> {
             };
             let mut instance = whole(unit, self.unit_names[&unit.name.key()]);
             let declared = file.instances.iter().find(|found| found.of.is(chosen));
+            instance.retention = declared.map(|found| found.retention).unwrap_or_default();
             return match declared.and_then(|found| found.task.as_ref()) {
                 Some(task) if !self.give_task(file, task, &mut instance) => Vec::new(),
                 _ => vec![instance],
