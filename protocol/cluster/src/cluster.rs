@@ -72,6 +72,8 @@ pub struct Understudy {
     pub name: String,
     /// Where it listens, if the file says so.
     pub address: Option<SocketAddr>,
+    /// Whether this is the slot of a spare: absent until a spare wakes here.
+    pub spare: bool,
 }
 
 /// A ladder that finds failed channels.
@@ -256,6 +258,11 @@ impl Cluster {
     /// In the order of their ranks.
     pub fn understudies(&self) -> &[Understudy] {
         &self.understudies
+    }
+
+    /// Whether a member is the slot of a spare.
+    pub fn is_spare_slot(&self, member: Member) -> bool {
+        matches!(member, Member::Station(station) if self.agreement.schedule.spare_slots().contains(station))
     }
 
     /// In the order of their programs.
