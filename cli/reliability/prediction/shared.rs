@@ -47,11 +47,14 @@ pub(super) fn compared(
             wake,
             coverage,
         };
-        rows.insert(1, Row {
-            name: format!("{spares} shared spare{}", if spares == 1 { "" } else { "s" }),
-            boxes: options.controllers + options.groups + spares,
-            mttf_hours: plant.mttf().map_err(|errors| refused(&errors))?,
-        });
+        rows.insert(
+            1,
+            Row {
+                name: format!("{spares} shared spare{}", if spares == 1 { "" } else { "s" }),
+                boxes: options.controllers + options.groups + spares,
+                mttf_hours: plant.mttf().map_err(|errors| refused(&errors))?,
+            },
+        );
     }
     let mut text = format!("{:<18} {:>6} {:>14}\n", "", "boxes", "MTTF in h");
     for Row { name, boxes, mttf_hours } in &rows {
