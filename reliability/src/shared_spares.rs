@@ -85,6 +85,9 @@ impl Plant {
 /// A step out of a state: its rate, and the state after it; none where the plant fails.
 type Step = (f64, Option<Plant>);
 
+/// The groups of a state whose spare is in one condition.
+type Part = fn(&mut Plant) -> &mut [u16];
+
 impl SharedSpares {
     /// Mean time to the first failure of a group, in hours.
     ///
@@ -176,7 +179,7 @@ impl SharedSpares {
         let idle = self.spares.saturating_sub(plant.taken());
         step(idle, fails, &|it| add(&mut it.failed));
         step(plant.failed.into(), repaired, &|it| remove(&mut it.failed));
-        let parts: [(fn(&mut Plant) -> &mut [u16], &[u16]); 3] = [
+        let parts: [(Part, &[u16]); 3] = [
             (|it| &mut it.alone, &plant.alone),
             (|it| &mut it.waking, &plant.waking),
             (|it| &mut it.awake, &plant.awake),

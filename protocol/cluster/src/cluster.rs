@@ -260,6 +260,11 @@ impl Cluster {
         &self.understudies
     }
 
+    /// Number of the understudies that are no slots of spares.
+    pub fn lasting_understudies(&self) -> usize {
+        self.understudies.iter().filter(|understudy| !understudy.spare).count()
+    }
+
     /// Whether a member is the slot of a spare.
     pub fn is_spare_slot(&self, member: Member) -> bool {
         matches!(member, Member::Station(station) if self.agreement.schedule.spare_slots().contains(station))
