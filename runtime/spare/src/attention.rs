@@ -18,6 +18,9 @@ pub const WITNESSES: usize = 3;
 /// Further cycles that a slot waits for each slot before it: where that one wakes, this one is not needed.
 const NEXT_SLOT_AFTER: u32 = 100;
 
+/// A station that was never received counts after this many times `spare_after`: groups start station by station.
+const FIRST_TIME: u32 = 10;
+
 /// Attention to one group.
 #[derive(Debug, Clone)]
 pub struct Attention {
@@ -29,6 +32,8 @@ pub struct Attention {
     stations: usize,
     flag_after: u32,
     spare_after: u32,
+    /// Stations that a witness has received.
+    known: StationSet,
     witnesses: Vec<Option<Witness>>,
 }
 
@@ -76,6 +81,7 @@ impl Attention {
             stations: schedule.stations(),
             flag_after: agreement.flag_after,
             spare_after: spare_after.max(agreement.flag_after).saturating_add(later),
+            known: StationSet::EMPTY,
             witnesses: vec![None; controllers.min(WITNESSES)],
         }
     }
@@ -85,6 +91,7 @@ impl Attention {
         let Some(place) = self.witnesses.get_mut(witness) else {
             return;
         };
+        self.known = self.known.or(heard);
         let stations = self.stations;
         let fresh = || Witness { silent: vec![0; stations], complete: 0 };
         let mut seen = place.take().unwrap_or_else(fresh);
@@ -119,7 +126,7 @@ impl Attention {
         let controllers = StationSet::first(self.controllers);
         let expected = controllers.or(self.understudies);
         let stations = (0..self.stations).map(|rank| StationId(rank as u8));
-        stations.filter(move |it| expected.contains(*it) && self.silent(*it) >= self.spare_after)
+        stations.filter(move |it| expected.contains(*it) && self.silent(*it) >= self.limit(*it))
     }
 
     /// What is known now.
@@ -127,11 +134,7 @@ impl Attention {
         let followed = self.followed().count();
         let others = self.slots.without(StationSet::only(self.own));
         // A slot is empty as soon as it is flagged; any other station is missed for longer before that counts.
-        let present = |station: StationId| {
-            let limit =
-                if self.slots.contains(station) { self.flag_after } else { self.spare_after };
-            self.silent(station) < limit
-        };
+        let present = |station: StationId| self.silent(station) < self.limit(station);
         let masked = if followed == 0 { None } else { self.masked(others, present) };
         Standing {
             seen: followed > 0 && followed >= self.witnesses.len().div_ceil(2),
@@ -140,6 +143,17 @@ impl Attention {
             redundancy: masked.unwrap_or(0),
             complete: self.followed().map(|witness| witness.complete).min().unwrap_or(0),
             publishes: followed > 0 && self.silent(self.own) == 0,
+        }
+    }
+
+    /// Cycles without a turn after which a station counts as failed.
+    fn limit(&self, station: StationId) -> u32 {
+        if self.slots.contains(station) {
+            self.flag_after
+        } else if self.known.contains(station) {
+            self.spare_after
+        } else {
+            self.spare_after.saturating_mul(FIRST_TIME)
         }
     }
 

@@ -115,6 +115,21 @@ fn a_station_that_flaps_ten_times_a_minute_does_not_make_the_spare_run_in_circle
     assert_eq!(orders, 2);
 }
 
+/// Its stations start one after the other; one that never comes counts in the end.
+#[test]
+fn a_group_that_starts_wakes_nobody() {
+    let attention = Attention::new(&agreement(3, 1, 2), StationId(4), SPARE_AFTER);
+    let mut bench = Bench { attention };
+    bench.pass(SPARE_AFTER * 10 - 1, &[0, 2, 3]);
+    assert!(!bench.is_wanted());
+    bench.pass(1, &[0, 2, 3]);
+    assert!(bench.is_wanted());
+    bench.pass(1, &ALL);
+    assert!(!bench.is_wanted());
+    bench.pass(SPARE_AFTER, &[0, 2, 3]);
+    assert!(bench.is_wanted(), "it is known now");
+}
+
 /// Its journal does not come, so it has no opinion; the others go on.
 #[test]
 fn a_remote_io_that_nobody_receives_wakes_nobody() {
@@ -201,7 +216,7 @@ proptest! {
         let own = StationId((stations - 1) as u8);
         let mut attention = Attention::new(&agreement(controllers, understudies, slots), own, 3);
         let present = StationSet::from_bits(heard).and(StationSet::first(stations));
-        for _ in 0..1000 {
+        for _ in 0..2000 {
             (0..controllers).for_each(|witness| attention.deadline(witness, present));
         }
         let others = present.without(StationSet::only(own));
