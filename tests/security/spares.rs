@@ -5,7 +5,7 @@ use std::fs;
 use std::net::{SocketAddr, TcpStream};
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
-use std::process::Stdio;
+use std::process::{ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 use nix::sys::signal::{Signal, kill};
@@ -179,12 +179,24 @@ fn a_spare_masks_the_second_failure_and_retires_when_the_station_is_back() {
     plant.reported("line-1: retires");
     plant.slot_is_taken("line-1", false);
     passes(&groups[0], "robot-io", 20);
-    // It is free for the other group. When it is killed, its station ends too.
+    // It is free for the other group. Its station ends with it, whether it is ended in order or killed.
     groups[1].signal("understudy", Signal::SIGKILL);
+    plant.reported("line-2: publishes");
+    plant.slot_is_taken("line-2", true);
+    assert!(terminate(&mut spare).success());
+    plant.slot_is_taken("line-2", false);
+    let mut spare = plant.spare();
     plant.reported("line-2: publishes");
     plant.slot_is_taken("line-2", true);
     spare.0.kill().expect("it runs");
     plant.slot_is_taken("line-2", false);
+}
+
+/// Ends a process in order.
+fn terminate(process: &mut Running) -> ExitStatus {
+    let id = i32::try_from(process.0.id()).expect("a process id");
+    kill(Pid::from_raw(id), Signal::SIGTERM).expect("it runs");
+    process.0.wait().expect("it ends")
 }
 
 /// No group runs: the spare reports that, and ends in order.
@@ -195,9 +207,7 @@ fn a_spare_reports_groups_that_it_cannot_watch_and_ends_with_sigterm() {
     GROUPS.iter().for_each(|group| drop(plant.start(group)));
     let mut spare = plant.spare();
     plant.reported("line-1: cannot watch it, retrying: ");
-    let id = i32::try_from(spare.0.id()).expect("a process id");
-    kill(Pid::from_raw(id), Signal::SIGTERM).expect("it runs");
-    let status = spare.0.wait().expect("it ends");
+    let status = terminate(&mut spare);
     let said = fs::read_to_string(plant.folder.join("spare.out")).expect("its output");
     assert!(status.success() && said.contains("spare-1: woke 0 times"), "{status}: {said}");
 }

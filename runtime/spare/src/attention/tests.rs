@@ -151,6 +151,12 @@ fn a_remote_io_that_is_cut_off_wakes_nobody() {
         (1..3).for_each(|witness| bench.attention.deadline(witness, set(&ALL)));
     }
     assert!(!bench.is_wanted());
+    // Of a broken link of one witness, the same.
+    for _ in 0..200 {
+        bench.attention.deadline(0, set(&[0, 1, 3]));
+        (1..3).for_each(|witness| bench.attention.deadline(witness, set(&ALL)));
+    }
+    assert!(!bench.is_wanted());
 }
 
 /// One of three remote I/Os is followed: whatever it reports, most of the group is not seen.
