@@ -7,6 +7,7 @@ mod gateway;
 pub(crate) mod keys;
 pub(crate) mod operate;
 mod resources;
+mod spare;
 
 use crate::commands::{Entry, Group, command};
 use crate::member;
@@ -33,6 +34,7 @@ pub(crate) fn group() -> Group {
         command("keys", |it, _| keys::run(&it)),
     ];
     entries.extend(of_members());
+    entries.push(command("spare", |it, console| spare::run(&it, console)));
     entries.push(command("operate", |it, _| operate::run(&it)));
     entries.push(command("gateway", |it, console| gateway::run(&it, console)));
 

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use understudy_cluster::looks_like_a_plant_file;
 use understudy_interchange::Format;
 use understudy_reconfiguration::project::looks_like_a_project;
 use understudy_scenarios::looks_like_a_scenario;
@@ -13,6 +14,7 @@ use crate::answer::{Answer, Status};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     Cluster,
+    Plant,
     Scenario,
     Project,
     Model,
@@ -44,6 +46,7 @@ impl Kind {
             Some(FileKind::Model) => Self::Model,
             None if looks_like_a_scenario(text) => Self::Scenario,
             None if looks_like_a_project(text) => Self::Project,
+            None if looks_like_a_plant_file(text) => Self::Plant,
             None => Self::Cluster,
         }
     }
@@ -52,6 +55,7 @@ impl Kind {
     pub(crate) fn word(self) -> &'static str {
         match self {
             Self::Cluster => "cluster",
+            Self::Plant => "plant",
             Self::Scenario => "scenario",
             Self::Project => "project",
             Self::Model => "model",
@@ -66,6 +70,7 @@ impl Kind {
     fn in_a_sentence(self) -> &'static str {
         match self {
             Self::Cluster => "a cluster file",
+            Self::Plant => "a plant file",
             Self::Scenario => "a scenario",
             Self::Project => "a reconfiguration project",
             Self::Model => "a model of plants and specifications",

@@ -14,6 +14,7 @@ mod kind;
 mod member;
 mod overrides;
 mod patience;
+mod plants;
 mod programs;
 mod reliability;
 mod run;

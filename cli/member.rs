@@ -47,6 +47,9 @@ pub struct Arguments {
     /// Exit when standard input is closed or the parent process ends
     #[arg(long)]
     in_laboratory: bool,
+    /// As --in-laboratory, and operators reach the member at its address
+    #[arg(long)]
+    ends_with_parent: bool,
     /// Do not request real-time scheduling and locked memory
     #[arg(long)]
     no_real_time: bool,
@@ -134,6 +137,7 @@ impl Arguments {
             },
             keys: self.keys.clone(),
             in_laboratory: self.in_laboratory,
+            ends_with_parent: self.in_laboratory || self.ends_with_parent,
             real_time: !self.no_real_time,
             retain: self.retain.clone(),
             journal: self.journal.clone(),

@@ -26,6 +26,7 @@ use understudy_typed::{Cost, Program};
 use crate::answer::{Answer, Failure, Status};
 use crate::files::{self, ProgramText, read_cluster};
 use crate::kind::Kind;
+use crate::plants;
 use crate::programs::init::from::Known;
 use crate::supervisors::automata;
 use crate::supervisors::reconfigure::read_project;
@@ -46,7 +47,7 @@ The files of a TwinCAT project are checked as one program: several files, its .p
 cluster.toml in its folder. Ladder programs are also checked for rungs without effect, coils with conflicting values in one scan, and
 sequence steps that are passed in one scan; `understudy verify` shows example runs. Warnings do not change the exit status.")]
 pub(crate) struct Arguments {
-    /// Programs (.ladder, .st, .xml and others), TCT automata (.ADS), and clusters, scenarios, models, nets, signal maps and projects (.toml)
+    /// Programs (.ladder, .st, .xml and others), TCT automata (.ADS), and clusters, plants, scenarios, models, nets, signal maps and projects (.toml)
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
     /// The program to check in a text with several programs and no configuration
@@ -70,7 +71,7 @@ struct Result {
 #[derive(Serialize)]
 struct CheckedFile {
     name: String,
-    /// `ladder`, `cluster`, `scenario`, `model`, `net`, `map`, `project`, `ADS` or `unknown`; null for an unreadable file.
+    /// `ladder`, `cluster`, `plant`, `scenario`, `model`, `net`, `map`, `project`, `ADS` or `unknown`; null for an unreadable file.
     kind: Option<&'static str>,
     errors: usize,
     warnings: usize,
@@ -186,6 +187,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
                 found.add_file(Kind::Unknown, path, text, diagnostics);
             }
             Kind::Scenario => scenarios.push((path, text)),
+            Kind::Plant => found.add(Kind::Plant, plants::read(path, &text).report),
             Kind::Project => {
                 found.add_with_ladders(Kind::Project, read_project(path, &text).reports);
             }

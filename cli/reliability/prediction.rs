@@ -1,5 +1,7 @@
 //! `understudy reliability`: MTTF, reliability and availability from Markov models.
 
+mod shared;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -72,6 +74,18 @@ pub(crate) struct Arguments {
     /// Number of equal groups without a shared understudy
     #[arg(long, value_name = "G", default_value_t = 1)]
     groups: u32,
+    /// Compare 0 to P spares that the groups share with hot-standby pairs
+    #[arg(long, value_name = "P", conflicts_with_all = UNSHARED)]
+    shared_spares: Option<u32>,
+    /// Mean time from a failure to the first turn of the spare that wakes
+    #[arg(long, value_name = "TIME", default_value = "1s", allow_hyphen_values = true)]
+    wake: String,
+    /// Probability that a spare wakes
+    #[arg(long, value_name = "C", default_value_t = 1.0, allow_hyphen_values = true)]
+    wake_coverage: f64,
+    /// Number of the groups that are too large for the capacity of the spares
+    #[arg(long, value_name = "G", default_value_t = 0)]
+    too_large: u32,
     /// Mean time to detect a failure, before the repair starts
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     detection: Option<String>,
@@ -91,6 +105,20 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
 }
+
+/// Options that the model of shared spares does not have.
+const UNSHARED: [&str; 10] = [
+    "spares",
+    "boxes",
+    "shared",
+    "crews",
+    "coverage",
+    "detection",
+    "beta",
+    "mission",
+    "chain",
+    "report",
+];
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum ConventionWord {
@@ -166,6 +194,9 @@ fn of_cluster(arguments: &Arguments) -> Result<Answer, Answer> {
     let mut wrong = set_unequal(&mut options, cluster.as_ref().map(|read| &read.0), boxes);
     wrong.extend(options.system().err().unwrap_or_default());
     times.finish(wrong)?;
+    if let Some(most) = arguments.shared_spares {
+        return shared::compared(arguments, &options, most);
+    }
     let found = calculate(&options).map_err(|errors| refused(&errors))?;
     let (cluster, reports) =
         cluster.map_or((None, Vec::new()), |(cluster, reports)| (Some(cluster), reports));

@@ -124,7 +124,7 @@ fn campaign(arguments: &Arguments, path: &Path, console: &mut Console) -> Result
     let (cluster, reports) = files::cluster(path, arguments.overrides.overrides())?;
     let mut kinds: Vec<Kind> = arguments.faults.iter().flatten().copied().collect();
     if kinds.is_empty() {
-        kinds = Kind::masked_by(cluster.understudies().len());
+        kinds = Kind::masked_by(cluster.lasting_understudies());
     }
     kinds.sort_unstable();
     kinds.dedup();

@@ -28,6 +28,8 @@ enum Shape {
     Model,
     /// Automation Petri net
     Net,
+    /// Plant file
+    Plant,
     /// Scenario file
     Scenario,
     /// Signal map of supervisor-to-ladder --io
@@ -42,6 +44,7 @@ pub(crate) fn run(arguments: &Arguments) -> Answer {
         Shape::Cluster => understudy_cluster::schema(),
         Shape::Model => model_schema(),
         Shape::Net => net_schema(),
+        Shape::Plant => understudy_cluster::plant_file_schema(),
         Shape::Scenario => scenario_schema(),
         Shape::SignalMap => map_schema(),
         Shape::Summary => schema_for!(Summary),

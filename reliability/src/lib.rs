@@ -29,6 +29,7 @@ mod poisson_weights;
 mod quantity;
 mod report;
 mod sensitivity;
+mod shared_spares;
 mod system;
 mod transient;
 
@@ -54,6 +55,7 @@ pub use report::{OverTime, Provenance, Report, ReportData, report, report_data};
 pub use sensitivity::{
     ByUnderstudies, Sensitivity, WhatIf, by_understudies, sensitivities, what_if,
 };
+pub use shared_spares::{MAXIMUM_SHARED_GROUPS, MAXIMUM_SHARED_SPARES, SharedSpares};
 pub use system::{
     BoxKind, CommonCause, CommonCauseConvention, MAXIMUM_BOXES, MAXIMUM_MODEL_STATES, Rule,
     SharedPart, System,

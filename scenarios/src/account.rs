@@ -27,7 +27,7 @@ use understudy_node::Event as StationEvent;
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_simulator::{Action, Referee, Violation};
 use understudy_wire::{
-    Force, Member, Moment, OrderRefusal, ProgramId, ProgramSet, Source, StationId, StationSet,
+    Force, Member, Moment, OrderRefusal, ProgramId, ProgramSet, Source, StationSet,
 };
 
 use crate::figure::Signals;
@@ -186,7 +186,10 @@ impl Account {
     pub fn new(terms: Terms, scenario: &Scenario, origin_rule: OriginRule) -> Self {
         let schedule = &terms.agreement.schedule;
         let programs = schedule.controllers();
-        let stations = schedule.stations();
+        let mut presences = Presences::new(schedule.stations(), terms.agreement.flag_after);
+        for slot in schedule.spare_slots().iter() {
+            presences.step(0, Member::Station(slot), Action::Crash);
+        }
         Self {
             cycles: scenario.cycles,
             numbering: Numbering::default(),
@@ -195,14 +198,14 @@ impl Account {
             origin: None,
             origin_rule,
             starting_plants: terms.plants,
-            presences: Presences::new(stations, terms.agreement.flag_after),
+            presences,
             services: vec![ServiceTrack::default(); programs],
             stalls: Stalls::default(),
             times: TimesOfDay::new(terms.agreement.schedule.period()),
             alarms: Alarms::new(&terms.alarms, programs),
             traces: Traces {
                 plants: vec![PlantTrace::default(); programs],
-                stations: vec![Trace::default(); stations],
+                stations: vec![Trace::default(); schedule.stations()],
             },
             steps: Vec::new(),
             forces: Vec::new(),
@@ -254,8 +257,9 @@ impl Account {
             .map(ProgramId)
             .filter(|&program| !in_either(&|cycle| cycle.content.contains(program)))
             .map(Member::RemoteIo);
-        let stations = (0..schedule.stations() as u8)
-            .map(StationId)
+        let stations = schedule
+            .expected()
+            .iter()
             .filter(|&station| {
                 let test = |cycle: &OpenCycle| {
                     if schedule.is_understudy(station) {
@@ -406,11 +410,10 @@ impl Account {
             return;
         }
         let schedule = &self.terms.agreement.schedule;
-        let understudies = StationSet::first(schedule.stations())
-            .without(StationSet::first(schedule.controllers()));
+        let understudies = schedule.expected().without(StationSet::first(schedule.controllers()));
         let everybody = self.open.get(&number).is_some_and(|cycle| {
             cycle.content == ProgramSet::first(schedule.controllers())
-                && cycle.covering == understudies
+                && understudies.without(cycle.covering).is_empty()
         });
         if everybody && self.starting_plants.is_empty() {
             self.origin = Some((moment, number));

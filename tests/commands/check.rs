@@ -101,3 +101,21 @@ fn what_is_retentive_is_listed_and_proved_about() {
     assert_eq!(property["verdict"], "fails");
     assert_eq!(property["scans"]["signals"]["power.returns"], serde_json::json!([0, 1]));
 }
+
+#[test]
+fn a_plant_file_is_checked_with_its_groups() {
+    let right = understudy(&["check", "--json", "examples/shared-spare/plant.toml"]).json();
+    assert_eq!(right["result"]["files"][0]["kind"], "plant");
+    assert_eq!(right["result"]["errors"], 0);
+    let folder = empty_folder("plant_file");
+    let plant = "[[group]]\nname = \"a\"\ncluster = \"cluster.toml\"\n[[spare]]\nname = \"x\"\ngroups = { b = \"spare\" }\n";
+    fs::write(folder.join("plant.toml"), plant).expect("written");
+    fs::write(folder.join("cluster.toml"), "[cluster]\n").expect("written");
+    let wrong = understudy_in(&folder, &["check", "plant.toml"]);
+    assert_eq!(wrong.status, 2);
+    for code in ["U0231", "U0209"] {
+        assert!(wrong.errors.contains(code), "{code}: {}", wrong.errors);
+    }
+    let schema = understudy(&["schema", "plant"]).output;
+    assert!(schema.contains("retire_after"), "{schema}");
+}

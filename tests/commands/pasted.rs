@@ -9,7 +9,7 @@ use std::process::{Command, Stdio};
 use crate::{empty_folder, understudy, understudy_in};
 
 /// Examples that this test does not run, by a part of each, and why. The command line understands them all (`cli/commands.rs`).
-const NOT_RUN: [(&str, &str); 29] = [
+const NOT_RUN: [(&str, &str); 30] = [
     ("TcPOU", "names the files of a project of another tool"),
     ("understudy demo", "runs for a minute; the tests of the page run it"),
     ("understudy lab ", "runs for a minute; the tests of the laboratory run it"),
@@ -26,6 +26,7 @@ const NOT_RUN: [(&str, &str); 29] = [
     ("understudy node ", "is a member of a cluster"),
     ("understudy remote-io ", "is a member of a cluster"),
     ("understudy plant ", "is a member of a cluster"),
+    ("understudy spare ", "serves until it is interrupted"),
     ("understudy operate ", "commands a cluster that runs"),
     ("understudy measure ", "runs for minutes"),
     ("--runs 2000 ", "runs for a minute in a debug build"),

@@ -55,6 +55,29 @@ fn the_figures_for_twenty_controllers_stand_at_the_top_and_in_the_result() {
     assert!(hours.is_some_and(|hours| (hours / 3.03e7 - 1.0).abs() < 1e-3), "{hours:?}");
 }
 
+/// Two shared spares protect 25 groups of 12 controllers better than 300 pairs, with little more than half of the machines.
+#[test]
+fn shared_spares_are_compared_with_pairs() {
+    let plant = ["--controllers", "300", "--groups", "25", "--shared-spares", "2"];
+    let found = reliability(&[&plant[..], &RATES[..], &["--json"]].concat()).json();
+    let row = |place: usize| {
+        let row = &found["result"]["compared"][place];
+        (row["boxes"].as_u64().expect("a count"), row["mttf_hours"].as_f64().expect("hours"))
+    };
+    let rows = [(600, 7_018.0), (325, 7_247.0), (326, 24_166.0), (327, 110_526.0)];
+    for (place, (boxes, hours)) in rows.into_iter().enumerate() {
+        let found = row(place);
+        assert_eq!(found.0, boxes);
+        assert!((found.1 / hours - 1.0).abs() < 1e-3, "{place}: {found:?}");
+    }
+    // Pairs in closed form: (3 lambda + mu) / (2 lambda^2), for each of 300.
+    let pairs = (3e-4 + 1.0 / 24.0) / 2e-8 / 300.0;
+    assert!((row(0).1 / pairs - 1.0).abs() < 5e-3, "{pairs}");
+    let refused =
+        reliability(&[&["--controllers", "4", "--shared-spares", "9"], &RATES[..]].concat());
+    assert_eq!(refused.status, 2, "{}", refused.errors);
+}
+
 #[test]
 fn a_cluster_file_says_how_many_boxes_there_are() {
     let of_file = reliability(&[&[PRESS_CELL, "--json"], &RATES[..]].concat()).json();

@@ -15,6 +15,7 @@ mod members;
 #[allow(dead_code, reason = "each test uses its part")]
 #[path = "../shared/mod.rs"]
 mod shared;
+mod spares;
 mod strangers;
 mod systemd;
 

@@ -85,9 +85,20 @@ impl Deployed {
         let times = "period = \"50ms\"\nlink = \"udp\"";
         assert!(file.contains("period = \"10ms\"") && !file.contains("\nlink"));
         fs::write(&cluster, file.replace("period = \"10ms\"", times)).expect("it is ours");
+        Self::of(folder, cluster, &[])
+    }
+
+    /// A cluster whose members have the names of those of the press cell and addresses of their own, each as a process. These
+    /// viewers have keys too.
+    pub(crate) fn of(folder: &Path, cluster: PathBuf, viewers: &[&str]) -> Self {
         let keys = folder.join("keys");
         let (status, made, _) = answer(&["keys", "init", text(&cluster), "--folder", text(&keys)]);
         assert_eq!(status, 0, "{made:#}");
+        for viewer in viewers {
+            let issue = ["keys", "issue", text(&cluster), "--viewer", viewer];
+            let (status, issued, _) = answer(&[&issue[..], &["--folder", text(&keys)]].concat());
+            assert_eq!(status, 0, "{issued:#}");
+        }
         let folder = folder.to_owned();
         let mut deployed = Self { folder, cluster, keys, members: BTreeMap::new() };
         MEMBERS.iter().for_each(|(name, _)| deployed.start_with(name, &deployed.cluster.clone()));

@@ -314,7 +314,10 @@ impl Laboratory<'_> {
         let mut terminate = signal(SignalKind::terminate()).map_err(system("to hear SIGTERM"))?;
         let members: Vec<Member> =
             self.account.terms.members.iter().map(|(member, _)| member).collect();
-        for member in members {
+        let slots = self.account.terms.agreement.schedule.spare_slots();
+        let is_slot = |member: Member| matches!(member, Member::Station(it) if slots.contains(it));
+        // The slot of a spare is empty until a step or an operator starts it.
+        for member in members.into_iter().filter(|member| !is_slot(*member)) {
             self.start(member).await?;
         }
         let mut waits = Waits::new();

@@ -98,7 +98,7 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    /// All members start at time 0.
+    /// All members start at time 0; the slots of spares are empty until a restart.
     ///
     /// # Panics
     /// If the parts have no station or not one remote I/O and plant place a program.
@@ -118,7 +118,12 @@ impl Simulation {
         let stations = parts.stations.iter().enumerate().map(|(rank, settings)| {
             let mut settings = settings.clone();
             settings.epoch = Epoch(1 + rank as u64);
-            Slot::new(disks.station(now, settings))
+            let slots = settings.agreement.schedule.spare_slots();
+            let mut slot = Slot::new(disks.station(now, settings));
+            if slots.contains(StationId(rank as u8)) {
+                slot.crash();
+            }
+            slot
         });
         let stations: Vec<_> = stations.collect();
         let remote_ios = parts.remote_ios.iter();

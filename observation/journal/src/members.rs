@@ -3,7 +3,7 @@
 use understudy_cluster::{Cluster, InputSource};
 use understudy_remote_io::OperatorInput;
 use understudy_typed::{Elementary, Point};
-use understudy_wire::{Member, ProgramId, SignalPlace, StationId};
+use understudy_wire::{Member, ProgramId, SignalPlace, StationId, StationSet};
 
 /// Every member of a cluster with its name: stations by rank, then remote I/Os, then plants.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -13,6 +13,7 @@ pub struct Members {
     operator_inputs: Vec<NamedInput>,
     /// Signals of each program; empty where only the members are known.
     signals: Vec<Vec<NamedSignal>>,
+    spare_slots: StationSet,
 }
 
 /// Input or output of a program, by name.
@@ -61,6 +62,7 @@ impl Members {
             signals: (0..cluster.controllers().len())
                 .map(|program| signals(cluster, program))
                 .collect(),
+            spare_slots: cluster.agreement().schedule.spare_slots(),
             ..Self::new(cluster.members().map(|member| (member, name(member))))
         }
     }
@@ -69,7 +71,12 @@ impl Members {
     pub fn new(members: impl IntoIterator<Item = (Member, String)>) -> Self {
         let mut members: Vec<_> = members.into_iter().collect();
         members.sort();
-        Self { members, operator_inputs: Vec::new(), signals: Vec::new() }
+        Self {
+            members,
+            operator_inputs: Vec::new(),
+            signals: Vec::new(),
+            spare_slots: StationSet::EMPTY,
+        }
     }
 
     /// Members with their names, in ascending order.
@@ -112,6 +119,11 @@ impl Members {
     pub fn outputs(&self, program: ProgramId) -> impl Iterator<Item = &NamedSignal> {
         let signals = self.signals.get(program.index()).into_iter().flatten();
         signals.filter(|signal| matches!(signal.place, SignalPlace::Output(_)))
+    }
+
+    /// Whether a member is the slot of a spare.
+    pub fn is_spare_slot(&self, member: Member) -> bool {
+        matches!(member, Member::Station(station) if self.spare_slots.contains(station))
     }
 
     /// Stations in rank order.

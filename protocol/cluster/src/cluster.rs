@@ -73,6 +73,8 @@ pub struct Understudy {
     pub name: String,
     /// Where it listens, if the file says so.
     pub address: Option<SocketAddr>,
+    /// Whether this is the slot of a spare: absent until a spare wakes here.
+    pub spare: bool,
 }
 
 /// A ladder that finds failed channels.
@@ -271,6 +273,16 @@ impl Cluster {
     /// In the order of their ranks.
     pub fn understudies(&self) -> &[Understudy] {
         &self.understudies
+    }
+
+    /// Number of the understudies that are no slots of spares.
+    pub fn lasting_understudies(&self) -> usize {
+        self.understudies.iter().filter(|understudy| !understudy.spare).count()
+    }
+
+    /// Whether a member is the slot of a spare.
+    pub fn is_spare_slot(&self, member: Member) -> bool {
+        matches!(member, Member::Station(station) if self.agreement.schedule.spare_slots().contains(station))
     }
 
     /// In the order of their programs.

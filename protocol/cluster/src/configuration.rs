@@ -70,7 +70,8 @@ pub(crate) fn configuration_text(cluster: &Cluster, plants: &[String]) -> String
         }
     }
     for understudy in &cluster.understudies {
-        line(format_args!("understudy {}", understudy.name));
+        let spare = if understudy.spare { " spare" } else { "" };
+        line(format_args!("understudy {}{spare}", understudy.name));
     }
     text
 }

@@ -81,6 +81,7 @@ pub(crate) struct ControllerSection {
 pub(crate) struct UnderstudySection {
     pub(crate) name: Option<Placed<String>>,
     pub(crate) address: Option<Placed<SocketAddr>>,
+    pub(crate) spare: bool,
 }
 
 #[derive(Debug)]
@@ -168,6 +169,7 @@ pub(crate) fn read(text: &str, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
         let read = |fields: &Fields<'_, '_>| UnderstudySection {
             name: fields.name("name", diagnostics),
             address: fields.address("address", diagnostics),
+            spare: fields.flag("spare", diagnostics),
         };
         tables.iter().map(read).collect()
     });
@@ -274,7 +276,7 @@ fn cluster(root: &DeTable<'_>, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
 }
 
 /// All tables of a repeated section; nothing where the file has no such key.
-fn tables<'a, 't>(
+pub(crate) fn tables<'a, 't>(
     root: &'a DeTable<'t>,
     section: &'static Section,
     diagnostics: &mut Vec<Diagnostic>,

@@ -157,6 +157,7 @@ pub(crate) static UNDERSTUDY: Section = Section {
     keys: keys! {
         required name: Kind::Name, "names the station";
         key address: Kind::Address, "as for a controller";
+        key spare: Kind::Flag, "whether this is the slot of a spare: it is empty until `understudy spare` wakes here, and its absence is no alarm";
     },
 };
 
@@ -294,6 +295,34 @@ const LONGEST_DELAY: Duration = Duration::from_hours(24);
 pub(crate) static SECTIONS: [&Section; 7] =
     [&CLUSTER, &CONTROLLER, &UNDERSTUDY, &REMOTE_IO, &PLANT, &ALARM, &NOTIFY];
 
+/// Sections of a plant file.
+pub(crate) static PLANT_FILE_SECTIONS: [&Section; 2] = [&GROUP, &SPARE];
+
+pub(crate) static GROUP: Section = Section {
+    name: "group",
+    repeated: true,
+    meaning: "a cluster that spares serve; the order is the preference between groups with equal remaining redundancy",
+    keys: keys! {
+        required name: Kind::Name, "names the group";
+        required cluster: Kind::Text, "its cluster file, relative to the plant file";
+        key failure_domain: Kind::Text, "the rack, feeder or switch of its stations";
+    },
+};
+
+pub(crate) static SPARE: Section = Section {
+    name: "spare",
+    repeated: true,
+    meaning: "a machine that serves one group at a time; the order is the rank of the spares",
+    keys: keys! {
+        required name: Kind::Name, "names the spare";
+        required groups: Kind::Names, "the slot in each group that it serves, by the name of the group, such as `{ line-1 = \"spare\" }`";
+        key capacity: count(1, u32::MAX, u32::MAX), "operations in a second that its machine executes for a group; a group that needs more is never served";
+        key failure_domain: Kind::Text, "its rack, feeder or switch";
+        key spare_after: count(1, MANY_CYCLES, 50), "cycles for which a station must be flagged before the spare wakes";
+        key retire_after: time(Duration::from_millis(100), Duration::from_secs(86_400), Duration::from_secs(30)), "time for which the group must be complete without the spare before it retires";
+    },
+};
+
 pub(crate) static ROBOT_PARAMETERS: Section = Section {
     name: "plant.parameters",
     repeated: false,
@@ -412,17 +441,23 @@ mod tests {
         let parameters =
             [&ROBOT_PARAMETERS, &PRESS_PARAMETERS, &FIELD, &POINT, &OPERATOR_INPUT, &SIGNAL_INPUT];
         for section in SECTIONS.into_iter().chain(parameters) {
-            assert!(page.contains(&section.header()), "{}", section.header());
-            for key in section.keys {
-                let default = match (key.required, key.kind.default()) {
-                    (true, _) => "required".into(),
-                    (false, Some(default)) => format!("`{default}`"),
-                    (false, None) => "—".into(),
-                };
-                let expected = key.kind.expected();
-                let row = format!("| `{}` | {expected} | {default} | {} |", key.name, key.meaning);
-                assert!(page.contains(&row), "docs/reference/cluster-file.md lacks the row\n{row}");
-            }
+            has_rows(page, section);
+        }
+        let page = include_str!("../../../docs/reference/plant-file.md");
+        PLANT_FILE_SECTIONS.into_iter().for_each(|section| has_rows(page, section));
+    }
+
+    fn has_rows(page: &str, section: &Section) {
+        assert!(page.contains(&section.header()), "{}", section.header());
+        for key in section.keys {
+            let default = match (key.required, key.kind.default()) {
+                (true, _) => "required".into(),
+                (false, Some(default)) => format!("`{default}`"),
+                (false, None) => "—".into(),
+            };
+            let expected = key.kind.expected();
+            let row = format!("| `{}` | {expected} | {default} | {} |", key.name, key.meaning);
+            assert!(page.contains(&row), "docs/reference lacks the row\n{row}");
         }
     }
 }

@@ -20,6 +20,7 @@ mod file;
 mod format;
 mod notify;
 mod place;
+mod plant_file;
 mod read;
 mod schema;
 mod source;
@@ -37,8 +38,12 @@ pub use device::{BAUD_RATES, Binding, Connection, FieldDevice, Parity, SerialLin
 pub use draft::{Draft, DraftProgram, MAXIMUM_PROGRAM_NAME};
 pub use notify::Notify;
 pub use place::{BitPlace, ByteOrder, Place, PlaceError, RegisterTable, Registers};
+pub use plant_file::{
+    LoadedPlant, PlantFile, PlantGroup, PlantSpare, Serves, load_of, looks_like_a_plant_file,
+    read_plant_file,
+};
 pub use read::{Loaded, MAXIMUM_TEXT_BYTES, Overrides, read, read_with};
-pub use schema::schema;
+pub use schema::{plant_file_schema, schema};
 pub use source::{
     GroupSignal, InputSource, InputSourceKind, OperatorDeclaration, SignalDeclaration,
 };

@@ -56,7 +56,7 @@ use understudy_logic::Circuit;
 use understudy_node::Program;
 use understudy_remote_io::{Release, Restart, StaleState, ValueFault};
 use understudy_text::{Diagnostic, Report};
-use understudy_wire::{ClusterHash, ConfigurationHash, MAXIMUM_PROGRAMS};
+use understudy_wire::{ClusterHash, ConfigurationHash, MAXIMUM_PROGRAMS, StationId, StationSet};
 
 use self::ladders::Ladders;
 pub(crate) use self::marks::MARK;
@@ -170,7 +170,7 @@ fn build(
     let alarms = alarms::resolve(file.alarms, &members, period, diagnostics);
     limits::check(&members, &remote_ios, cluster.history, diagnostics);
     let mode = overrides.mode.unwrap_or([Mode::Full, Mode::Paper][cluster.mode]);
-    check_understudies(understudy_count, mode, &cluster.span, diagnostics);
+    check_understudies(&understudies, mode, &cluster.span, diagnostics);
 
     let controllers: Option<Vec<Controller>> = members.into_iter().map(controller).collect();
     let (controllers, name) = (controllers?, cluster.name.as_ref()?.value.clone());
@@ -197,7 +197,7 @@ fn build(
     let agreement = Agreement {
         cluster: ClusterHash::of(name.as_bytes()),
         configuration: ConfigurationHash::default(),
-        schedule: schedule.ok()?,
+        schedule: schedule.ok()?.with_spare_slots(spare_slots(controllers.len(), &understudies)),
         mode,
         history: cluster.history as usize,
         flag_after: cluster.flag_after,
@@ -278,7 +278,7 @@ fn understudies(
     let Some(sections) = sections else {
         let name = "understudy".to_owned();
         names.declare(&name, 0..0, diagnostics);
-        return vec![Understudy { name, address: None }];
+        return vec![Understudy { name, address: None, spare: false }];
     };
     let mut understudies = Vec::new();
     for section in sections {
@@ -290,9 +290,15 @@ fn understudies(
         understudies.push(Understudy {
             name: name.unwrap_or_default(),
             address: section.address.map(|address| address.value),
+            spare: section.spare,
         });
     }
     understudies
+}
+
+fn spare_slots(controllers: usize, understudies: &[Understudy]) -> StationSet {
+    let slots = (controllers..).zip(understudies).filter(|(_, understudy)| understudy.spare);
+    slots.map(|(rank, _)| StationId(rank as u8)).collect()
 }
 
 fn remote_ios(
@@ -394,12 +400,21 @@ fn default_remote_io_name(member: &Member) -> String {
 }
 
 fn check_understudies(
-    understudies: usize,
+    understudies: &[Understudy],
     mode: Mode,
     span: &std::ops::Range<usize>,
     diagnostics: &mut Vec<Diagnostic>,
 ) {
-    let (message, help) = match (understudies, mode) {
+    let slots = understudies.iter().filter(|understudy| understudy.spare).count();
+    let (message, help) = match (understudies.len() - slots, mode) {
+        (0, _) if slots > 0 => (
+            "there is no understudy: no failure is masked until a spare is awake".to_owned(),
+            "add an `[[understudy]]` without `spare = true`",
+        ),
+        (_, Mode::Paper) if slots > 0 => (
+            "the paper's mode has one understudy, and a spare is one more".to_owned(),
+            "use `mode = \"full\"` with spares",
+        ),
         (0, _) => (
             "there is no understudy: no failure is masked".to_owned(),
             "leave `understudy = []` out",

@@ -6,8 +6,8 @@ use understudy_text::duration;
 
 use crate::address::MAXIMUM_NAME_LENGTH;
 use crate::format::{
-    CLUSTER, CONTROLLER, FIELD, Key, Kind, OPERATOR_INPUT, POINT, PRESS_PARAMETERS,
-    ROBOT_PARAMETERS, SECTIONS, SIGNAL_INPUT, Section,
+    CLUSTER, CONTROLLER, FIELD, Key, Kind, OPERATOR_INPUT, PLANT_FILE_SECTIONS, POINT,
+    PRESS_PARAMETERS, ROBOT_PARAMETERS, SECTIONS, SIGNAL_INPUT, Section,
 };
 use crate::place::{ByteOrder, Registers};
 
@@ -31,6 +31,22 @@ pub fn schema() -> Schema {
         "type": "object",
         "additionalProperties": false,
         "required": [CLUSTER.name, CONTROLLER.name],
+        "properties": Value::Object(sections.into_iter().collect()),
+    })
+}
+
+/// JSON Schema 2020-12 of the data of a plant file.
+pub fn plant_file_schema() -> Schema {
+    let sections = PLANT_FILE_SECTIONS.map(|section| {
+        let value = json!({ "type": "array", "items": table(section), "minItems": 1 });
+        (section.name.to_owned(), value)
+    });
+    schemars::json_schema!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Plant file of Understudy",
+        "type": "object",
+        "additionalProperties": false,
+        "required": PLANT_FILE_SECTIONS.map(|section| section.name),
         "properties": Value::Object(sections.into_iter().collect()),
     })
 }

@@ -12,7 +12,7 @@
 
 use std::time::Duration;
 
-use understudy_wire::{MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, StationId};
+use understudy_wire::{MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, StationId, StationSet};
 
 /// The timing of a cluster. All offsets are from the start of a cycle.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -30,6 +30,8 @@ pub struct Schedule {
     guard: Duration,
     grace: Duration,
     stall: Duration,
+    /// Stations that are normally absent.
+    spare_slots: StationSet,
 }
 
 /// Reason why a schedule is refused.
@@ -110,7 +112,25 @@ impl Schedule {
             guard: share(GUARD_PER_MILLE),
             grace: (share(GUARD_PER_MILLE) * (controllers + understudies) as u32).min(period),
             stall: share(STALL_PER_MILLE),
+            spare_slots: StationSet::EMPTY,
         })
+    }
+
+    /// The same schedule, in which these stations are the slots of spares: their absence is no loss.
+    #[must_use]
+    pub fn with_spare_slots(mut self, slots: StationSet) -> Self {
+        self.spare_slots = slots;
+        self
+    }
+
+    /// Stations that are the slots of spares.
+    pub fn spare_slots(&self) -> StationSet {
+        self.spare_slots
+    }
+
+    /// Stations that a complete cluster has: all but the slots of spares.
+    pub fn expected(&self) -> StationSet {
+        StationSet::first(self.stations()).without(self.spare_slots)
     }
 
     /// The period T.

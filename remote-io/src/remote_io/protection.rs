@@ -93,6 +93,12 @@ impl RemoteIo {
         if protection.missed >= patience && protection.reported != Some(false) {
             protection.reported = Some(false);
             let since = protection.since;
+            // The empty slot of a spare is no loss.
+            let slots = agreement.schedule.spare_slots();
+            let is_empty = |one: &Lacking| {
+                one.reason == LackingReason::NotReceived && slots.contains(one.station)
+            };
+            let lacking = lacking.into_iter().filter(|one| !is_empty(one)).collect();
             self.report(Event::Unprotected { moment, since, lacking });
         }
     }

@@ -36,8 +36,10 @@ pub struct MemberOptions {
     pub multicast: Option<SocketAddrV4>,
     /// The folder of its keys.
     pub keys: Option<PathBuf>,
-    /// Whether it ends with standard input and with the process that started it.
+    /// Whether standard input is its operator: no other one is listened to.
     pub in_laboratory: bool,
+    /// Whether it ends with standard input and with the process that started it.
+    pub ends_with_parent: bool,
     /// Whether it asks for real-time rights.
     pub real_time: bool,
     /// The folder of what it keeps for the time after a power failure; nothing is kept without one.
@@ -159,12 +161,12 @@ where
         channel: keys.channel,
         retention,
         field,
-        commands: if options.in_laboratory {
+        commands: if options.ends_with_parent {
             Commands::ReadAndEndWithInput
         } else {
             Commands::Read
         },
-        ends_with_parent: options.in_laboratory,
+        ends_with_parent: options.ends_with_parent,
         real_time: options.real_time,
     };
     let output: Box<dyn io::Write + Send> = match &options.journal {

@@ -6,7 +6,6 @@ use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_simulator::Action;
 use understudy_wire::{
     Force, Image, Member, Moment, OrderRefusal, ProgramId, ProgramSet, Source, StationId,
-    StationSet,
 };
 
 use super::service::Outcome;
@@ -78,14 +77,14 @@ impl Account {
         if let Some(violation) = violation {
             self.violate(program, Some(number), violation);
         }
-        let stations = self.terms.agreement.schedule.stations();
+        let expected = self.terms.agreement.schedule.expected();
         let Some(cycle) = self.open_cycle(number) else {
             return;
         };
         cycle.outcomes.insert(program, outcome);
         if !idle {
             cycle.heard = cycle.heard.or(*heard);
-            if *source == Source::Direct && *heard == StationSet::first(stations) {
+            if *source == Source::Direct && expected.without(*heard).is_empty() {
                 cycle.content.insert(program);
             }
         }

@@ -357,14 +357,20 @@ impl Reader<'_> {
                 _ => continue,
             };
             let before = last.get(name.as_str());
+            let is_slot = self.members.is_some_and(|members| {
+                members.find(name).is_some_and(|member| members.is_spare_slot(member))
+            });
+            // The slot of a spare is empty at first.
+            let at_first = is_slot.then_some(Action::Crash);
             let possible = matches!(
-                (before.map(|(action, _)| *action), action),
+                (before.map(|(action, _)| *action).or(at_first), action),
                 (None | Some(Action::Restart | Action::Continue), Action::Crash | Action::Stop)
                     | (Some(Action::Stop), Action::Continue | Action::Crash)
                     | (Some(Action::Crash), Action::Restart)
             );
             if !possible {
                 let why = match before {
+                    None if is_slot => "is the empty slot of a spare; restart it first",
                     Some((Action::Crash, _)) => "has crashed by then; restart it first",
                     Some((Action::Stop, _)) => "is suspended by then; continue it first",
                     _ => "runs by then",

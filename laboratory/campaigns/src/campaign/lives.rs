@@ -142,8 +142,8 @@ impl<'a> Lives<'a> {
 
     /// Everybody is synchronised: from now on they fail.
     pub(super) fn begin(&mut self) {
-        for rank in 0..self.lives.len() {
-            self.order(StationId(rank as u8), Action::Crash);
+        for station in self.ranks() {
+            self.order(station, Action::Crash);
         }
     }
 
@@ -187,8 +187,10 @@ impl<'a> Lives<'a> {
         }
     }
 
+    /// All stations; the slots of spares stay empty.
     fn ranks(&self) -> impl Iterator<Item = StationId> + use<> {
-        (0..self.lives.len() as u8).map(StationId)
+        let slots = self.cluster.agreement().schedule.spare_slots();
+        (0..self.lives.len() as u8).map(StationId).filter(move |rank| !slots.contains(*rank))
     }
 
     /// Programs whose states a station holds.
@@ -366,7 +368,7 @@ impl<'a> Lives<'a> {
         match self.mode() {
             Mode::Paper => down.len() > 1,
             Mode::Full => {
-                understudies == self.cluster.understudies().len() && down.len() > understudies
+                understudies == self.cluster.lasting_understudies() && down.len() > understudies
             }
         }
     }

@@ -175,7 +175,7 @@ pub fn set_unequal(
                     errors.push(wrong("there is one of that name".to_owned()));
                     continue;
                 }
-                Some(Member::Station(_)) if cluster.understudies().len() == 1 => {
+                Some(Member::Station(_)) if cluster.lasting_understudies() == 1 => {
                     boxes.understudies = true;
                 }
                 Some(Member::Station(_)) => {
@@ -199,7 +199,7 @@ pub fn set_unequal(
 pub fn options_of(cluster: &Cluster, mtbf: Hours, mttr: Hours) -> Options {
     let count = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
     let mut options = Options::new(count(cluster.controllers().len()), mtbf, mttr);
-    options.spares = count(cluster.understudies().len());
+    options.spares = count(cluster.lasting_understudies());
     options.rule = match cluster.agreement().mode {
         Mode::Full => Rule::AsBuilt,
         Mode::Paper => Rule::Paper,

@@ -119,7 +119,8 @@ impl Simulation {
             self.violations.push(violation);
         }
         if let Event::Applied { source, heard, .. } = event {
-            if *source == Source::Direct && heard.len() == self.stations.len() {
+            let expected = self.parts.stations[0].agreement.schedule.expected();
+            if *source == Source::Direct && expected.without(*heard).is_empty() {
                 self.ready.insert(program);
             } else {
                 self.ready.remove(program);

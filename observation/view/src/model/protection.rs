@@ -216,6 +216,7 @@ impl Model {
             return Some(reported);
         };
         let proves: StationSet = self.provers(program).collect();
+        let slots = self.cluster.agreement().schedule.spare_slots();
         let lacking = self.station_ids().filter_map(|id| {
             let name = self.members.name(Member::Station(id));
             let known = reported.lacking.iter().find(|one| one.station == name);
@@ -225,6 +226,7 @@ impl Model {
             let is_received = heard.contains(id);
             let covers = || self.covers(id, cycle).contains(program);
             match known.map(|known| known.reason) {
+                None | Some(NOT_RECEIVED) if !is_received && slots.contains(id) => None,
                 None | Some(NOT_RECEIVED) if !is_received => {
                     let state = self.station_state_in(standing, id, Some(cycle));
                     Some(self.not_received(program, id, state, cycles.clone()))

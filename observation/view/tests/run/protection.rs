@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use understudy_cluster::Cluster;
 use understudy_journal::{Happening, Record, RunEvent};
 use understudy_node::Event as StationEvent;
 use understudy_view::{
@@ -10,13 +11,13 @@ use understudy_view::{
 use understudy_wire::{Member, ProgramId, StationId};
 
 use crate::complete::without_remote_io;
-use crate::support::{cell, model, records, scenario};
+use crate::support::{cell, example, model, records, scenario};
 
 const LOST_STATE: &str = include_str!("../../../../examples/press-cell/lost-state.toml");
 
 /// What was known of the robot's program whenever this changed, with the open alarms of its remote I/O.
-fn changes(records: &[Record]) -> Vec<String> {
-    let mut model = Model::new(Arc::new(cell()), Bounds::default());
+fn changes(cluster: Cluster, records: &[Record]) -> Vec<String> {
+    let mut model = Model::new(Arc::new(cluster), Bounds::default());
     let mut told: Vec<String> = Vec::new();
     for record in records {
         model.note(record);
@@ -45,7 +46,20 @@ fn changes(records: &[Record]) -> Vec<String> {
 fn a_loss_of_protection_and_of_a_state_are_alarms_with_their_causes() {
     let cell = cell();
     let records = records(&cell, &scenario(&cell, LOST_STATE), 1);
-    insta::assert_snapshot!("protection", changes(&records).join("\n"));
+    insta::assert_snapshot!("protection", changes(cell, &records).join("\n"));
+}
+
+/// The empty slot of a spare is no cause and no alarm; while the spare is awake, the program is protected, and not when the understudy fails too.
+#[test]
+fn a_spare_that_is_awake_protects_and_one_that_is_away_is_no_alarm() {
+    let cell = example("shared-spare/line-1");
+    let second = include_str!("../../../../examples/shared-spare/line-1/second-failure.toml");
+    let records = records(&cell, &scenario(&cell, second), 1);
+    let mut model = Model::new(Arc::new(cell.clone()), Bounds::default());
+    records.iter().for_each(|record| model.note(record));
+    let of_the_spare: Vec<&Alarm> = model.alarms().filter(|it| it.name == "spare").collect();
+    assert!(of_the_spare.is_empty(), "{of_the_spare:?}");
+    insta::assert_snapshot!("spare", changes(cell, &records).join("\n"));
 }
 
 fn lost(model: &Model) -> Option<LostState> {

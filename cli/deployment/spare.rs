@@ -1,0 +1,104 @@
+//! `understudy spare`: a machine without a role that serves several groups.
+
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+use clap::Args;
+use serde_json::json;
+use understudy_attach::AttachError;
+use understudy_bus::interruption;
+use understudy_cluster::{PlantFile, PlantGroup, PlantSpare, Security, Serves};
+use understudy_keys::{Date, OperatorKeys};
+use understudy_member::{restart_for_zenoh, tls_keys};
+use understudy_spare::{Duty, SpareSettings};
+
+use crate::answer::{Answer, Status};
+use crate::console::Console;
+use crate::files;
+use crate::member::peers;
+use crate::plants;
+
+/// Run a spare, which joins the group with the least remaining redundancy
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy spare plant.toml --name spare-1 --keys keys
+
+The folder of --keys has a folder for each group, with the keys of the slot and those of a viewer with the name of the spare:
+keys/line-1/spare and keys/line-1/spare-1. The spare follows the journals of up to three remote I/Os of each group. When a station has been
+flagged for `spare_after` cycles, the spare runs the station of its slot until the group is complete without it (docs/how-to/spares.md).
+SIGINT and SIGTERM end the spare and its station.")]
+pub(crate) struct Arguments {
+    /// Plant file
+    #[arg(value_name = "PLANT.toml")]
+    plant: PathBuf,
+    /// Name of the spare in the plant file
+    #[arg(long, value_name = "NAME")]
+    name: String,
+    /// Folder with a folder of keys for each group
+    #[arg(long, value_name = "DIR")]
+    keys: PathBuf,
+    /// Folder of the journals of its stations, one file for each group. Default: no journal
+    #[arg(long, value_name = "DIR")]
+    journals: Option<PathBuf>,
+    /// Do not request real-time scheduling and locked memory
+    #[arg(long)]
+    no_real_time: bool,
+}
+
+pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
+    restart_for_zenoh(understudy_bus::LinkKind::Zenoh);
+    let (plant, _) = plants::valid(&arguments.plant)?;
+    let Some(spare) = plant.spares.iter().find(|spare| spare.name == arguments.name) else {
+        let known: Vec<&str> = plant.spares.iter().map(|spare| spare.name.as_str()).collect();
+        let message =
+            format!("there is no spare `{}`; the spares are {}", arguments.name, known.join(", "));
+        return Err(Answer::failed(Status::BadInput, "U0605", message));
+    };
+    if let Some(journals) = &arguments.journals {
+        files::make_folder(journals)?;
+    }
+    let duties = spare.serves.iter().map(|serves| arguments.duty(&plant, spare, serves));
+    let settings = SpareSettings {
+        duties: duties.collect::<Result<_, _>>()?,
+        spare: spare.clone(),
+        program: std::env::current_exe().map_err(|error| {
+            let message = format!("cannot find the executable of this program: {error}");
+            Answer::failed(Status::Failed, "U0604", message)
+        })?,
+        real_time: !arguments.no_real_time,
+    };
+    let failed =
+        |error: understudy_bus::BusError| Answer::failed(Status::Failed, error.code(), &error);
+    let ends = interruption().map_err(failed)?;
+    let mut say = |report: &understudy_spare::Report| console.note(&report.to_string());
+    let woke = understudy_spare::run(&settings, &ends, &mut say).map_err(failed)?;
+    let name = &spare.name;
+    Ok(Answer::done(format!("{name}: woke {woke} times"), json!({ "spare": name, "woke": woke })))
+}
+
+impl Arguments {
+    fn duty(&self, plant: &PlantFile, spare: &PlantSpare, serves: &Serves) -> Result<Duty, Answer> {
+        let PlantGroup { name, file, cluster, .. } = &plant.groups[serves.group];
+        if cluster.security() == Security::Off {
+            let error = AttachError::NoKeys;
+            return Err(Answer::failed(Status::BadInput, error.code(), error));
+        }
+        let folder = self.keys.join(name);
+        let viewer = folder.join(&spare.name);
+        let keys = OperatorKeys::load(&viewer, cluster, Date::of(SystemTime::now()));
+        let keys = keys.map_err(|errors| super::keys::failed(&errors))?;
+        Ok(Duty {
+            group: name.clone(),
+            cluster: cluster.clone(),
+            cluster_file: self.plant.parent().unwrap_or(Path::new("")).join(file),
+            slot: serves.station,
+            slot_name: serves.name.clone(),
+            fits: serves.fits,
+            slot_keys: folder.join(&serves.name),
+            viewer_keys: tls_keys(&keys.tls),
+            peers: peers(cluster, None)?,
+            journal: self.journals.as_ref().map(|folder| folder.join(format!("{name}.jsonl"))),
+        })
+    }
+}

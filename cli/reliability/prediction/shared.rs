@@ -1,0 +1,65 @@
+//! Spares that the groups of a plant share, compared with hot-standby pairs.
+
+use std::fmt::Write as _;
+
+use serde::Serialize;
+use serde_json::json;
+use understudy_reliability::{Hours, Options, Probability, SharedSpares, grouped};
+
+use super::{Arguments, Times, refused};
+use crate::answer::Answer;
+
+/// One way to protect the plant.
+#[derive(Serialize)]
+struct Row {
+    name: String,
+    boxes: u32,
+    mttf_hours: f64,
+}
+
+/// The pairs, and 0 to `most` shared spares.
+pub(super) fn compared(
+    arguments: &Arguments,
+    options: &Options,
+    most: u32,
+) -> Result<Answer, Answer> {
+    let mut times = Times::default();
+    let wake = times.required("wake", Some(&arguments.wake));
+    let coverage = Probability::new("the coverage of the wake-up", arguments.wake_coverage);
+    times.finish(coverage.clone().err().into_iter().collect())?;
+    let (wake, coverage): (Option<Hours>, _) = (wake, coverage.unwrap_or(Probability::ONE));
+    let pairs = options.system().and_then(|system| system.copies_chain(2));
+    let pairs = pairs.map_err(|errors| refused(&errors))?;
+    let mut rows = vec![Row {
+        name: "hot-standby pairs".to_owned(),
+        boxes: 2 * options.controllers,
+        mttf_hours: pairs.mttf().map_err(|error| refused(&[error]))?,
+    }];
+    // From the largest number down, so that one out of its bounds is refused at once.
+    for (spares, wake) in (0..=most).rev().zip(std::iter::repeat(wake).flatten()) {
+        let plant = SharedSpares {
+            groups: options.groups.saturating_sub(arguments.too_large),
+            too_large: arguments.too_large,
+            controllers: options.controllers / options.groups.max(1),
+            spares,
+            mtbf: options.mtbf,
+            mttr: options.mttr,
+            wake,
+            coverage,
+        };
+        rows.insert(
+            1,
+            Row {
+                name: format!("{spares} shared spare{}", if spares == 1 { "" } else { "s" }),
+                boxes: options.controllers + options.groups + spares,
+                mttf_hours: plant.mttf().map_err(|errors| refused(&errors))?,
+            },
+        );
+    }
+    let mut text = format!("{:<18} {:>6} {:>14}\n", "", "boxes", "MTTF in h");
+    for Row { name, boxes, mttf_hours } in &rows {
+        let mean = grouped(*mttf_hours);
+        let _ = writeln!(text, "{name:<18} {boxes:>6} {mean:>14}");
+    }
+    Ok(Answer::done(text, json!({ "options": options, "compared": rows })))
+}

@@ -1,0 +1,121 @@
+//! The slot of a spare: empty without an alarm, and one more understudy once its station is started.
+
+use understudy_cycle::Mode;
+use understudy_remote_io::Event;
+use understudy_simulator::{Action, Fault, Network, Record, Simulation, parts};
+use understudy_wire::{Member, ProgramId, StationId};
+
+const CONTROLLER: Member = Member::Station(StationId(0));
+const UNDERSTUDY: Member = Member::Station(StationId(2));
+const SPARE: Member = Member::Station(StationId(3));
+
+/// Two controllers, an understudy and the slot of a spare.
+const CELL: &str = r#"
+[cluster]
+name = "cell"
+[[controller]]
+name = "robot"
+ladder = "robot.ladder"
+[[controller]]
+name = "press"
+ladder = "press.ladder"
+[[understudy]]
+name = "understudy"
+[[understudy]]
+name = "spare"
+spare = true
+[[plant]]
+controller = "robot"
+model = "robot"
+[[plant]]
+controller = "press"
+model = "press"
+"#;
+
+/// What the remote I/O of the robot reported.
+#[derive(Debug, Default, PartialEq, Eq)]
+struct Outcome {
+    /// Cycles in which no remote I/O had a provable output.
+    missed: u64,
+    /// `protected` and `unprotected`, with the cycle.
+    protection: Vec<(u64, bool)>,
+}
+
+fn check(steps: &[(u64, Member, Action)], cycles: u64) -> Outcome {
+    let cluster = understudy_testing::cluster(CELL, Mode::Full);
+    let mut simulation = Simulation::new(parts(&cluster), Network::default(), 1);
+    for &(at_cycle, member, action) in steps {
+        simulation.schedule(Fault { at_cycle, phase: 0.3, member, action });
+    }
+    let mut protection = Vec::new();
+    let mut observe = |_, cycle: Option<u64>, member, record: Record<'_>| {
+        if member != Member::RemoteIo(ProgramId(0)) {
+            return;
+        }
+        match (record, cycle) {
+            (Record::RemoteIo(Event::Protected { .. }), Some(cycle)) => {
+                protection.push((cycle, true));
+            }
+            (Record::RemoteIo(Event::Unprotected { .. }), Some(cycle)) => {
+                protection.push((cycle, false));
+            }
+            _ => {}
+        }
+    };
+    simulation.run(cycles, 200, &mut observe).expect("the cell starts without its spare");
+    assert_eq!(simulation.violations().first(), None);
+    let missed = simulation.tallies().iter().map(|tally| tally.held + tally.fail_safe).sum();
+    Outcome { missed, protection }
+}
+
+#[test]
+fn an_empty_slot_is_neither_waited_for_nor_an_alarm() {
+    let outcome = check(&[], 300);
+    assert_eq!(outcome, Outcome { missed: 0, protection: Vec::new() });
+}
+
+/// Without the spare the second failure ends the proof of the robot's outputs; with it no output is held.
+#[test]
+fn a_spare_that_is_awake_masks_the_second_failure() {
+    let crash = |at, member| (at, member, Action::Crash);
+    let without = check(&[crash(20, CONTROLLER), crash(100, UNDERSTUDY)], 200);
+    assert!(without.missed > 50, "{without:?}");
+    let wakes = (40, SPARE, Action::Restart);
+    let with = check(&[crash(20, CONTROLLER), wakes, crash(100, UNDERSTUDY)], 200);
+    assert_eq!(with.missed, 0, "{with:?}");
+}
+
+/// Any one of the three stations and the spare may fail at any time after the spare publishes.
+#[test]
+fn with_a_spare_any_second_station_may_fail() {
+    let stations = [CONTROLLER, Member::Station(StationId(1)), UNDERSTUDY];
+    for first in stations {
+        for second in stations.into_iter().chain([SPARE]).filter(|second| *second != first) {
+            let steps = [
+                (20, first, Action::Crash),
+                (40, SPARE, Action::Restart),
+                (70, second, Action::Crash),
+            ];
+            assert_eq!(check(&steps, 150).missed, 0, "{first:?}, {second:?}");
+        }
+    }
+}
+
+/// The program is protected again within 20 cycles of the start of the spare.
+#[test]
+fn protection_returns_within_twenty_cycles_and_stays_when_the_spare_retires() {
+    let steps = [
+        (20, CONTROLLER, Action::Crash),
+        (40, SPARE, Action::Restart),
+        (100, CONTROLLER, Action::Restart),
+        (150, SPARE, Action::Crash),
+        (200, CONTROLLER, Action::Crash),
+    ];
+    let outcome = check(&steps, 300);
+    assert_eq!(outcome.missed, 0);
+    let [(lost, false), (back, true), (_, false)] = outcome.protection[..] else {
+        panic!("{outcome:?}");
+    };
+    assert!((20..=24).contains(&lost), "{outcome:?}");
+    assert!((41..=60).contains(&back), "{outcome:?}");
+}

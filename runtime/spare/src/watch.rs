@@ -1,0 +1,87 @@
+//! Follows the journals of a few remote I/Os of a group.
+
+use std::sync::mpsc::Sender;
+use std::time::Duration;
+
+use understudy_bus::{BusError, Call, Peer, TlsKeys, Told};
+use understudy_journal::{Happening, Record};
+use understudy_remote_io::Event;
+use understudy_wire::{ClusterHash, ConfigurationHash, StationSet};
+
+/// Between two calls.
+const AGAIN: Duration = Duration::from_secs(1);
+
+/// The shortest time without a line after which a remote I/O is no longer followed.
+const SILENT_AFTER: Duration = Duration::from_secs(2);
+
+/// What comes of a witness.
+pub(crate) enum Seen {
+    /// A deadline, at which it had received these stations.
+    Deadline(StationSet),
+    /// It is not followed, and why.
+    Lost(String),
+}
+
+/// A witness: one of the remote I/Os of a group, another one where that is not received.
+pub(crate) struct Watch {
+    pub(crate) cluster: ClusterHash,
+    pub(crate) configuration: ConfigurationHash,
+    pub(crate) period: Duration,
+    pub(crate) keys: TlsKeys,
+    /// The remote I/Os that it follows in turn; at least one.
+    pub(crate) peers: Vec<Peer>,
+}
+
+impl Watch {
+    /// Follows until the spare ends; its end of the channel is gone then.
+    pub(crate) fn run(self, group: usize, witness: usize, seen: &Sender<(usize, usize, Seen)>) {
+        for peer in self.peers.iter().cycle() {
+            let lost = match Call::to(peer.address, self.cluster, &peer.name, &self.keys) {
+                Ok(call) => self.follow(&call, |deadline| {
+                    seen.send((group, witness, Seen::Deadline(deadline))).is_ok()
+                }),
+                Err(BusError::Uncalled { reason, .. }) => reason,
+                Err(error) => error.to_string(),
+            };
+            let lost = Seen::Lost(format!("{}: {lost}", peer.name));
+            if seen.send((group, witness, lost)).is_err() {
+                return;
+            }
+            std::thread::sleep(AGAIN);
+        }
+    }
+
+    /// Until the journal ends: the reason.
+    fn follow(&self, call: &Call, mut deadline: impl FnMut(StationSet) -> bool) -> String {
+        let mut other = None;
+        let patience = (self.period * 10).max(SILENT_AFTER);
+        let ended = call.follow(patience, |told| match told {
+            Told::By(reporter) => {
+                let theirs = reporter.map(|by| by.configuration.as_str()).unwrap_or_default();
+                let same = theirs == self.configuration.to_string();
+                if !same {
+                    other = Some(format!("it runs configuration {theirs}"));
+                }
+                same
+            }
+            Told::Line(line) => heard(line).is_none_or(&mut deadline),
+            // Missed deadlines are not counted, so the spare wakes later.
+            Told::Lost(_) => true,
+        });
+        let silent = || ended.err().map(|_| "it sends no journal".to_owned());
+        other.or_else(silent).unwrap_or_else(|| "the call ended".to_owned())
+    }
+}
+
+/// The stations of a line that records a deadline.
+fn heard(line: &str) -> Option<StationSet> {
+    // Most lines are of other events.
+    if !line.contains("\"applied\"") {
+        return None;
+    }
+    let record: Record = serde_json::from_str(line).ok()?;
+    match record.event {
+        Happening::RemoteIo(Event::Applied { heard, .. }) => Some(heard),
+        _ => None,
+    }
+}

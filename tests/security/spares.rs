@@ -1,0 +1,213 @@
+//! A spare beside two groups on loopback: it wakes where a station has failed, and retires when that is back.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::net::{SocketAddr, TcpStream};
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
+use std::process::{ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+use serde_json::Value;
+use understudy_bus::free_addresses;
+
+use super::shared::deployed::Deployed;
+use super::{DEADLINE, Running, empty_folder, one_at_a_time, text, understudy};
+
+const GROUPS: [&str; 2] = ["line-1", "line-2"];
+
+/// Flagged for so long, a station wakes the spare; at 50 ms this is half a second.
+const SPARE_AFTER: u64 = 10;
+
+/// The groups of the example, with free addresses and keys, as files.
+struct Plant {
+    folder: PathBuf,
+    /// By group: the address of the slot.
+    slots: BTreeMap<&'static str, SocketAddr>,
+}
+
+impl Plant {
+    fn new(name: &str) -> Self {
+        let folder = empty_folder(name);
+        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/shared-spare");
+        let plant = fs::read_to_string(source.join("plant.toml")).expect("the example is whole");
+        let times = format!("spare_after = {SPARE_AFTER}\nretire_after = \"2s\"");
+        fs::write(folder.join("plant.toml"), plant.replace("retire_after = \"5s\"", &times))
+            .expect("it is ours");
+        let slots = GROUPS.map(|group| {
+            let own = folder.join(group);
+            fs::create_dir_all(&own).expect("a folder");
+            for ladder in ["robot.ladder", "press.ladder"] {
+                fs::copy(source.join(group).join(ladder), own.join(ladder)).expect("it is whole");
+            }
+            let cluster = source.join(group).join("cluster.toml");
+            let cluster = fs::read_to_string(cluster).expect("the example is whole");
+            let addresses = free_addresses(8).expect("eight free ports");
+            let mut next = addresses.iter();
+            let lines = cluster.replace("\"10ms\"", "\"50ms\"");
+            let lines = lines.lines().map(|line| match line.starts_with("address") {
+                true => format!("address = \"{}\"\n", next.next().expect("eight members")),
+                false => format!("{line}\n"),
+            });
+            fs::write(own.join("cluster.toml"), lines.collect::<String>()).expect("it is ours");
+            (group, addresses[3])
+        });
+        Self { folder, slots: slots.into() }
+    }
+
+    /// All members of a group but its spare, with keys for the spare.
+    fn start(&self, group: &str) -> Deployed {
+        let own = self.folder.join(group);
+        let deployed = Deployed::of(&own, own.join("cluster.toml"), &["spare-1"]);
+        self.link_keys(group);
+        deployed
+    }
+
+    fn link_keys(&self, group: &str) {
+        fs::create_dir_all(self.folder.join("keys")).expect("a folder");
+        let members = self.folder.join(group).join("keys/members");
+        symlink(members, self.folder.join("keys").join(group)).expect("a link");
+    }
+
+    fn spare(&self) -> Running {
+        let (plant, keys) = (self.folder.join("plant.toml"), self.folder.join("keys"));
+        let journals = self.folder.join("journals");
+        let spare = ["spare", text(&plant), "--name", "spare-1", "--keys", text(&keys)];
+        let child = understudy(&[&spare[..], &["--no-real-time", "--journals"]].concat())
+            .arg(text(&journals))
+            .stdin(Stdio::null())
+            .stdout(fs::File::create(self.folder.join("spare.out")).expect("a file"))
+            .stderr(fs::File::create(self.folder.join("spare.errors")).expect("a file"))
+            .spawn();
+        Running(child.expect("the binary is built"))
+    }
+
+    /// Until the spare has reported this.
+    fn reported(&self, wanted: &str) {
+        let log = self.folder.join("spare.errors");
+        until(&|| fs::read_to_string(&log).unwrap_or_default(), &|said| said.contains(wanted));
+    }
+
+    /// Until a process listens at the slot of a group, or none does.
+    fn slot_is_taken(&self, group: &str, taken: bool) {
+        let address = self.slots[group];
+        until(&|| TcpStream::connect(address).is_ok(), &|open| *open == taken);
+    }
+}
+
+fn until<T: std::fmt::Debug>(look: &dyn Fn() -> T, reached: &dyn Fn(&T) -> bool) {
+    let begun = Instant::now();
+    loop {
+        let found = look();
+        if reached(&found) {
+            return;
+        }
+        assert!(begun.elapsed() < DEADLINE, "{found:?}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+/// The events of a remote I/O whose kind is `applied`, `protected` or `unprotected`, in their order.
+fn events(deployed: &Deployed, name: &str) -> Vec<Value> {
+    let journal = fs::read_to_string(deployed.journal(name)).unwrap_or_default();
+    let records = journal.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
+    let kinds = ["applied", "protected", "unprotected"];
+    let events = records.map(|record| record["event"].clone());
+    events.filter(|event| kinds.contains(&event["event"].as_str().unwrap_or_default())).collect()
+}
+
+fn kinds(events: &[Value]) -> Vec<&str> {
+    let kinds = events.iter().filter_map(|event| event["event"].as_str());
+    kinds.filter(|kind| *kind != "applied").collect()
+}
+
+/// Until a remote I/O has reported this many changes of protection, the last one of which is `wanted`.
+fn protection_is(deployed: &Deployed, name: &str, changes: usize, wanted: &str) {
+    until(&|| events(deployed, name), &|found| {
+        let kinds = kinds(found);
+        kinds.len() == changes && kinds.last() == Some(&wanted)
+    });
+}
+
+/// Sources of the applied outputs since the first direct one.
+fn sources(deployed: &Deployed, name: &str) -> Vec<String> {
+    let events = events(deployed, name);
+    let sources = events.iter().filter_map(|event| event["source"].as_str());
+    sources.skip_while(|source| *source != "direct").map(str::to_owned).collect()
+}
+
+/// Until a remote I/O has passed some more deadlines.
+fn passes(deployed: &Deployed, name: &str, deadlines: usize) {
+    let before = sources(deployed, name).len();
+    until(&|| sources(deployed, name).len(), &|now| *now >= before + deadlines);
+}
+
+#[test]
+fn a_spare_masks_the_second_failure_and_retires_when_the_station_is_back() {
+    let _alone = one_at_a_time();
+    let plant = Plant::new("spare");
+    let mut groups = GROUPS.map(|group| plant.start(group));
+    let mut spare = plant.spare();
+    for (group, deployed) in GROUPS.iter().zip(&groups) {
+        plant.reported(&format!("{group}: watches it"));
+        for name in ["robot-io", "press-io"] {
+            protection_is(deployed, name, 1, "protected");
+        }
+    }
+    groups[0].signal("robot", Signal::SIGKILL);
+    plant.reported("line-1: wakes as spare; failed: robot (flagged for 10 cycles)");
+    plant.reported("line-1: publishes");
+    protection_is(&groups[0], "robot-io", 3, "protected");
+    // The second failure: only the spare executes the program of the robot now.
+    groups[0].signal("understudy", Signal::SIGKILL);
+    passes(&groups[0], "robot-io", 60);
+    // A busy host suspends a process for a deadline or two; without the spare, none of these would be proved.
+    for name in ["robot-io", "press-io"] {
+        let applied = sources(&groups[0], name);
+        let newest = &applied[applied.len() - 50..];
+        let unproved = newest.iter().filter(|it| ["held", "fail-safe"].contains(&it.as_str()));
+        let unproved = unproved.count();
+        assert!(unproved <= 2, "{name}: {unproved} of {newest:?}");
+    }
+    assert_eq!(kinds(&events(&groups[1], "robot-io")), ["protected"], "the other group");
+    let cluster = groups[0].cluster.clone();
+    for name in ["robot", "understudy"] {
+        groups[0].start_with(name, &cluster);
+    }
+    plant.reported("line-1: retires");
+    plant.slot_is_taken("line-1", false);
+    passes(&groups[0], "robot-io", 20);
+    // It is free for the other group. Its station ends with it, whether it is ended in order or killed.
+    groups[1].signal("understudy", Signal::SIGKILL);
+    plant.reported("line-2: publishes");
+    plant.slot_is_taken("line-2", true);
+    assert!(terminate(&mut spare).success());
+    plant.slot_is_taken("line-2", false);
+    let mut spare = plant.spare();
+    plant.reported("line-2: publishes");
+    plant.slot_is_taken("line-2", true);
+    spare.0.kill().expect("it runs");
+    plant.slot_is_taken("line-2", false);
+}
+
+/// Ends a process in order.
+fn terminate(process: &mut Running) -> ExitStatus {
+    let id = i32::try_from(process.0.id()).expect("a process id");
+    kill(Pid::from_raw(id), Signal::SIGTERM).expect("it runs");
+    process.0.wait().expect("it ends")
+}
+
+/// No group runs: the spare reports that, and ends in order.
+#[test]
+fn a_spare_reports_groups_that_it_cannot_watch_and_ends_with_sigterm() {
+    let _alone = one_at_a_time();
+    let plant = Plant::new("unseen");
+    GROUPS.iter().for_each(|group| drop(plant.start(group)));
+    let mut spare = plant.spare();
+    plant.reported("line-1: cannot watch it, retrying: ");
+    let status = terminate(&mut spare);
+    let said = fs::read_to_string(plant.folder.join("spare.out")).expect("its output");
+    assert!(status.success() && said.contains("spare-1: woke 0 times"), "{status}: {said}");
+}
