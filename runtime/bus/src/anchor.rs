@@ -2,7 +2,7 @@
 //!
 //! Both clocks of a host run at one rate, which NTP adjusts; only a step moves one against the other.
 
-use crate::journal::HostEvent;
+use crate::host_event::HostEvent;
 
 /// What differs by more was set. The two clocks are read within a millisecond.
 const STEP_NS: i64 = 20_000_000;

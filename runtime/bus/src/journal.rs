@@ -6,7 +6,6 @@
 
 use std::borrow::Cow;
 use std::io::{self, BufWriter, Write};
-use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -18,20 +17,12 @@ use understudy_wire::{Member, Time};
 use crate::anchor::Anchors;
 use crate::clock::{Clock, wall_clock};
 use crate::error::BusError;
-use crate::host::Summary;
-use crate::link::LinkKind;
-use crate::refused_as::RefusedAs;
-use crate::refused_orders::RefusedOrder;
-use crate::rights::Rights;
+use crate::host_event::HostEvent;
 use crate::tally::Tally;
 
 /// Version of the journal: what its records are called and hold. Journals of version 1 do not say theirs; version 3 packs closed segments and records the wall
 /// clock; in version 4 the bits of the state of a ladder stand in another order.
 pub const JOURNAL_VERSION: u32 = 4;
-
-fn first_version() -> u32 {
-    1
-}
 
 /// Records that wait to be written, at most: some seconds of a member at 10 ms.
 pub const JOURNAL_RECORDS: usize = 4096;
@@ -60,172 +51,6 @@ pub enum Noted<E> {
     Host(HostEvent),
     /// By the member.
     Member(E),
-}
-
-/// What the process of a member reports.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(tag = "event", rename_all = "kebab-case")]
-pub enum HostEvent {
-    /// It listens, and its cycle starts.
-    Ready {
-        /// Version of the records that it reports.
-        #[serde(default = "first_version")]
-        version: u32,
-        /// Process id.
-        process: u32,
-        /// Where it listens.
-        address: SocketAddr,
-        /// What carries its frames.
-        link: LinkKind,
-        /// What the system lets it have.
-        rights: Rights,
-    },
-    /// Datagrams arrived that are no frames, since the last such record.
-    RefusedBytes {
-        /// How many.
-        datagrams: u64,
-        /// Why the last one is none.
-        reason: String,
-    },
-    /// Frames arrived that do not count, since the last such record: somebody on the network does what he should not.
-    RefusedFrames {
-        /// How many.
-        datagrams: u64,
-        /// Why.
-        refused_as: RefusedAs,
-        /// In whose name they came, where they bear one.
-        sender: Option<Member>,
-        /// The same in words.
-        reason: String,
-    },
-    /// Operators can call, by mutual TLS.
-    ChannelOpened {
-        /// Where.
-        address: SocketAddr,
-        /// The common names of those who may command.
-        operators: Vec<String>,
-    },
-    /// Operators cannot call; it is tried again.
-    ChannelFailed {
-        /// Why.
-        reason: String,
-    },
-    /// What it keeps for the time after a power failure is not written to its disk.
-    RetainFailed {
-        /// Why.
-        reason: String,
-    },
-    /// That is written again.
-    RetainRegained,
-    /// A file that it has kept is not used, or not to its end.
-    RetainedRefused {
-        /// The file.
-        file: String,
-        /// Why.
-        reason: String,
-    },
-    /// Frames of two lives of a member arrive in turn: two processes run with its keys, for example one of an old disk image.
-    DuplicateFound {
-        /// Whose keys they have.
-        member: Member,
-    },
-    /// The earlier life of the member has sent nothing for some seconds.
-    DuplicateGone {
-        /// Whose keys they had.
-        member: Member,
-    },
-    /// The others do not receive this member, so it goes on in a new life.
-    NewLife {
-        /// Its number.
-        life: u32,
-    },
-    /// The others do not receive this member, and it cannot go on in a new life.
-    NoNewLife {
-        /// Why.
-        reason: String,
-    },
-    /// Connections to the operators' port were closed at once, since the last such record: there were too many, in all or from one
-    /// address.
-    RefusedConnections {
-        /// How many.
-        connections: u64,
-        /// Where the last one came from.
-        address: IpAddr,
-    },
-    /// The TLS listener refused certificates of callers, since the last such record.
-    RefusedCertificates {
-        /// How many.
-        connections: u64,
-        /// Why the last one; with the time of this machine and the end of the validity, where that is the reason.
-        reason: String,
-    },
-    /// Writes of operators were refused at once since the last such record: more came in a second than this member takes.
-    RefusedWrites {
-        /// Their number.
-        writes: u64,
-    },
-    /// An order of a person to this member was refused before it was sent: it names something that does not exist, or the person has no right to it.
-    OrderRefused(RefusedOrder),
-    /// The member said frames that break a bound of the wire, since the last such record: a mistake in this program.
-    UnsendableFrames {
-        /// How many.
-        frames: u64,
-        /// Which bound, for the last one.
-        reason: String,
-    },
-    /// No configured peer was received for so long, or one that is connected was not, that the link was closed and opened anew.
-    LinkReopened {
-        /// How long, in milliseconds.
-        silence_ms: u64,
-        /// The one that is connected and was not received; none where no peer was.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        peer: Option<Member>,
-    },
-    /// The same, and the link could not be opened: no frame is sent or received. It is tried again.
-    LinkFailed {
-        /// How long, in milliseconds.
-        silence_ms: u64,
-        /// The one that is connected and was not received; none where no peer was.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        peer: Option<Member>,
-        /// Why it cannot be opened.
-        reason: String,
-    },
-    /// The equipment of a remote I/O cannot be seen any more.
-    FieldLost {
-        /// Why.
-        reason: String,
-    },
-    /// The equipment can be seen again.
-    FieldRegained,
-    /// The equipment of a remote I/O holds other outputs than the remote I/O wrote, again and again: another master writes them too.
-    FieldContested,
-    /// The equipment holds what the remote I/O wrote.
-    FieldUncontested,
-    /// The wall clock beside the monotonic time of the record, once in ten minutes.
-    WallClock {
-        /// Nanoseconds since 1970-01-01 UTC.
-        unix_ns: u64,
-    },
-    /// The wall clock was set.
-    WallClockStepped {
-        /// Nanoseconds since 1970-01-01 UTC, after it.
-        unix_ns: u64,
-        /// By how much, in nanoseconds; negative for one that was set back.
-        step_ns: i64,
-    },
-    /// Records were lost because the journal was too slow, since the last such record.
-    JournalLost {
-        /// How many.
-        records: u64,
-    },
-    /// A line was read that is no command.
-    UnknownCommand {
-        /// The line.
-        line: String,
-    },
-    /// The member ends as it was told to.
-    Stopped(Summary),
 }
 
 /// Takes what is reported; never blocks.
@@ -362,6 +187,9 @@ mod tests {
     use understudy_wire::{ProgramId, StationId};
 
     use super::*;
+    use crate::host::Summary;
+    use crate::link::LinkKind;
+    use crate::rights::Rights;
 
     /// Writes only after it was let.
     struct Held {

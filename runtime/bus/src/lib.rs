@@ -18,6 +18,7 @@ mod error;
 mod field;
 mod guard;
 mod host;
+mod host_event;
 mod interruption;
 mod journal;
 mod link;
@@ -55,9 +56,10 @@ pub use error::BusError;
 pub use field::{FieldDriver, Look, NoField, SimulatedField};
 pub use guard::{Guard, Keys, NewLife};
 pub use host::{Host, Summary};
+pub use host_event::HostEvent;
 pub use interruption::interruption;
 pub use journal::{
-    EventSink, HostEvent, JOURNAL_RECORDS, JOURNAL_VERSION, Journal, JournalSender, Noted, Record,
+    EventSink, JOURNAL_RECORDS, JOURNAL_VERSION, Journal, JournalSender, Noted, Record,
 };
 pub use link::{Link, LinkCounters, LinkKind, NoSuchLink, Reopening};
 pub use log::{Line, Log, LogFilter, LogFormat, LogSettings, log_environment};

@@ -16,9 +16,7 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{Builder, JoinHandle};
 
-use understudy_wire::{
-    ClusterHash, Moment, Note, ProgramHash, ProgramId, Retained, RetainedError, RetainedRun,
-};
+use understudy_wire::{ClusterHash, Moment, Note, ProgramHash, ProgramId, Retained, RetainedRun};
 
 use crate::error::BusError;
 
@@ -123,10 +121,7 @@ impl RetainedFiles {
             };
             let (records, error) = Retained::read(&bytes);
             let (found, newest, foreign) = of_file(records);
-            // A process that is killed leaves a torn record behind its last one: the state before it is complete.
-            let damage =
-                error.filter(|error| newest.is_none() || !matches!(error, RetainedError::Torn(_)));
-            let problem = foreign.or(damage.map(|error| error.to_string()));
+            let problem = foreign.or(error.map(|error| error.to_string()));
             all.extend(found);
             files.push(FoundFile { path, newest, problem });
         }
@@ -325,3 +320,6 @@ impl Writer {
         Ok(is_whole)
     }
 }
+
+#[cfg(test)]
+mod tests;

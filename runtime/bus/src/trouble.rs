@@ -9,7 +9,7 @@ use std::time::Duration;
 use understudy_wire::{Member, Time};
 
 use crate::guard::Refused;
-use crate::journal::HostEvent;
+use crate::host_event::HostEvent;
 use crate::refused_as::RefusedAs;
 
 /// Kinds and senders told apart in one report.

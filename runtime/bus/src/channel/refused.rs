@@ -7,7 +7,8 @@ use understudy_wire::Time;
 use zenoh::query::Queryable;
 
 use super::{Channel, DONE, REFUSED_KEY, answer};
-use crate::journal::{EventSink, HostEvent, Noted};
+use crate::host_event::HostEvent;
+use crate::journal::{EventSink, Noted};
 use crate::refused_certificates::{self, RefusedCertificates};
 use crate::refused_orders::{RefusedOrder, RefusedOrders};
 

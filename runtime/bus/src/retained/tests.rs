@@ -1,0 +1,264 @@
+use std::fs;
+use std::time::{Duration, Instant};
+
+use proptest::prelude::*;
+use understudy_testing::Folder;
+use understudy_wire::{
+    Cycle, Digest, Epoch, Image, Lineage, Recalled, RetainedState, RetainedStep, SamplesReceived,
+    StationSet,
+};
+
+use super::*;
+
+const CLUSTER: ClusterHash = ClusterHash(1);
+const HASH: understudy_wire::ProgramHash = understudy_wire::ProgramHash(2);
+const PROGRAM: ProgramId = ProgramId(0);
+
+fn moment(cycle: u64) -> Moment {
+    Moment { epoch: Epoch(1), cycle: Cycle(cycle) }
+}
+
+fn inputs(cycle: u64) -> Image {
+    Image::from_words(64, &[cycle]).expect("64 bits")
+}
+
+/// The lineage after the sample of `cycle`.
+fn lineage(cycle: u64) -> Lineage {
+    (1..=cycle).fold(Lineage(7), |lineage, cycle| lineage.after(&inputs(cycle)))
+}
+
+fn state(cycle: u64) -> Retained {
+    Retained::State(RetainedState {
+        cluster: CLUSTER,
+        program: PROGRAM,
+        hash: HASH,
+        born: moment(0),
+        lineage: lineage(cycle),
+        stepped: moment(cycle),
+        digest: Digest(0),
+        state: inputs(cycle),
+    })
+}
+
+fn step(cycle: u64) -> Retained {
+    Retained::Step(RetainedStep {
+        program: PROGRAM,
+        stepped: moment(cycle),
+        inputs: inputs(cycle),
+        after: lineage(cycle),
+    })
+}
+
+fn note(cycle: u64) -> Retained {
+    Retained::Note(Note {
+        cluster: CLUSTER,
+        configuration: understudy_wire::ConfigurationHash(3),
+        hash: HASH,
+        lineage: lineage(cycle),
+        recalled: Recalled {
+            program: PROGRAM,
+            sampled: moment(cycle),
+            received: SamplesReceived::Later,
+            applied: Some(moment(cycle)),
+            excluded: StationSet::EMPTY,
+            accounted_for: StationSet::EMPTY,
+            writes: Default::default(),
+            pulses: Default::default(),
+            inputs: inputs(cycle),
+        },
+    })
+}
+
+/// Keeps a state in every tenth cycle and the steps in between, from `first` to `last`.
+fn keep(files: &RetainedFiles, first: u64, last: u64) {
+    let retainer = Retainer::start(vec![(Some(PROGRAM), files.clone())]).expect("threads");
+    for cycle in first..=last {
+        retainer.keep(if cycle == first || cycle % 10 == 0 { state(cycle) } else { step(cycle) });
+    }
+    retainer.finish();
+}
+
+/// The newest cycle that is read.
+fn newest(files: &RetainedFiles) -> Option<u64> {
+    let (runs, _) = files.runs(CLUSTER, HASH);
+    runs.iter().map(|run| run.stepped().cycle.0).max()
+}
+
+#[test]
+fn the_newest_cycle_comes_back_over_several_lives() {
+    let folder = Folder::new("retained-lives");
+    let files = RetainedFiles::new(&folder, "robot.robot".to_owned());
+    assert_eq!(newest(&files), None);
+    let mut last = 0;
+    for life in [1, 5, 9, 10, 11, 25, 31] {
+        keep(&files, last + 1, last + life);
+        last += life;
+        assert_eq!(newest(&files), Some(last));
+    }
+    let (_, found) = files.runs(CLUSTER, HASH);
+    assert!(found.iter().all(|file| file.problem.is_none()), "{found:?}");
+}
+
+#[test]
+fn the_newest_note_comes_back() {
+    let folder = Folder::new("retained-notes");
+    let files = RetainedFiles::new(&folder, "robot-io".to_owned());
+    let retainer = Retainer::start(vec![(None, files.clone())]).expect("threads");
+    let last = u64::from(NOTES_IN_A_FILE) * 2 + 7;
+    let mut cycle = 0;
+    while cycle < last {
+        // The queue is shorter than the number of notes.
+        for _ in 0..WAITING_RECORDS.min((last - cycle) as usize) / 2 + 1 {
+            cycle += 1;
+            retainer.keep(Retained::Note(match note(1) {
+                Retained::Note(mut of) => {
+                    of.recalled.sampled = moment(cycle);
+                    of
+                }
+                _ => unreachable!("a note"),
+            }));
+        }
+        while newest_note(files.notes(CLUSTER).0).map(|note| note.applied()) != Some(moment(cycle))
+        {
+            std::thread::yield_now();
+        }
+    }
+    retainer.finish();
+    let (notes, found) = files.notes(CLUSTER);
+    assert_eq!(newest_note(notes).map(|note| note.applied()), Some(moment(cycle)));
+    assert!(found.iter().all(|file| file.problem.is_none()), "{found:?}");
+    let (foreign, found) = files.notes(ClusterHash(9));
+    assert!(foreign.is_empty() && found.iter().all(|file| file.problem.is_some()), "{found:?}");
+}
+
+/// A folder that cannot be written is reported, and so is that it can be again; nothing ends.
+#[test]
+fn a_disk_that_takes_nothing_is_reported_until_it_does() {
+    let folder = Folder::new("retained-full");
+    let path = folder.join("below");
+    fs::write(&path, "a file in place of the folder").expect("written");
+    let files = RetainedFiles::new(&path, "robot.robot".to_owned());
+    let mut retainer = Retainer::start(vec![(Some(PROGRAM), files.clone())]).expect("threads");
+    let wait = |retainer: &mut Retainer, cycle: u64| {
+        let patience = Instant::now() + Duration::from_secs(60);
+        retainer.keep(state(cycle));
+        loop {
+            if let Some(change) = retainer.take_change() {
+                return change;
+            }
+            assert!(Instant::now() < patience, "no change");
+            std::thread::yield_now();
+        }
+    };
+    let reason = wait(&mut retainer, 1).expect("a reason");
+    assert!(reason.contains("below"), "{reason}");
+    fs::remove_file(&path).expect("removed");
+    assert_eq!(wait(&mut retainer, 2), None);
+    retainer.keep(step(3));
+    retainer.finish();
+    assert_eq!(newest(&files), Some(3));
+}
+
+/// What happens to a file while the power is off.
+#[derive(Debug, Clone)]
+enum Damage {
+    None,
+    Missing,
+    /// It ends at this share of its bytes.
+    Torn(f64),
+    /// A bit flips at this share of its bytes.
+    Flipped(f64),
+    /// It is of another program.
+    Foreign,
+}
+
+fn damages() -> impl Strategy<Value = Damage> {
+    prop_oneof![
+        Just(Damage::None),
+        Just(Damage::Missing),
+        (0.0f64..1.0).prop_map(Damage::Torn),
+        (0.0f64..1.0).prop_map(Damage::Flipped),
+        Just(Damage::Foreign),
+    ]
+}
+
+/// Damages a file; answers with the newest cycle that is intact in it, for these records.
+fn damage(path: &Path, damage: &Damage) -> Option<u64> {
+    let bytes = fs::read(path).ok()?;
+    let (records, _) = Retained::read(&bytes);
+    let cycles: Vec<u64> = records
+        .iter()
+        .map(|record| match record {
+            Retained::State(state) => state.stepped.cycle.0,
+            Retained::Step(step) => step.stepped.cycle.0,
+            Retained::Note(_) => 0,
+        })
+        .collect();
+    let mut ends = vec![0];
+    for record in &records {
+        let mut one = Vec::new();
+        record.write(&mut one);
+        ends.push(ends[ends.len() - 1] + one.len());
+    }
+    let intact_before =
+        |byte: usize| cycles[..ends.iter().filter(|end| **end <= byte).count() - 1].last().copied();
+    let at = |share: f64| ((bytes.len() as f64 * share) as usize).min(bytes.len() - 1);
+    match damage {
+        Damage::None => cycles.last().copied(),
+        Damage::Missing => {
+            fs::remove_file(path).expect("removed");
+            None
+        }
+        Damage::Torn(share) => {
+            fs::write(path, &bytes[..at(*share)]).expect("written");
+            intact_before(at(*share))
+        }
+        Damage::Flipped(share) => {
+            let mut flipped = bytes.clone();
+            flipped[at(*share)] ^= 0x04;
+            fs::write(path, &flipped).expect("written");
+            intact_before(at(*share))
+        }
+        Damage::Foreign => {
+            let mut foreign = Vec::new();
+            if let Retained::State(of) = state(1) {
+                Retained::State(RetainedState { hash: understudy_wire::ProgramHash(99), ..of })
+                    .write(&mut foreign);
+            }
+            fs::write(path, &foreign).expect("written");
+            None
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
+
+    /// Whatever happens to the files: the newest intact cycle is read, none that never was, and the next life goes on.
+    #[test]
+    fn the_newest_intact_cycle_is_read(last in 1u64..60, both in prop::array::uniform2(damages())) {
+        let folder = Folder::new("retained-damaged");
+        let files = RetainedFiles::new(&folder, "robot.robot".to_owned());
+        keep(&files, 1, last);
+        let intact = files.paths().iter().zip(&both).filter_map(|(path, of)| damage(path, of)).max();
+        let (runs, found) = files.runs(CLUSTER, HASH);
+        for run in &runs {
+            let cycle = run.stepped().cycle.0;
+            prop_assert_eq!(run.steps.last().map_or(run.state.lineage, |step| step.after), lineage(cycle));
+        }
+        prop_assert_eq!(newest(&files), intact);
+        // Every file that is not used to its end is named.
+        for (path, of) in files.paths().iter().zip(&both) {
+            let file = found.iter().find(|file| file.path == *path);
+            let told = file.is_some_and(|file| file.problem.is_some());
+            match of {
+                Damage::Foreign | Damage::Flipped(_) => prop_assert!(told || file.is_none()),
+                Damage::None | Damage::Missing => prop_assert!(!told, "{:?}", file),
+                // One that ends between two records has an end like any other.
+                Damage::Torn(_) => {}
+            }
+        }
+        keep(&files, last + 1, last + 3);
+        prop_assert_eq!(newest(&files), Some(last + 3));
+    }
+}
