@@ -22,6 +22,7 @@ use understudy_supervisor::read_ads;
 use understudy_text::duration;
 use understudy_text::{Diagnostic, Report, Severity, has_errors};
 use understudy_typed::{Cost, Program};
+use understudy_wire::ProgramId;
 
 use crate::answer::{Answer, Failure, Status};
 use crate::files::{self, ProgramText, read_cluster};
@@ -288,14 +289,15 @@ impl Found<'_> {
     fn look(&mut self, looking: &Looking, cluster: &Cluster, reports: &mut [Report]) {
         let period = cluster.agreement().schedule.period();
         let mut seen = Vec::new();
-        for controller in cluster.controllers() {
+        for (program, controller) in (0..).map(ProgramId).zip(cluster.controllers()) {
             let of_it = |report: &&mut Report| Path::new(&report.name).ends_with(&controller.file);
             let Some(report) = reports.iter_mut().find(of_it) else {
                 continue;
             };
             let known = seen.contains(&report.name) || has_errors(&report.diagnostics);
             seen.push(report.name.clone());
-            let retained = Retained::of(controller.code.typed(), controller.ladder().is_some());
+            let retained = Retained::of(controller.code.typed(), controller.ladder().is_some())
+                .map(|retained| retained.writing(cluster.retained_bytes_a_day(program)));
             self.retained.extend(retained.map(|retained| (report.name.clone(), retained)));
             if controller.ladder().is_none() {
                 self.sizes.push((report.name.clone(), Size::of(controller.code.typed())));

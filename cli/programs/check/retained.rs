@@ -17,6 +17,9 @@ pub(super) struct Retained {
     kept_bits: usize,
     /// Bits of the state.
     state_bits: usize,
+    /// Bytes that each of its stations writes to its disk in a day, at most; only of the program of a cluster, whose period is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bytes_a_day: Option<u64>,
 }
 
 impl Retained {
@@ -33,7 +36,17 @@ impl Retained {
             false => (program.retentive_mask(), program.state as usize * 64),
         };
         let kept_bits = mask.iter().map(|word| word.count_ones() as usize).sum();
-        Some(Self { variables: program.retentive_names(), kept_bits, state_bits })
+        Some(Self {
+            variables: program.retentive_names(),
+            kept_bits,
+            state_bits,
+            bytes_a_day: None,
+        })
+    }
+
+    /// With what its stations write in a day.
+    pub(super) fn writing(self, bytes_a_day: Option<u64>) -> Self {
+        Self { bytes_a_day, ..self }
     }
 
     pub(super) fn text(&self) -> String {
@@ -44,6 +57,9 @@ impl Retained {
             more => format!(" and {more} more"),
         };
         let (names, kept) = (names.join(", "), self.kept_bits);
-        format!("; retentive: {names}{more}, {kept} of {} state bits", self.state_bits)
+        let written = self.bytes_a_day.map_or_else(String::new, |bytes| {
+            format!(", {:.2} GB a day to the disk of each station", bytes as f64 / 1e9)
+        });
+        format!("; retentive: {names}{more}, {kept} of {} state bits{written}", self.state_bits)
     }
 }

@@ -234,17 +234,6 @@ impl Cluster {
         self.link
     }
 
-    /// Whether a program of it has retentive variables.
-    pub fn is_retentive(&self) -> bool {
-        self.programs.iter().any(|program| program.executable.is_retentive())
-    }
-
-    /// Steps of a program with retentive variables after which a station writes its whole state to disk.
-    pub fn retain_every(&self) -> u32 {
-        let period = self.agreement.schedule.period().as_nanos().max(1);
-        u32::try_from(self.retain_every.as_nanos().div_ceil(period)).unwrap_or(u32::MAX).max(1)
-    }
-
     /// The first multicast group of its frames, where the network has multicast; only for UDP.
     pub fn multicast(&self) -> Option<SocketAddrV4> {
         self.multicast.filter(|_| self.link == Link::Udp)

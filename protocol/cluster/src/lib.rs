@@ -22,6 +22,7 @@ mod notify;
 mod place;
 mod plant_file;
 mod read;
+mod retention;
 mod schema;
 mod source;
 mod template;
