@@ -238,7 +238,7 @@ mod tests {
     }
 
     fn step(before: Lineage, cycle: u64) -> RetainedStep {
-        let inputs = Image::from_bits([cycle % 2 == 0, true]);
+        let inputs = Image::from_bits([cycle.is_multiple_of(2), true]);
         RetainedStep {
             program: ProgramId(2),
             stepped: Moment { epoch: Epoch(4), cycle: Cycle(cycle) },
