@@ -279,18 +279,18 @@ impl<'a> Comparison<'a> {
 
     fn retained(&mut self) {
         let (program, again) = (self.program, self.again);
-        let shown = |name: &Name| format!("`{name}`");
-        let is_kept =
-            |name: &&Name| self.names.get(name.as_str()).is_some_and(|it| again.retains(it));
-        let lost = program.retained.iter().filter(|name| !is_kept(name));
-        let lost: Vec<String> = lost.map(shown).collect();
-        let kept: HashSet<&str> = program
-            .retained
-            .iter()
-            .filter_map(|name| Some(self.names.get(name.as_str())?.as_str()))
-            .collect();
-        let more = again.retained.iter().filter(|name| !kept.contains(name.as_str()));
-        let more: Vec<String> = more.map(shown).collect();
+        let found: HashSet<&str> = again.retained.iter().map(Name::as_str).collect();
+        let mut wanted = HashSet::new();
+        let mut lost = Vec::new();
+        for name in &program.retained {
+            let written = self.names.get(name.as_str()).map_or("", String::as_str);
+            wanted.insert(written);
+            if !found.contains(written) {
+                lost.push(format!("`{name}`"));
+            }
+        }
+        let more = again.retained.iter().filter(|name| !wanted.contains(name.as_str()));
+        let more: Vec<String> = more.map(|name| format!("`{name}`")).collect();
         self.lost("does not keep that these are retentive", &lost, "");
         self.lost("makes these retentive", &more, "");
     }

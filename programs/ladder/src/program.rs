@@ -210,11 +210,6 @@ impl Program {
         self.rungs.push(Rung { title: Some(title.to_owned()), network, coils, ..Rung::default() });
     }
 
-    /// Whether a warm start keeps an output, a memory bit or a block.
-    pub fn retains(&self, name: &str) -> bool {
-        self.retained.iter().any(|kept| kept.as_str() == name)
-    }
-
     /// All blocks, in the order of the scan.
     pub fn blocks(&self) -> Vec<&Block> {
         let mut blocks = Vec::new();

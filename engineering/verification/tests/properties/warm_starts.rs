@@ -1,11 +1,13 @@
 //! A proof holds for a program that is restarted warm in any scans.
 
+use std::collections::{BTreeSet, HashSet};
 use std::time::Duration;
 
-use understudy_bits::POWER_RETURNS;
+use understudy_bits::{Member, POWER_RETURNS, Source};
 use understudy_ladder::{Program, parse};
 use understudy_logic::{Scan, Scratch};
 use understudy_structured_text::{Options, lower, parse as parse_text};
+use understudy_testing::random::random_program;
 use understudy_verification::numbers::{self, Model};
 use understudy_verification::program::{Answer, Bounds, Lamp, OutputFinding, Subject};
 use understudy_verification::property::{Asked, Property, read, read_one};
@@ -110,4 +112,99 @@ fn numbers_of_a_mixed_state_are_found() {
     // Both kept, or neither: no scan sees a difference.
     let (both, _) = check(&text.replace("END_VAR VAR m", "m"));
     assert!(matches!(both, numbers::Answer::Holds(_)), "{both:?}");
+}
+
+/// Each program of a cluster restarts by itself; a sample that a remote I/O keeps is not one of a program.
+#[test]
+fn programs_of_a_cluster_restart_one_by_one() {
+    let text = "PROGRAM p VAR_INPUT a : BOOL; END_VAR VAR_OUTPUT y : BOOL; END_VAR
+        VAR RETAIN kept : BOOL; END_VAR VAR lost : BOOL; END_VAR
+        kept := kept OR a; lost := lost OR a; y := kept AND NOT lost; END_PROGRAM";
+    let (file, _) = parse_text(text);
+    let program = lower(&file, &Options { text, ..Options::default() }).program.expect("a program");
+    let member = |name: &str| {
+        let sources = vec![Source::Any(None)];
+        Member { name: name.to_owned(), program: &program, sources }
+    };
+    let members = [member("one"), member("two")];
+    let model = Model::of_cluster("cell", &members, &Asked::default()).expect("followed");
+    let restarting: Vec<&str> = model.restarting().collect();
+    assert_eq!(restarting, ["one.power.returns", "two.power.returns"]);
+    for (text, holds) in
+        [("never one.y", false), ("AG (one.y -> !two.y)", false), ("never one.y and !one.y", true)]
+    {
+        let formula = model.resolve(&property(text)).expect("names");
+        let answer = model.check(&[formula], &[], Bounds::default(), &mut || {}).remove(0);
+        match holds {
+            true => assert!(matches!(answer, numbers::Answer::Holds(_)), "{text}: {answer:?}"),
+            false => {
+                assert!(matches!(answer, numbers::Answer::Fails(Some(_))), "{text}: {answer:?}")
+            }
+        }
+    }
+}
+
+/// Outputs of all scans of all runs with warm starts: from every state that the circuit of the stations reaches, step by step. Nothing where there are
+/// many.
+fn reached(ladder: &Program, period: Duration) -> Option<BTreeSet<u64>> {
+    let typed = ladder.typed(period).expect("a sound program");
+    let exact = understudy_ladder::circuit(&typed).expect("a circuit");
+    let mask = exact.layout.retentive_mask(&typed);
+    let scan = Scan::new(&exact.circuit);
+    let mut scratch = Scratch::default();
+    let mut outputs = vec![0_u64; scan.output_count().div_ceil(64)];
+    let mut seen = HashSet::from([scan.initial().to_vec()]);
+    let mut waiting = vec![scan.initial().to_vec()];
+    let mut found = BTreeSet::new();
+    while let Some(state) = waiting.pop() {
+        let restarted = scan.initial().iter().zip(&mask).zip(&state);
+        let restarted = restarted.map(|((initial, mask), kept)| initial & !mask | kept & mask);
+        for begins in [restarted.collect(), state.clone()] {
+            for inputs in 0..1_u64 << scan.input_count() {
+                let mut next: Vec<u64> = begins.clone();
+                scan.step(&mut scratch, &mut next, &[inputs], &mut outputs);
+                found.insert(outputs[0]);
+                if seen.len() > 3_000 {
+                    return None;
+                }
+                if seen.insert(next.clone()) {
+                    waiting.push(next);
+                }
+            }
+        }
+    }
+    Some(found)
+}
+
+#[test]
+fn what_holds_in_every_scan_is_what_no_state_breaks() {
+    let (mut compared, mut broken_by_restarts) = (0, 0);
+    for seed in 0..200 {
+        let ladder = random_program(seed, 4);
+        let period = Duration::from_millis(400);
+        let Some(wanted) = reached(&ladder, period) else { continue };
+        let plain = Program { retained: Vec::new(), ..ladder.clone() };
+        let without = reached(&plain, period);
+        let subject = Subject::new(&ladder, period, &Asked::default()).expect("a circuit");
+        let outputs = ladder.outputs.iter().enumerate();
+        for (one, name) in outputs.clone() {
+            for (other, without) in outputs.clone() {
+                // An output that is on, or is on while another one is not.
+                let text = match one == other {
+                    true => format!("never {}", name.name),
+                    false => format!("never {} and !{}", name.name, without.name),
+                };
+                let is_so =
+                    |word: &u64| word >> one & 1 == 1 && (one == other || word >> other & 1 == 0);
+                let answer = answer(&subject, &text);
+                let holds = matches!(answer, Answer::Holds(_));
+                let what = understudy_ladder::print(&ladder);
+                assert!(holds || matches!(answer, Answer::Fails(Some(_))), "{answer:?}\n{what}");
+                assert_eq!(holds, !wanted.iter().any(is_so), "{text}\n{what}");
+                compared += 1;
+            }
+        }
+        broken_by_restarts += usize::from(without.is_some_and(|without| without != wanted));
+    }
+    assert!(compared > 60 && broken_by_restarts > 0, "{compared}, {broken_by_restarts}");
 }

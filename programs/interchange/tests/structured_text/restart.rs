@@ -186,20 +186,19 @@ fn times_go_on_over_a_restart() {
       VAR_INPUT a, b : BOOL; END_VAR
       VAR_OUTPUT y, z, w, q, r : BOOL; END_VAR
       VAR RETAIN kept : TON; since : TIME; n : INT (0..3); END_VAR
-      VAR lost : TON; begun : TIME; m : INT (0..3); end; END_VAR
+      VAR lost : TON; begun : TIME; m : INT (0..3); END_VAR
       kept(IN := a, PT := T#1s); lost(IN := a, PT := T#1s);
       y := kept.Q; z := lost.Q;
       IF b THEN since := TIME(); begun := TIME(); END_IF;
       w := TIME() - since >= T#700ms; q := TIME() - begun >= T#500ms;
       r := n > m;
       IF a THEN n := (n + 1) MOD 4; m := (m + 1) MOD 4; END_IF;
-    END_PROGRAM"
-        .replace(" end;", "");
-    let (file, _) = parse(&text);
-    let typed = typed(&text, &file).expect("a program");
+    END_PROGRAM";
+    let (file, _) = parse(text);
+    let typed = typed(text, &file).expect("a program");
     assert_eq!(typed.retentive_names(), ["kept", "since", "n"]);
     let exact = Exact::new(&typed, RESTARTING).expect("a circuit");
     for seed in 0..20 {
-        assert!(check(&text, &exact.circuit, &typed, seed) > 5);
+        assert!(check(text, &exact.circuit, &typed, seed) > 5);
     }
 }
