@@ -101,7 +101,7 @@ pub struct RegisterMap {
 }
 
 /// The numbers of [`StationState::ALL`].
-const STATION_STATES: &str = "0 not-started, 1 publishing, 2 not-received, 3 flagged, 4 joining, 5 shadow-mode, 6 refused, 7 suspended, 8 killed, 9 ended";
+const STATION_STATES: &str = "0 not-started, 1 publishing, 2 not-received, 3 flagged, 4 joining, 5 shadow-mode, 6 refused, 7 suspended, 8 killed, 9 ended, 10 standby";
 
 /// Meaning of an input.
 const INPUT: &str = "input, as last sampled";

@@ -46,11 +46,13 @@ pub enum StationState {
     Killed,
     /// Its process ended unexpectedly.
     Ended,
+    /// The slot of a spare, which is empty.
+    Standby,
 }
 
 impl StationState {
     /// Every state, by its number in the register map of Modbus.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::NotStarted,
         Self::Publishing,
         Self::NotReceived,
@@ -61,6 +63,7 @@ impl StationState {
         Self::Suspended,
         Self::Killed,
         Self::Ended,
+        Self::Standby,
     ];
 
     /// The state as JSON, labels of metrics and the page write it.
@@ -76,6 +79,17 @@ impl StationState {
             Self::Suspended => "suspended",
             Self::Killed => "killed",
             Self::Ended => "ended",
+            Self::Standby => "standby",
+        }
+    }
+
+    /// The state of the slot of a spare: empty is as it should be.
+    pub(crate) fn of_slot(self) -> Self {
+        match self {
+            Self::NotStarted | Self::NotReceived | Self::Flagged | Self::Killed | Self::Ended => {
+                Self::Standby
+            }
+            other => other,
         }
     }
 

@@ -18,7 +18,7 @@ const PARTS = ["controller", "remote I/O", "outputs", "protection"];
 
 // States of members that need no words.
 const SOUND = new Set(["publishing", "serving", "moving"]);
-const CHANGING = new Set(["joining", "shadow-mode", "not-started", "listening", "awaits-release"]);
+const CHANGING = new Set(["joining", "shadow-mode", "not-started", "standby", "listening", "awaits-release"]);
 
 // Levels of a part, the worst first.
 const LEVELS = ["bad", "degraded", "changing", "normal"];

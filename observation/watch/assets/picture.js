@@ -15,6 +15,7 @@ export const STATES = {
   suspended: { sign: "‖", words: "suspended" },
   killed: { sign: "✕", words: "killed" },
   ended: { sign: "✕", words: "ended" },
+  standby: { sign: "…", words: "standby" },
   "not-started": { sign: "…", words: "not started" },
   "state-lost": { sign: "✗", words: "state lost" },
   "awaits-release": { sign: "⚠", words: "awaits release" },

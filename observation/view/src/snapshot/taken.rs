@@ -202,6 +202,8 @@ impl Picture<'_> {
         let own = self.standing.station(station).cloned().unwrap_or_default();
         let state = model.station_state_in(self.standing, station, self.cycle);
         let schedule = &model.cluster().agreement().schedule;
+        let is_slot = schedule.spare_slots().contains(station);
+        let state = if is_slot { state.of_slot() } else { state };
         let covers = match (state, self.cycle) {
             (StationState::Publishing, Some(cycle)) => model.covers(station, cycle),
             _ => ProgramSet::EMPTY,
@@ -213,7 +215,7 @@ impl Picture<'_> {
             rank: station.0,
             understudy: schedule.is_understudy(station),
             state,
-            flagged: own.is_flagged(),
+            flagged: own.is_flagged() && state != StationState::Standby,
             publishes_for: self.program_names(covers),
             excluded_from: self.program_names(self.standing.excluded_from(station)),
             done: own.done.map(|(what, cycle)| format!("{what} in cycle {cycle}")),

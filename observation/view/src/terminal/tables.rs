@@ -28,7 +28,10 @@ pub(super) fn stations(snapshot: &Snapshot, above: usize) -> Table<'static> {
     let rows = rows.map(|station| {
         let colour = match station.state {
             StationState::Publishing => GOOD,
-            StationState::Joining | StationState::ShadowMode | StationState::NotStarted => MIDDLING,
+            StationState::Joining
+            | StationState::ShadowMode
+            | StationState::NotStarted
+            | StationState::Standby => MIDDLING,
             _ => BAD,
         };
         let mut state = station.state.text().to_owned();

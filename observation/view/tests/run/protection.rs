@@ -59,6 +59,8 @@ fn a_spare_that_is_awake_protects_and_one_that_is_away_is_no_alarm() {
     records.iter().for_each(|record| model.note(record));
     let of_the_spare: Vec<&Alarm> = model.alarms().filter(|it| it.name == "spare").collect();
     assert!(of_the_spare.is_empty(), "{of_the_spare:?}");
+    let spare = &model.snapshot().stations[3];
+    assert_eq!((spare.state, spare.flagged), (StationState::Standby, false));
     insta::assert_snapshot!("spare", changes(cell, &records).join("\n"));
 }
 

@@ -28,7 +28,7 @@ pub(super) const fn of_state(state: StationState) -> Sign {
         StationState::NotReceived => sign("○", AMBER, "2 3"),
         StationState::Flagged => sign("⚑", AMBER, "2 3"),
         StationState::Suspended => sign("‖", AMBER, "2 3"),
-        StationState::NotStarted => sign("…", BLUE, "10 3"),
+        StationState::NotStarted | StationState::Standby => sign("…", BLUE, "10 3"),
         StationState::Joining => sign("↻", BLUE, "10 3"),
         StationState::ShadowMode => sign("◐", BLUE, "10 3"),
     }
