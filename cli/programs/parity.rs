@@ -58,9 +58,16 @@ fn made(cluster: &Cluster, form: Form) -> Result<(String, Value), Answer> {
     let parity = files::parity_of(cluster, "parity")?;
     let circuit = parity.circuit();
     let text = match form {
-        Form::Ladder => print(&from_circuit(circuit)),
+        Form::Ladder => {
+            let note = not_retentive(cluster).map(|note| format!("-- {note}\n"));
+            note.unwrap_or_default() + &print(&from_circuit(circuit))
+        }
         // Addresses of the members belong to other PLCs and would collide here.
-        Form::St => circuit_as_structured_text(circuit, cluster.agreement().schedule.period()),
+        Form::St => {
+            let note = not_retentive(cluster).map(|note| format!("(* {note} *)\n"));
+            let period = cluster.agreement().schedule.period();
+            note.unwrap_or_default() + &circuit_as_structured_text(circuit, period)
+        }
         Form::Equations | Form::Json => {
             let equations = Equations::of(&parity);
             let value = serde_json::to_value(&equations).unwrap_or_default();
@@ -74,4 +81,17 @@ fn made(cluster: &Cluster, form: Form) -> Result<(String, Value), Answer> {
     };
     let result = json!({ "text": text });
     Ok((text, result))
+}
+
+/// What a reader of the text has to know where programs have retentive variables: the text keeps none of them.
+fn not_retentive(cluster: &Cluster) -> Option<String> {
+    let of = |controller: &understudy_cluster::Controller| {
+        let names = controller.code.typed().retentive_names();
+        (!names.is_empty()).then(|| format!("{} of {}", names.join(", "), controller.name))
+    };
+    let names: Vec<String> = cluster.controllers().iter().filter_map(of).collect();
+    let names = names.join("; ");
+    (!names.is_empty()).then(|| {
+        format!("Not retentive here, and initial after a power failure: {names}. An understudy of the cluster keeps them.")
+    })
 }
