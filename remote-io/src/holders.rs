@@ -6,7 +6,7 @@ use std::cmp::Reverse;
 
 use understudy_cycle::Agreement;
 use understudy_wire::{
-    Holding, Moment, ProgramId, Recalled, SamplesReceived, StationId, StationSet,
+    Epoch, Holding, Moment, ProgramId, Recalled, SamplesReceived, StationId, StationSet,
 };
 
 /// One entry for each station that can hold the program's state.
@@ -254,13 +254,15 @@ impl Holders {
             .filter_map(|entry| Some((entry.station, entry.retained.as_ref()?)))
     }
 
-    /// The retained state that was stepped last; the first of equals.
-    pub(crate) fn newest_retained(&self, excluded: StationSet) -> Option<(StationId, &Holding)> {
-        self.retained(excluded).reduce(
-            |best, other| {
-                if other.1.stepped > best.1.stepped { other } else { best }
-            },
-        )
+    /// The retained state that was stepped last; the first of equals. Those of `epoch`, where that is given, come before all others.
+    pub(crate) fn newest_retained(
+        &self,
+        excluded: StationSet,
+        epoch: Option<Epoch>,
+    ) -> Option<(StationId, &Holding)> {
+        let rank = |of: &Holding| (epoch == Some(of.stepped.epoch), of.stepped);
+        self.retained(excluded)
+            .reduce(|best, other| if rank(other.1) > rank(best.1) { other } else { best })
     }
 
     /// Stations that have retained the newest state, where they have different ones.

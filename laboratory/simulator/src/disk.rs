@@ -40,12 +40,18 @@ impl Disks {
         match (member, record) {
             (Member::Station(station), Retained::State(state)) => {
                 let runs = &mut self.stations[station.index()];
-                runs.retain(|run| run.state.program != state.program);
+                // Two files in turn: that of the state before stays as it is.
+                let of_it = |run: &RetainedRun| run.state.program == state.program;
+                if runs.iter().filter(|run| of_it(run)).count() == 2
+                    && let Some(oldest) = runs.iter().position(of_it)
+                {
+                    runs.remove(oldest);
+                }
                 runs.push(RetainedRun { state, steps: Vec::new() });
             }
             (Member::Station(station), Retained::Step(step)) => {
                 let runs = &mut self.stations[station.index()];
-                if let Some(run) = runs.iter_mut().find(|run| run.state.program == step.program) {
+                if let Some(run) = runs.iter_mut().rfind(|run| run.state.program == step.program) {
                     run.steps.push(step);
                 }
             }

@@ -213,3 +213,25 @@ proptest! {
         prop_assert!(seen.asked == 0 || seen.applied.len() > 100, "{:?}", seen);
     }
 }
+
+/// Every power failure sets the wall clocks back, so epochs are founded that are earlier than those before: an old state is none the newer for it.
+#[test]
+fn a_wall_clock_that_is_set_back_brings_no_old_state_back() {
+    let mut simulation = simulation("", 1);
+    let mut last = 0;
+    for epoch in [900, 500, 20] {
+        for (place, member) in (0..).zip(ALL) {
+            simulation.schedule(fault((100, 0.9), member, Action::Crash));
+            let action = match member {
+                Member::Station(_) => Action::RestartInEpoch { epoch: epoch + place },
+                _ => Action::Restart,
+            };
+            simulation.schedule(fault((140, 0.1), member, action));
+        }
+        let seen = run(&mut simulation, 250);
+        assert_eq!(simulation.violations(), [], "{epoch}");
+        assert!(!seen.goes_back() && seen.applied[0].0 > last, "{epoch}");
+        assert_eq!((seen.warm.as_slice(), seen.asked), (&[Some(0)][..], 0), "{epoch}");
+        last = seen.applied.last().expect("it ran").0;
+    }
+}

@@ -39,6 +39,8 @@ struct Keeps {
     at: Option<Lineage>,
     /// Steps since the last state.
     steps: u32,
+    /// Number of the next state.
+    number: u64,
 }
 
 impl Retaining {
@@ -68,10 +70,13 @@ impl Retaining {
             })
         } else {
             keeps.steps = 0;
+            let number = keeps.number;
+            keeps.number += 1;
             Retained::State(RetainedState {
                 cluster: keeps.cluster,
                 program: id,
                 hash: program.hash,
+                number,
                 born: held.born,
                 lineage: *lineage,
                 stepped: *stepped,
@@ -85,7 +90,7 @@ impl Retaining {
 impl Replica {
     /// From now on it keeps its state: whole after every `every` steps, and each step in between.
     pub(crate) fn retain(&mut self, cluster: ClusterHash, every: u32) {
-        self.retaining.keeps = Some(Keeps { cluster, every, at: None, steps: 0 });
+        self.retaining.keeps = Some(Keeps { cluster, every, at: None, steps: 0, number: 0 });
     }
 
     /// Takes what was kept before the power failed; of another program it takes nothing.
@@ -125,8 +130,11 @@ impl Replica {
             state.lineage = step.after;
             state.stepped = step.stepped;
         }
-        let newest = self.retaining.found.as_ref().map(|found| found.state.stepped);
-        if newest.is_none_or(|newest| newest < state.stepped) {
+        let Some(keeps) = &mut self.retaining.keeps else {
+            return;
+        };
+        if keeps.number <= kept.number {
+            keeps.number = kept.number.saturating_add(1);
             self.retaining.found = Some(Held { born: kept.born, state });
             self.retaining.before = before;
         }

@@ -43,6 +43,7 @@ impl Cluster {
             cluster: self.agreement.cluster,
             program,
             hash: compiled.hash,
+            number: u64::MAX,
             born: stepped,
             lineage,
             stepped,

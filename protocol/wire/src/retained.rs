@@ -51,6 +51,8 @@ pub struct RetainedState {
     pub program: ProgramId,
     /// Hash of that program.
     pub hash: ProgramHash,
+    /// Number of the state among those that this station has kept: a wall clock that is set back makes moments earlier, and this number no smaller.
+    pub number: u64,
     /// Moment of the start of that program.
     pub born: Moment,
     /// Lineage of the state.
@@ -85,6 +87,8 @@ pub struct Note {
     pub configuration: ConfigurationHash,
     /// Hash of its program.
     pub hash: ProgramHash,
+    /// Number of the note among those that this remote I/O has made.
+    pub number: u64,
     /// Lineage after the sample.
     pub lineage: Lineage,
     /// The sample, as stations recall it.
@@ -229,6 +233,7 @@ mod tests {
             cluster: ClusterHash(1),
             program: ProgramId(2),
             hash: ProgramHash(3),
+            number: 1,
             born: Moment { epoch: Epoch(4), cycle: Cycle(5) },
             lineage: Lineage(6),
             stepped: Moment { epoch: Epoch(4), cycle: Cycle(7) },

@@ -189,7 +189,7 @@ impl RemoteIo {
         let moment = self.moment();
         let owned = |(from, newest): (StationId, &Holding)| (from, *newest);
         let held = self.holders.newest().map(owned);
-        let retained = self.holders.newest_retained(StationSet::EMPTY).map(owned);
+        let retained = self.newest_retained().map(owned);
         let retained = retained.filter(|_| held.is_none() && self.settings.restart.is_some());
         let newest = held.or(retained);
         match (self.question, choice, newest) {

@@ -27,6 +27,8 @@ use crate::settings::{Release, Restart};
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub(super) struct Noting {
     is_on: bool,
+    /// Of the next note.
+    number: u64,
     /// Of an earlier life.
     found: Option<Note>,
     /// Of the newest sample, for the case that outputs of it are applied.
@@ -37,6 +39,7 @@ impl RemoteIo {
     /// Notes the newest sample whose outputs it applies ([`Output::Retain`]); `found` is what it has noted before it was started.
     #[must_use]
     pub fn noting(mut self, found: Option<Note>) -> Self {
+        let number = found.as_ref().map_or(0, |note| note.number.saturating_add(1));
         let cluster = self.settings.agreement.cluster;
         let width = self.settings.undriven.width();
         let found = found.filter(|note| {
@@ -44,7 +47,7 @@ impl RemoteIo {
         });
         let fits = |note: &Note| note.recalled.inputs.width() == width;
         let found = found.filter(|note| note.hash != self.settings.hash || fits(note));
-        self.noting = Noting { is_on: true, found, next: None };
+        self.noting = Noting { is_on: true, number, found, next: None };
         self
     }
 
@@ -83,6 +86,7 @@ impl RemoteIo {
             cluster: agreement.cluster,
             configuration: agreement.configuration,
             hash: self.settings.hash,
+            number: self.noting.number,
             lineage: after,
             recalled: Recalled {
                 program: self.settings.program,
@@ -101,8 +105,19 @@ impl RemoteIo {
     /// Outputs of the sample of `moment` are applied.
     pub(super) fn note_applied(&mut self, moment: Moment) {
         if let Some(note) = self.noting.next.take().filter(|note| note.applied() == moment) {
+            self.noting.number += 1;
             self.member.put(Output::Retain(Retained::Note(note)));
         }
+    }
+
+    /// The newest retained state, but for those of stations that were excluded, with its station.
+    pub(super) fn newest_retained(&self) -> Option<(StationId, &Holding)> {
+        let epoch = self.newest_applied().map(|applied| applied.epoch);
+        self.holders.newest_retained(self.noted_exclusions(), epoch)
+    }
+
+    fn noted_exclusions(&self) -> StationSet {
+        self.noted().map_or(StationSet::EMPTY, |note| note.recalled.excluded)
     }
 
     /// What the retained states of the stations allow, where no living station holds a state.
@@ -110,8 +125,8 @@ impl RemoteIo {
         let Some(restart) = self.settings.restart else {
             return Verdict::Cold;
         };
-        let excluded = self.noted().map_or(StationSet::EMPTY, |note| note.recalled.excluded);
-        let retained = self.holders.newest_retained(excluded);
+        let excluded = self.noted_exclusions();
+        let retained = self.newest_retained();
         match (restart, retained) {
             (Restart::Cold, _) => Verdict::Cold,
             (_, None) if self.newest_applied().is_some() => Verdict::Lost,
@@ -135,16 +150,18 @@ impl RemoteIo {
         floor.or(self.noted().map(|note| note.lineage)) == Some(state.lineage)
     }
 
-    /// Whether outputs of a newer state were applied.
+    /// Whether outputs of a newer state may have been applied. Moments of two epochs have no order here: the one that is founded after a power failure
+    /// is earlier where the wall clock was set back.
     fn is_before_applied(&self, state: &Holding) -> bool {
-        let applied = self.newest_applied().max(self.holders.newest_recalled());
-        applied.is_some_and(|applied| match applied.cmp(&state.stepped) {
-            std::cmp::Ordering::Less => false,
-            // An older note says nothing of the lineage.
-            std::cmp::Ordering::Equal => {
-                self.newest_applied() == Some(applied) && !self.is_newest_applied(state)
-            }
-            std::cmp::Ordering::Greater => true,
+        let noted = self.newest_applied();
+        if self.holders.newest_recalled().is_some_and(|recalled| recalled > state.stepped) {
+            return true;
+        }
+        noted.is_some_and(|applied| {
+            let (newest, stepped) = (applied.cycle, state.stepped.cycle);
+            applied.epoch != state.stepped.epoch
+                || stepped < newest
+                || stepped == newest && !self.is_newest_applied(state)
         })
     }
 

@@ -92,7 +92,7 @@ impl RetainedFiles {
                 Retained::Note(note) => Some(note),
                 Retained::State(_) | Retained::Step(_) => None,
             });
-            let newest = notes.max_by_key(Note::applied);
+            let newest = notes.max_by_key(|note| note.number);
             let foreign = newest.as_ref().is_some_and(|note| note.cluster != cluster);
             let newest = newest.filter(|_| !foreign);
             let applied = newest.as_ref().map(Note::applied);
@@ -139,7 +139,7 @@ fn read_bounded(path: &Path) -> io::Result<Vec<u8>> {
 
 /// The newest of several notes.
 pub fn newest_note(notes: Vec<Note>) -> Option<Note> {
-    notes.into_iter().max_by_key(Note::applied)
+    notes.into_iter().max_by_key(|note| note.number)
 }
 
 /// Why the disk takes nothing, since when it does not; shared with the writer.

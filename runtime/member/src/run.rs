@@ -86,7 +86,7 @@ pub fn run_remote_io(cluster: &Cluster, options: &MemberOptions) -> Result<(), M
         let retention = Retention { is_missing: is_retentive, ..Retention::default() };
         return run(cluster, options, member, machine, field, retention);
     };
-    let files = RetainedFiles::new(folder, options.name.clone());
+    let files = RetainedFiles::new(folder, format!("{}.{}", cluster.name(), options.name));
     let (notes, found) = files.notes(cluster.agreement().cluster);
     let machine = machine.noting(newest_note(notes));
     run(
@@ -222,7 +222,8 @@ fn retained_runs(
     };
     for program in retentive {
         let Program { hash, .. } = &settings.programs[program.index()];
-        let name = format!("{}.{}", options.name, cluster.controllers()[program.index()].name);
+        let controller = &cluster.controllers()[program.index()].name;
+        let name = format!("{}.{}.{controller}", cluster.name(), options.name);
         let files = RetainedFiles::new(folder, name);
         let (found_runs, found) = files.runs(cluster.agreement().cluster, *hash);
         runs.extend(found_runs);

@@ -32,6 +32,7 @@ fn state(cycle: u64) -> Retained {
         cluster: CLUSTER,
         program: PROGRAM,
         hash: HASH,
+        number: cycle,
         born: moment(0),
         lineage: lineage(cycle),
         stepped: moment(cycle),
@@ -54,6 +55,7 @@ fn note(cycle: u64) -> Retained {
         cluster: CLUSTER,
         configuration: understudy_wire::ConfigurationHash(3),
         hash: HASH,
+        number: cycle,
         lineage: lineage(cycle),
         recalled: Recalled {
             program: PROGRAM,
@@ -112,6 +114,7 @@ fn the_newest_note_comes_back() {
             cycle += 1;
             retainer.keep(Retained::Note(match note(1) {
                 Retained::Note(mut of) => {
+                    of.number = cycle;
                     of.recalled.sampled = moment(cycle);
                     of
                 }
