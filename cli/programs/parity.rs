@@ -83,7 +83,7 @@ fn made(cluster: &Cluster, form: Form) -> Result<(String, Value), Answer> {
     Ok((text, result))
 }
 
-/// What a reader of the text has to know where programs have retentive variables: the text keeps none of them.
+/// what a reader of the text must know where programs have retentive variables: the text keeps none of them.
 fn not_retentive(cluster: &Cluster) -> Option<String> {
     let of = |controller: &understudy_cluster::Controller| {
         let names = controller.code.typed().retentive_names();
