@@ -41,6 +41,9 @@ pub(crate) struct Arguments {
     /// Folder of the journals of its stations, one file for each group. Default: no journal
     #[arg(long, value_name = "DIR")]
     journals: Option<PathBuf>,
+    /// Folder for what its stations keep for the time after a power failure
+    #[arg(long, value_name = "DIR")]
+    retain: Option<PathBuf>,
     /// Do not request real-time scheduling and locked memory
     #[arg(long)]
     no_real_time: bool,
@@ -99,6 +102,7 @@ impl Arguments {
             viewer_keys: tls_keys(&keys.tls),
             peers: peers(cluster, None)?,
             journal: self.journals.as_ref().map(|folder| folder.join(format!("{name}.jsonl"))),
+            retain: self.retain.clone(),
         })
     }
 }

@@ -28,6 +28,9 @@ impl Post {
         if let Some(journal) = &duty.journal {
             command.arg("--journal").arg(journal);
         }
+        if let Some(retain) = &duty.retain {
+            command.arg("--retain").arg(retain);
+        }
         // Its input is closed when the spare ends, however that ends.
         command.stdin(Stdio::piped()).stdout(Stdio::null());
         command.spawn().map(Self)

@@ -44,6 +44,8 @@ pub struct Duty {
     pub peers: Vec<Peer>,
     /// The file of the journal of the station; it is discarded where absent.
     pub journal: Option<PathBuf>,
+    /// The folder of what the station keeps for the time after a power failure.
+    pub retain: Option<PathBuf>,
 }
 
 /// What a spare needs to run.
