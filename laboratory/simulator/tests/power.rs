@@ -235,3 +235,24 @@ fn a_wall_clock_that_is_set_back_brings_no_old_state_back() {
         last = seen.applied.last().expect("it ran").0;
     }
 }
+
+/// A remote I/O and a station run a wrong program for a while, and the note is of that program then: what was applied of the right one before is not
+/// known, so an older state that a station has kept is the operator's choice.
+#[test]
+fn a_note_of_another_program_proves_nothing() {
+    for (crash, returns) in (0..6).flat_map(|crash| (0..6).map(move |returns| (crash, returns))) {
+        let mut simulation = simulation("", 1);
+        // The controller goes first: its newest state is before the newest applied output.
+        simulation.schedule(fault((60, 0.3), CONTROLLER, Action::Crash));
+        for member in [UNDERSTUDY, REMOTE_IO] {
+            simulation.schedule(fault((62 + crash, 0.5), member, Action::Crash));
+            simulation.schedule(fault((64 + crash, 0.5), member, Action::RestartWrongProgram));
+            simulation.schedule(fault((120, 0.5), member, Action::Crash));
+            simulation.schedule(fault((122 + returns, 0.5), member, Action::Restart));
+        }
+        simulation.schedule(fault((124, 0.5), CONTROLLER, Action::Restart));
+        let seen = run(&mut simulation, 250);
+        assert_eq!(simulation.violations(), [], "{crash} {returns}");
+        assert_eq!((seen.warm.len(), seen.asked), (0, 1), "{crash} {returns}");
+    }
+}

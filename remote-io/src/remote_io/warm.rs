@@ -134,10 +134,10 @@ impl RemoteIo {
             (Restart::Operator, Some((from, retained))) => Verdict::Stale(from, *retained),
             (Restart::Warm, Some((from, retained))) => {
                 match self.holders.disputed_retained(excluded, retained) {
+                    _ if self.is_before_applied(retained) => Verdict::Stale(from, *retained),
                     Some(stations) if !self.is_newest_applied(retained) => {
                         Verdict::Disputed(stations)
                     }
-                    _ if self.is_before_applied(retained) => Verdict::Stale(from, *retained),
                     _ => Verdict::Warm(from, *retained),
                 }
             }
@@ -150,10 +150,20 @@ impl RemoteIo {
         floor.or(self.noted().map(|note| note.lineage)) == Some(state.lineage)
     }
 
+    /// Whether its last note is of another program: what was applied of this one before that is not known.
+    fn ran_another_program(&self) -> bool {
+        let found = self.noting.found.as_ref();
+        self.knowledge.floor().is_none()
+            && found.is_some_and(|note| note.hash != self.settings.hash)
+    }
+
     /// Whether outputs of a newer state may have been applied. Moments of two epochs have no order here: the one that is founded after a power failure
     /// is earlier where the wall clock was set back.
     fn is_before_applied(&self, state: &Holding) -> bool {
         let noted = self.newest_applied();
+        if self.ran_another_program() {
+            return true;
+        }
         if self.holders.newest_recalled().is_some_and(|recalled| recalled > state.stepped) {
             return true;
         }
