@@ -13,7 +13,7 @@ use crate::execution::{check, check_bits, typed};
 use crate::support::{found, program};
 
 /// A branch of a CASE may assign a known value outside a subrange.
-fn is_outside(found: &Diagnostic) -> bool {
+pub(crate) fn is_outside(found: &Diagnostic) -> bool {
     found.code == "U1043"
 }
 

@@ -8,7 +8,8 @@ use understudy_testing::random::Dice;
 use understudy_typed::{Fault, Interpreter, Program};
 
 use crate::execution::typed;
-use crate::random::text;
+use crate::random::{is_outside, text};
+use crate::support::found;
 
 const RESTARTING: Shown<'_> =
     Shown { variables: &[], compared: &[], keeps_all: false, restarts: true };
@@ -65,6 +66,7 @@ proptest! {
     fn a_circuit_restarts_as_its_program(seed: u64) {
         let mut dice = Dice::new(seed);
         let source = text::Text::random(&mut dice).to_string();
+        prop_assume!(!found(&source).iter().any(is_outside));
         let mut typed = typed(&source, &parse(&source).0).expect("a sound program");
         let inputs: Vec<u32> = typed.inputs.iter().map(|point| point.slot).collect();
         let mut kept = Vec::new();
