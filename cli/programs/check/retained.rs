@@ -17,7 +17,7 @@ pub(super) struct Retained {
     kept_bits: usize,
     /// Bits of the state.
     state_bits: usize,
-    /// Bytes that each of its stations writes to its disk in a day, at most; only of the program of a cluster, whose period is known.
+    /// Bytes that each of its stations writes to its files in a day, at most; a disk writes whole blocks, which is several times as much. Only of the program of a cluster, whose period is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     bytes_a_day: Option<u64>,
 }
@@ -58,7 +58,7 @@ impl Retained {
         };
         let (names, kept) = (names.join(", "), self.kept_bits);
         let written = self.bytes_a_day.map_or_else(String::new, |bytes| {
-            format!(", {:.2} GB a day to the disk of each station", bytes as f64 / 1e9)
+            format!(", {:.2} GB a day to the files of each station", bytes as f64 / 1e9)
         });
         format!("; retentive: {names}{more}, {kept} of {} state bits{written}", self.state_bits)
     }

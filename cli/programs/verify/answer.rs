@@ -65,6 +65,8 @@ pub(crate) struct ProgramAnswer {
     finite_inputs: Vec<String>,
     /// Inputs that are 1 in the first scan of a warm start, of programs with retentive variables.
     restarted_by: Vec<String>,
+    /// Whether it is assumed that no program starts again, from its initial state, while another one continues: of several programs together.
+    pub(super) starts_together: bool,
     /// For each output of a ladder program, whether it can always be switched on and off again.
     switches: Vec<Switch>,
     /// Remarks on the order and the effect of its rungs; they do not affect the verdict.
@@ -177,6 +179,7 @@ impl ProgramAnswer {
             registers: model.circuit().registers().len(),
             finite_inputs: model.finite_inputs().map(str::to_owned).collect(),
             restarted_by: model.restarting().map(str::to_owned).collect(),
+            starts_together: false,
             switches: Vec::new(),
             remarks: Vec::new(),
             undecided_remarks: 0,
@@ -198,6 +201,7 @@ impl ProgramAnswer {
             registers: circuit.registers().len(),
             finite_inputs: Vec::new(),
             restarted_by: subject.restarting().map(str::to_owned).collect(),
+            starts_together: false,
             switches: switches.map(|(signal, finding)| switch(circuit, signal, &finding)).collect(),
             remarks: remarked.collect(),
             undecided_remarks: remarks.undecided,
@@ -258,6 +262,10 @@ impl ProgramAnswer {
             let names = listed(&self.restarted_by);
             let what = "the power may return in any scan, as a warm start";
             let _ = writeln!(text, "  {:<9} {what}: {names}", "assumed");
+        }
+        if self.starts_together {
+            let what = "no program starts cold while another one continues";
+            let _ = writeln!(text, "  {:<9} {what}", "assumed");
         }
         for finding in &self.properties {
             let name = finding.name.as_ref().map(|name| format!("{name}: "));

@@ -104,7 +104,9 @@ pub(super) fn of_cluster(
     let wrong = |assumed: &Property| model.wrong_assumption(assumed);
     let asked = texts.resolved(&|property| model.resolve(property), &wrong)?;
     let name = "all programs together";
-    Ok(prove(&model, name, asked, bounds, patience))
+    let mut proved = prove(&model, name, asked, bounds, patience);
+    proved.starts_together = members.len() > 1;
+    Ok(proved)
 }
 
 fn prove(

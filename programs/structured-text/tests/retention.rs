@@ -62,6 +62,12 @@ fn global_variables_and_whole_programs_are_retentive() {
     assert_eq!(program(text).retentive_names(), ["g", "p.a"]);
     let alone = read(text, Some("one")).0.program.expect("a program");
     assert_eq!(alone.retentive_names(), ["g", "a"]);
+    // Variables at addresses are memory of the controller, and declared by the program all the same.
+    let text = "PROGRAM one VAR k AT %QD0 : INT; m AT %MW2 : INT; i AT %IX0.0 : BOOL; END_VAR VAR NON_RETAIN n AT %MW4 : INT; END_VAR
+        k := k + 1; m := m + 1; n := n + 1; END_PROGRAM
+        CONFIGURATION c RESOURCE r ON plc TASK t(INTERVAL := T#10ms, PRIORITY := 0);
+        PROGRAM RETAIN p WITH t : one; END_RESOURCE END_CONFIGURATION";
+    assert_eq!(program(text).retentive_names(), ["k", "m"]);
 }
 
 #[test]

@@ -22,7 +22,7 @@ impl Cluster {
         u32::try_from(self.retain_every.as_nanos().div_ceil(period)).unwrap_or(u32::MAX).max(1)
     }
 
-    /// Bytes that each station which runs a program writes to its disk in a day, at most; `None` of a program without retentive variables.
+    /// Bytes that each station which runs a program writes to its files in a day, at most; `None` of a program without retentive variables.
     pub fn retained_bytes_a_day(&self, program: ProgramId) -> Option<u64> {
         let compiled = self.programs.get(program.index())?;
         let executable = &compiled.executable;

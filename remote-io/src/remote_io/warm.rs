@@ -3,7 +3,7 @@
 //! ```text
 //!   no living station holds a state, and a retained one is
 //!     at or behind the newest applied sample ──── warm: the initial state with the retentive values
-//!     before it ───────────────────────────────── the state is lost: see `StaleState`
+//!     before it, or it is not known ───────────── the state is lost: see `StaleState`
 //!   no station has retained one, though outputs
 //!     of the program were applied ─────────────── the state is lost
 //! ```
@@ -65,7 +65,9 @@ impl RemoteIo {
     /// The newest applied output whose state a cold start loses. A program that retains nothing loses nothing with the power of the whole plant.
     pub(super) fn lost_by_cold_start(&self) -> Option<Moment> {
         let floor = self.knowledge.floor().map(|floor| floor.moment);
-        floor.or(self.newest_applied().filter(|_| self.settings.restart.is_some()))
+        // Where a cold start is configured, it is what was asked for.
+        let keeps = self.settings.restart.is_some_and(|restart| restart != Restart::Cold);
+        floor.or(self.newest_applied().filter(|_| keeps))
     }
 
     /// Whether it ran another configuration before it was started.
@@ -150,29 +152,20 @@ impl RemoteIo {
         floor.or(self.noted().map(|note| note.lineage)) == Some(state.lineage)
     }
 
-    /// Whether its last note is of another program: what was applied of this one before that is not known.
-    fn ran_another_program(&self) -> bool {
-        let found = self.noting.found.as_ref();
-        self.knowledge.floor().is_none()
-            && found.is_some_and(|note| note.hash != self.settings.hash)
-    }
-
     /// Whether outputs of a newer state may have been applied. Moments of two epochs have no order here: the one that is founded after a power failure
     /// is earlier where the wall clock was set back.
     fn is_before_applied(&self, state: &Holding) -> bool {
-        let noted = self.newest_applied();
-        if self.ran_another_program() {
+        // Without a note of this program, it is not known what was applied.
+        let Some(applied) = self.newest_applied() else {
             return true;
-        }
+        };
         if self.holders.newest_recalled().is_some_and(|recalled| recalled > state.stepped) {
             return true;
         }
-        noted.is_some_and(|applied| {
-            let (newest, stepped) = (applied.cycle, state.stepped.cycle);
-            applied.epoch != state.stepped.epoch
-                || stepped < newest
-                || stepped == newest && !self.is_newest_applied(state)
-        })
+        let (newest, stepped) = (applied.cycle, state.stepped.cycle);
+        applied.epoch != state.stepped.epoch
+            || stepped < newest
+            || stepped == newest && !self.is_newest_applied(state)
     }
 
     /// Starts to sample from the initial state with the retentive values of a retained one.

@@ -121,7 +121,9 @@ impl RetainedFiles {
             };
             let (records, error) = Retained::read(&bytes);
             let (found, newest, foreign) = of_file(records);
-            let problem = foreign.or(error.map(|error| error.to_string()));
+            // A file that was made and has no record of this member: its records did not reach the disk.
+            let empty = newest.is_none().then(|| "it has no whole record".to_owned());
+            let problem = foreign.or(error.map(|error| error.to_string())).or(empty);
             all.extend(found);
             files.push(FoundFile { path, newest, problem });
         }
@@ -137,9 +139,10 @@ fn read_bounded(path: &Path) -> io::Result<Vec<u8>> {
     std::fs::read(path)
 }
 
-/// The newest of several notes.
-pub fn newest_note(notes: Vec<Note>) -> Option<Note> {
-    notes.into_iter().max_by_key(|note| note.number)
+/// The newest note, where no file lacks one that may be newer.
+pub fn newest_note(notes: Vec<Note>, found: &[FoundFile]) -> Option<Note> {
+    let is_whole = found.iter().all(|file| file.problem.is_none());
+    notes.into_iter().max_by_key(|note| note.number).filter(|_| is_whole)
 }
 
 /// Why the disk takes nothing, since when it does not; shared with the writer.
@@ -312,6 +315,12 @@ impl Writer {
             // Where the disk is slow, the next record waits here, and the cycle does not.
             Ok(Some(begun)) => drop(self.sync.send(begun)),
             Err(error) => {
+                if of.is_none() {
+                    // A note that is too old would prove what is not true; without one a person is asked. Files can be removed from a full disk.
+                    for path in turn.files.paths() {
+                        let _ = std::fs::remove_file(path);
+                    }
+                }
                 // Behind a torn record, or a gap in the steps, nothing would be read.
                 turn.current = None;
                 return Err((turn.files.folder.clone(), error));

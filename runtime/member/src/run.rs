@@ -88,7 +88,7 @@ pub fn run_remote_io(cluster: &Cluster, options: &MemberOptions) -> Result<(), M
     };
     let files = RetainedFiles::new(folder, format!("{}.{}", cluster.name(), options.name));
     let (notes, found) = files.notes(cluster.agreement().cluster);
-    let machine = machine.noting(newest_note(notes));
+    let machine = machine.noting(newest_note(notes, &found));
     run(
         cluster,
         options,

@@ -71,8 +71,9 @@ fn all_viewers_show_the_same() {
             states.extend(check(&cluster, told, &mut chance, seed));
         }
     }
-    // The dice reach every state of a station.
-    let all: Vec<&str> = StationState::ALL.map(StationState::word).to_vec();
+    // The dice reach every state of a station; this cell has no slot of a spare.
+    let all = StationState::ALL.into_iter().filter(|state| *state != StationState::Standby);
+    let all: Vec<&str> = all.map(StationState::word).collect();
     assert_eq!(states.len(), all.len(), "{states:?} of {all:?}");
 }
 

@@ -4,7 +4,7 @@ use std::rc::Rc;
 
 use understudy_typed::{Declared, Elementary, Root, Type};
 
-use crate::syntax::{Class, Declaration, Name, Span};
+use crate::syntax::{Class, Declaration, Name, Retention, Span};
 
 use super::Lowering;
 use super::images::initial;
@@ -86,6 +86,20 @@ impl Lowering<'_> {
             self.keep(declaration.retention, &variable.of.clone(), slot);
         }
         symbol
+    }
+
+    /// Keeps what a retentive program declares at addresses, of which it does not say anything else.
+    pub(super) fn keep_located(&mut self, declarations: &[Declaration]) {
+        let unstated = |it: &&Declaration| it.retention == Retention::Unstated && !it.constant;
+        for declaration in declarations.iter().filter(unstated) {
+            let key = declaration.address.as_ref().map(|address| normal(address.as_str()));
+            if let Some(Symbol::Variable(variable)) =
+                key.and_then(|key| self.addresses.get(&key)).cloned()
+                && let (Root::Global(slot), false) = (variable.root, variable.is_point)
+            {
+                self.keep(Retention::Retained, &variable.of.clone(), slot);
+            }
+        }
     }
 
     fn located_at(&mut self, declaration: &Declaration, resolved: &Resolved) -> Option<Symbol> {

@@ -270,6 +270,9 @@ impl<'a> Lowering<'a> {
         };
         self.program.initial.extend(initial(&block.image, own));
         self.keep(instance.retention, &block.of, own);
+        if instance.retention == Retention::Retained {
+            self.keep_located(&self.units[instance.unit].unit.declarations);
+        }
         if is_only {
             self.name_program(instance.unit, own, &block.of);
         }

@@ -75,7 +75,18 @@ pub(super) fn resolve(
             }
         }
         let kind = match source {
-            SourceText::Operator(text) => operator(text, point, period, diagnostics),
+            SourceText::Operator(text) => {
+                let keeps =
+                    member.code.as_ref().is_some_and(|(code, _)| code.typed().is_retentive());
+                if text.retain && !keeps {
+                    let message =
+                        format!("`{}` has `retain`, and its program starts cold", point.name);
+                    let help = "after a power failure a program with a retentive variable starts warm, with the values of such inputs: declare one \
+                                (RETAIN), or leave `retain` out";
+                    diagnostics.push(misfit(message, text.span.clone(), help));
+                }
+                operator(text, point, period, diagnostics)
+            }
             SourceText::Signal { from, default, stale_after } => {
                 let signal = Signal {
                     from: from.as_ref(),

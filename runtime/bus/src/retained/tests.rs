@@ -101,6 +101,34 @@ fn the_newest_cycle_comes_back_over_several_lives() {
     assert!(found.iter().all(|file| file.problem.is_none()), "{found:?}");
 }
 
+fn newest_of(files: &RetainedFiles) -> Option<Moment> {
+    let (notes, found) = files.notes(CLUSTER);
+    newest_note(notes, &found).map(|note| note.applied())
+}
+
+/// A note that may not be the newest proves nothing: a file that is damaged, cut or emptied leaves none.
+#[test]
+fn a_damaged_note_leaves_none() {
+    let folder = Folder::new("retained-damaged-notes");
+    let files = RetainedFiles::new(&folder, "robot-io".to_owned());
+    let retainer = Retainer::start(vec![(None, files.clone())]).expect("threads");
+    (1..=20).for_each(|cycle| retainer.keep(note(cycle)));
+    retainer.finish();
+    assert_eq!(newest_of(&files), Some(moment(20)));
+    let [path, _] = files.paths();
+    let bytes = fs::read(&path).expect("a file");
+    let flipped = |place: usize| {
+        let mut flipped = bytes.clone();
+        flipped[place] ^= 1;
+        flipped
+    };
+    let half = bytes.len() / 2 - 1;
+    for damaged in [Vec::new(), bytes[..half].to_vec(), flipped(0), flipped(half)] {
+        fs::write(&path, damaged).expect("written");
+        assert_eq!(newest_of(&files), None);
+    }
+}
+
 #[test]
 fn the_newest_note_comes_back() {
     let folder = Folder::new("retained-notes");
@@ -121,14 +149,13 @@ fn the_newest_note_comes_back() {
                 _ => unreachable!("a note"),
             }));
         }
-        while newest_note(files.notes(CLUSTER).0).map(|note| note.applied()) != Some(moment(cycle))
-        {
+        while newest_of(&files) != Some(moment(cycle)) {
             std::thread::yield_now();
         }
     }
     retainer.finish();
     let (notes, found) = files.notes(CLUSTER);
-    assert_eq!(newest_note(notes).map(|note| note.applied()), Some(moment(cycle)));
+    assert_eq!(newest_note(notes, &found).map(|note| note.applied()), Some(moment(cycle)));
     assert!(found.iter().all(|file| file.problem.is_none()), "{found:?}");
     let (foreign, found) = files.notes(ClusterHash(9));
     assert!(foreign.is_empty() && found.iter().all(|file| file.problem.is_some()), "{found:?}");
