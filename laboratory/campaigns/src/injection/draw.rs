@@ -193,13 +193,14 @@ impl Draw<'_> {
                 all.extend(self.others(member));
                 let mut steps = Vec::new();
                 for member in all {
-                    let mut at = |cycle: u64, action| {
-                        let cycle = (cycle + self.random.random_range(0..2)).min(last);
+                    let mut at = |cycle: u64, most: u64, action| {
+                        let cycle = (cycle + self.random.random_range(0..2)).min(most);
                         let phase = f64::from(self.random.random_range(0..1000)) / 1000.0;
                         steps.push(Fault { at_cycle: cycle, phase, member, action });
                     };
-                    at(from, Action::Crash);
-                    at(to + 2, Action::Restart);
+                    // It starts again after it was gone.
+                    at(from, last.saturating_sub(2), Action::Crash);
+                    at(to + 2, last, Action::Restart);
                 }
                 steps
             }
