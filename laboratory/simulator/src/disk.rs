@@ -2,7 +2,9 @@
 
 use understudy_node::{Settings, Station};
 use understudy_remote_io::RemoteIo;
-use understudy_wire::{Member, Note, Retained, RetainedRun, StationId, Time};
+use understudy_wire::{
+    Member, Note, ProgramId, ProgramSet, Retained, RetainedRun, StationId, Time,
+};
 
 /// Steps after which a station keeps the whole state again.
 const RETAIN_EVERY: u32 = 8;
@@ -12,11 +14,17 @@ const RETAIN_EVERY: u32 = 8;
 pub(crate) struct Disks {
     stations: Vec<Vec<RetainedRun>>,
     remote_ios: Vec<Option<Note>>,
+    /// Remote I/Os whose notes cannot be read.
+    damaged: ProgramSet,
 }
 
 impl Disks {
     pub(crate) fn new(stations: usize, remote_ios: usize) -> Self {
-        Self { stations: vec![Vec::new(); stations], remote_ios: vec![None; remote_ios] }
+        Self {
+            stations: vec![Vec::new(); stations],
+            remote_ios: vec![None; remote_ios],
+            damaged: ProgramSet::EMPTY,
+        }
     }
 
     /// A station that starts with what its disk has.
@@ -31,8 +39,9 @@ impl Disks {
         now: Time,
         settings: understudy_remote_io::Settings,
     ) -> RemoteIo {
-        let note = self.remote_ios[settings.program.index()].clone();
-        RemoteIo::new(now, settings).noting(note)
+        let program = settings.program;
+        let note = self.remote_ios[program.index()].clone();
+        RemoteIo::new(now, settings).noting(note, self.damaged.contains(program))
     }
 
     /// A member keeps a record.
@@ -57,9 +66,16 @@ impl Disks {
             }
             (Member::RemoteIo(program), Retained::Note(note)) => {
                 self.remote_ios[program.index()] = Some(note);
+                self.damaged.remove(program);
             }
             _ => {}
         }
+    }
+
+    /// The notes of a remote I/O cannot be read any more.
+    pub(crate) fn damage(&mut self, program: ProgramId) {
+        self.remote_ios[program.index()] = None;
+        self.damaged.insert(program);
     }
 
     /// A station gets another disk, with nothing on it.

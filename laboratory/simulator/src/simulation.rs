@@ -194,6 +194,11 @@ impl Simulation {
         self.disks.lose(station, steps);
     }
 
+    /// The notes of a remote I/O cannot be read any more.
+    pub fn damage_notes(&mut self, program: ProgramId) {
+        self.disks.damage(program);
+    }
+
     /// A station gets an empty disk.
     pub fn lose_disk(&mut self, station: StationId) {
         self.disks.empty(station);

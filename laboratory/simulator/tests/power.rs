@@ -256,3 +256,26 @@ fn a_note_of_another_program_proves_nothing() {
         assert_eq!((seen.warm.len(), seen.asked), (0, 1), "{crash} {returns}");
     }
 }
+
+/// Without a note it is not known what was applied: a person is asked, whether stations have kept a state or not.
+#[test]
+fn a_damaged_note_is_a_question() {
+    for has_states in [true, false] {
+        let mut simulation = simulation("", 1);
+        for member in ALL {
+            simulation.schedule(fault((100, 0.9), member, Action::Crash));
+        }
+        run(&mut simulation, 110);
+        simulation.damage_notes(ProgramId(0));
+        if !has_states {
+            (0..2).for_each(|rank| simulation.lose_disk(StationId(rank)));
+        }
+        for member in ALL {
+            simulation.schedule(fault((10, 0.1), member, Action::Restart));
+        }
+        let seen = run(&mut simulation, 100);
+        assert_eq!(simulation.violations(), [], "{has_states}");
+        let starts = seen.warm.len() + seen.cold.len();
+        assert_eq!((starts, seen.asked, seen.applied.len()), (0, 1, 0), "{has_states}");
+    }
+}

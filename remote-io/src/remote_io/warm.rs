@@ -31,14 +31,17 @@ pub(super) struct Noting {
     number: u64,
     /// Of an earlier life.
     found: Option<Note>,
+    /// Whether there was one that cannot be read.
+    is_damaged: bool,
     /// Of the newest sample, for the case that outputs of it are applied.
     next: Option<Note>,
 }
 
 impl RemoteIo {
-    /// Notes the newest sample whose outputs it applies ([`Output::Retain`]); `found` is what it has noted before it was started.
+    /// Notes the newest sample whose outputs it applies ([`Output::Retain`]); `found` is what it has noted before it was started, where that can be
+    /// read, and `is_damaged` tells where it cannot.
     #[must_use]
-    pub fn noting(mut self, found: Option<Note>) -> Self {
+    pub fn noting(mut self, found: Option<Note>, is_damaged: bool) -> Self {
         let number = found.as_ref().map_or(0, |note| note.number.saturating_add(1));
         let cluster = self.settings.agreement.cluster;
         let width = self.settings.undriven.width();
@@ -47,7 +50,7 @@ impl RemoteIo {
         });
         let fits = |note: &Note| note.recalled.inputs.width() == width;
         let found = found.filter(|note| note.hash != self.settings.hash || fits(note));
-        self.noting = Noting { is_on: true, number, found, next: None };
+        self.noting = Noting { is_on: true, number, found, is_damaged, next: None };
         self
     }
 
@@ -131,7 +134,7 @@ impl RemoteIo {
         let retained = self.newest_retained();
         match (restart, retained) {
             (Restart::Cold, _) => Verdict::Cold,
-            (_, None) if self.newest_applied().is_some() => Verdict::Lost,
+            (_, None) if self.newest_applied().is_some() || self.noting.is_damaged => Verdict::Lost,
             (_, None) => Verdict::Cold,
             (Restart::Operator, Some((from, retained))) => Verdict::Stale(from, *retained),
             (Restart::Warm, Some((from, retained))) => {

@@ -88,7 +88,8 @@ pub fn run_remote_io(cluster: &Cluster, options: &MemberOptions) -> Result<(), M
     };
     let files = RetainedFiles::new(folder, format!("{}.{}", cluster.name(), options.name));
     let (notes, found) = files.notes(cluster.agreement().cluster);
-    let machine = machine.noting(newest_note(notes, &found));
+    let is_damaged = found.iter().any(|file| file.problem.is_some());
+    let machine = machine.noting(newest_note(notes, &found), is_damaged);
     run(
         cluster,
         options,
