@@ -10,7 +10,7 @@
 //! | U0232 | a station that is not the slot of a spare |
 //! | U0233 | a spare whose capacity fits none of its groups |
 //! | U0234 | two spares in one slot |
-//! | U0257 | warning: a group that its spare cannot serve, or serves from the same failure domain |
+//! | U0257 | warning: a group that no spare serves, that its spare cannot serve, or that it serves from the same failure domain |
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -142,17 +142,38 @@ fn build(
     }
     let mut taken = Taken::new();
     let mut groups: Vec<(String, Option<PlantGroup>)> = Vec::new();
+    let mut places = Vec::new();
     for fields in tables(root, &GROUP, diagnostics).unwrap_or_default() {
         let Some(name) = declared(&fields, "group", &mut taken, diagnostics) else {
             continue;
         };
-        groups.push((name.clone(), group(name, &fields, open, diagnostics)));
+        let group = group(name.clone(), &fields, open, diagnostics);
+        let cluster = |of: &PlantGroup| of.cluster.agreement().cluster;
+        let first = groups.iter().position(|(_, other)| {
+            other.as_ref().zip(group.as_ref()).is_some_and(|(it, own)| cluster(it) == cluster(own))
+        });
+        if let Some(first) = first {
+            let message = format!("groups `{}` and `{name}` are one cluster", groups[first].0);
+            let place: &Range<usize> = &places[first];
+            let diagnostic = Diagnostic::error("U0208", message, fields.span.clone());
+            diagnostics.push(diagnostic.with_related(place.clone(), "the first is here"));
+        }
+        places.push(fields.span.clone());
+        groups.push((name, group));
     }
     let (mut taken, mut slots) = (Taken::new(), BTreeMap::new());
     let mut spares = Vec::new();
     for fields in tables(root, &SPARE, diagnostics).unwrap_or_default() {
         if let Some(name) = declared(&fields, "spare", &mut taken, diagnostics) {
             spares.push(spare(name, &fields, &groups, &mut slots, diagnostics));
+        }
+    }
+    for (index, ((name, _), place)) in groups.iter().zip(&places).enumerate() {
+        let is_named = |spare: &PlantSpare| spare.serves.iter().any(|it| it.group == index);
+        if !has_errors(diagnostics) && !spares.iter().any(is_named) {
+            let message = format!("no spare serves group `{name}`");
+            let help = "name it in `groups` of a spare, or leave it out";
+            diagnostics.push(Diagnostic::warning("U0257", message, place.clone()).with_help(help));
         }
     }
     let groups: Option<Vec<PlantGroup>> = groups.into_iter().map(|(_, group)| group).collect();

@@ -10,12 +10,12 @@ const PUMP: (&str, &str) = (
     "PROGRAM pump VAR_INPUT on : BOOL; END_VAR VAR_OUTPUT run : BOOL; END_VAR run := on; END_PROGRAM",
 );
 
-/// A group with an understudy and these slots.
+/// A group with an understudy and these slots, under a name of its own.
 fn group(slots: &[&str]) -> Cluster {
     let mut text =
-        "[cluster]\nname = \"cell\"\n[[controller]]\nname = \"pump\"\nladder = \"pump.st\"\n\
+        "[cluster]\nname = \"CELL\"\n[[controller]]\nname = \"pump\"\nladder = \"pump.st\"\n\
                     [[understudy]]\nname = \"understudy\"\n"
-            .to_owned();
+            .replace("CELL", &format!("cell-{}", slots.len()));
     for slot in slots {
         text += &format!("[[understudy]]\nname = \"{slot}\"\nspare = true\n");
     }
@@ -120,4 +120,17 @@ fn the_schema_of_a_plant_file_has_its_sections() {
     let schema = plant_file_schema();
     let properties = schema.get("properties").and_then(|it| it.as_object()).expect("an object");
     assert_eq!(properties.keys().collect::<Vec<_>>(), ["group", "spare"]);
+}
+
+#[test]
+fn a_group_is_named_once_and_served() {
+    let report = |text: &str| {
+        let found = plant(text).report.diagnostics;
+        found.iter().map(|one| format!("{} {}", one.code, one.message)).collect::<Vec<_>>()
+    };
+    let spare = "[[spare]]\nname = \"x\"\ngroups = { a = \"spare\" }\n";
+    let unserved = report(&format!("{GROUPS}{spare}"));
+    assert_eq!(unserved, ["U0257 no spare serves group `b`"]);
+    let twice = report(&format!("{GROUPS}{spare}").replace("two.toml", "one.toml"));
+    assert_eq!(twice, ["U0208 groups `a` and `b` are one cluster"]);
 }
