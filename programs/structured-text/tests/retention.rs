@@ -111,3 +111,15 @@ fn retain_that_has_no_effect_is_told() {
     }
     assert_eq!(message("VAR RETAIN a : INT; END_VAR"), "");
 }
+
+#[test]
+fn the_parts_of_a_data_block_say_what_is_kept() {
+    let text = |block: &str| {
+        format!(
+            "DATA_BLOCK \"d\" {block} VAR a : INT; END_VAR VAR RETAIN b : INT; END_VAR VAR NON_RETAIN c : INT; END_VAR BEGIN END_DATA_BLOCK
+            ORGANIZATION_BLOCK \"Main\" BEGIN \"d\".a := \"d\".a + 1; \"d\".b := \"d\".b + 1; \"d\".c := \"d\".c + 1; %QW0 := \"d\".a; END_ORGANIZATION_BLOCK"
+        )
+    };
+    assert_eq!(program(&text("")).retentive_names(), ["d.a", "d.b"]);
+    assert_eq!(program(&text("NON_RETAIN")).retentive_names(), ["d.b"]);
+}

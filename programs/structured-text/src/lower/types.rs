@@ -302,7 +302,7 @@ impl<'a> Lowering<'a> {
     ) -> Option<Resolved> {
         let mut fields: Vec<Field> = Vec::new();
         let mut known = HashMap::new();
-        let mut ranges = HashMap::new();
+        let (mut ranges, mut retention) = (HashMap::new(), HashMap::new());
         let mut image = Builder::default();
         let mut slots: u64 = 0;
         let mut is_whole = true;
@@ -325,6 +325,10 @@ impl<'a> Lowering<'a> {
             }
             image.put(start * 64, &resolved.of, &resolved.image);
             ranges.extend(resolved.range.map(|range| (start as u32, range)));
+            // Only the blocks of declarations of a data block say it.
+            if declaration.retention != syntax::Retention::Unstated {
+                retention.insert(start as u32, declaration.retention);
+            }
             fields.push(Field {
                 name: declaration.name.as_str().to_owned(),
                 of: resolved.of,
@@ -338,13 +342,7 @@ impl<'a> Lowering<'a> {
         let image = image.done();
         let id = self.add_structure(
             Structure { name: name.to_owned(), fields },
-            StructureInfo {
-                fields: known,
-                ranges,
-                retention: HashMap::new(),
-                is_mixed: false,
-                unit: None,
-            },
+            StructureInfo { fields: known, ranges, retention, is_mixed: false, unit: None },
         );
         Some(Resolved::new(Type::Structure(id, slots as u32), image))
     }
