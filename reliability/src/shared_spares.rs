@@ -94,6 +94,11 @@ impl SharedSpares {
     /// # Errors
     /// Numbers out of their bounds, and a precision that is not reached.
     pub fn mttf(&self) -> Result<f64, Vec<ReliabilityError>> {
+        if self.spares == 0 && self.too_large > 0 {
+            // Without spares all groups are alike.
+            let groups = self.groups + self.too_large;
+            return Self { groups, too_large: 0, ..self.clone() }.mttf();
+        }
         let served = self.chain()?.mttf().map_err(|error| vec![error])?;
         if self.too_large == 0 {
             return Ok(served);
