@@ -226,6 +226,8 @@ struct Turn {
     files: RetainedFiles,
     /// Which of the two is begun next.
     next: usize,
+    /// Files of an earlier life that cannot be read to their end: they go once something newer is written.
+    damaged: Vec<PathBuf>,
     current: Option<File>,
     /// Whether what begins the current file is on the disk: until then the other one is needed.
     is_synced: Arc<AtomicBool>,
@@ -234,11 +236,16 @@ struct Turn {
 
 impl Turn {
     fn new(of: Option<ProgramId>, files: RetainedFiles) -> Self {
+        let is_damaged = |path: &&PathBuf| {
+            let bytes = read_bounded(path);
+            bytes.is_ok_and(|bytes| bytes.is_empty() || Retained::read(&bytes).1.is_some())
+        };
         // The older one of an earlier life is begun first.
         let newest = |path: &PathBuf| std::fs::metadata(path).and_then(|of| of.modified()).ok();
-        let [first, second] = files.paths();
-        let next = usize::from(newest(&first) > newest(&second));
-        Self { of, files, next, current: None, is_synced: Arc::default(), notes: 0 }
+        let paths = files.paths();
+        let damaged = paths.iter().filter(is_damaged).cloned().collect();
+        let next = usize::from(newest(&paths[0]) > newest(&paths[1]));
+        Self { of, files, next, damaged, current: None, is_synced: Arc::default(), notes: 0 }
     }
 
     /// Begins the other file with a record; the one before stays as it is where that fails.
@@ -248,6 +255,9 @@ impl Turn {
         let mut file = OpenOptions::new().create(true).write(true).truncate(true).open(path)?;
         file.write_all(bytes)?;
         let synced = file.try_clone()?;
+        for damaged in self.damaged.drain(..).filter(|damaged| damaged != path) {
+            std::fs::remove_file(damaged)?;
+        }
         self.current = Some(file);
         self.next = 1 - self.next;
         self.is_synced = Arc::default();

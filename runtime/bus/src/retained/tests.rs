@@ -123,9 +123,16 @@ fn a_damaged_note_leaves_none() {
         flipped
     };
     let half = bytes.len() / 2 - 1;
-    for damaged in [Vec::new(), bytes[..half].to_vec(), flipped(0), flipped(half)] {
-        fs::write(&path, damaged).expect("written");
+    for (damaged, cycle) in
+        [Vec::new(), bytes[..half].to_vec(), flipped(0), flipped(half)].into_iter().zip(21..)
+    {
+        fs::write(&path, &damaged).expect("written");
         assert_eq!(newest_of(&files), None);
+        // The next life has a note again as soon as it makes one, in whichever file.
+        let retainer = Retainer::start(vec![(None, files.clone())]).expect("threads");
+        retainer.keep(note(cycle));
+        retainer.finish();
+        assert_eq!(newest_of(&files), Some(moment(cycle)));
     }
 }
 
