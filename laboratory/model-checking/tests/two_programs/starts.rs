@@ -93,12 +93,12 @@ fn check_misled(station: Member, states: usize) {
 
 #[test]
 fn a_remote_io_and_its_controller_have_a_wrong_program() {
-    check_misled(station(0), 164_838);
+    check_misled(station(0), 164_897);
 }
 
 #[test]
 fn a_remote_io_and_the_understudy_have_a_wrong_program() {
-    check_misled(station(2), 139_252);
+    check_misled(station(2), 140_069);
 }
 
 #[test]
