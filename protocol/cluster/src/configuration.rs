@@ -38,8 +38,8 @@ pub(crate) fn configuration_text(cluster: &Cluster, plants: &[String]) -> String
     line(format_args!("shadow {}", agreement.shadow_cycles));
     line(format_args!("listen {}", agreement.listen_cycles));
     let remote_ios = cluster.remote_ios.iter().zip(&cluster.plants).zip(plants);
-    for (controller, ((remote_io, plant), plant_text)) in cluster.controllers.iter().zip(remote_ios)
-    {
+    let programs = cluster.controllers.iter().zip(cluster.programs.iter());
+    for ((controller, program), ((remote_io, plant), plant_text)) in programs.zip(remote_ios) {
         line(format_args!("controller {}", controller.name));
         line(format_args!("{}", indented(&controller.code.text())));
         line(format_args!("remote io {}", remote_io.name));
@@ -52,7 +52,7 @@ pub(crate) fn configuration_text(cluster: &Cluster, plants: &[String]) -> String
         line(format_args!("  release {:?}", remote_io.release));
         line(format_args!("  value fault {:?}", remote_io.value_fault));
         line(format_args!("  stale state {:?}", remote_io.stale_state));
-        if controller.code.executable().is_retentive() {
+        if program.executable.is_retentive() {
             line(format_args!("  restart {:?}", remote_io.restart));
         }
         for source in &remote_io.inputs {

@@ -31,9 +31,9 @@ use crate::format::{GROUP, PLANT_FILE_SECTIONS, SPARE};
 /// The groups of a plant and their spares.
 #[derive(Debug, Clone)]
 pub struct PlantFile {
-    /// In the order of the file.
+    /// Its groups, in the order of the file.
     pub groups: Vec<PlantGroup>,
-    /// In the order of their ranks.
+    /// Its spares, in the order of their ranks.
     pub spares: Vec<PlantSpare>,
 }
 
