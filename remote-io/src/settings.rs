@@ -96,7 +96,7 @@ pub enum Restart {
     /// From the initial state with the retentive values of the newest retained state.
     #[default]
     Warm,
-    /// From the initial state.
+    /// From the initial state, whatever was kept.
     Cold,
     /// The operator chooses between the two.
     Operator,

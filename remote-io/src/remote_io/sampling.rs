@@ -84,7 +84,7 @@ impl RemoteIo {
         let base = history.base();
         let (born, before, after) = (history.born(), history.before(), history.head());
         let samples = history.samples();
-        let noted = unforced.clone();
+        let noted = self.noting.is_on().then(|| unforced.clone());
         let body = Body::Sample(Sample {
             born,
             base,
@@ -104,7 +104,9 @@ impl RemoteIo {
         if void > 0 {
             self.report(Event::Voided { moment, samples: void, lineage: base });
         }
-        self.prepare_note(moment, after, noted);
+        if let Some(noted) = noted {
+            self.prepare_note(moment, after, noted);
+        }
         self.report(Event::Sampled { moment, inputs, born, before });
         self.report_void(&void_writes);
         self.report_validity(&validity);

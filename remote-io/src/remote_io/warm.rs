@@ -27,14 +27,21 @@ use crate::settings::{Release, Restart};
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub(super) struct Noting {
     is_on: bool,
-    /// Of the next note.
+    /// The number of the next note.
     number: u64,
-    /// Of an earlier life.
+    /// The newest note of an earlier life.
     found: Option<Note>,
     /// Whether there was one that cannot be read.
     is_damaged: bool,
     /// Of the newest sample, for the case that outputs of it are applied.
     next: Option<Note>,
+}
+
+impl Noting {
+    /// Whether notes are made.
+    pub(super) fn is_on(&self) -> bool {
+        self.is_on
+    }
 }
 
 impl RemoteIo {
@@ -83,9 +90,6 @@ impl RemoteIo {
 
     /// Prepares the note of a sample.
     pub(super) fn prepare_note(&mut self, moment: Moment, after: Lineage, inputs: Image) {
-        if !self.noting.is_on {
-            return;
-        }
         let agreement = &self.settings.agreement;
         self.noting.next = Some(Note {
             cluster: agreement.cluster,
