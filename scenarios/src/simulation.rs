@@ -97,7 +97,7 @@ pub fn simulate(
         }
     };
     simulation.run(scenario.cycles, PATIENCE_CYCLES, &mut observe)?;
-    // Cycles in which no remote I/O runs are counted by nobody.
+    // Cycles in which no remote I/O runs are not counted.
     if told.get().is_none_or(|cycle| cycle + 1 < scenario.cycles) {
         let most = scenario.cycles.saturating_mul(2).saturating_add(PATIENCE_CYCLES);
         simulation.go_on(most, &mut observe, &mut || {

@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::fs;
 
 use serde_json::Value;
+use understudy_testing::COUNTER;
 
 use super::shared::{answer, empty_folder, some_at_a_time};
 use super::{PERIOD, no_orphan};
@@ -22,16 +23,6 @@ name = "understudy"
 [[remote_io]]
 controller = "counter"
 "#;
-
-const COUNTER: &str = "
-PROGRAM counter
-  VAR_INPUT hold : BOOL; END_VAR
-  VAR_OUTPUT RETAIN total : DINT; END_VAR
-  VAR_OUTPUT since : DINT; END_VAR
-  total := total + 1;
-  since := since + 1;
-END_PROGRAM
-";
 
 /// Cycles between two failures.
 const BETWEEN: u64 = 60;

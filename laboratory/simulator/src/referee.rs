@@ -78,7 +78,6 @@ pub struct Referee {
     /// Samples for which the program may go on from a state that the operator has chosen.
     choice: u32,
     cold_starts: u64,
-    warm_starts: u64,
     /// Whether outputs were applied since the last cold start.
     applied: bool,
 }
@@ -130,7 +129,6 @@ impl Referee {
             unrecorded: Unrecorded::new(settings.sourced_bits()),
             choice: 0,
             cold_starts: 0,
-            warm_starts: 0,
             applied: false,
         }
     }
@@ -216,11 +214,6 @@ impl Referee {
     /// Starts from the initial state, the first one included.
     pub fn cold_starts(&self) -> u64 {
         self.cold_starts
-    }
-
-    /// Starts after a power failure, from the initial state with retentive values.
-    pub fn warm_starts(&self) -> u64 {
-        self.warm_starts
     }
 
     /// Takes one report of the remote I/O, in the order in which they were made; samples and applied outputs count.
@@ -342,7 +335,6 @@ impl Referee {
         let bits = self.executable.restarted(state.bits.words());
         let bits = Image::from_words(self.executable.state_count(), &bits);
         self.last_true = None;
-        self.warm_starts += 1;
         self.remember(born, start, bits.expect("a state of this program is packed"));
         if from >= self.floor || chosen {
             return Ok(());

@@ -4,22 +4,13 @@ use proptest::prelude::*;
 use understudy_cluster::read;
 use understudy_remote_io::Event;
 use understudy_simulator::{Action, Fault, Network, Record, Simulation, parts};
+use understudy_testing::COUNTER;
 use understudy_wire::{Image, Member, Moment, ProgramId, Source, StateChoice, StationId};
 
 const CONTROLLER: Member = Member::Station(StationId(0));
 const UNDERSTUDY: Member = Member::Station(StationId(1));
 const REMOTE_IO: Member = Member::RemoteIo(ProgramId(0));
 const ALL: [Member; 3] = [CONTROLLER, UNDERSTUDY, REMOTE_IO];
-
-/// Counts scans for good, and since the last start.
-const COUNTER: &str = "
-PROGRAM counter
-  VAR_INPUT hold : BOOL; END_VAR
-  VAR_OUTPUT RETAIN total : DINT; END_VAR
-  VAR_OUTPUT since : DINT; END_VAR
-  total := total + 1;
-  since := since + 1;
-END_PROGRAM";
 
 fn simulation(remote_io: &str, seed: u64) -> Simulation {
     let text = format!(

@@ -40,7 +40,7 @@ pub enum HostEvent {
         /// Why the last one is none.
         reason: String,
     },
-    /// Frames arrived that do not count, since the last such record: somebody on the network does what he should not.
+    /// Frames arrived that do not count, since the last such record: a process on the network does what it must not.
     RefusedFrames {
         /// How many.
         datagrams: u64,

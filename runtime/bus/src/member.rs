@@ -128,7 +128,7 @@ where
         let reason = "no folder was given for it (--retain)".to_owned();
         sink.record(clock.now(), Noted::Host(HostEvent::RetainFailed { reason }));
     }
-    for FoundFile { path, problem, .. } in found {
+    for FoundFile { path, problem } in found {
         if let Some(reason) = problem {
             let file = path.display().to_string();
             sink.record(clock.now(), Noted::Host(HostEvent::RetainedRefused { file, reason }));

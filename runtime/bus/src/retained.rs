@@ -41,8 +41,6 @@ pub struct RetainedFiles {
 pub struct FoundFile {
     /// The file.
     pub path: PathBuf,
-    /// The newest cycle that it has.
-    pub newest: Option<Moment>,
     /// What is wrong with it, in words; nothing where it was read to its end.
     pub problem: Option<String>,
 }
@@ -115,7 +113,7 @@ impl RetainedFiles {
                 Ok(bytes) => bytes,
                 Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
                 Err(error) => {
-                    files.push(FoundFile { path, newest: None, problem: Some(error.to_string()) });
+                    files.push(FoundFile { path, problem: Some(error.to_string()) });
                     continue;
                 }
             };
@@ -125,7 +123,7 @@ impl RetainedFiles {
             let empty = newest.is_none().then(|| "it has no whole record".to_owned());
             let problem = foreign.or(error.map(|error| error.to_string())).or(empty);
             all.extend(found);
-            files.push(FoundFile { path, newest, problem });
+            files.push(FoundFile { path, problem });
         }
         (all, files)
     }

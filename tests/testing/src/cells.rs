@@ -47,3 +47,13 @@ pub fn cluster(text: &str, mode: Mode) -> Cluster {
     let loaded = read_with_files(text, files(), overrides);
     loaded.cluster.unwrap_or_else(|| panic!("{:?}", loaded.reports))
 }
+
+/// A program that counts scans for good, in the retentive output `total`, and since the last start.
+pub const COUNTER: &str = "
+PROGRAM counter
+  VAR_INPUT hold : BOOL; END_VAR
+  VAR_OUTPUT RETAIN total : DINT; END_VAR
+  VAR_OUTPUT since : DINT; END_VAR
+  total := total + 1;
+  since := since + 1;
+END_PROGRAM";
