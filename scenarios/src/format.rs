@@ -51,6 +51,8 @@ pub(crate) static STEP: Table = Table {
         key("phase", SHARE),
         key("to", Kind::OneOrMany(&Kind::Text)),
         key("both_ways", Kind::Flag),
+        key("network", Kind::Count(1, 2)),
+        key("others", Kind::Flag),
         key("by", Kind::Time(Duration::ZERO, MAXIMUM_SLOWNESS)),
         key("frames", Kind::Count(1, MAXIMUM_NUMBER)),
         key("age", Kind::Count(1, MAXIMUM_NUMBER)),

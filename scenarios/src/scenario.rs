@@ -86,7 +86,7 @@ impl Scenario {
 }
 
 /// Every action as scenario files write it, in the order in which they are explained.
-pub const ACTIONS: [&str; 22] = [
+pub const ACTIONS: [&str; 24] = [
     "crash",
     "restart",
     "restart-misconfigured",
@@ -102,6 +102,8 @@ pub const ACTIONS: [&str; 22] = [
     "set",
     "cut",
     "heal",
+    "unplug",
+    "plug",
     "delay",
     "corrupt",
     "replay",
@@ -133,6 +135,9 @@ pub(crate) fn action_text(member: Member, action: Action, members: &Members) -> 
             None => word.to_owned(),
         },
         Action::Cut { to } | Action::Heal { to } => format!("{word} to {}", members.name(to)),
+        Action::Unplug { network } | Action::Plug { network } => {
+            format!("{word} network {network}")
+        }
         Action::Delay { to, by } => format!("{word} to {} by {by:?}", members.name(to)),
         Action::RestartInEpoch { epoch } => format!("{word} {epoch}"),
         Action::Slow { by } => format!("{word} by {by:?}"),

@@ -78,6 +78,9 @@ fn write_step(text: &mut String, step: &Fault, members: &Members) {
             None => Ok(()),
         },
         Action::Cut { to } | Action::Heal { to } => writeln!(text, "to = {}", name(to)),
+        Action::Unplug { network } | Action::Plug { network } => {
+            writeln!(text, "network = {network}")
+        }
         Action::Delay { to, by } => {
             writeln!(text, "to = {}\nby = {}", name(to), time(by))
         }

@@ -6,6 +6,8 @@
 //!                        └ 10.87.0.1
 //! ```
 //!
+//! With two networks each host has an `eth1` at 10.88.0.0/16 too, on a bridge of its own.
+//!
 //! Invariant: nothing is left behind, however the run ends. The namespaces have no names: this process holds them by file
 //! descriptors, the processes in them by being there, and when the last of those is gone the kernel removes the namespace with its
 //! interfaces and rules. The machine's own network is never touched.
@@ -20,6 +22,7 @@ use std::path::PathBuf;
 
 use nix::errno::Errno;
 use nix::sched::{CloneFlags, setns, unshare};
+use understudy_wire::Via;
 
 use crate::error::NetworkError;
 use crate::impairment::Share;
@@ -27,8 +30,10 @@ use crate::tools::{IP, NFT, run};
 
 /// Hosts of one network, at most.
 const MAXIMUM_HOSTS: usize = 250;
-/// The first two bytes of every address.
-const NETWORK: [u8; 2] = [10, 87];
+/// The first two bytes of every address, by network.
+const NETWORKS: [[u8; 2]; 2] = [[10, 87], [10, 88]];
+/// The first letter of the switch's ports, by network.
+const PORTS: [char; 2] = ['h', 's'];
 /// A share is written as so many of this.
 const PARTS: u64 = 1_000_000;
 
@@ -36,7 +41,7 @@ const PARTS: u64 = 1_000_000;
 #[derive(Debug)]
 pub struct Host {
     name: String,
-    address: Ipv4Addr,
+    place: u8,
     namespace: OwnedFd,
 }
 
@@ -46,9 +51,10 @@ impl Host {
         &self.name
     }
 
-    /// Its address.
-    pub fn address(&self) -> Ipv4Addr {
-        self.address
+    /// Its address on a network.
+    pub fn address(&self, via: Via) -> Ipv4Addr {
+        let [first, second] = NETWORKS[via.index()];
+        Ipv4Addr::new(first, second, 0, self.place + 2)
     }
 }
 
@@ -58,11 +64,14 @@ pub struct Hosts {
     own: OwnedFd,
     switch: OwnedFd,
     hosts: Vec<Host>,
+    networks: &'static [Via],
     nft: PathBuf,
     /// From where to where nothing passes.
     cuts: BTreeSet<(usize, usize)>,
     /// Of what passes from one host to another, by chance.
     losses: BTreeMap<(usize, usize), Share>,
+    /// Hosts whose cable to a network is pulled.
+    unplugged: BTreeSet<(Via, usize)>,
 }
 
 /// The programs that [`Hosts`] needs and this machine does not have, with the packages that have them.
@@ -71,16 +80,19 @@ pub fn missing_tools() -> Vec<NetworkError> {
 }
 
 impl Hosts {
-    /// Where the switch itself has an address, for a proxy between the hosts.
-    pub const SWITCH: Ipv4Addr = Ipv4Addr::new(NETWORK[0], NETWORK[1], 0, 1);
+    /// Where the switch itself has an address on a network, for a proxy between the hosts.
+    pub fn switch(via: Via) -> Ipv4Addr {
+        let [first, second] = NETWORKS[via.index()];
+        Ipv4Addr::new(first, second, 0, 1)
+    }
 
-    /// Makes one host for each name.
+    /// Makes one host for each name, on one network or on two.
     ///
     /// To be called where the calling thread may change its network namespace: it is the one that it was again afterwards.
     ///
     /// # Errors
     /// [`NetworkError::NotPermitted`], [`NetworkError::NoTool`], or what a tool said. Nothing is left then.
-    pub fn build(names: &[String]) -> Result<Self, NetworkError> {
+    pub fn build(names: &[String], has_two_networks: bool) -> Result<Self, NetworkError> {
         let (ip, nft) = (IP.find()?, NFT.find()?);
         if names.len() > MAXIMUM_HOSTS {
             return Err(NetworkError::System {
@@ -91,11 +103,7 @@ impl Hosts {
         let own = current_namespace()?;
         let switch = new_namespace(&own)?;
         let hosts = names.iter().enumerate().map(|(place, name)| {
-            Ok(Host {
-                name: name.clone(),
-                address: Ipv4Addr::new(NETWORK[0], NETWORK[1], 0, place as u8 + 2),
-                namespace: new_namespace(&own)?,
-            })
+            Ok(Host { name: name.clone(), place: place as u8, namespace: new_namespace(&own)? })
         });
         let hosts = Self {
             hosts: hosts.collect::<Result<_, NetworkError>>()?,
@@ -104,25 +112,36 @@ impl Hosts {
             nft,
             cuts: BTreeSet::new(),
             losses: BTreeMap::new(),
+            unplugged: BTreeSet::new(),
+            networks: if has_two_networks { &Via::BOTH } else { &[Via::First] },
         };
-        let mut bridge = format!(
-            "link set lo up\nlink add br0 type bridge\naddr add {}/16 dev br0\nlink set br0 up\n",
-            Self::SWITCH
-        );
-        for (place, host) in hosts.hosts.iter().enumerate() {
-            let namespace = host.namespace.as_raw_fd();
-            let process = std::process::id();
+        let process = std::process::id();
+        let mut bridge = String::from("link set lo up\n");
+        for (number, via) in hosts.networks.iter().enumerate() {
+            let (switch, letter) = (Self::switch(*via), PORTS[number]);
             let _ = write!(
                 bridge,
-                "link add h{place} type veth peer name eth0 netns /proc/{process}/fd/{namespace}\n\
-                 link set h{place} master br0\nlink set h{place} up\n"
+                "link add br{number} type bridge\naddr add {switch}/16 dev br{number}\nlink set br{number} up\n"
             );
+            for (place, host) in hosts.hosts.iter().enumerate() {
+                let namespace = host.namespace.as_raw_fd();
+                let _ = write!(
+                    bridge,
+                    "link add {letter}{place} type veth peer name eth{number} netns /proc/{process}/fd/{namespace}\n\
+                     link set {letter}{place} master br{number}\nlink set {letter}{place} up\n"
+                );
+            }
         }
         hosts.in_switch(|| run(&ip, &["-batch", "-"], &bridge))??;
         for (place, host) in hosts.hosts.iter().enumerate() {
-            let address = host.address;
-            let lines =
-                format!("link set lo up\naddr add {address}/16 dev eth0\nlink set eth0 up\n");
+            let mut lines = String::from("link set lo up\n");
+            for (number, via) in hosts.networks.iter().enumerate() {
+                let address = host.address(*via);
+                let _ = write!(
+                    lines,
+                    "addr add {address}/16 dev eth{number}\nlink set eth{number} up\n"
+                );
+            }
             hosts.within(place, || run(&ip, &["-batch", "-"], &lines))??;
         }
         hosts.apply_rules()?;
@@ -169,6 +188,24 @@ impl Hosts {
         self.apply_rules().inspect_err(|_| self.cuts = before)
     }
 
+    /// Pulls the cable between a host and one network, or plugs it in again.
+    ///
+    /// # Errors
+    /// What `nft` said; everything passes as before then.
+    pub fn unplug(
+        &mut self,
+        host: usize,
+        via: Via,
+        is_unplugged: bool,
+    ) -> Result<(), NetworkError> {
+        let before = self.unplugged.clone();
+        match is_unplugged {
+            true => self.unplugged.insert((via, host)),
+            false => self.unplugged.remove(&(via, host)),
+        };
+        self.apply_rules().inspect_err(|_| self.unplugged = before)
+    }
+
     /// Loses a share of what passes from one host to another, by chance.
     ///
     /// # Errors
@@ -184,23 +221,39 @@ impl Hosts {
 
     /// All rules at once: `nft` takes a file as a whole or not at all.
     fn apply_rules(&self) -> Result<(), NetworkError> {
-        let rules = rules(&self.cuts, &self.losses);
+        let mut rules = rules(self.networks, &self.cuts, &self.losses);
+        for (via, host) in &self.unplugged {
+            let port = PORTS[via.index()];
+            for side in ["iifname", "oifname"] {
+                let _ = writeln!(
+                    rules,
+                    "add rule bridge links pass {side} \"{port}{host}\" ether type ip drop"
+                );
+            }
+        }
         self.in_switch(|| run(&self.nft, &["-f", "-"], &rules))?
     }
 }
 
 /// What `nft` reads. Only packets of IP are touched, so that hosts still find each other.
-fn rules(cuts: &BTreeSet<(usize, usize)>, losses: &BTreeMap<(usize, usize), Share>) -> String {
+fn rules(
+    networks: &[Via],
+    cuts: &BTreeSet<(usize, usize)>,
+    losses: &BTreeMap<(usize, usize), Share>,
+) -> String {
     let mut text = String::from(
         "add table bridge links\n\
          add chain bridge links pass { type filter hook forward priority 0; policy accept; }\n\
          flush chain bridge links pass\n",
     );
     let mut rule = |(from, to): &(usize, usize), what: &str| {
-        let _ = writeln!(
-            text,
-            "add rule bridge links pass iifname \"h{from}\" oifname \"h{to}\" ether type ip {what}"
-        );
+        for via in networks {
+            let port = PORTS[via.index()];
+            let _ = writeln!(
+                text,
+                "add rule bridge links pass iifname \"{port}{from}\" oifname \"{port}{to}\" ether type ip {what}"
+            );
+        }
     };
     for pair in cuts {
         rule(pair, "drop");
@@ -248,7 +301,8 @@ mod tests {
     #[test]
     fn rules_name_pairs_and_shares() {
         let share = Share::new(0.1).expect("a share");
-        let text = rules(&BTreeSet::from([(0, 1)]), &BTreeMap::from([((2, 0), share)]));
+        let (cuts, losses) = (BTreeSet::from([(0, 1)]), BTreeMap::from([((2, 0), share)]));
+        let text = rules(&[Via::First], &cuts, &losses);
         let rules: Vec<&str> = text.lines().skip(3).collect();
         assert_eq!(
             rules,

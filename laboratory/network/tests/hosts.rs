@@ -11,7 +11,7 @@ const PATIENCE: Duration = Duration::from_secs(2);
 
 fn hosts(count: usize) -> Option<Hosts> {
     let names: Vec<String> = (0..count).map(|number| format!("host-{number}")).collect();
-    match Hosts::build(&names) {
+    match Hosts::build(&names, false) {
         Ok(hosts) => Some(hosts),
         Err(error @ (NetworkError::NotPermitted { .. } | NetworkError::NoTool { .. })) => {
             skip(error);
@@ -24,7 +24,7 @@ fn hosts(count: usize) -> Option<Hosts> {
 fn sockets(hosts: &Hosts) -> Vec<UdpSocket> {
     let places = 0..hosts.hosts().len();
     let socket = |place: usize| {
-        let address = SocketAddr::from((hosts.hosts()[place].address(), 7450));
+        let address = SocketAddr::from((hosts.hosts()[place].address(Via::First), 7450));
         let socket = hosts.within(place, || UdpSocket::bind(address));
         let socket = socket.expect("the host is there").expect("a free port");
         socket.set_read_timeout(Some(PATIENCE)).expect("a timeout");

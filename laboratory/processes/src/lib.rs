@@ -242,6 +242,8 @@ fn refuse_what_is_simulated(scenario: &Scenario) -> Result<(), LaboratoryError> 
                 | Action::Write { .. }
                 | Action::Cut { .. }
                 | Action::Heal { .. }
+                | Action::Unplug { .. }
+                | Action::Plug { .. }
         )
     };
     let simulated = scenario.steps.iter().filter(|step| !real(step.action));

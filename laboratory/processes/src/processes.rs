@@ -10,7 +10,7 @@ use understudy_bus::{Cuts, HostEvent, ZENOH_RUNTIME, log_environment};
 use understudy_journal::{Happening, Record, RunEvent, check_version};
 use understudy_scenarios::action_word;
 use understudy_simulator::{Action, Fault};
-use understudy_wire::{Member, SignalPlace};
+use understudy_wire::{Member, SignalPlace, Via};
 
 use super::{Deaths, Laboratory, Progress};
 use crate::error::LaboratoryError;
@@ -184,6 +184,8 @@ impl Laboratory<'_> {
             }
             (Action::Cut { to }, _) => self.cut(step.member, to, true).await,
             (Action::Heal { to }, _) => self.cut(step.member, to, false).await,
+            (Action::Unplug { network }, _) => self.unplug(step.member, network, true).await,
+            (Action::Plug { network }, _) => self.unplug(step.member, network, false).await,
             (Action::Crash, Some(process)) => process.crash().await,
             (Action::Stop, Some(process)) => process.stop(),
             (Action::Continue, Some(process)) => process.go_on(),
@@ -234,6 +236,24 @@ impl Laboratory<'_> {
         let cuts = self.cuts.entry(to).or_default();
         cuts.set(from, is_cut);
         if let Some(process) = self.processes.get_mut(&to) {
+            cut(process, cuts).await;
+        }
+        Ok(())
+    }
+
+    /// A member sends and receives nothing more over one of two networks, or everything again. A plant stays on the cables of its remote I/O.
+    async fn unplug(
+        &mut self,
+        member: Member,
+        network: Via,
+        is_unplugged: bool,
+    ) -> std::io::Result<()> {
+        if self.site.unplug(member, network, is_unplugged)? {
+            return Ok(());
+        }
+        let cuts = self.cuts.entry(member).or_default();
+        cuts.unplug(network, is_unplugged);
+        if let Some(process) = self.processes.get_mut(&member) {
             cut(process, cuts).await;
         }
         Ok(())

@@ -16,12 +16,12 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr, SocketAddrV4};
 use std::path::{Path, PathBuf};
 
 use understudy_bus::{Endpoints, LinkKind, Peer};
-use understudy_cluster::Cluster;
+use understudy_cluster::{Addresses, Cluster};
 use understudy_journal::RunDirectory;
 use understudy_network::{Hosts, Impairment, NetworkError, ProxyPlan, Route, Share, Transport};
 use understudy_scenarios::Scenario;
 use understudy_simulator::Network;
-use understudy_wire::Member;
+use understudy_wire::{Member, Via};
 
 use crate::LaboratorySettings;
 use crate::error::LaboratoryError;
@@ -60,7 +60,7 @@ pub(super) struct Site {
     host_of: BTreeMap<Member, usize>,
     proxy: Option<LinkProxy>,
     /// From whom to whom, and the place of the route in the proxy.
-    routes: BTreeMap<(Member, Member), usize>,
+    routes: BTreeMap<(Member, Member, Via), usize>,
     /// The address of each route that a member is given for another member's.
     stand_ins: Vec<SocketAddr>,
     impairment: Impairment,
@@ -87,7 +87,10 @@ impl Site {
         let host_of = hosts_of(&members);
         let mut hosts = match settings.hosts {
             HostKind::Loopback => None,
-            HostKind::Namespaces => Some(Hosts::build(&host_names(cluster, &host_of))?),
+            HostKind::Namespaces => {
+                let names = host_names(cluster, &host_of);
+                Some(Hosts::build(&names, cluster.has_two_networks())?)
+            }
         };
         let addresses = match &hosts {
             None => loopback_addresses(cluster)
@@ -97,8 +100,10 @@ impl Site {
         let peers: Vec<Peer> = members
             .iter()
             .zip(addresses)
-            .filter_map(|(&member, address)| {
-                Some(Peer { member, name: cluster.member_name(member)?.to_owned(), address })
+            .filter_map(|(&member, [address, second])| {
+                let name = cluster.member_name(member)?.to_owned();
+                let second = Some(second).filter(|_| cluster.has_two_networks());
+                Some(Peer { member, name, address, second })
             })
             .collect();
         let list = directory.file("endpoints.json");
@@ -169,6 +174,22 @@ impl Site {
         }
     }
 
+    /// Pulls the cable between a member's host and a network, or plugs it in again. False where the member has to do it by itself.
+    pub(super) fn unplug(
+        &mut self,
+        member: Member,
+        via: Via,
+        is_unplugged: bool,
+    ) -> io::Result<bool> {
+        match (&mut self.hosts, &self.proxy, self.host_of.get(&member)) {
+            (Some(hosts), None, Some(&host)) => {
+                let done = hosts.unplug(host, via, is_unplugged);
+                done.map(|()| true).map_err(io::Error::other)
+            }
+            _ => Ok(false),
+        }
+    }
+
     /// Ends the proxy; what a reader of the results should know.
     pub(super) fn end(mut self) -> Vec<String> {
         let mut notes = Vec::new();
@@ -197,8 +218,9 @@ impl Site {
         hosts: Option<&Hosts>,
     ) -> Result<(), LaboratoryError> {
         let link = laboratory.link;
-        let host = hosts.map_or(Ipv4Addr::LOCALHOST, |_| Hosts::SWITCH);
+        let host = |via| hosts.map_or(Ipv4Addr::LOCALHOST, |_| Hosts::switch(via));
         let mut routes: Vec<Route> = Vec::new();
+        let mut networks: Vec<Via> = Vec::new();
         for first in peers {
             let own = Endpoints::new(
                 cluster.agreement().cluster,
@@ -213,24 +235,27 @@ impl Site {
                 if !opens || !own.talks_with(second.member) {
                     continue;
                 }
-                self.routes.insert((first.member, second.member), routes.len());
-                routes.push(Route {
-                    listen: SocketAddr::new(IpAddr::V4(host), 0),
-                    to: link.frames_address(second.address).map_err(LaboratoryError::Endpoints)?,
-                    transport: match link {
-                        LinkKind::Zenoh => Transport::Tcp,
-                        LinkKind::Udp => Transport::Udp,
-                    },
-                    forth: self.impairment,
-                    back: self.impairment,
-                });
+                for (via, address) in Via::BOTH.into_iter().zip(second.addresses()) {
+                    self.routes.insert((first.member, second.member, via), routes.len());
+                    networks.push(via);
+                    routes.push(Route {
+                        listen: SocketAddr::new(IpAddr::V4(host(via)), 0),
+                        to: link.frames_address(address).map_err(LaboratoryError::Endpoints)?,
+                        transport: match link {
+                            LinkKind::Zenoh => Transport::Tcp,
+                            LinkKind::Udp => Transport::Udp,
+                        },
+                        forth: self.impairment,
+                        back: self.impairment,
+                    });
+                }
             }
         }
         let free = understudy_bus::free_addresses(routes.len()).map_err(|source| {
             LaboratoryError::System { what: "free ports for the proxy", source }
         })?;
-        for (route, free) in routes.iter_mut().zip(free) {
-            let stands_for = SocketAddr::new(IpAddr::V4(host), free.port());
+        for ((route, via), free) in routes.iter_mut().zip(networks).zip(free) {
+            let stands_for = SocketAddr::new(IpAddr::V4(host(via)), free.port());
             let frames = link.frames_address(stands_for);
             route.listen = frames.map_err(LaboratoryError::Endpoints)?;
             self.stand_ins.push(stands_for);
@@ -256,9 +281,15 @@ impl Site {
             let view: Vec<Peer> = peers
                 .iter()
                 .map(|peer| {
-                    let route = self.routes.get(&(own.member, peer.member));
-                    let stands_for = route.and_then(|&route| self.stand_ins.get(route));
-                    Peer { address: stands_for.copied().unwrap_or(peer.address), ..peer.clone() }
+                    let stands_for = |via| {
+                        let route = self.routes.get(&(own.member, peer.member, via))?;
+                        self.stand_ins.get(*route).copied()
+                    };
+                    Peer {
+                        address: stands_for(Via::First).unwrap_or(peer.address),
+                        second: stands_for(Via::Second).or(peer.second),
+                        ..peer.clone()
+                    }
                 })
                 .collect();
             let path = folder.join(format!("{}.json", own.name));
@@ -313,20 +344,28 @@ fn host_names(cluster: &Cluster, host_of: &BTreeMap<Member, usize>) -> Vec<Strin
         .collect()
 }
 
-/// From the cluster file, or free ones of the loopback interface.
-fn loopback_addresses(cluster: &Cluster) -> io::Result<Vec<SocketAddr>> {
-    let known: Vec<Option<SocketAddr>> =
-        cluster.members().map(|member| cluster.address(member)).collect();
-    let lacking = known.iter().filter(|address| address.is_none()).count();
+/// From the cluster file, or free ones of the loopback interface, for both networks.
+fn loopback_addresses(cluster: &Cluster) -> io::Result<Vec<[SocketAddr; 2]>> {
+    let known: Vec<Addresses> = cluster.members().map(|member| cluster.addresses(member)).collect();
+    let is_used = |via: Via| via == Via::First || cluster.has_two_networks();
+    let of = |addresses: &Addresses| [addresses.first, addresses.second];
+    let known = known.iter().map(of);
+    let lacking = known.clone().flat_map(|addresses| Via::BOTH.into_iter().zip(addresses));
+    let lacking = lacking.filter(|(via, address)| is_used(*via) && address.is_none()).count();
     let mut free = understudy_bus::free_addresses(lacking)?.into_iter();
-    Ok(known.into_iter().filter_map(|address| address.or_else(|| free.next())).collect())
+    let both = known.filter_map(|[first, second]| {
+        let first = first.or_else(|| free.next())?;
+        let second = if is_used(Via::Second) { second.or_else(|| free.next())? } else { first };
+        Some([first, second])
+    });
+    Ok(both.collect())
 }
 
 fn namespace_addresses(
     members: &[Member],
     host_of: &BTreeMap<Member, usize>,
     hosts: &Hosts,
-) -> Vec<SocketAddr> {
+) -> Vec<[SocketAddr; 2]> {
     let mut used: BTreeMap<usize, u16> = BTreeMap::new();
     members
         .iter()
@@ -334,8 +373,8 @@ fn namespace_addresses(
             let host = *host_of.get(member)?;
             let port = used.entry(host).or_insert(FIRST_PORT);
             *port += 1;
-            let address = hosts.hosts().get(host)?.address();
-            Some((address, *port - 1).into())
+            let host = hosts.hosts().get(host)?;
+            Some(Via::BOTH.map(|via| (host.address(via), *port - 1).into()))
         })
         .collect()
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 use understudy_wire::{
     Force, MAXIMUM_FORCE_SECONDS, Member, PointValue, ProgramHash, ProgramId, Role, SignalPlace,
-    StateChoice, Write, WriteId,
+    StateChoice, Via, Write, WriteId,
 };
 
 /// One thing done to one member.
@@ -84,6 +84,17 @@ pub enum Action {
     Heal {
         /// Who hears it again.
         to: Member,
+    },
+    /// The cable between it and one of two networks is pulled: over that one it sends and receives nothing more. Where all are unplugged from a
+    /// network, that network has failed.
+    Unplug {
+        /// Which.
+        network: Via,
+    },
+    /// That cable is plugged in again.
+    Plug {
+        /// Which.
+        network: Via,
     },
     /// Its frames reach one other member so much later from now on, and are overtaken by later ones of others; zero ends this.
     Delay {
@@ -178,6 +189,8 @@ impl Action {
             Self::Set { .. } => "set",
             Self::Cut { .. } => "cut",
             Self::Heal { .. } => "heal",
+            Self::Unplug { .. } => "unplug",
+            Self::Plug { .. } => "plug",
             Self::Delay { .. } => "delay",
             Self::Corrupt { .. } => "corrupt",
             Self::Replay { .. } => "replay",

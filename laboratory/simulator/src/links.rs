@@ -10,8 +10,10 @@ use std::time::Duration;
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use smallvec::SmallVec;
 use understudy_wire::{
-    Body, Frame, Image, Member, ProgramSet, Roster, StationId, StationSet, Time, decode, encode,
+    Body, Frame, Image, Member, ProgramSet, Roster, StationId, StationSet, Time, Via, decode,
+    encode,
 };
 
 use crate::fault::Action;
@@ -41,6 +43,10 @@ pub(crate) struct Links {
     /// By place: how much later a member hears.
     late: Vec<Duration>,
     anybody_late: bool,
+    /// Over how many networks each frame is sent.
+    networks: &'static [Via],
+    /// By place: the networks that a member is unplugged from.
+    unplugged: Vec<[bool; 2]>,
     remembers: bool,
     refused: u64,
     metered: Option<Metered>,
@@ -89,10 +95,10 @@ impl Flips {
 }
 
 impl Links {
-    /// Links of so many stations and remote I/Os.
+    /// Links of so many stations and remote I/Os, over two networks where they have them.
     pub(crate) fn new(
         (stations, remote_ios): (usize, usize),
-        roster: Roster,
+        (roster, has_two_networks): (Roster, bool),
         network: Network,
         seed: u64,
     ) -> Self {
@@ -109,6 +115,8 @@ impl Links {
             intakes: vec![Flips::default(); stations],
             late: vec![Duration::ZERO; stations + remote_ios],
             anybody_late: false,
+            networks: if has_two_networks { &Via::BOTH } else { &[Via::First] },
+            unplugged: vec![[false; 2]; stations + remote_ios],
             remembers: false,
             refused: 0,
             metered: None,
@@ -133,7 +141,15 @@ impl Links {
         let delays = &self.senders[sender].delays;
         let late = delays.iter().any(|(place, _)| *place == receiver);
         let slow = |place: usize| !self.late[place].is_zero();
-        !deaf && !late && !slow(sender) && !slow(receiver)
+        let is_joined = self.joins(sender, receiver).next().is_some();
+        is_joined && !deaf && !late && !slow(sender) && !slow(receiver)
+    }
+
+    /// The networks that carry frames from one place to another.
+    fn joins(&self, sender: usize, receiver: usize) -> impl Iterator<Item = Via> + use<> {
+        let (sender, receiver) = (self.unplugged[sender], self.unplugged[receiver]);
+        let networks = self.networks.iter().copied();
+        networks.filter(move |via| !sender[via.index()] && !receiver[via.index()])
     }
 
     /// Counts what is sent, from here on.
@@ -190,6 +206,8 @@ impl Links {
                     Member::Plant(_) => {}
                 }
             }
+            Action::Unplug { network } => self.unplugged[place][network.index()] = true,
+            Action::Plug { network } => self.unplugged[place][network.index()] = false,
             Action::Delay { to, by } => {
                 let Some(to) = self.place(to) else {
                     return;
@@ -325,7 +343,8 @@ impl Links {
             metered.frames += receivers;
             metered.bytes += receivers * bytes.len() as u64;
         }
-        if self.network.is_even() && !self.anybody_late && sender.delays.is_empty() {
+        let all_plugged = self.unplugged.iter().all(|unplugged| *unplugged == [false; 2]);
+        if self.network.is_even() && !self.anybody_late && sender.delays.is_empty() && all_plugged {
             let at = now + self.network.latency;
             self.queue.push(at, frame, stations, remote_ios);
             return;
@@ -352,17 +371,25 @@ impl Links {
         let delays = self.senders[sender].delays.iter();
         let late = delays.filter(|(to, _)| *to == receiver).map(|(_, by)| *by);
         let late = self.late[receiver] + late.sum::<Duration>();
-        for delay in self.network.arrivals(&mut self.random) {
-            let share = self.network.corruption;
-            let frame = if share > 0.0 && self.random.random::<f64>() < share {
-                self.corrupted(frame)
-            } else {
-                Some(Arc::clone(frame))
-            };
-            if let Some(frame) = frame {
-                let at = now + delay + late;
-                self.queue.push(at, frame, stations, remote_ios);
+        let mut copies = SmallVec::<[(Time, Arc<Frame>); 4]>::new();
+        for _ in self.joins(sender, receiver) {
+            for delay in self.network.arrivals(&mut self.random) {
+                let share = self.network.corruption;
+                let frame = if share > 0.0 && self.random.random::<f64>() < share {
+                    self.corrupted(frame)
+                } else {
+                    Some(Arc::clone(frame))
+                };
+                copies.extend(frame.map(|frame| (now + delay + late, frame)));
             }
+        }
+        if self.networks.len() > 1 {
+            // The receiver takes the first copy.
+            copies.sort_by_key(|(at, _)| *at);
+            copies.truncate(1);
+        }
+        for (at, frame) in copies {
+            self.queue.push(at, frame, stations, remote_ios);
         }
     }
 }
@@ -383,11 +410,13 @@ impl Hash for Links {
             intakes,
             late,
             anybody_late: _,
+            networks: _,
+            unplugged,
             remembers: _,
             refused: _,
             metered: _,
         } = self;
-        (queue, intakes, late).hash(hasher);
+        (queue, intakes, late, unplugged).hash(hasher);
         for sender in senders {
             (sender.deaf_stations, sender.deaf_remote_ios).hash(hasher);
             (&sender.delays, sender.corrupt, sender.samples, sender.words).hash(hasher);

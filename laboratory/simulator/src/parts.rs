@@ -17,6 +17,8 @@ pub struct Parts {
     pub fed_by: Vec<Option<ProgramId>>,
     /// For each plant, what it follows.
     pub follows: Vec<Vec<Followed>>,
+    /// Whether each frame is sent over two networks.
+    pub has_two_networks: bool,
 }
 
 impl Parts {
@@ -57,5 +59,6 @@ pub fn parts(cluster: &Cluster) -> Parts {
                 None => Vec::new(),
             })
             .collect(),
+        has_two_networks: cluster.has_two_networks(),
     }
 }

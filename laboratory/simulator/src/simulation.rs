@@ -134,7 +134,7 @@ impl Simulation {
         let mut simulation = Self {
             links: Links::new(
                 (parts.stations.len(), parts.remote_ios.len()),
-                parts.roster(),
+                (parts.roster(), parts.has_two_networks),
                 network,
                 seed,
             ),

@@ -146,7 +146,16 @@ fn effect(record: &Record) -> Option<Effect> {
                 return Some(Effect::Ends(about("duplicate", member)));
             }
             HostEvent::RetainFailed { .. } | HostEvent::RetainRegained => of("retain"),
-            HostEvent::LinkFailed { .. } | HostEvent::LinkReopened { .. } => of("link"),
+            HostEvent::LinkFailed { network, .. } | HostEvent::LinkReopened { network, .. } => {
+                about("link", network)
+            }
+            HostEvent::NetworkReception { network, lost, impaired } => {
+                let subject = about("network", network);
+                if lost.is_empty() && impaired.is_empty() {
+                    return Some(Effect::Ends(subject));
+                }
+                subject
+            }
             HostEvent::WallClock { .. } | HostEvent::WallClockStepped { .. } => of("wall-clock"),
             _ => return None,
         },
@@ -198,6 +207,9 @@ fn of_run(event: &RunEvent) -> Option<Subject> {
                 (Action::Continue, _) => ("continued", String::new()),
                 (_, Some(_)) => ("process", String::new()),
                 (Action::Cut { to } | Action::Heal { to }, _) => ("cut", format!("{to:?}")),
+                (Action::Unplug { network } | Action::Plug { network }, _) => {
+                    ("unplugged", network.to_string())
+                }
                 // The newest is the cause that is named.
                 _ => ("action", String::new()),
             };

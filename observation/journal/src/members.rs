@@ -14,6 +14,7 @@ pub struct Members {
     /// Signals of each program; empty where only the members are known.
     signals: Vec<Vec<NamedSignal>>,
     spare_slots: StationSet,
+    have_two_networks: bool,
 }
 
 /// Input or output of a program, by name.
@@ -63,6 +64,7 @@ impl Members {
                 .map(|program| signals(cluster, program))
                 .collect(),
             spare_slots: cluster.agreement().schedule.spare_slots(),
+            have_two_networks: cluster.has_two_networks(),
             ..Self::new(cluster.members().map(|member| (member, name(member))))
         }
     }
@@ -76,7 +78,13 @@ impl Members {
             operator_inputs: Vec::new(),
             signals: Vec::new(),
             spare_slots: StationSet::EMPTY,
+            have_two_networks: false,
         }
+    }
+
+    /// Whether each frame is sent over two networks.
+    pub fn have_two_networks(&self) -> bool {
+        self.have_two_networks
     }
 
     /// Members with their names, in ascending order.

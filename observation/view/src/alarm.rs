@@ -229,6 +229,15 @@ impl Alarms {
         self.raise_alarm(subject, cycle, text, |_| {});
     }
 
+    /// Raises an alarm that lasts; of one that lasts already the text is replaced.
+    pub(crate) fn raise_or_retell(&mut self, subject: Subject, cycle: i64, text: String) {
+        let lasting = self.lasting.get(&subject).and_then(|number| self.alarms.get_mut(number));
+        match lasting {
+            Some(alarm) => alarm.text = text,
+            None => self.raise(subject, cycle, text),
+        }
+    }
+
     /// Raises an alarm that lasts and requires an immediate response.
     pub(crate) fn raise_critical(&mut self, subject: Subject, cycle: i64, text: String) {
         self.raise_alarm(subject, cycle, text, |alarm| alarm.priority = Some(Priority::Critical));

@@ -6,6 +6,7 @@ mod counters;
 mod cycle;
 mod driving;
 mod members;
+mod networks;
 mod past;
 mod process_alarms;
 mod programs;
@@ -38,6 +39,8 @@ use crate::timing::Timings;
 use changes::Changes;
 pub use counters::{Counters, MemberCounters, ProgramCounters};
 use cycle::{LastMargin, Received};
+use networks::Networks;
+
 use programs::ProgramTrack;
 use protection::Attribution;
 use reports::Reports;
@@ -97,6 +100,7 @@ pub struct Model {
     attributions: Vec<Attribution>,
     /// Who refuses whom.
     refusals: BTreeSet<members::Refusal>,
+    networks: Networks,
     pub(crate) process_alarms: ProcessAlarms,
     timings: Timings,
     pub(crate) times: TimesOfDay,
@@ -131,6 +135,7 @@ impl Model {
         let members = Members::of(&cluster);
         Self {
             alarms: Alarms::new(&members, programs),
+            networks: Networks::default(),
             members,
             writes: Writes::default(),
             cycles: Cycles::default(),

@@ -2,6 +2,33 @@
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, SocketAddrV4};
 
+/// Where a member listens, as far as that is known: on the network that every cluster has, and on the second one of a cluster with two.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Addresses<A = SocketAddr> {
+    /// On the first network.
+    pub first: Option<A>,
+    /// On the second network.
+    pub second: Option<A>,
+}
+
+impl<A> Default for Addresses<A> {
+    fn default() -> Self {
+        Self { first: None, second: None }
+    }
+}
+
+impl<A> Addresses<A> {
+    /// The same, borrowed.
+    pub(crate) fn as_ref(&self) -> Addresses<&A> {
+        Addresses { first: self.first.as_ref(), second: self.second.as_ref() }
+    }
+
+    /// Each value that is there, mapped.
+    pub(crate) fn map<B>(self, mut value: impl FnMut(A) -> B) -> Addresses<B> {
+        Addresses { first: self.first.map(&mut value), second: self.second.map(value) }
+    }
+}
+
 /// The longest name of a member, in characters.
 pub const MAXIMUM_NAME_LENGTH: usize = 48;
 

@@ -6,6 +6,7 @@ use std::net::{SocketAddr, SocketAddrV4};
 use std::sync::Arc;
 use std::time::Duration;
 
+use crate::address::Addresses;
 use crate::alarm::AlarmDeclaration;
 use crate::code::Code;
 use crate::device::FieldDevice;
@@ -63,7 +64,7 @@ pub struct Controller {
     /// Of the program.
     pub hash: ProgramHash,
     /// Where it listens, if the file says so.
-    pub address: Option<SocketAddr>,
+    pub addresses: Addresses,
 }
 
 /// A generated parity controller.
@@ -72,7 +73,7 @@ pub struct Understudy {
     /// The station's name.
     pub name: String,
     /// Where it listens, if the file says so.
-    pub address: Option<SocketAddr>,
+    pub addresses: Addresses,
     /// Whether this is the slot of a spare: absent until a spare wakes here.
     pub spare: bool,
 }
@@ -166,7 +167,7 @@ pub struct RemoteIo {
     /// What finds failed channels that do not say so.
     pub diagnosis: Option<DiagnosisPlace>,
     /// Where it listens, if the file says so.
-    pub address: Option<SocketAddr>,
+    pub addresses: Addresses,
 }
 
 impl RemoteIo {
@@ -197,7 +198,7 @@ pub struct PlantPlace {
     /// Periods without an actuation after which the fail-safe outputs are in force.
     pub watchdog_cycles: u32,
     /// Where it listens, if the file says so.
-    pub address: Option<SocketAddr>,
+    pub addresses: Addresses,
 }
 
 /// Programs, stations, remote I/Os and plants.
@@ -210,6 +211,7 @@ pub struct Cluster {
     pub(crate) link: Link,
     pub(crate) retain_every: Duration,
     pub(crate) multicast: Option<SocketAddrV4>,
+    pub(crate) has_two_networks: bool,
     pub(crate) security: Security,
     pub(crate) agreement: Arc<Agreement>,
     pub(crate) canonical_text: String,
@@ -237,6 +239,11 @@ impl Cluster {
     /// The first multicast group of its frames, where the network has multicast; only for UDP.
     pub fn multicast(&self) -> Option<SocketAddrV4> {
         self.multicast.filter(|_| self.link == Link::Udp)
+    }
+
+    /// Whether each frame is sent over two networks.
+    pub fn has_two_networks(&self) -> bool {
+        self.has_two_networks
     }
 
     /// Who may speak.
@@ -366,30 +373,35 @@ impl Cluster {
         self.members().find(|&member| self.member_name(member) == Some(name))
     }
 
-    /// Where a member listens; nothing where the file does not say so.
+    /// Where a member listens on the first network; nothing where the file does not say so.
     pub fn address(&self, member: Member) -> Option<SocketAddr> {
-        self.place(member).and_then(|(_, address)| address)
+        self.addresses(member).first
     }
 
-    fn place(&self, member: Member) -> Option<(&str, Option<SocketAddr>)> {
+    /// Where a member listens, as far as the file says so.
+    pub fn addresses(&self, member: Member) -> Addresses {
+        self.place(member).map_or_else(Addresses::default, |(_, addresses)| addresses)
+    }
+
+    fn place(&self, member: Member) -> Option<(&str, Addresses)> {
         match member {
             Member::Station(station) => {
                 let rank = station.index();
                 let controller = self.controllers.get(rank);
-                let controller = controller.map(|found| (found.name.as_str(), found.address));
+                let controller = controller.map(|found| (found.name.as_str(), found.addresses));
                 let understudy = rank.checked_sub(self.controllers.len());
                 controller.or_else(|| {
                     let found = self.understudies.get(understudy?)?;
-                    Some((&found.name, found.address))
+                    Some((&found.name, found.addresses))
                 })
             }
             Member::RemoteIo(program) => {
                 let found = self.remote_ios.get(program.index())?;
-                Some((&found.name, found.address))
+                Some((&found.name, found.addresses))
             }
             Member::Plant(program) => {
                 let found = self.plants.get(program.index())?.as_ref()?;
-                Some((&found.name, found.address))
+                Some((&found.name, found.addresses))
             }
         }
     }

@@ -16,7 +16,7 @@ pub(crate) use understudy_text::tables::Placed;
 use understudy_text::tables::{Codes, Constant, Value, unknown_key};
 
 use crate::address::{
-    MAXIMUM_NAME_LENGTH, MULTICAST_GROUPS, is_multicast_range, is_name, why_unreachable,
+    Addresses, MAXIMUM_NAME_LENGTH, MULTICAST_GROUPS, is_multicast_range, is_name, why_unreachable,
 };
 use crate::format::{Key, Kind, OPERATOR_INPUT, POINT, SIGNAL_INPUT, Section};
 use crate::place::{ByteOrder, Place, PlaceError, Registers, register};
@@ -164,7 +164,18 @@ impl<'a, 't> Fields<'a, 't> {
         Some(text)
     }
 
-    pub(crate) fn address(
+    /// Where a member listens.
+    pub(crate) fn addresses(
+        &self,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Addresses<Placed<SocketAddr>> {
+        Addresses {
+            first: self.address("address", diagnostics),
+            second: self.address("second_address", diagnostics),
+        }
+    }
+
+    fn address(
         &self,
         name: &'static str,
         diagnostics: &mut Vec<Diagnostic>,

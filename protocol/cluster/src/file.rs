@@ -11,6 +11,7 @@ use understudy_text::Diagnostic;
 use understudy_text::tables::Constant;
 use understudy_text::tables::{Value, unknown_key};
 
+use crate::address::Addresses;
 use crate::device::{BAUD_RATES, Connection, Parity, SerialLine};
 use crate::fields::{CODES, ConnectionText, Fields, PlaceEntry, Placed, SourceEntry};
 use crate::format::{
@@ -65,6 +66,7 @@ pub(crate) struct ClusterSection {
     /// Index into [`crate::format::LINKS`].
     pub(crate) link: usize,
     pub(crate) multicast: Option<SocketAddrV4>,
+    pub(crate) networks: u32,
     /// Index into [`crate::format::SECURITIES`].
     pub(crate) security: usize,
 }
@@ -74,13 +76,13 @@ pub(crate) struct ControllerSection {
     pub(crate) span: Range<usize>,
     pub(crate) name: Option<Placed<String>>,
     pub(crate) ladder: Option<Placed<String>>,
-    pub(crate) address: Option<Placed<SocketAddr>>,
+    pub(crate) addresses: Addresses<Placed<SocketAddr>>,
 }
 
 #[derive(Debug)]
 pub(crate) struct UnderstudySection {
     pub(crate) name: Option<Placed<String>>,
-    pub(crate) address: Option<Placed<SocketAddr>>,
+    pub(crate) addresses: Addresses<Placed<SocketAddr>>,
     pub(crate) spare: bool,
 }
 
@@ -102,7 +104,7 @@ pub(crate) struct RemoteIoSection {
     pub(crate) diagnosis: Option<Placed<String>>,
     pub(crate) inputs: Vec<SourceEntry>,
     pub(crate) field: Option<FieldSection>,
-    pub(crate) address: Option<Placed<SocketAddr>>,
+    pub(crate) addresses: Addresses<Placed<SocketAddr>>,
 }
 
 #[derive(Debug)]
@@ -130,7 +132,7 @@ pub(crate) struct PlantSection {
     /// By terminal: where the terminal stands, and the sensor of another plant.
     pub(crate) follows: BTreeMap<String, (Range<usize>, Placed<String>)>,
     pub(crate) watchdog_cycles: u32,
-    pub(crate) address: Option<Placed<SocketAddr>>,
+    pub(crate) addresses: Addresses<Placed<SocketAddr>>,
 }
 
 #[derive(Debug)]
@@ -159,7 +161,7 @@ pub(crate) fn read(text: &str, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
             span: fields.span.clone(),
             name: fields.name("name", diagnostics),
             ladder: fields.text("ladder", diagnostics),
-            address: fields.address("address", diagnostics),
+            addresses: fields.addresses(diagnostics),
         })
         .collect();
     if controllers.is_empty() && !root.contains_key(CONTROLLER.name) {
@@ -168,7 +170,7 @@ pub(crate) fn read(text: &str, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
     let understudies = tables(root, &UNDERSTUDY, diagnostics).map(|tables| {
         let read = |fields: &Fields<'_, '_>| UnderstudySection {
             name: fields.name("name", diagnostics),
-            address: fields.address("address", diagnostics),
+            addresses: fields.addresses(diagnostics),
             spare: fields.flag("spare", diagnostics),
         };
         tables.iter().map(read).collect()
@@ -189,7 +191,7 @@ pub(crate) fn read(text: &str, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
             diagnosis: fields.text("diagnosis", diagnostics),
             inputs: fields.sources("inputs", diagnostics),
             field: field(fields, &empty, diagnostics),
-            address: fields.address("address", diagnostics),
+            addresses: fields.addresses(diagnostics),
         })
         .collect();
     let plants = tables(root, &PLANT, diagnostics).unwrap_or_default();
@@ -204,7 +206,7 @@ pub(crate) fn read(text: &str, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
             signals: fields.names("signals", diagnostics),
             follows: fields.names("follows", diagnostics),
             watchdog_cycles: fields.count("watchdog_cycles", diagnostics),
-            address: fields.address("address", diagnostics),
+            addresses: fields.addresses(diagnostics),
         })
         .collect();
     let alarms = tables(root, &ALARM, diagnostics).unwrap_or_default();
@@ -271,6 +273,7 @@ fn cluster(root: &DeTable<'_>, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
         retain_every: fields.time("retain_every", diagnostics),
         link: fields.word("link", diagnostics),
         multicast: fields.multicast("multicast", diagnostics),
+        networks: fields.count("networks", diagnostics),
         security: fields.word("security", diagnostics),
     })
 }

@@ -134,7 +134,8 @@ pub(crate) static CLUSTER: Section = Section {
         key listen_cycles: count(1, MANY_CYCLES, 4), "cycles for which a starting station listens before it founds an epoch of its own";
         key retain_every: time(SHORTEST_PERIOD, Duration::from_secs(3600), Duration::from_secs(1)), "how often a station writes the whole state of a program with retentive variables to its disk, and makes sure that it is there; each cycle in between is written too, and may be lost with the power";
         key link: word(&LINKS), "the transport of the frames";
-        key multicast: Kind::Text, "with `link = \"udp\"`: the first of 33 IPv4 multicast groups and their port, such as `239.192.0.0:7600`, in a network that delivers multicast between all members; each frame is then sent once for all its receivers. Other clusters on the network need other groups or another port";
+        key multicast: Kind::Text, "with `link = \"udp\"`: the first of 33 IPv4 multicast groups and their port, such as `239.192.0.0:7600`, in a network that delivers multicast between all members; each frame is then sent once for all its receivers. With two networks the second one has the same groups at the next port. Other clusters on the network need other groups or another port";
+        key networks: count(1, 2, 1), "number of independent networks between the members; with `2` every member has a `second_address`, each frame is sent over both, and the loss of one of them is an alarm and costs no cycle, see [two networks](../how-to/two-networks.md)";
         key security: word(&SECURITIES), "whose frames are accepted: `keys`, those of members with keys of this cluster, see `understudy keys`; `off`, all frames on the network. The laboratory makes keys of its own for each run";
     },
 };
@@ -147,6 +148,7 @@ pub(crate) static CONTROLLER: Section = Section {
         required name: Kind::Name, "names the station";
         required ladder: Kind::Text, "the file with its program, relative to the cluster file";
         key address: Kind::Address, "where it listens, such as `192.168.1.11:7450`; the laboratory picks a free loopback port where it is absent";
+        key second_address: Kind::Address, "with `networks = 2`: where it listens on the second network";
     },
 };
 
@@ -157,6 +159,7 @@ pub(crate) static UNDERSTUDY: Section = Section {
     keys: keys! {
         required name: Kind::Name, "names the station";
         key address: Kind::Address, "as for a controller";
+        key second_address: Kind::Address, "as for a controller";
         key spare: Kind::Flag, "whether this is the slot of a spare: it is empty until `understudy spare` wakes here, and its absence is no alarm";
     },
 };
@@ -179,6 +182,7 @@ pub(crate) static REMOTE_IO: Section = Section {
         key inputs: Kind::Sources, "inputs that do not come from the field: operators write them, or another program computes them, see below";
         key field: Kind::Device, "real equipment behind it, see below; without it its plant is simulated";
         key address: Kind::Address, "as for a controller";
+        key second_address: Kind::Address, "as for a controller";
     },
 };
 
@@ -256,6 +260,7 @@ pub(crate) static PLANT: Section = Section {
         key parameters: Kind::Parameters, "of a built-in model, see below";
         key watchdog_cycles: count(2, MANY_CYCLES, 3), "periods without an actuation after which the fail-safe outputs are in force";
         key address: Kind::Address, "as for a controller";
+        key second_address: Kind::Address, "as for a controller";
     },
 };
 

@@ -26,6 +26,7 @@
 //! | U0225 | a source of an input that does not fit its type |
 //! | U0226 | an alarm whose condition does not fit its signal |
 //! | U0227 | a sender and a receiver of different types or ranges |
+//! | U0235 | addresses that are not of two networks, or of one network only |
 //! | U0251 | warning: an input that no sensor drives |
 //! | U0252 | warning: an output that moves nothing |
 //! | U0253 | warning: not one understudy where the mode wants one |
@@ -61,6 +62,7 @@ use understudy_wire::{ClusterHash, ConfigurationHash, MAXIMUM_PROGRAMS, StationI
 use self::ladders::Ladders;
 pub(crate) use self::marks::MARK;
 use self::names::Names;
+use crate::address::Addresses;
 use crate::cluster::{Cluster, Controller, Link, RemoteIo, Security, Understudy};
 use crate::code::Code;
 use crate::configuration::configuration_text;
@@ -153,7 +155,8 @@ fn build(
     }
     file.controllers.truncate(MAXIMUM_PROGRAMS);
     let link = overrides.link.unwrap_or([Link::Udp, Link::Zenoh][cluster.link]);
-    let mut names = Names::new(link, cluster.multicast.is_some());
+    let has_two_networks = cluster.networks == 2;
+    let mut names = Names::new(link, cluster.multicast.is_some(), has_two_networks);
     let members = members(file.controllers, period, ladders, &mut names, diagnostics);
     let understudies = understudies(file.understudies, &mut names, diagnostics);
     let remote_ios =
@@ -209,6 +212,7 @@ fn build(
         link,
         retain_every: cluster.retain_every,
         multicast: cluster.multicast,
+        has_two_networks,
         security: overrides.security.unwrap_or([Security::Keys, Security::Off][cluster.security]),
         agreement: Arc::new(agreement.clone()),
         canonical_text: String::new(),
@@ -243,7 +247,7 @@ fn members(
             }
             None => String::new(),
         };
-        names.listen(section.address.as_ref(), diagnostics);
+        names.listen(&section.addresses, diagnostics);
         let code =
             section.ladder.as_ref().and_then(|file| ladders.code(file, &name, period, diagnostics));
         members.push(Member {
@@ -266,7 +270,7 @@ fn controller(member: Member) -> Option<Controller> {
         hash: code.hash(),
         interface,
         code,
-        address: member.section.address.map(|address| address.value),
+        addresses: member.section.addresses.map(|address| address.value),
     })
 }
 
@@ -278,18 +282,18 @@ fn understudies(
     let Some(sections) = sections else {
         let name = "understudy".to_owned();
         names.declare(&name, 0..0, diagnostics);
-        return vec![Understudy { name, address: None, spare: false }];
+        return vec![Understudy { name, addresses: Addresses::default(), spare: false }];
     };
     let mut understudies = Vec::new();
     for section in sections {
-        names.listen(section.address.as_ref(), diagnostics);
+        names.listen(&section.addresses, diagnostics);
         let name = section.name.map(|name| {
             names.declare(&name.value, name.span, diagnostics);
             name.value
         });
         understudies.push(Understudy {
             name: name.unwrap_or_default(),
-            address: section.address.map(|address| address.value),
+            addresses: section.addresses.map(|address| address.value),
             spare: section.spare,
         });
     }
@@ -313,7 +317,7 @@ fn remote_ios(
     let mut places: BTreeMap<usize, RemoteIo> = BTreeMap::new();
     let mut taken = BTreeMap::new();
     for section in sections {
-        names.listen(section.address.as_ref(), diagnostics);
+        names.listen(&section.addresses, diagnostics);
         if let Some(name) = &section.name {
             names.declare(&name.value, name.span.clone(), diagnostics);
         }
@@ -358,7 +362,7 @@ fn remote_ios(
                 .diagnosis
                 .as_ref()
                 .and_then(|file| diagnosis::read(file, period, member, ladders, diagnostics)),
-            address: section.address.map(|address| address.value),
+            addresses: section.addresses.map(|address| address.value),
         };
         places.insert(index, remote_io);
     }
@@ -384,7 +388,7 @@ fn remote_ios(
                 stale_state: StaleState::default(),
                 restart: Restart::default(),
                 diagnosis: None,
-                address: None,
+                addresses: Addresses::default(),
             }
         })
     };

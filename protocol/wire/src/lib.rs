@@ -15,6 +15,7 @@ mod segment;
 mod set;
 mod state_choice;
 mod time;
+mod via;
 mod write;
 
 pub use audience::{Audience, Roster, Topic, ZENOH_PORT_OFFSET};
@@ -38,6 +39,7 @@ pub use segment::{MAXIMUM_SEGMENTS, Segment, SegmentMask};
 pub use set::{Element, ProgramSet, Set, StationSet};
 pub use state_choice::StateChoice;
 pub use time::Time;
+pub use via::{NoSuchNetwork, Via};
 pub use write::{
     MAXIMUM_PULSES, MAXIMUM_SESSIONS, Pulse, Role, Write, WriteAnswer, WriteId, WriteOutcome,
     WriteRefusal,

@@ -144,7 +144,7 @@ pub fn examine_peers(
     let expected = endpoints.senders().count();
     let mut bytes = Vec::new();
     while clock.now() < end && heard.len() < expected {
-        while opened.receive(&mut bytes) {
+        while opened.receive(&mut bytes).is_some() {
             match guard.open(&mut bytes) {
                 Ok(Some(frame)) if frame.header.cluster == endpoints.cluster() => {
                     heard.insert(frame.header.sender, frame.header.configuration);

@@ -1,5 +1,6 @@
 //! Who is where; [`Roster`] says who receives what.
 
+use std::collections::BTreeMap;
 use std::net::{SocketAddr, SocketAddrV4};
 
 use serde::{Deserialize, Serialize};
@@ -16,6 +17,16 @@ pub struct Peer {
     pub name: String,
     /// Where it listens, and where the others send to.
     pub address: SocketAddr,
+    /// The same on the second network, in a cluster with two.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub second: Option<SocketAddr>,
+}
+
+impl Peer {
+    /// Where it listens, on each network.
+    pub fn addresses(&self) -> impl Iterator<Item = SocketAddr> + use<> {
+        [self.address].into_iter().chain(self.second)
+    }
 }
 
 /// What one member knows of all.
@@ -26,6 +37,11 @@ pub struct Endpoints {
     others: Vec<Peer>,
     roster: Roster,
     multicast: Option<SocketAddrV4>,
+}
+
+/// The first group of the second network: the same at the next port.
+fn next_port(first: SocketAddrV4) -> Option<SocketAddrV4> {
+    Some(SocketAddrV4::new(*first.ip(), first.port().checked_add(1)?))
 }
 
 impl Endpoints {
@@ -39,14 +55,16 @@ impl Endpoints {
         members: Vec<Peer>,
         roster: Roster,
     ) -> Result<Self, BusError> {
-        for (place, first) in members.iter().enumerate() {
-            let same = |second: &&Peer| second.address == first.address;
-            if let Some(second) = members[place + 1..].iter().find(same) {
-                return Err(BusError::SharedAddress {
-                    first: first.name.clone(),
-                    second: second.name.clone(),
-                    address: first.address,
-                });
+        let mut taken: BTreeMap<SocketAddr, &str> = BTreeMap::new();
+        for peer in &members {
+            for address in peer.addresses() {
+                if let Some(first) = taken.insert(address, &peer.name) {
+                    return Err(BusError::SharedAddress {
+                        first: first.to_owned(),
+                        second: peer.name.clone(),
+                        address,
+                    });
+                }
             }
         }
         let (mut own_peers, others): (Vec<Peer>, Vec<Peer>) =
@@ -59,6 +77,19 @@ impl Endpoints {
     #[must_use]
     pub fn with_multicast(self, first: Option<SocketAddrV4>) -> Self {
         Self { multicast: first, ..self }
+    }
+
+    /// Where everybody is on the second network, where this member is on it; a member that is not receives nothing there.
+    pub fn on_second_network(&self) -> Option<Self> {
+        let there =
+            |peer: &Peer| Some(Peer { address: peer.second?, second: None, ..peer.clone() });
+        Some(Self {
+            own: there(&self.own)?,
+            others: self.others.iter().filter_map(there).collect(),
+            multicast: self.multicast.and_then(next_port),
+            cluster: self.cluster,
+            roster: self.roster.clone(),
+        })
     }
 
     /// The first multicast group.
@@ -143,6 +174,7 @@ mod tests {
                 member,
                 name: format!("{place}"),
                 address: ([127, 0, 0, 1], 7000 + place as u16).into(),
+                second: None,
             })
             .collect()
     }

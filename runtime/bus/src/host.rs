@@ -13,17 +13,19 @@ use serde::{Deserialize, Serialize};
 use tracing::span::EnteredSpan;
 use tracing::{Span, debug, trace, trace_span};
 use understudy_cycle::{Input, Machine, Output, RemoteIoInput};
-use understudy_wire::{Body, Frame, Moment, Time, encode};
+use understudy_wire::{Body, Frame, Moment, Time, Via, encode};
 
 use crate::clock::Clock;
 use crate::error::BusError;
 use crate::field::silence::Silence;
 use crate::field::{FieldDriver, Look};
-use crate::guard::Guard;
+use crate::guard::{Guard, Refused};
 use crate::host_event::HostEvent;
 use crate::journal::{EventSink, Noted};
 use crate::link::{Link, LinkCounters, Reopening};
+use crate::network_reception::{Arrival, NetworkReception};
 use crate::orders::{Obeyed, Order, Orders};
+use crate::refused_as::RefusedAs;
 use crate::retained::Retainer;
 use crate::trouble::{Duplicates, Refusals};
 use crate::unreceived::Unreceived;
@@ -45,6 +47,9 @@ pub struct Summary {
     pub frames_said: u64,
     /// Frames that it heard, copies included.
     pub frames_heard: u64,
+    /// Second copies of frames, over the other one of two networks.
+    #[serde(default)]
+    pub second_copies: u64,
     /// Datagrams that were no frames, or did not count.
     pub refused: u64,
     /// Frames that broke a bound of the wire and were not sent.
@@ -61,6 +66,8 @@ pub struct Host<'a, M: Machine> {
     pub machine: &'a mut M,
     /// Carries its frames.
     pub link: &'a mut dyn Link,
+    /// Which copy of a frame counts, where the link has two networks.
+    pub networks: Option<NetworkReception>,
     /// Closes and opens them.
     pub guard: &'a mut Guard,
     /// Its sensors and actuators.
@@ -167,6 +174,9 @@ impl<M: Machine> Host<'_, M> {
         loop {
             if self.obey(&mut round) || self.machine.outvoted().is_some() {
                 break;
+            }
+            for via in Via::BOTH {
+                self.link.plug(via, !self.orders.is_unplugged(via));
             }
             self.look(&mut round);
             let heard = self.listen(&mut round);
@@ -284,12 +294,21 @@ impl<M: Machine> Host<'_, M> {
     /// Takes what has arrived, and says how many datagrams that were.
     fn listen(&mut self, round: &mut Round) -> usize {
         for taken in 0..INPUTS_IN_A_ROW {
-            if !self.link.receive(&mut round.received) {
+            let Some(via) = self.link.receive(&mut round.received) else {
                 return taken;
-            }
+            };
             self.look_again(round);
             let now = self.clock.now();
-            match self.guard.open(&mut round.received) {
+            let datagram =
+                self.networks.as_ref().map(|_| NetworkReception::identity(&round.received));
+            let opened = self.guard.open(&mut round.received);
+            if let Some(datagram) = datagram
+                && self.is_second_copy(now, via, datagram, &opened)
+            {
+                round.summary.second_copies += 1;
+                continue;
+            }
+            match opened {
                 // In order, and for another station.
                 Ok(None) => {}
                 Ok(Some(frame)) if self.orders.is_cut(frame.header.sender) => {}
@@ -334,6 +353,32 @@ impl<M: Machine> Host<'_, M> {
             }
         }
         INPUTS_IN_A_ROW
+    }
+
+    /// Whether an authentic datagram came over the other network before; it is counted for the network that it came over now.
+    fn is_second_copy(
+        &mut self,
+        now: Time,
+        via: Via,
+        datagram: u64,
+        opened: &Result<Option<Frame>, Refused>,
+    ) -> bool {
+        let Some(networks) = &mut self.networks else {
+            return false;
+        };
+        let (sender, was_accepted) = match opened {
+            Ok(frame) => (frame.as_ref().map(|frame| frame.header.sender), false),
+            Err(refused) if refused.kind == RefusedAs::Replayed => (refused.sender, true),
+            Err(_) => return false,
+        };
+        let arrival = networks.note(now, via, datagram);
+        let is_second = matches!(arrival, Arrival::Second { .. });
+        if let Some(sender) = sender
+            && (is_second || !was_accepted)
+        {
+            networks.count(sender, via, arrival);
+        }
+        is_second
     }
 
     fn drain(&mut self, now: Time, round: &mut Round) {
@@ -400,11 +445,11 @@ impl<M: Machine> Host<'_, M> {
 
     fn report_reopenings(&mut self, now: Time) {
         while let Some(reopening) = self.link.reopening() {
-            let Reopening { silence, peer, failure } = reopening;
+            let Reopening { via: network, silence, peer, failure } = reopening;
             let silence_ms = u64::try_from(silence.as_millis()).unwrap_or(u64::MAX);
             let event = match failure {
-                None => HostEvent::LinkReopened { silence_ms, peer },
-                Some(reason) => HostEvent::LinkFailed { silence_ms, peer, reason },
+                None => HostEvent::LinkReopened { network, silence_ms, peer },
+                Some(reason) => HostEvent::LinkFailed { network, silence_ms, peer, reason },
             };
             self.sink.record(now, Noted::Host(event));
         }
@@ -412,6 +457,9 @@ impl<M: Machine> Host<'_, M> {
 
     fn report_trouble(&mut self, now: Time, period: Duration, round: &mut Round) {
         for event in round.duplicates.over(now) {
+            self.sink.record(now, Noted::Host(event));
+        }
+        for event in self.networks.as_mut().map(|it| it.judge(now)).into_iter().flatten() {
             self.sink.record(now, Noted::Host(event));
         }
         if let Some(begun) = self.guard.begin_life() {

@@ -3,7 +3,7 @@
 use std::net::{IpAddr, SocketAddr};
 
 use serde::{Deserialize, Serialize};
-use understudy_wire::Member;
+use understudy_wire::{Member, Via};
 
 use crate::host::Summary;
 use crate::link::LinkKind;
@@ -126,8 +126,20 @@ pub enum HostEvent {
         /// Which bound, for the last one.
         reason: String,
     },
+    /// What this member receives over one of two networks has changed. Each time all peers of which it is not in order are named.
+    NetworkReception {
+        /// Which network.
+        network: Via,
+        /// Peers of which nothing arrives over it in time, while the other network carries their frames.
+        lost: Vec<Member>,
+        /// Peers of which less arrives over it in time than over the other one.
+        impaired: Vec<Member>,
+    },
     /// No configured peer was received for so long, or one that is connected was not, that the link was closed and opened anew.
     LinkReopened {
+        /// Over which of two networks it is.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        network: Option<Via>,
         /// How long, in milliseconds.
         silence_ms: u64,
         /// The one that is connected and was not received; none where no peer was.
@@ -136,6 +148,9 @@ pub enum HostEvent {
     },
     /// The same, and the link could not be opened: no frame is sent or received. It is tried again.
     LinkFailed {
+        /// Over which of two networks it is.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        network: Option<Via>,
         /// How long, in milliseconds.
         silence_ms: u64,
         /// The one that is connected and was not received; none where no peer was.

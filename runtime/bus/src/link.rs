@@ -7,10 +7,11 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
-use understudy_wire::{Frame, Member, ZENOH_PORT_OFFSET};
+use understudy_wire::{Frame, Member, Via, ZENOH_PORT_OFFSET};
 
 use crate::endpoints::Endpoints;
 use crate::error::BusError;
+use crate::two_networks::TwoNetworks;
 use crate::udp::UdpLink;
 use crate::zenoh_link::ZenohLink;
 
@@ -22,14 +23,18 @@ pub trait Link: Send {
     /// Sends `bytes`, which are `frame` encoded, to all whom it concerns.
     fn send(&mut self, frame: &Frame, bytes: &[u8]);
 
-    /// Puts the next datagram in place of what is in `bytes`; false where none has arrived.
-    fn receive(&mut self, bytes: &mut Vec<u8>) -> bool;
+    /// Puts the next datagram in place of what is in `bytes`, and says over which network it came; nothing where none has arrived.
+    fn receive(&mut self, bytes: &mut Vec<u8>) -> Option<Via>;
 
     /// Readable when there is something to receive.
     fn readiness(&self) -> BorrowedFd<'_>;
 
     /// What happened since the start.
     fn counters(&self) -> LinkCounters;
+
+    /// Lets nothing more pass over one of two networks, in either direction, or everything again; a link over one network has nothing to
+    /// pull.
+    fn plug(&mut self, _: Via, _is_plugged: bool) {}
 
     /// The next time that the link was opened anew; to be asked again until there is none.
     fn reopening(&mut self) -> Option<Reopening> {
@@ -40,6 +45,8 @@ pub trait Link: Send {
 /// A link received none of its peers, or not one that is connected, and was closed and opened anew.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reopening {
+    /// Over which of two networks it is.
+    pub via: Option<Via>,
     /// How long no peer was received, or `peer` was not.
     pub silence: Duration,
     /// The one that is connected and was not received; none where no peer was.
@@ -88,11 +95,19 @@ impl LinkKind {
         Ok(SocketAddr::new(address.ip(), port))
     }
 
-    /// Opens the link of one member.
+    /// Opens the link of one member, over both networks where there are two.
     ///
     /// # Errors
     /// [`BusError::PortInUse`], [`BusError::Listen`], [`BusError::NoZenohPort`] or [`BusError::Zenoh`].
     pub fn open(self, endpoints: &Endpoints) -> Result<Box<dyn Link>, BusError> {
+        match endpoints.on_second_network() {
+            None => self.open_one(endpoints),
+            Some(second) => Ok(Box::new(TwoNetworks::open(self, endpoints, &second)?)),
+        }
+    }
+
+    /// Opens the link over one network.
+    pub(crate) fn open_one(self, endpoints: &Endpoints) -> Result<Box<dyn Link>, BusError> {
         Ok(match self {
             Self::Zenoh => Box::new(ZenohLink::open(endpoints)?),
             Self::Udp => Box::new(UdpLink::open(endpoints)?),

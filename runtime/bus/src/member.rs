@@ -3,6 +3,7 @@
 use std::any::Any;
 use std::io::Write;
 use std::os::fd::AsFd;
+use std::time::Duration;
 
 use nix::sys::eventfd::{EfdFlags, EventFd};
 use nix::sys::prctl::set_pdeathsig;
@@ -22,6 +23,7 @@ use crate::host::{Host, Summary};
 use crate::host_event::HostEvent;
 use crate::journal::{EventSink, JOURNAL_RECORDS, JOURNAL_VERSION, Journal, Noted};
 use crate::link::LinkKind;
+use crate::network_reception::NetworkReception;
 use crate::orders::{Order, orders};
 use crate::retained::{FoundFile, Retainer, Retention};
 use crate::rights::{Rights, keep_times};
@@ -33,6 +35,8 @@ pub struct MemberSettings {
     pub endpoints: Endpoints,
     /// What carries the frames.
     pub link: LinkKind,
+    /// T, from one cycle to the next.
+    pub period: Duration,
     /// Closes and opens the frames.
     pub guard: Guard,
     /// Where operators can call; nowhere without it.
@@ -71,6 +75,7 @@ where
     let MemberSettings {
         endpoints,
         link: kind,
+        period,
         mut guard,
         channel,
         retention,
@@ -99,7 +104,7 @@ where
     };
     // The journal's thread starts before the rights are claimed, so that it inherits none.
     let (mut sink, journal) =
-        Journal::start::<M::Event>(JOURNAL_RECORDS, clock, own.member, own.name, output)?;
+        Journal::start::<M::Event>(JOURNAL_RECORDS, clock, own.member, own.name.clone(), output)?;
     let Retention { files, found, is_missing } = retention;
     let retainer = match files.is_empty() {
         true => None,
@@ -108,6 +113,7 @@ where
     let mut rights = if real_time { Rights::claim() } else { Rights::unclaimed() };
     let raises = rights.real_time;
     let mut link = kind.open(&endpoints)?;
+    let networks = own.second.map(|_| NetworkReception::new(clock.now(), period));
     if real_time {
         rights.lock();
     }
@@ -152,6 +158,7 @@ where
                 Host {
                     machine: &mut machine,
                     link: link.as_mut(),
+                    networks,
                     guard: &mut guard,
                     field: field.as_mut(),
                     retainer,

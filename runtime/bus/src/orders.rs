@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use understudy_wire::{
-    Force, Member, OrderRefusal, ProgramSet, SignalPlace, StateChoice, StationSet, Write,
+    Force, Member, OrderRefusal, ProgramSet, SignalPlace, StateChoice, StationSet, Via, Write,
     WriteAnswer,
 };
 
@@ -34,7 +34,7 @@ pub enum Order {
     Unforce(SignalPlace),
     /// An operator writes a value.
     Write(Write),
-    /// The laboratory cuts the links from these members, and heals those from all others.
+    /// The laboratory cuts these links and pulls these cables, and no others.
     Cut(Cuts),
 }
 
@@ -67,14 +67,25 @@ pub(crate) enum Unknown {
     Late,
 }
 
-/// Members whose frames a member of a laboratory drops, as if the links from them were cut.
+/// Members whose frames a member of a laboratory drops, as if the links from them were cut, and networks that it is unplugged from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Cuts {
     stations: StationSet,
     remote_ios: ProgramSet,
+    #[serde(default, skip_serializing_if = "is_plugged")]
+    unplugged: [bool; 2],
+}
+
+fn is_plugged(unplugged: &[bool; 2]) -> bool {
+    *unplugged == [false; 2]
 }
 
 impl Cuts {
+    /// Pulls the cable to one of two networks, or plugs it in again.
+    pub fn unplug(&mut self, via: Via, is_unplugged: bool) {
+        self.unplugged[via.index()] = is_unplugged;
+    }
+
     /// Cuts the link from a member, or heals it. A plant stays with its remote I/O.
     pub fn set(&mut self, member: Member, cut: bool) {
         match (member, cut) {
@@ -197,6 +208,11 @@ impl Orders {
     /// Whether the link from a member is cut.
     pub(crate) fn is_cut(&self, member: Member) -> bool {
         self.standing.cuts().contains(member)
+    }
+
+    /// Whether the cable to a network is pulled.
+    pub(crate) fn is_unplugged(&self, via: Via) -> bool {
+        self.standing.cuts().unplugged[via.index()]
     }
 
     pub(crate) fn readiness(&self) -> BorrowedFd<'_> {

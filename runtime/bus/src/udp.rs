@@ -8,7 +8,7 @@ use std::os::fd::{AsFd, BorrowedFd};
 
 use nix::sys::socket::{setsockopt, sockopt};
 use understudy_seal::OVERHEAD_BYTES;
-use understudy_wire::{Body, Frame, MAXIMUM_FRAME_BYTES, Member, Roster, Topic};
+use understudy_wire::{Body, Frame, MAXIMUM_FRAME_BYTES, Member, Roster, Topic, Via};
 
 use crate::endpoints::Endpoints;
 use crate::error::BusError;
@@ -83,17 +83,15 @@ impl Link for UdpLink {
         }
     }
 
-    fn receive(&mut self, bytes: &mut Vec<u8>) -> bool {
+    fn receive(&mut self, bytes: &mut Vec<u8>) -> Option<Via> {
         // Most frames come by the groups, where there are any.
         let groups = self.groups.as_ref();
         let length = groups.and_then(|groups| groups.receive(&mut self.datagram));
         let own = || self.socket.recv(&mut self.datagram).ok();
-        let Some(length) = length.or_else(own) else {
-            return false;
-        };
+        let length = length.or_else(own)?;
         bytes.clear();
         bytes.extend_from_slice(&self.datagram[..length]);
-        true
+        Some(Via::First)
     }
 
     fn readiness(&self) -> BorrowedFd<'_> {

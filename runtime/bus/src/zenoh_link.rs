@@ -26,7 +26,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use understudy_wire::{ClusterHash, Frame, Member, Roster, Time, Topic};
+use understudy_wire::{ClusterHash, Frame, Member, Roster, Time, Topic, Via};
 use zenoh::Wait;
 use zenoh::key_expr::KeyExpr;
 use zenoh::pubsub::{Publisher, Subscriber};
@@ -164,12 +164,9 @@ impl Link for ZenohLink {
         }
     }
 
-    fn receive(&mut self, bytes: &mut Vec<u8>) -> bool {
-        let Some(datagram) = self.inbox.take() else {
-            return false;
-        };
-        *bytes = datagram;
-        true
+    fn receive(&mut self, bytes: &mut Vec<u8>) -> Option<Via> {
+        *bytes = self.inbox.take()?;
+        Some(Via::First)
     }
 
     fn readiness(&self) -> BorrowedFd<'_> {
@@ -369,8 +366,12 @@ impl Keeper {
         self.failed = failure.is_some();
         if !again {
             // A link that is dropped asks no more.
-            let _ =
-                self.report.send(Reopening { silence: silent.lasts, peer: silent.peer, failure });
+            let _ = self.report.send(Reopening {
+                via: None,
+                silence: silent.lasts,
+                peer: silent.peer,
+                failure,
+            });
         }
     }
 }
@@ -442,7 +443,12 @@ mod tests {
         ];
         let addresses = free_addresses(members.len()).expect("there are ports");
         let peers = members.iter().zip(addresses);
-        let peers = peers.map(|(&member, address)| Peer { member, name: name(member), address });
+        let peers = peers.map(|(&member, address)| Peer {
+            member,
+            name: name(member),
+            address,
+            second: None,
+        });
         let peers: Vec<Peer> = peers.collect();
         let endpoints = |own| {
             let roster = Roster::new(1, 2, Vec::new());

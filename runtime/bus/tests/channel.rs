@@ -104,6 +104,7 @@ fn member_with(
             retention: Default::default(),
             endpoints,
             link: LinkKind::Udp,
+            period: press_cell(Mode::Full).agreement().schedule.period(),
             guard: Guard::Off,
             channel: Some(ChannelSettings {
                 keys,
@@ -239,7 +240,7 @@ fn an_operator_reaches_a_member_with_an_ipv6_address() {
     let address = found.local_addr().expect("bound");
     drop(found);
     let folder = issued_at(Ipv6Addr::LOCALHOST);
-    let peers = [Peer { member: station(0), name: "robot".into(), address }];
+    let peers = [Peer { member: station(0), name: "robot".into(), address, second: None }];
     let endpoint = endpoints(station(0), &peers);
     let hash = endpoint.cluster();
     let running = member_with(endpoint, keys(&folder, "robot"), || Admitted {

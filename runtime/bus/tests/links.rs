@@ -83,6 +83,7 @@ impl Running {
                 guard: &mut guard,
                 field: field.as_mut(),
                 sink: &mut sink,
+                networks: None,
                 retainer: None,
                 watchdog: None,
                 orders: &orders,

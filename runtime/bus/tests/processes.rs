@@ -79,6 +79,7 @@ fn act(part: &Part) -> ExitCode {
         channel: None,
         endpoints: endpoints(part.own, &part.peers),
         link: part.link,
+        period: agreement().schedule.period(),
         field,
         commands: if part.ends_with_input { Commands::ReadAndEndWithInput } else { Commands::Read },
         ends_with_parent: true,

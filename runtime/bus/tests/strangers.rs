@@ -59,6 +59,7 @@ fn start(
             guard: &mut guard,
             field: &mut SimulatedField::new(ProgramId(0), agreement()),
             sink: &mut Sink { own, reports },
+            networks: None,
             retainer: None,
             watchdog: None,
             orders: &orders,

@@ -1,10 +1,9 @@
 //! The members of a cluster and their addresses.
 
-use std::net::SocketAddr;
 use std::path::Path;
 
 use understudy_bus::Peer;
-use understudy_cluster::{Cluster, why_unreachable};
+use understudy_cluster::{Addresses, Cluster, why_unreachable};
 use understudy_wire::Member;
 
 use crate::error::MemberError;
@@ -28,9 +27,11 @@ pub fn listed_peers(path: &Path, text: &str) -> Result<Vec<Peer>, MemberError> {
     let refused = |reason: String| MemberError::List { path: path.to_owned(), reason };
     let peers: Vec<Peer> =
         serde_json::from_str(text).map_err(|error| refused(error.to_string()))?;
-    for Peer { name, address, .. } in &peers {
-        if let Some(why) = why_unreachable(*address) {
-            return Err(refused(format!("{name} has the address {address}: {why}")));
+    for peer in &peers {
+        for address in peer.addresses() {
+            if let Some(why) = why_unreachable(address) {
+                return Err(refused(format!("{} has the address {address}: {why}", peer.name)));
+            }
         }
     }
     Ok(peers)
@@ -42,15 +43,19 @@ pub fn listed_peers(path: &Path, text: &str) -> Result<Vec<Peer>, MemberError> {
 /// [`MemberError::NoAddress`].
 pub fn addressed_peers(cluster: &Cluster) -> Result<Vec<Peer>, MemberError> {
     let name = |member| cluster.member_name(member).unwrap_or_default().to_owned();
-    let known: Vec<(Member, Option<SocketAddr>)> =
-        cluster.members().map(|member| (member, cluster.address(member))).collect();
-    let lacking = known.iter().filter(|(_, address)| address.is_none());
+    let known: Vec<(Member, Addresses)> =
+        cluster.members().map(|member| (member, cluster.addresses(member))).collect();
+    let is_complete = |addresses: &Addresses| {
+        addresses.first.is_some() && addresses.second.is_some() == cluster.has_two_networks()
+    };
+    let lacking = known.iter().filter(|(_, addresses)| !is_complete(addresses));
     let names: Vec<String> = lacking.map(|(member, _)| name(*member)).collect();
     if !names.is_empty() {
         return Err(MemberError::NoAddress { names });
     }
-    let peers = known.into_iter().filter_map(|(member, address)| {
-        Some(Peer { member, name: name(member), address: address? })
+    let peers = known.into_iter().filter_map(|(member, addresses)| {
+        let Addresses { first, second } = addresses;
+        Some(Peer { member, name: name(member), address: first?, second })
     });
     Ok(peers.collect())
 }

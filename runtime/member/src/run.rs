@@ -158,6 +158,7 @@ where
     let settings = MemberSettings {
         endpoints,
         link: link_kind(cluster),
+        period: cluster.agreement().schedule.period(),
         guard: keys.guard,
         channel: keys.channel,
         retention,

@@ -11,7 +11,7 @@ use understudy_simulator::{Action, Fault};
 use understudy_text::Diagnostic;
 use understudy_text::spelling::suggestion;
 use understudy_text::tables::{Fields, Placed};
-use understudy_wire::{Member, PointValue, ProgramId, StateChoice};
+use understudy_wire::{Member, PointValue, ProgramId, StateChoice, Via};
 
 use super::{MAXIMUM_STEPS, Reader};
 use crate::format::{STEP, action_keys};
@@ -172,6 +172,8 @@ impl Reader<'_> {
             "slow" => one(Action::Slow { by: self.slowness(fields)? }),
             "cut" => self.cut(fields, member, |to| Action::Cut { to }),
             "heal" => self.cut(fields, member, |to| Action::Heal { to }),
+            "unplug" => self.cable(fields, member, |network| Action::Unplug { network }),
+            "plug" => self.cable(fields, member, |network| Action::Plug { network }),
             "delay" => {
                 let by = self.slowness(fields);
                 let links =
@@ -310,6 +312,39 @@ impl Reader<'_> {
         let back = peers.iter().map(|&peer| (Some(peer), action(member)));
         let both = there.clone().chain(back.take(if both_ways { peers.len() } else { 0 }));
         Some(both.collect())
+    }
+
+    /// One action for the cable of this member to a network; with `others`, one for each of the others too.
+    fn cable(
+        &mut self,
+        fields: &mut Fields<'_, '_>,
+        member: Option<Member>,
+        action: impl Fn(Via) -> Action,
+    ) -> Option<Vec<(Option<Member>, Action)>> {
+        fields.require(&["network"], &mut self.diagnostics);
+        let others = fields.flag("others", &mut self.diagnostics).unwrap_or(false);
+        let network = fields.format_count("network", &mut self.diagnostics)?;
+        let members = self.members?;
+        if !members.have_two_networks() {
+            let message = "the cluster has one network, so this would cut every link";
+            self.diagnostics.push(
+                Diagnostic::error("U0309", message, network.span).with_help(
+                    "use `cut`, or add `networks = 2` to `[cluster]` in the cluster file",
+                ),
+            );
+            return None;
+        }
+        let via = Via::try_from(network.value as u8).ok()?;
+        let all = members.iter().map(|(peer, _)| peer);
+        let peers = all.filter(|&peer| Some(peer) != member && !matches!(peer, Member::Plant(_)));
+        let others: Vec<Member> = if others { peers.collect() } else { Vec::new() };
+        let own = (None, action(via));
+        Some(
+            [own]
+                .into_iter()
+                .chain(others.into_iter().map(|peer| (Some(peer), action(via))))
+                .collect(),
+        )
     }
 
     /// The program whose state it is: named by its controller; a controller's own where the step does not say.

@@ -151,6 +151,7 @@ fn play_part(part: Part) -> Result<(), BusError> {
                 guard: guard(&endpoints),
                 endpoints,
                 link,
+                period: settings.period,
                 channel: None,
                 field: Box::new(NoField),
                 commands: Commands::ReadAndEndWithInput,
@@ -201,7 +202,8 @@ fn members() -> io::Result<Vec<Peer>> {
     let remote_ios = (0..PROGRAMS).map(|program| Member::RemoteIo(ProgramId(program)));
     let members: Vec<Member> = stations.chain(remote_ios).collect();
     let addresses = free_addresses(members.len())?;
-    let peer = |(member, address)| Peer { member, name: format!("{member:?}"), address };
+    let peer =
+        |(member, address)| Peer { member, name: format!("{member:?}"), address, second: None };
     Ok(members.into_iter().zip(addresses).map(peer).collect())
 }
 

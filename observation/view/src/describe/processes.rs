@@ -4,10 +4,11 @@ use std::time::{Duration, UNIX_EPOCH};
 
 use understudy_bus::{HostEvent, RefusedOrder};
 use understudy_journal::{Action, Command, Members, RunEvent, time_text};
-use understudy_wire::{Member, SignalPlace, StateChoice};
+use understudy_wire::{Member, SignalPlace, StateChoice, Via};
 
 use super::Words;
 use super::signals::assignment;
+use crate::alarm::listed;
 
 descriptions! { host: HostEvent, members: Members;
     Ready { process, address, .. } => "ready" Info format!("listens as process {process} at {address}");
@@ -35,10 +36,18 @@ descriptions! { host: HostEvent, members: Members;
     OrderRefused(order) => "order-refused" Warning refused_text(order);
     UnsendableFrames { frames, reason } => "unsendable-frames" Warning
         format!("{frames} frames could not be sent: {reason}");
-    LinkReopened { silence_ms, peer } => "link-reopened" Warning
-        format!("received {} for {silence_ms} ms and reopened its link", nothing_of(*peer, members));
-    LinkFailed { silence_ms, peer, reason } => "link-failed" Alarm format!(
-        "received {} for {silence_ms} ms and cannot reopen its link: {reason}", nothing_of(*peer, members)
+    NetworkReception { network, lost, impaired } => "network-reception" Warning
+        reception_text(*network, lost, impaired, members);
+    LinkReopened { network, silence_ms: 0, .. } => "link-reopened" Notice
+        format!("opened its link{}", over(*network));
+    LinkReopened { network, silence_ms, peer } => "link-reopened" Warning format!(
+        "received {} for {silence_ms} ms and reopened its link{}", nothing_of(*peer, members), over(*network)
+    );
+    LinkFailed { network, silence_ms: 0, reason, .. } => "link-failed" Alarm
+        format!("cannot open its link{}: {reason}", over(*network));
+    LinkFailed { network, silence_ms, peer, reason } => "link-failed" Alarm format!(
+        "received {} for {silence_ms} ms and cannot reopen its link{}: {reason}",
+        nothing_of(*peer, members), over(*network)
     );
     RetainFailed { reason } => "retain-failed" Alarm format!(
         "what it keeps for the time after a power failure is not written to its disk: {reason}"
@@ -69,6 +78,32 @@ fn refused_text(order: &RefusedOrder) -> String {
         more => format!("; {more} more were refused before it"),
     };
     format!("{owner} orders {order}{signal} at {to}{reason}; refused: {why}{more}")
+}
+
+/// What a member receives over one of two networks.
+fn reception_text(network: Via, lost: &[Member], impaired: &[Member], members: &Members) -> String {
+    let names = |of: &[Member]| {
+        let names: Vec<&str> = of.iter().map(|member| members.name(*member)).collect();
+        listed(&names)
+    };
+    let over = format!("over network {network}");
+    match (lost.is_empty(), impaired.is_empty()) {
+        (true, true) => format!("receives all members {over} again"),
+        (false, true) => format!("receives nothing {over} from {}", names(lost)),
+        (true, false) => format!("receives less {over} from {}", names(impaired)),
+        (false, false) => {
+            format!(
+                "receives nothing {over} from {}, and less from {}",
+                names(lost),
+                names(impaired)
+            )
+        }
+    }
+}
+
+/// Over which of two networks a link is.
+fn over(network: Option<Via>) -> String {
+    network.map_or_else(String::new, |network| format!(" over network {network}"))
 }
 
 /// What a link did not receive: no member, or one that it is connected to.
@@ -153,6 +188,8 @@ pub(crate) fn fault_text(action: Action, member: Member, members: &Members) -> S
         Action::Continue => format!("{name} is resumed"),
         Action::Cut { to } => format!("{name} is cut off from {}", members.name(to)),
         Action::Heal { to } => format!("{name} is connected to {} again", members.name(to)),
+        Action::Unplug { network } => format!("{name} is unplugged from network {network}"),
+        Action::Plug { network } => format!("{name} is plugged into network {network} again"),
         Action::Delay { to, by } => format!("{} receives {name} {by:?} later", members.name(to)),
         Action::Release => format!("{name} is released"),
         Action::Write { input, value } => {

@@ -208,6 +208,7 @@ impl Model {
     /// A process begins, unless it is known to have ended: its records may be read afterwards.
     fn ready(&mut self, member: Member, cycle: i64) {
         self.refuses_none(member, cycle);
+        self.network_forgets(member, cycle);
         if !self.changes.now().is_down(member) {
             let change = Change::Process(member, Process::Running);
             self.changes.process(member, cycle, change);
@@ -240,8 +241,9 @@ impl Model {
                 let subject = (self.members.name(*member).to_owned(), "duplicate");
                 self.alarms.over(&subject, cycle);
             }
-            HostEvent::LinkFailed { reason, .. } => {
-                self.alarms.raise(own("link-failed"), cycle, reason.clone());
+            HostEvent::LinkFailed { .. } => {
+                let text = describe(record, &self.members, &self.writes).text;
+                self.alarms.raise(own("link-failed"), cycle, text);
             }
             HostEvent::RetainFailed { reason } => {
                 self.alarms.raise(own("retain-failed"), cycle, reason.clone());
@@ -251,6 +253,9 @@ impl Model {
             }
             HostEvent::Ready { .. } | HostEvent::RetainRegained => {
                 self.alarms.over(&own("retain-failed"), cycle)
+            }
+            HostEvent::NetworkReception { network, lost, impaired } => {
+                self.network_received(member, *network, (lost, impaired), cycle);
             }
             HostEvent::LinkReopened { .. } => self.alarms.over(&own("link-failed"), cycle),
             _ => {}

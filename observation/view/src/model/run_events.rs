@@ -120,6 +120,7 @@ impl Model {
         let change = Change::Process(member, process);
         self.changes.process(member, cycle, change);
         if !process.is_running() {
+            self.network_forgets(member, cycle);
             self.reports.down(member);
             self.find_complete();
         }

@@ -1,7 +1,7 @@
 //! Names and addresses that are given once.
 
 use std::collections::BTreeMap;
-use std::net::SocketAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::ops::Range;
 
 use understudy_text::Diagnostic;
@@ -9,6 +9,7 @@ use understudy_text::spelling::suggestion;
 use understudy_wire::ZENOH_PORT_OFFSET;
 
 use super::Member;
+use crate::address::Addresses;
 use crate::cluster::Link;
 use crate::fields::Placed;
 
@@ -18,12 +19,22 @@ pub(crate) struct Names {
     addresses: BTreeMap<SocketAddr, Range<usize>>,
     link: Link,
     has_multicast: bool,
+    has_two_networks: bool,
+    /// By host, which network it is on and where that stands; hosts of loopback are on both.
+    hosts: BTreeMap<IpAddr, (bool, Range<usize>)>,
 }
 
 impl Names {
     /// None, in a cluster with this link.
-    pub(crate) fn new(link: Link, has_multicast: bool) -> Self {
-        Self { members: BTreeMap::new(), addresses: BTreeMap::new(), link, has_multicast }
+    pub(crate) fn new(link: Link, has_multicast: bool, has_two_networks: bool) -> Self {
+        Self {
+            members: BTreeMap::new(),
+            addresses: BTreeMap::new(),
+            link,
+            has_multicast,
+            has_two_networks,
+            hosts: BTreeMap::new(),
+        }
     }
 
     /// Reports a name that another member has.
@@ -45,15 +56,72 @@ impl Names {
         }
     }
 
-    /// Reports an address at which a member cannot listen: another member has it, or the link cannot use it.
+    /// Reports addresses at which a member cannot listen, or that are not of as many networks as the cluster has.
     pub(crate) fn listen(
         &mut self,
-        address: Option<&Placed<SocketAddr>>,
+        addresses: &Addresses<Placed<SocketAddr>>,
         diagnostics: &mut Vec<Diagnostic>,
     ) {
-        let Some(Placed { value, span }) = address else {
-            return;
+        let mut report = |message: String, place: &Placed<SocketAddr>, help: &str| {
+            let span = place.span.clone();
+            diagnostics.push(Diagnostic::error("U0235", message, span).with_help(help));
         };
+        match (&addresses.first, &addresses.second) {
+            (_, Some(second)) if !self.has_two_networks => report(
+                "a `second_address` in a cluster with one network".to_owned(),
+                second,
+                "add `networks = 2` to `[cluster]`, and a `second_address` to every member",
+            ),
+            (Some(first), None) if self.has_two_networks => report(
+                format!("the member at {} has no `second_address`", first.value),
+                first,
+                "with `networks = 2` every member has an address on each network",
+            ),
+            (None, Some(second)) => report(
+                format!("the member at {} has a `second_address` and no `address`", second.value),
+                second,
+                "with `networks = 2` every member has an address on each network",
+            ),
+            _ => {}
+        }
+        for (address, is_second) in [(&addresses.first, false), (&addresses.second, true)] {
+            if let Some(address) = address {
+                self.listen_at(address, diagnostics);
+                self.place_host(address, is_second, diagnostics);
+            }
+        }
+    }
+
+    /// Reports a host that is on both networks: what they share can take both away.
+    fn place_host(
+        &mut self,
+        Placed { value, span }: &Placed<SocketAddr>,
+        is_second: bool,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) {
+        let host = value.ip().to_canonical();
+        if !self.has_two_networks || host.is_loopback() {
+            return;
+        }
+        let (known, first) = self.hosts.entry(host).or_insert_with(|| (is_second, span.clone()));
+        if *known != is_second {
+            let message = format!("{host} is on the first and on the second network");
+            diagnostics.push(
+                Diagnostic::error("U0235", message, span.clone())
+                    .with_related(first.clone(), "the other network is here")
+                    .with_help(
+                        "each network needs an interface of its own, with an address of its own",
+                    ),
+            );
+        }
+    }
+
+    /// Reports an address at which a member cannot listen: another member has it, or the link cannot use it.
+    fn listen_at(
+        &mut self,
+        Placed { value, span }: &Placed<SocketAddr>,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) {
         if let Some(first) = self.addresses.get(value) {
             let message = format!("two members have the address {value}");
             diagnostics.push(

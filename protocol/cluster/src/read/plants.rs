@@ -54,7 +54,7 @@ pub(crate) fn place(
     let mut taken = BTreeMap::new();
     let mut drafts = Vec::new();
     for section in sections {
-        names.listen(section.address.as_ref(), diagnostics);
+        names.listen(&section.addresses, diagnostics);
         if let Some(name) = &section.name {
             names.declare(&name.value, name.span.clone(), diagnostics);
         }
@@ -206,7 +206,7 @@ fn bound(
         fed_by,
         follows,
         watchdog_cycles: section.watchdog_cycles,
-        address: section.address.as_ref().map(|address| address.value),
+        addresses: section.addresses.as_ref().map(|address| address.value),
     })
 }
 

@@ -168,7 +168,14 @@ pub(crate) fn plant(program: u8) -> Member {
 pub(crate) fn peers(members: &[Member]) -> Vec<Peer> {
     let addresses = free_addresses(members.len()).expect("free ports");
     let named = members.iter().zip(addresses);
-    named.map(|(&member, address)| Peer { member, name: format!("{member:?}"), address }).collect()
+    named
+        .map(|(&member, address)| Peer {
+            member,
+            name: format!("{member:?}"),
+            address,
+            second: None,
+        })
+        .collect()
 }
 
 /// The key of a member, in a cluster whose secret everybody knows.

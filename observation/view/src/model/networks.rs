@@ -1,0 +1,101 @@
+//! The two networks of a cluster, as its members receive them.
+//!
+//! A network is one alarm, however many members report it. Its text says what is left, then who is affected.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use understudy_wire::{Member, Via};
+
+use super::Model;
+use crate::alarm::listed;
+
+/// Alarm of one of two networks.
+pub(crate) const NETWORK_FAULT: &str = "network-fault";
+
+/// By network, the peers of which each member receives nothing over it, and of which it receives less than over the other one.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Networks {
+    faults: [BTreeMap<Member, Faults>; 2],
+}
+
+#[derive(Debug, Clone, Default)]
+struct Faults {
+    lost: Vec<Member>,
+    impaired: Vec<Member>,
+}
+
+/// The name under which a network is an alarm.
+pub(crate) fn network_name(via: Via) -> String {
+    format!("network {via}")
+}
+
+impl Model {
+    /// A member has told what it receives over a network.
+    pub(super) fn network_received(
+        &mut self,
+        receiver: Member,
+        via: Via,
+        (lost, impaired): (&[Member], &[Member]),
+        cycle: i64,
+    ) {
+        let faults = &mut self.networks.faults[via.index()];
+        if lost.is_empty() && impaired.is_empty() {
+            faults.remove(&receiver);
+        } else {
+            let told = Faults { lost: lost.to_vec(), impaired: impaired.to_vec() };
+            faults.insert(receiver, told);
+        }
+        self.network_changed(via, cycle);
+    }
+
+    /// The process of a member begins or ends: what it told of the networks holds no more.
+    pub(super) fn network_forgets(&mut self, receiver: Member, cycle: i64) {
+        for via in Via::BOTH {
+            if self.networks.faults[via.index()].remove(&receiver).is_some() {
+                self.network_changed(via, cycle);
+            }
+        }
+    }
+
+    fn network_changed(&mut self, via: Via, cycle: i64) {
+        let subject = (network_name(via), NETWORK_FAULT);
+        match self.network_text(via) {
+            None => self.alarms.over(&subject, cycle),
+            Some(text) => self.alarms.raise_or_retell(subject, cycle, text),
+        }
+    }
+
+    /// What is wrong with a network; nothing where it is in order.
+    fn network_text(&self, via: Via) -> Option<String> {
+        let faults = &self.networks.faults[via.index()];
+        let pairs = |of: fn(&Faults) -> &Vec<Member>| {
+            let pairs = faults.iter();
+            pairs.flat_map(move |(&to, faults)| of(faults).iter().map(move |&from| (from, to)))
+        };
+        let lost: Vec<(Member, Member)> = pairs(|faults| &faults.lost).collect();
+        let impaired = pairs(|faults| &faults.impaired).collect::<Vec<_>>();
+        let what = if lost.is_empty() {
+            "frames are lost or late"
+        } else if impaired.is_empty() {
+            "no frames arrive"
+        } else {
+            "no frames arrive, or some are lost or late"
+        };
+        let all: Vec<(Member, Member)> = lost.into_iter().chain(impaired).collect();
+        let (from, to) = *all.first()?;
+        let of_all = |member: Member| all.iter().all(|&(from, to)| from == member || to == member);
+        let name = |member| self.members.name(member);
+        let whom = if all.len() == 1 {
+            format!("from {} to {}", name(from), name(to))
+        } else if let Some(member) = [from, to].into_iter().find(|&member| of_all(member)) {
+            format!("at {}", name(member))
+        } else {
+            let affected: BTreeSet<Member> =
+                all.iter().flat_map(|&(from, to)| [from, to]).collect();
+            let names: Vec<&str> = affected.into_iter().map(name).collect();
+            format!("between {}", listed(&names))
+        };
+        let left = via.other();
+        Some(format!("all depends on network {left}: over network {via} {what} {whom}"))
+    }
+}

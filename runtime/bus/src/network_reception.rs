@@ -1,0 +1,310 @@
+//! What a member receives over each of two networks, and which copy of a frame counts.
+//!
+//! The first copy of a datagram counts; the one over the other network is its *second copy*, and dropped. Each copy is counted for the network that
+//! carried it before anything is dropped, so a network is seen to be lost while the other one carries everything.
+//!
+//! | a network from one peer, in [`JUDGED_EVERY`] | is |
+//! |---|---|
+//! | carried no frame that came over the other one, or each too late | lost |
+//! | carried less than [`WELL_PERCENT`] of them in time | impaired |
+//! | carried more, for [`WELL_AGAIN`] such times after it was lost or impaired | in order |
+
+use std::collections::BTreeMap;
+use std::hash::{DefaultHasher, Hasher};
+use std::time::Duration;
+
+use understudy_wire::{Member, Time, Via};
+
+use crate::host_event::HostEvent;
+
+/// How often the networks are judged.
+const JUDGED_EVERY: Duration = Duration::from_millis(500);
+/// Frames of a peer on which it is judged, at least.
+const FEWEST_FRAMES: u32 = 8;
+/// A network carries so many of a hundred frames, or is impaired.
+const WELL_PERCENT: u32 = 90;
+/// Times in a row that a network is in order before that is reported.
+const WELL_AGAIN: u8 = 4;
+/// Times in a row without a frame of a peer over any network after which nothing is said of the networks to it: the peer is down.
+const SILENT_FOR: u8 = 4;
+/// Datagrams that are remembered: those of five cycles of 64 programs, and more.
+const REMEMBERED: usize = 4096;
+
+/// Which copy of a datagram this is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Arrival {
+    /// The first that arrives.
+    First,
+    /// It came over the other network before.
+    Second {
+        /// Whether it came within the time that a frame is of use.
+        in_time: bool,
+    },
+    /// It came over this network before: the sender, or somebody else, has sent it again.
+    Again,
+}
+
+/// A datagram that has arrived.
+#[derive(Debug, Clone, Copy, Default)]
+struct Seen {
+    datagram: u64,
+    at: Time,
+    over: [bool; 2],
+}
+
+/// What came of one peer since it was last judged.
+#[derive(Debug, Default)]
+struct Received {
+    frames: u32,
+    over: [u32; 2],
+    state: [State; 2],
+    well: [u8; 2],
+    silent: u8,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+enum State {
+    #[default]
+    InOrder,
+    Impaired,
+    Lost,
+}
+
+/// What one member receives over each of two networks.
+#[derive(Debug)]
+pub struct NetworkReception {
+    seen: Box<[Seen]>,
+    /// A second copy that comes later than this after the first one is too late.
+    patience: Duration,
+    peers: BTreeMap<Member, Received>,
+    judged: Time,
+    /// What was reported, by network: the peers of which it is lost, and of which it is impaired.
+    reported: [[Vec<Member>; 2]; 2],
+}
+
+impl NetworkReception {
+    /// Nothing received yet; a copy counts for its network where it comes within `patience` of the first one.
+    pub fn new(now: Time, patience: Duration) -> Self {
+        Self {
+            seen: vec![Seen::default(); REMEMBERED].into(),
+            patience,
+            peers: BTreeMap::new(),
+            judged: now,
+            reported: Default::default(),
+        }
+    }
+
+    /// What tells a datagram from others.
+    pub(crate) fn identity(datagram: &[u8]) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        hasher.write(datagram);
+        hasher.finish()
+    }
+
+    /// Notes a datagram that is authentic.
+    pub(crate) fn note(&mut self, now: Time, via: Via, datagram: u64) -> Arrival {
+        let seen = &mut self.seen[datagram as usize % REMEMBERED];
+        let place = via.index();
+        if seen.datagram != datagram || seen.over == [false; 2] {
+            *seen = Seen { datagram, at: now, over: [false; 2] };
+            seen.over[place] = true;
+            return Arrival::First;
+        }
+        if std::mem::replace(&mut seen.over[place], true) {
+            return Arrival::Again;
+        }
+        Arrival::Second { in_time: now.since(seen.at) <= self.patience }
+    }
+
+    /// Counts a copy for the network that carried it.
+    pub(crate) fn count(&mut self, sender: Member, via: Via, arrival: Arrival) {
+        let received = self.peers.entry(sender).or_default();
+        match arrival {
+            Arrival::First => {
+                received.frames += 1;
+                received.over[via.index()] += 1;
+            }
+            Arrival::Second { in_time: true } => received.over[via.index()] += 1,
+            Arrival::Second { in_time: false } | Arrival::Again => {}
+        }
+    }
+
+    /// What has changed, once it is time to look.
+    pub(crate) fn judge(&mut self, now: Time) -> Vec<HostEvent> {
+        if now.since(self.judged) < JUDGED_EVERY {
+            return Vec::new();
+        }
+        self.judged = now;
+        self.peers.values_mut().for_each(Received::judge);
+        let mut changes = Vec::new();
+        for via in Via::BOTH {
+            let of = |state| {
+                let peers = self.peers.iter();
+                let found = peers.filter(|(_, received)| received.state[via.index()] == state);
+                found.map(|(member, _)| *member).collect::<Vec<Member>>()
+            };
+            let found = [of(State::Lost), of(State::Impaired)];
+            let reported = &mut self.reported[via.index()];
+            if *reported != found {
+                let [lost, impaired] = found.clone();
+                *reported = found;
+                changes.push(HostEvent::NetworkReception { network: via, lost, impaired });
+            }
+        }
+        changes
+    }
+}
+
+impl Received {
+    fn judge(&mut self) {
+        if self.frames == 0 {
+            self.silent = self.silent.saturating_add(1);
+            if self.silent == SILENT_FOR {
+                *self = Self::default();
+            }
+            return;
+        }
+        self.silent = 0;
+        if self.frames < FEWEST_FRAMES {
+            return;
+        }
+        for place in 0..2 {
+            let found = match self.over[place] {
+                0 => State::Lost,
+                over if over * 100 < self.frames * WELL_PERCENT => State::Impaired,
+                _ => State::InOrder,
+            };
+            let (state, well) = (&mut self.state[place], &mut self.well[place]);
+            if found >= *state {
+                (*state, *well) = (found, 0);
+                continue;
+            }
+            *well += 1;
+            if *well >= WELL_AGAIN {
+                (*state, *well) = (found, 0);
+            }
+        }
+        (self.frames, self.over) = (0, [0; 2]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use understudy_wire::StationId;
+
+    use super::*;
+
+    const PERIOD: Duration = Duration::from_millis(10);
+    const PRESS: Member = Member::Station(StationId(1));
+
+    /// What is reported, with its millisecond, where a frame comes every period for `seconds`; `late(period, network)` says by how much each copy is
+    /// late, nothing for one that is lost.
+    fn reports(
+        seconds: u32,
+        late: impl Fn(u32, Via) -> Option<Duration>,
+    ) -> Vec<(u64, u8, usize, usize)> {
+        let mut reception = NetworkReception::new(Time(0), PERIOD);
+        let mut copies = Vec::new();
+        for period in 0..seconds * 100 {
+            for via in Via::BOTH {
+                if let Some(late) = late(period, via) {
+                    copies.push((Time(0) + PERIOD * period + late, via, u64::from(period) + 1));
+                }
+            }
+        }
+        copies.sort_by_key(|(at, ..)| *at);
+        let mut found = Vec::new();
+        for (now, via, datagram) in copies {
+            let arrival = reception.note(now, via, datagram);
+            reception.count(PRESS, via, arrival);
+            for event in reception.judge(now) {
+                let HostEvent::NetworkReception { network, lost, impaired } = event else {
+                    panic!("{event:?}");
+                };
+                let ms = now.since(Time(0)).as_millis() as u64;
+                found.push((ms, u8::from(network), lost.len(), impaired.len()));
+            }
+        }
+        found
+    }
+
+    #[test]
+    fn two_networks_in_order_are_not_mentioned() {
+        let at_once = |_, _| Some(Duration::ZERO);
+        assert_eq!(reports(20, at_once), []);
+        // One that is always a little later, and one frame of twenty lost on each.
+        let a_little = |period, via| match via {
+            Via::First => (period % 20 != 3).then_some(Duration::ZERO),
+            Via::Second => (period % 20 != 9).then_some(PERIOD / 2),
+        };
+        assert_eq!(reports(20, a_little), []);
+    }
+
+    #[test]
+    fn a_lost_network_is_reported_within_a_second_and_its_return_later() {
+        let lost = |period, via| {
+            let is_lost = via == Via::Second && (300..900).contains(&period);
+            (!is_lost).then_some(Duration::ZERO)
+        };
+        let found = reports(20, lost);
+        let [(begins, 2, 0, 1), (lost, 2, 1, 0), (ends, 2, 0, 0)] = found[..] else {
+            panic!("{found:?}");
+        };
+        assert!((3000..=3500).contains(&begins) && lost == begins + 500, "{found:?}");
+        assert!((11_000..=11_500).contains(&ends), "{found:?}");
+    }
+
+    #[test]
+    fn each_kind_of_impairment_is_found() {
+        let from_three = |bad: fn(u32) -> Option<Duration>| {
+            move |period: u32, via| match via {
+                Via::First if period >= 300 => bad(period),
+                _ => Some(Duration::ZERO),
+            }
+        };
+        let check = |bad, expected: (u8, usize, usize)| {
+            let found = reports(10, from_three(bad));
+            let (at, network, lost, impaired) = *found.last().expect("a report");
+            assert_eq!((network, lost, impaired), expected, "{found:?}");
+            assert!(found[0].0 <= 4000 && at <= 4500, "{found:?}");
+        };
+        // Five cycles late: each copy is of no use.
+        check(|_| Some(PERIOD * 5), (1, 1, 0));
+        // Up and down every 50 ms.
+        check(|period| (period / 5 % 2 == 0).then_some(Duration::ZERO), (1, 0, 1));
+        // Three of ten lost.
+        check(|period| (period * 7 % 10 >= 3).then_some(Duration::ZERO), (1, 0, 1));
+    }
+
+    #[test]
+    fn nothing_is_said_of_the_networks_to_a_peer_that_is_down() {
+        let mut reception = NetworkReception::new(Time(0), PERIOD);
+        let mut found = Vec::new();
+        for period in 0..2000_u32 {
+            let now = Time(0) + PERIOD * period;
+            if period < 500 {
+                let arrival = reception.note(now, Via::First, u64::from(period) + 1);
+                reception.count(PRESS, Via::First, arrival);
+            }
+            found.extend(reception.judge(now));
+        }
+        let lost =
+            |lost| HostEvent::NetworkReception { network: Via::Second, lost, impaired: Vec::new() };
+        assert_eq!(found, [lost(vec![PRESS]), lost(Vec::new())]);
+    }
+
+    #[test]
+    fn copies_are_told_apart() {
+        let mut reception = NetworkReception::new(Time(0), PERIOD);
+        let datagram = NetworkReception::identity(b"turn");
+        let now = Time(0) + PERIOD;
+        assert_eq!(reception.note(now, Via::Second, datagram), Arrival::First);
+        assert_eq!(reception.note(now, Via::Second, datagram), Arrival::Again);
+        assert_eq!(reception.note(now, Via::First, datagram), Arrival::Second { in_time: true });
+        assert_eq!(reception.note(now, Via::First, datagram), Arrival::Again);
+        let other = NetworkReception::identity(b"turn ");
+        assert_eq!(reception.note(now, Via::First, other), Arrival::First);
+        let late = reception.note(now + PERIOD * 2, Via::Second, other);
+        assert_eq!(late, Arrival::Second { in_time: false });
+    }
+}
