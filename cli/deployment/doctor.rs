@@ -8,7 +8,9 @@ use std::time::{Duration, SystemTime};
 
 use clap::Args;
 use serde::Serialize;
-use understudy_bus::doctor::{Finding, Health, examine_machine, examine_peers, examine_ports};
+use understudy_bus::doctor::{
+    Finding, Health, examine_machine, examine_networks, examine_peers, examine_ports,
+};
 use understudy_bus::{BusError, Endpoints, Guard};
 use understudy_cluster::{Cluster, Security};
 use understudy_keys::{Date, KeysError, MemberKeys};
@@ -146,6 +148,7 @@ fn of_member(
     let endpoints =
         endpoints.map_err(|error| Answer::failed(Status::BadInput, error.code(), error))?;
     let mut findings = examine_ports(&endpoints, link_kind(cluster));
+    findings.extend(examine_networks(&endpoints));
     let (mut guard, of_keys) = keys(arguments, cluster, member);
     findings.extend(of_keys);
     let Some(guard) = &mut guard else {

@@ -9,8 +9,8 @@ use std::time::{Duration, SystemTime};
 
 use clap::{Args, ValueEnum};
 use serde_json::json;
-use understudy_bus::{BusError, Call, DONE, RefusedOrder, Request, Told};
-use understudy_cluster::{Cluster, Overrides};
+use understudy_bus::{BusError, Call, DONE, Peer, RefusedOrder, Request, Told};
+use understudy_cluster::{Addresses, Cluster, Overrides};
 use understudy_executable::Interface;
 use understudy_journal::{
     Command, Done, OperatorAction, Refusal, RequestedValue, WriteRequest, attempt_until_decided,
@@ -352,20 +352,26 @@ fn write_elsewhere(
     Ok(Answer::done(text, result))
 }
 
+/// How long a member is given to take a call at one of its addresses on two networks.
+const REACH: Duration = Duration::from_millis(1500);
+
 /// Sends the command to a remote member. The member records one that is refused here, or to which this certificate is not admitted, too.
 fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
     let (cluster, _) = files::cluster(&arguments.target, Overrides::default())?;
     let keys = OperatorKeys::load(keys, &cluster, Date::of(SystemTime::now()));
     let keys = keys.map_err(|errors| crate::deployment::keys::failed(&errors))?;
     let member = crate::member::find(&cluster, &arguments.name)?;
-    let address = cluster.address(member).ok_or_else(|| {
+    let Addresses { first, second } = cluster.addresses(member);
+    let address = first.ok_or_else(|| {
         let message = format!("no address for {}", arguments.name);
         Answer::failed(Status::BadInput, "U0608", message)
     })?;
+    let peer = Peer { member, name: arguments.name.clone(), address, second };
     let hash = cluster.agreement().cluster;
     let tls = tls_keys(&keys.tls);
     let configuration = cluster.agreement().configuration;
     let call = || {
+        let address = second.and_then(|_| peer.reachable(REACH).ok()).unwrap_or(address);
         let call = Call::to(address, hash, &arguments.name, &tls)?;
         Ok(call.with_configuration(configuration))
     };

@@ -1,6 +1,5 @@
 //! Who of a cluster takes a call, and why the others do not.
 
-use std::net::TcpStream;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -127,15 +126,14 @@ impl Line {
     /// Calls one member, and hears whether it runs the same.
     pub(crate) fn call(&self, peer: &Peer) -> Result<Call, Vain> {
         // Asked of the system first: Zenoh says the same of a machine that is not there and of a key that is not believed.
-        TcpStream::connect_timeout(&peer.address, REACH)
-            .map_err(|error| Vain::Nobody(words_of(&error)))?;
+        let address = peer.reachable(REACH).map_err(|error| Vain::Nobody(words_of(&error)))?;
         let not_admitted = |error: BusError| {
             Vain::NotAdmitted(match error {
                 BusError::Uncalled { reason, .. } => reason,
                 error => error.to_string(),
             })
         };
-        let call = Call::to(peer.address, self.cluster, &peer.name, &self.keys);
+        let call = Call::to(address, self.cluster, &peer.name, &self.keys);
         let call = call.map_err(not_admitted)?;
         let theirs = call.ask(&Request::Cluster).map_err(|_| {
             let reason = "it believes the certificate, and does not answer its holder";

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use ring::aead::{Aad, LessSafeKey, Nonce};
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Frame, FrameError, Header, MAXIMUM_FRAME_BYTES, Member,
-    StationId, decode,
+    StationId, Via, decode,
 };
 
 use crate::envelope::{
@@ -46,6 +46,12 @@ pub enum Refusal {
         /// Its sender.
         sender: Member,
     },
+    /// It was accepted before, and this network has not carried it yet: the copy over the other one of two networks came first.
+    #[error("a frame of {sender:?} came over the other network before")]
+    SecondCopy {
+        /// Its sender.
+        sender: Member,
+    },
     /// New, but of a life before the newest one: two processes have the keys of its sender.
     #[error(
         "{sender:?} sends in two lives at once: two processes have its keys, or its frames were recorded"
@@ -70,10 +76,19 @@ pub enum Refusal {
     },
 }
 
+/// A member that this one receives.
+struct Sender {
+    key: FrameKey,
+    /// What was accepted, over any network.
+    accepted: Window,
+    /// What each network has carried.
+    carried: [Window; 2],
+}
+
 /// Opens the datagrams that arrive at one member.
 pub struct Opener {
     own: Member,
-    senders: BTreeMap<Member, (FrameKey, Window)>,
+    senders: BTreeMap<Member, Sender>,
     transfers: BTreeMap<StationId, LessSafeKey>,
     revoked: Arc<Revocations>,
     agreed: Option<(ClusterHash, ConfigurationHash)>,
@@ -92,7 +107,12 @@ impl Opener {
         let ciphers = transfers.into_iter().map(|(from, key)| (from, key.cipher()));
         Self {
             own,
-            senders: senders.map(|(member, key)| (member, (key, Window::default()))).collect(),
+            senders: senders
+                .map(|(member, key)| {
+                    let (accepted, carried) = (Window::default(), [Window::default(); 2]);
+                    (member, Sender { key, accepted, carried })
+                })
+                .collect(),
             transfers: ciphers.collect(),
             revoked,
             agreed: None,
@@ -111,11 +131,19 @@ impl Opener {
         self
     }
 
-    /// The frame in a datagram, which is decrypted in place; `None` where it is authentic and for another station.
+    /// [`Self::open_over`] the network that every cluster has.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn open(&mut self, datagram: &mut [u8]) -> Result<Option<Frame>, Refusal> {
+        self.open_over(Via::First, datagram)
+    }
+
+    /// The frame in a datagram that came over a network, which is decrypted in place; `None` where it is authentic and for another station.
     ///
     /// # Errors
     /// [`Refusal`]; the datagram then has no effect.
-    pub fn open(&mut self, datagram: &mut [u8]) -> Result<Option<Frame>, Refusal> {
+    pub fn open_over(&mut self, via: Via, datagram: &mut [u8]) -> Result<Option<Frame>, Refusal> {
         let length = datagram.len();
         let nothing = || Refusal::Bytes { bytes: length };
         if datagram.starts_with(&UNSEALED_MAGIC) {
@@ -128,18 +156,18 @@ impl Opener {
         let header: [u8; HEADER_BYTES] = *datagram.first_chunk().ok_or_else(nothing)?;
         let envelope = Envelope::read(&header).ok_or_else(nothing)?;
         let sender = envelope.sender;
-        let (key, window) = self.senders.get_mut(&sender).ok_or(Refusal::Foreign { sender })?;
+        let known = self.senders.get_mut(&sender).ok_or(Refusal::Foreign { sender })?;
         let (sealed, authenticator) = datagram.split_at_mut(length - AUTHENTICATOR_BYTES);
-        let computed = blake3::keyed_hash(key.bytes(), sealed);
+        let computed = blake3::keyed_hash(known.key.bytes(), sealed);
         if !same(&computed.as_bytes()[..AUTHENTICATOR_BYTES], authenticator) {
             return Err(Refusal::Forged { sender });
         }
         if self.revoked.holds(sender) {
             return Err(Refusal::Revoked { sender });
         }
-        let begins = window.begins(envelope.life);
+        let begins = known.accepted.begins(envelope.life);
         if !begins {
-            take(window, envelope)?;
+            known.take(via, envelope)?;
         }
         let text = &mut sealed[HEADER_BYTES..];
         let encoded = match envelope.to {
@@ -163,18 +191,23 @@ impl Opener {
         let agrees = self.agreed.is_none_or(|agreed| agreed == (cluster, configuration));
         // A frame of another configuration is refused by its receiver, and does not begin a life.
         if begins && agrees {
-            take(window, envelope)?;
+            known.take(via, envelope)?;
         }
         Ok(Some(frame))
     }
 }
 
-fn take(window: &mut Window, envelope: Envelope) -> Result<(), Refusal> {
-    let sender = envelope.sender;
-    match window.take(envelope.life, envelope.number) {
-        Verdict::Taken => Ok(()),
-        Verdict::Again => Err(Refusal::Replayed { sender }),
-        Verdict::OfAnotherLife => Err(Refusal::OfAnotherLife { sender }),
+impl Sender {
+    fn take(&mut self, via: Via, envelope: Envelope) -> Result<(), Refusal> {
+        let Envelope { sender, life, number, .. } = envelope;
+        // What a network carries is judged before what counts: its copy is none of the other network's.
+        let is_new_here = self.carried[via.index()].take(life, number) == Verdict::Taken;
+        match self.accepted.take(life, number) {
+            Verdict::Taken => Ok(()),
+            Verdict::Again if is_new_here => Err(Refusal::SecondCopy { sender }),
+            Verdict::Again => Err(Refusal::Replayed { sender }),
+            Verdict::OfAnotherLife => Err(Refusal::OfAnotherLife { sender }),
+        }
     }
 }
 

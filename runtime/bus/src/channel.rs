@@ -18,10 +18,13 @@
 //! Invariants: the cycle never waits for the channel, which has a thread and a bounded queue of its own; a channel that cannot be
 //! opened is tried again, and the member runs without it; who is revoked is cut off as soon as the list of the admitted changes.
 
+mod answers;
 mod followed;
 mod refused;
 mod tls;
 
+use std::collections::BTreeMap;
+use std::io;
 use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -39,12 +42,11 @@ use zenoh::query::{Query, Queryable};
 
 use crate::clock::Clock;
 use crate::connections::{Connections, Relay, inner_address};
-use crate::control::{LINE_BYTES, order};
 use crate::endpoints::Endpoints;
 use crate::error::{BusError, reason};
 use crate::host_event::HostEvent;
 use crate::journal::{EventSink, JournalSender, Noted};
-use crate::orders::{Control, Order, Unknown};
+use crate::orders::{Control, Order};
 use crate::rights::run_in_background;
 use crate::writes::{self, Callers};
 
@@ -53,6 +55,7 @@ pub(crate) use followed::{Gaps, Head, Telemetry, followed};
 pub use tls::{Admitted, TlsKeys, Validity};
 pub(crate) use tls::{REFUSED_KEY, WRITE_KEYS, endpoint, hash_key, insert, prefix, tls_config};
 
+use answers::{answer, given, of_configuration, with_value};
 use followed::Line;
 use refused::RefusedReports;
 use tls::access_control;
@@ -140,7 +143,8 @@ pub(crate) struct Channel<E> {
     settings: ChannelSettings,
     prefix: String,
     name: String,
-    address: SocketAddr,
+    /// Where operators can call, on each network.
+    addresses: Vec<SocketAddr>,
     /// What it said when it was ready.
     status: String,
     control: Control,
@@ -158,7 +162,10 @@ pub(crate) struct Channel<E> {
 /// What is open.
 struct Opened {
     session: zenoh::Session,
-    relay: Relay,
+    /// Where Zenoh listens.
+    inner: SocketAddr,
+    /// By the address at which operators call.
+    relays: BTreeMap<SocketAddr, Relay>,
     journal: Publisher<'static>,
     _answers: Vec<Queryable<()>>,
 }
@@ -197,7 +204,7 @@ impl<E: Send + 'static> Channel<E> {
             settings,
             prefix: prefix(endpoints.cluster(), &own.name),
             name: own.name.clone(),
-            address: own.address,
+            addresses: own.addresses().collect(),
             status,
             control,
             callers,
@@ -229,9 +236,12 @@ impl<E: Send + 'static> Channel<E> {
         let (mut stopping, mut is_valid) = (false, true);
         loop {
             let now = self.clock.now();
-            if opened.is_none() && now >= next_try {
-                opened = self.open(&admitted);
+            if now >= next_try {
                 next_try = now + TRY_AGAIN_AFTER;
+                match &mut opened {
+                    Some(opened) => self.relay_all(opened),
+                    None => opened = self.open(&admitted),
+                }
             }
             let waiting = self.telemetry.take_next().map(Ok);
             match waiting.unwrap_or_else(|| self.telemetry.lines.recv_timeout(LOOK_EVERY)) {
@@ -304,11 +314,13 @@ impl<E: Send + 'static> Channel<E> {
     fn open(&mut self, admitted: &Admitted) -> Option<Opened> {
         let event = match self.listen(admitted) {
             Ok(opened) => {
-                let event = HostEvent::ChannelOpened {
-                    address: self.address,
-                    operators: admitted.people().cloned().collect(),
-                };
-                self.sink.record(self.clock.now(), Noted::Host(event));
+                for address in opened.relays.keys() {
+                    let event = HostEvent::ChannelOpened {
+                        address: *address,
+                        operators: admitted.people().cloned().collect(),
+                    };
+                    self.sink.record(self.clock.now(), Noted::Host(event));
+                }
                 return Some(opened);
             }
             Err(error) => HostEvent::ChannelFailed { reason: reason(&error) },
@@ -318,9 +330,8 @@ impl<E: Send + 'static> Channel<E> {
     }
 
     fn listen(&self, admitted: &Admitted) -> zenoh::Result<Opened> {
-        // Zenoh accepts whatever calls, and where that takes all descriptors it closes none of them again. So it gets no more than has a place.
-        let listen = |source| BusError::listen(self.address, source).to_string();
-        let listener = TcpListener::bind(self.address).map_err(listen)?;
+        // Asked before Zenoh is started, which takes longer.
+        let listener = self.bind_first()?;
         let inner = inner_address()?;
         let listen = format!("{}#tls_handshake_timeout_ms={HANDSHAKE_TIMEOUT_MS}", endpoint(inner));
         let mut config = tls_config("peer", &self.settings.keys)?;
@@ -371,8 +382,44 @@ impl<E: Send + 'static> Channel<E> {
             answers.push(self.answer_writes(&session, role, key, own)?);
         }
         answers.push(self.answer_refused(&session)?);
-        let relay = Relay::start(listener, self.connections.clone(), PATIENCE, inner)?;
-        Ok(Opened { session, relay, journal, _answers: answers })
+        let mut opened =
+            Opened { session, inner, relays: BTreeMap::new(), journal, _answers: answers };
+        self.relay(&mut opened, listener)?;
+        self.relay_all(&mut opened);
+        Ok(opened)
+    }
+
+    /// A listener at the first address that there is now.
+    fn bind_first(&self) -> Result<TcpListener, String> {
+        let mut failure = String::new();
+        for address in &self.addresses {
+            match TcpListener::bind(address) {
+                Ok(listener) => return Ok(listener),
+                Err(source) => failure = BusError::listen(*address, source).to_string(),
+            }
+        }
+        Err(failure)
+    }
+
+    /// Hands over to Zenoh what calls at one more address. Zenoh accepts whatever calls, and where that takes all descriptors it closes none of
+    /// them again. So it gets no more than has a place.
+    fn relay(&self, opened: &mut Opened, listener: TcpListener) -> io::Result<()> {
+        let address = listener.local_addr()?;
+        let relay = Relay::start(listener, self.connections.clone(), PATIENCE, opened.inner)?;
+        opened.relays.insert(address, relay);
+        Ok(())
+    }
+
+    /// Listens at the addresses, of two networks, at which it does not listen yet.
+    fn relay_all(&self, opened: &mut Opened) {
+        for address in &self.addresses {
+            if !opened.relays.contains_key(address)
+                && let Ok(listener) = TcpListener::bind(address)
+                && let Err(error) = self.relay(opened, listener)
+            {
+                tracing::debug!(%error, %address, "operators cannot call here");
+            }
+        }
     }
 }
 
@@ -418,66 +465,13 @@ impl<E> Channel<E> {
     }
 }
 
-/// The answer to a command.
-fn given(control: &Control, order: Order) -> String {
-    match control.ask(order, ORDER_PATIENCE) {
-        Ok(Some(Ok(()))) => DONE.to_owned(),
-        Ok(Some(Err(refusal))) => format!("{}: {refusal}", refusal.code()),
-        Ok(None) => "U0554: this member cannot do that: it is for remote I/Os".to_owned(),
-        Err(Unknown::Full) => {
-            "U0557: too many commands wait at this member; repeat the command".to_owned()
-        }
-        Err(Unknown::Late) => {
-            "U0581: the member does not answer: the command may be done; ask for its state"
-                .to_owned()
-        }
-    }
-}
-
-/// Whether an order is for this configuration, where its sender says one: the signals of another one are others.
-fn of_configuration(query: &Query, own: ConfigurationHash) -> Result<(), String> {
-    let theirs = query.attachment().map(|theirs| theirs.to_bytes());
-    match theirs.map(|theirs| String::from_utf8_lossy(&theirs).into_owned()) {
-        Some(theirs) if theirs != own.to_string() => Err(format!(
-            "U0563: this member runs configuration {own}, and the order is for configuration {theirs:.32}: take the file that it runs"
-        )),
-        _ => Ok(()),
-    }
-}
-
-/// A command that comes with a value.
-fn with_value(word: &str, query: &Query) -> Result<Order, String> {
-    let bytes = query.payload().map(|payload| payload.to_bytes());
-    let bytes = bytes.unwrap_or_default();
-    let line = format!("{word} {}", String::from_utf8_lossy(&bytes));
-    if line.len() > LINE_BYTES {
-        return Err(format!("more than {LINE_BYTES} bytes"));
-    }
-    order(&line).ok_or_else(|| format!("invalid command `{line:.200}`"))
-}
-
 fn close(opened: Option<Opened>) {
     let Some(opened) = opened else {
         return;
     };
     // No call comes to a session that ends.
-    drop(opened.relay);
+    drop(opened.relays);
     if let Err(error) = opened.session.close().wait() {
         tracing::debug!(%error, "the channel was not closed");
     }
-}
-
-fn answer(
-    session: &zenoh::Session,
-    key: String,
-    say: impl Fn(&Query) -> String + Send + Sync + 'static,
-) -> zenoh::Result<Queryable<()>> {
-    session
-        .declare_queryable(key.clone())
-        .callback(move |query: Query| {
-            if let Err(error) = query.reply(key.clone(), say(&query)).wait() {
-                tracing::debug!(%error, "an answer was not sent");
-            }
-        })
-        .wait()
 }

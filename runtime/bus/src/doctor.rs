@@ -3,24 +3,26 @@
 //! Nothing is changed, and no frame is sent: peers are found by listening for as long as they surely speak.
 
 mod machine;
+mod networks;
 mod repair;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::net::{SocketAddr, TcpListener, UdpSocket};
 use std::time::Duration;
 
 use nix::poll::{PollFd, PollFlags, ppoll};
 use nix::sys::time::TimeSpec;
 use serde::Serialize;
-use understudy_wire::{ConfigurationHash, Member};
+use understudy_wire::{ConfigurationHash, Member, Via};
 
 use crate::clock::Clock;
 use crate::endpoints::Endpoints;
 use crate::error::BusError;
-use crate::guard::Guard;
+use crate::guard::{Guard, Opened};
 use crate::link::LinkKind;
 
 pub use machine::examine_machine;
+pub use networks::examine_networks;
 pub use repair::{Repair, may_repair};
 
 /// How something stands.
@@ -38,7 +40,7 @@ pub enum Health {
 /// One thing that was looked at.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Finding {
-    /// What: `clock`, `scheduler`, `memory`, `descriptors`, `processors`, `sockets`, `ports`, `keys`, `configuration` or `peer`.
+    /// What: `clock`, `scheduler`, `memory`, `descriptors`, `processors`, `sockets`, `ports`, `networks`, `keys`, `configuration` or `peer`.
     pub check: &'static str,
     /// How it stands.
     pub health: Health,
@@ -74,7 +76,11 @@ impl Finding {
 
 /// Whether a member can listen where it should: for its frames over `link`, and by TCP for its operators.
 pub fn examine_ports(endpoints: &Endpoints, link: LinkKind) -> Vec<Finding> {
-    let operators = endpoints.own().address;
+    let addresses = endpoints.own().addresses();
+    addresses.flat_map(|address| examine_ports_at(address, link)).collect()
+}
+
+fn examine_ports_at(operators: SocketAddr, link: LinkKind) -> Vec<Finding> {
     let frames = match link.frames_address(operators) {
         Ok(frames) => frames,
         Err(error) => {
@@ -140,14 +146,20 @@ pub fn examine_peers(
     let clock = Clock::start();
     let end = clock.now() + patience;
     let mut heard: BTreeMap<Member, ConfigurationHash> = BTreeMap::new();
+    let mut heard_over: BTreeSet<(Member, Via)> = BTreeSet::new();
     let mut refused: BTreeMap<Option<Member>, String> = BTreeMap::new();
-    let expected = endpoints.senders().count();
+    let networks = endpoints.own().addresses().count();
+    let expected = endpoints.senders().count() * networks;
     let mut bytes = Vec::new();
-    while clock.now() < end && heard.len() < expected {
-        while opened.receive(&mut bytes).is_some() {
-            match guard.open(&mut bytes) {
-                Ok(Some(frame)) if frame.header.cluster == endpoints.cluster() => {
+    while clock.now() < end && heard_over.len() < expected {
+        while let Some(via) = opened.receive(&mut bytes) {
+            match guard.open(via, &mut bytes) {
+                Ok(Opened::Frame(frame)) if frame.header.cluster == endpoints.cluster() => {
                     heard.insert(frame.header.sender, frame.header.configuration);
+                    heard_over.insert((frame.header.sender, via));
+                }
+                Ok(Opened::SecondCopy(sender)) => {
+                    heard_over.insert((sender, via));
                 }
                 Ok(_) => {}
                 Err(reason) => {
@@ -168,7 +180,17 @@ pub fn examine_peers(
             let name = format!("{} ({})", peer.name, peer.address);
             match (heard.get(&peer.member), refused.get(&Some(peer.member))) {
                 (Some(theirs), _) if *theirs == configuration => {
-                    Finding::good("peer", format!("{name} is heard"))
+                    let of = |via: &Via| heard_over.contains(&(peer.member, *via));
+                    let unheard = Via::BOTH.into_iter().take(networks).find(|via| !of(via));
+                    match unheard {
+                        None => Finding::good("peer", format!("{name} is heard")),
+                        Some(via) => Finding::trouble(
+                            "networks",
+                            Health::Bad,
+                            format!("{name} is heard over network {} and not over network {via}", via.other()),
+                            format!("check the cable, the switch and the addresses of network {via} on both machines"),
+                        ),
+                    }
                 }
                 (Some(theirs), _) => Finding::trouble(
                     "configuration",

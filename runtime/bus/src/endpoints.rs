@@ -1,7 +1,9 @@
 //! Who is where; [`Roster`] says who receives what.
 
 use std::collections::BTreeMap;
-use std::net::{SocketAddr, SocketAddrV4};
+use std::io;
+use std::net::{SocketAddr, SocketAddrV4, TcpStream};
+use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use understudy_wire::{ClusterHash, Member, Roster, Topic};
@@ -23,6 +25,21 @@ pub struct Peer {
 }
 
 impl Peer {
+    /// The first of its addresses that takes a call within `patience`.
+    ///
+    /// # Errors
+    /// What the system says of the last one.
+    pub fn reachable(&self, patience: Duration) -> io::Result<SocketAddr> {
+        let mut failure = io::ErrorKind::NotFound.into();
+        for address in self.addresses() {
+            match TcpStream::connect_timeout(&address, patience) {
+                Ok(_) => return Ok(address),
+                Err(error) => failure = error,
+            }
+        }
+        Err(failure)
+    }
+
     /// Where it listens, on each network.
     pub fn addresses(&self) -> impl Iterator<Item = SocketAddr> + use<> {
         [self.address].into_iter().chain(self.second)
@@ -37,6 +54,8 @@ pub struct Endpoints {
     others: Vec<Peer>,
     roster: Roster,
     multicast: Option<SocketAddrV4>,
+    /// Whether there is another network, of which these are the endpoints too.
+    is_one_of_two: bool,
 }
 
 /// The first group of the second network: the same at the next port.
@@ -70,7 +89,8 @@ impl Endpoints {
         let (mut own_peers, others): (Vec<Peer>, Vec<Peer>) =
             members.into_iter().partition(|peer| peer.member == own);
         let own = own_peers.pop().ok_or(BusError::NoAddress { member: own })?;
-        Ok(Self { cluster, own, others, roster, multicast: None })
+        let is_one_of_two = own.second.is_some();
+        Ok(Self { cluster, own, others, roster, multicast: None, is_one_of_two })
     }
 
     /// The same with the address of the first multicast group, where the network between the members has multicast.
@@ -89,7 +109,13 @@ impl Endpoints {
             multicast: self.multicast.and_then(next_port),
             cluster: self.cluster,
             roster: self.roster.clone(),
+            is_one_of_two: true,
         })
+    }
+
+    /// Whether this is one of two networks, so that the other one carries the frames where this one does not.
+    pub(crate) fn is_one_of_two(&self) -> bool {
+        self.is_one_of_two
     }
 
     /// The first multicast group.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 
 use understudy_seal::{Opener, Refusal, Seal};
-use understudy_wire::{Frame, FrameError, Member, decode};
+use understudy_wire::{Frame, FrameError, Member, Via, decode};
 
 use crate::refused_as::RefusedAs;
 use crate::rights::run_in_background;
@@ -39,6 +39,17 @@ impl std::fmt::Debug for Keys {
             .field("opener", &self.opener)
             .finish_non_exhaustive()
     }
+}
+
+/// What an authentic datagram is.
+#[derive(Debug)]
+pub(crate) enum Opened {
+    /// A frame for this member.
+    Frame(Frame),
+    /// For another station.
+    ForAnother,
+    /// A frame of this member that came over the other network before.
+    SecondCopy(Member),
 }
 
 /// Why a datagram is not passed on to the member.
@@ -119,11 +130,16 @@ impl Guard {
         }
     }
 
-    /// The frame in a datagram; nothing where it is in order, and for somebody else.
-    pub(crate) fn open(&mut self, datagram: &mut [u8]) -> Result<Option<Frame>, Refused> {
+    /// What a datagram is that came over a network. Without keys a second copy is a frame like its first.
+    pub(crate) fn open(&mut self, via: Via, datagram: &mut [u8]) -> Result<Opened, Refused> {
         match self {
-            Self::Off => decode(datagram).map(Some).map_err(Refused::from),
-            Self::Keys(keys) => keys.opener.open(datagram).map_err(Refused::from),
+            Self::Off => decode(datagram).map(Opened::Frame).map_err(Refused::from),
+            Self::Keys(keys) => match keys.opener.open_over(via, datagram) {
+                Ok(Some(frame)) => Ok(Opened::Frame(frame)),
+                Ok(None) => Ok(Opened::ForAnother),
+                Err(Refusal::SecondCopy { sender }) => Ok(Opened::SecondCopy(sender)),
+                Err(refusal) => Err(Refused::from(refusal)),
+            },
         }
     }
 }
@@ -141,7 +157,9 @@ impl From<Refusal> for Refused {
             Refusal::Unsealed => (RefusedAs::Unsealed, None),
             Refusal::Foreign { sender } => (RefusedAs::Foreign, Some(sender)),
             Refusal::Forged { sender } => (RefusedAs::Forged, Some(sender)),
-            Refusal::Replayed { sender } => (RefusedAs::Replayed, Some(sender)),
+            Refusal::Replayed { sender } | Refusal::SecondCopy { sender } => {
+                (RefusedAs::Replayed, Some(sender))
+            }
             Refusal::OfAnotherLife { sender } => (RefusedAs::OfAnotherLife, Some(sender)),
             Refusal::Revoked { sender } => (RefusedAs::Revoked, Some(sender)),
             Refusal::Broken { sender, .. } => (RefusedAs::NoFrame, Some(sender)),

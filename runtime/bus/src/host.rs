@@ -19,13 +19,12 @@ use crate::clock::Clock;
 use crate::error::BusError;
 use crate::field::silence::Silence;
 use crate::field::{FieldDriver, Look};
-use crate::guard::{Guard, Refused};
+use crate::guard::{Guard, Opened, Refused};
 use crate::host_event::HostEvent;
 use crate::journal::{EventSink, Noted};
 use crate::link::{Link, LinkCounters, Reopening};
 use crate::network_reception::{Arrival, NetworkReception};
 use crate::orders::{Obeyed, Order, Orders};
-use crate::refused_as::RefusedAs;
 use crate::retained::Retainer;
 use crate::trouble::{Duplicates, Refusals};
 use crate::unreceived::Unreceived;
@@ -301,7 +300,7 @@ impl<M: Machine> Host<'_, M> {
             let now = self.clock.now();
             let datagram =
                 self.networks.as_ref().map(|_| NetworkReception::identity(&round.received));
-            let opened = self.guard.open(&mut round.received);
+            let opened = self.guard.open(via, &mut round.received);
             if let Some(datagram) = datagram
                 && self.is_second_copy(now, via, datagram, &opened)
             {
@@ -309,10 +308,9 @@ impl<M: Machine> Host<'_, M> {
                 continue;
             }
             match opened {
-                // In order, and for another station.
-                Ok(None) => {}
-                Ok(Some(frame)) if self.orders.is_cut(frame.header.sender) => {}
-                Ok(Some(frame)) => {
+                Ok(Opened::ForAnother | Opened::SecondCopy(_)) => {}
+                Ok(Opened::Frame(frame)) if self.orders.is_cut(frame.header.sender) => {}
+                Ok(Opened::Frame(frame)) => {
                     let frame = Arc::new(frame);
                     round.summary.frames_heard += 1;
                     if let Some(unreceived) = &mut round.unreceived
@@ -361,20 +359,22 @@ impl<M: Machine> Host<'_, M> {
         now: Time,
         via: Via,
         datagram: u64,
-        opened: &Result<Option<Frame>, Refused>,
+        opened: &Result<Opened, Refused>,
     ) -> bool {
         let Some(networks) = &mut self.networks else {
             return false;
         };
-        let (sender, was_accepted) = match opened {
-            Ok(frame) => (frame.as_ref().map(|frame| frame.header.sender), false),
-            Err(refused) if refused.kind == RefusedAs::Replayed => (refused.sender, true),
+        let (sender, is_second) = match opened {
+            Ok(Opened::Frame(frame)) => (Some(frame.header.sender), false),
+            Ok(Opened::SecondCopy(sender)) => (Some(*sender), true),
+            Ok(Opened::ForAnother) => (None, false),
             Err(_) => return false,
         };
         let arrival = networks.note(now, via, datagram);
-        let is_second = matches!(arrival, Arrival::Second { .. });
+        let is_second = is_second || matches!(arrival, Arrival::Second { .. });
+        // One that is so late that its first copy is forgotten counts for no network.
         if let Some(sender) = sender
-            && (is_second || !was_accepted)
+            && (arrival != Arrival::First || !is_second)
         {
             networks.count(sender, via, arrival);
         }

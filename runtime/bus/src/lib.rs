@@ -21,6 +21,7 @@ mod host;
 mod host_event;
 mod interruption;
 mod journal;
+mod linger;
 mod link;
 mod log;
 mod member;

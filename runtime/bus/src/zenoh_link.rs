@@ -37,6 +37,7 @@ use crate::clock::Clock;
 use crate::doorbell::{Inbox, Outbox, doorbell};
 use crate::endpoints::{Endpoints, Peer};
 use crate::error::{BusError, reason};
+use crate::linger::Lingering;
 use crate::link::{Link, LinkCounters, LinkKind, Reopening};
 use crate::rights::raise_link_thread;
 use settings::{identity, settings};
@@ -111,7 +112,9 @@ impl ZenohLink {
             publishers: Arc::clone(&publishers),
             published: Arc::clone(&published),
             ears,
-            silence: Silence::new(clock.now(), place),
+            silence: Silence::new(clock.now(), place, endpoints.is_one_of_two()),
+            lingering: Lingering::new()
+                .map_err(|source| BusError::System { what: "a pair of sockets", source })?,
             failed: false,
             reopened: Arc::clone(&reopened),
             report,
@@ -312,6 +315,7 @@ struct Keeper {
     published: Arc<Published>,
     ears: Ears,
     silence: Silence,
+    lingering: Lingering,
     /// Whether that it could not be opened is reported.
     failed: bool,
     reopened: Arc<AtomicU64>,
@@ -320,6 +324,11 @@ struct Keeper {
 
 impl Keeper {
     fn pulse(&mut self, now: Time) {
+        match self.lingering.end() {
+            Ok(0) => {}
+            Ok(connections) => tracing::trace!(connections, "do not linger any more"),
+            Err(error) => tracing::warn!(%error, "the end of a connection may take ten seconds"),
+        }
         if let Some(session) = &self.session {
             for (publisher, published) in session.publishers.iter().zip(self.published.iter()) {
                 if let Some(publisher) = publisher

@@ -22,6 +22,9 @@ pub(crate) enum Seen {
     Lost(String),
 }
 
+/// How long a remote I/O is given to take a call at one of its addresses.
+const REACH: Duration = Duration::from_millis(1500);
+
 /// A witness: one of the remote I/Os of a group, another one where that is not received.
 pub(crate) struct Watch {
     pub(crate) cluster: ClusterHash,
@@ -36,7 +39,8 @@ impl Watch {
     /// Follows until the spare ends; its end of the channel is gone then.
     pub(crate) fn run(self, group: usize, witness: usize, seen: &Sender<(usize, usize, Seen)>) {
         for peer in self.peers.iter().cycle() {
-            let lost = match Call::to(peer.address, self.cluster, &peer.name, &self.keys) {
+            let address = peer.reachable(REACH).unwrap_or(peer.address);
+            let lost = match Call::to(address, self.cluster, &peer.name, &self.keys) {
                 Ok(call) => self.follow(&call, |deadline| {
                     seen.send((group, witness, Seen::Deadline(deadline))).is_ok()
                 }),

@@ -18,6 +18,10 @@ pub(super) const MUTE_PULSES: u32 = 12;
 /// The most times as long: a member whose peers are all switched off opens its session every 32 s.
 const MOST_PATIENCE: u32 = 32;
 
+/// The least times as long on one of two networks: a silent one is as a rule a network that has failed. Zenoh connects again by itself, and a new
+/// session costs time that the other network needs.
+const PATIENCE_OF_TWO: u32 = 8;
+
 /// What was not received, and for how long.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Silent {
@@ -34,13 +38,23 @@ pub(super) struct Silence {
     mute: BTreeMap<Member, u32>,
     /// Factor of the pulses that must pass.
     patience: u32,
+    /// The factor of the first time.
+    first_patience: u32,
     /// The place of this member among all.
     place: u32,
 }
 
 impl Silence {
-    pub(super) fn new(now: Time, place: u32) -> Self {
-        Self { place, since: now, pulses: 0, mute: BTreeMap::new(), patience: 1 }
+    pub(super) fn new(now: Time, place: u32, is_one_of_two: bool) -> Self {
+        let first_patience = if is_one_of_two { PATIENCE_OF_TWO } else { 1 };
+        Self {
+            place,
+            since: now,
+            pulses: 0,
+            mute: BTreeMap::new(),
+            patience: first_patience,
+            first_patience,
+        }
     }
 
     /// At each pulse: the reason to open the session anew. `heard` where a peer was received since the last one; `mute` are the peers that
@@ -67,7 +81,7 @@ impl Silence {
             self.mute.clear();
             self.patience = (self.patience * 2).min(MOST_PATIENCE);
         } else if heard && self.mute.is_empty() {
-            self.patience = 1;
+            self.patience = self.first_patience;
         }
         silent
     }
@@ -115,7 +129,7 @@ mod tests {
 
     #[test]
     fn without_any_peer_after_a_second_and_then_less_often() {
-        let mut silence = Silence::new(Time::default(), 0);
+        let mut silence = Silence::new(Time::default(), 0, false);
         // Seconds 1, 3, and 7: pauses of 1, 2 and 4 s.
         let found = opened(&mut silence, 1..=40, &[], &[station(1)]);
         assert_eq!(found, [(4, None), (12, None), (28, None)]);
@@ -127,7 +141,7 @@ mod tests {
 
     #[test]
     fn with_one_that_is_connected_and_mute_after_three_seconds() {
-        let mut silence = Silence::new(Time::default(), 0);
+        let mut silence = Silence::new(Time::default(), 0, false);
         let both = [station(1), station(2)];
         let found = opened(&mut silence, 1..=40, &both[..1], &both);
         assert_eq!(found, [(12, Some(station(2))), (36, Some(station(2)))]);
@@ -140,7 +154,7 @@ mod tests {
     fn one_member_after_the_other() {
         let both = [station(1), station(2)];
         let first = |place| {
-            let mut silence = Silence::new(Time::default(), place);
+            let mut silence = Silence::new(Time::default(), place, false);
             opened(&mut silence, 1..=40, &both[..1], &both)[0].0
         };
         assert_eq!([0, 1, 7].map(first), [12, 13, 19]);
@@ -148,7 +162,7 @@ mod tests {
 
     #[test]
     fn never_because_of_one_that_is_not_connected_or_heard_now_and_then() {
-        let mut silence = Silence::new(Time::default(), 0);
+        let mut silence = Silence::new(Time::default(), 0, false);
         let (one, both) = ([station(1)], [station(1), station(2)]);
         assert!(opened(&mut silence, 1..=100, &one, &one).is_empty());
         for round in 0..20 {
