@@ -9,7 +9,10 @@ use serde_json::Value;
 use understudy_testing::skip;
 
 use super::shared::DEADLINE;
-use super::{PERIOD, PRESS_CELL, answer, check, empty_folder, no_orphan, running, some_at_a_time};
+use super::{
+    PERIOD, PRESS_CELL, answer, assert_met, check, check_of, empty_folder, no_orphan, running,
+    some_at_a_time,
+};
 
 /// Whether this machine lets the tests make namespaces; where not, says why.
 fn permitted(name: &str) -> bool {
@@ -120,4 +123,66 @@ fn a_killed_laboratory_leaves_no_host() {
         !named.iter().any(|entry| entry.file_name().to_string_lossy().contains("understudy")),
         "{named:?}"
     );
+}
+
+/// A scenario file of this test.
+fn scenario_file(name: &str, text: &str) -> String {
+    let path = empty_folder(&format!("{name}_scenario")).join("scenario.toml");
+    fs::write(&path, text).expect("a file");
+    path.to_str().expect("text").to_owned()
+}
+
+fn step(at: u64, action: &str, more: &str) -> String {
+    format!("[[step]]\nat = {at}\naction = \"{action}\"\n{more}\n")
+}
+
+const NOTHING_IS_HELD: &str = "[expect]\nwrong = 0\nheld = 0\nfail_safe = 0\n";
+
+/// A machine that loses its cable says no farewell: its connections end by time-outs, longer than a lease. All others continue meanwhile.
+#[test]
+fn the_loss_of_a_cable_deafens_nobody_else() {
+    if !permitted("cable") {
+        return;
+    }
+    let both_ways = "station = \"understudy\"\nboth_ways = true";
+    let text = format!(
+        "title = \"The understudy loses its cable\"\ncycles = 200\n{}{}{NOTHING_IS_HELD}",
+        step(40, "cut", both_ways),
+        step(160, "heal", both_ways),
+    );
+    let scenario = scenario_file("cable", &text);
+    for link in ["udp", "zenoh"] {
+        let name = format!("cable_{link}");
+        assert_met(&check_of(&name, (PRESS_CELL, link), &scenario, &["--hosts", "netns"]));
+    }
+}
+
+/// The second network fails, then the cable of a member to the first one: no output is held, and both are reported.
+#[test]
+fn one_of_two_networks_fails_and_nothing_is_held() {
+    if !permitted("networks") {
+        return;
+    }
+    let (all, one) =
+        ("network = 2\nstation = \"robot\"\nothers = true", "network = 1\nstation = \"press-io\"");
+    let text = format!(
+        "title = \"Each of two networks fails\"\ncycles = 160\n{}{}{}{NOTHING_IS_HELD}",
+        step(20, "unplug", all),
+        step(70, "plug", all),
+        step(110, "unplug", one),
+    );
+    let scenario = scenario_file("networks", &text);
+    for link in ["udp", "zenoh"] {
+        let name = format!("networks_{link}");
+        let cluster = "examples/two-networks/cluster.toml";
+        assert_met(&check_of(&name, (cluster, link), &scenario, &["--hosts", "netns"]));
+        let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join(env!("CARGO_CRATE_NAME")).join(&name);
+        let journal = out.join("latest/journal.jsonl");
+        let journal = fs::read_to_string(journal).expect("a journal");
+        for network in [1, 2] {
+            let told =
+                format!("\"event\":\"network-reception\",\"network\":{network},\"lost\":[{{");
+            assert!(journal.contains(&told), "network {network} over {link}");
+        }
+    }
 }

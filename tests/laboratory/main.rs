@@ -71,10 +71,14 @@ fn processes() -> BTreeSet<String> {
 
 /// What a run over plain UDP came to. Cycles in which a machine that other programs share stood still are counted apart.
 fn check(name: &str, scenario: &str, more: &[&str]) -> Value {
+    check_of(name, (PRESS_CELL, "udp"), scenario, more)
+}
+
+/// The same of a cluster over a link.
+fn check_of(name: &str, (cluster, link): (&str, &str), scenario: &str, more: &[&str]) -> Value {
     let _one = some_at_a_time();
     let out = empty_folder(name);
-    let arguments =
-        ["lab", PRESS_CELL, "--scenario", scenario, "--link", "udp", "--period", PERIOD];
+    let arguments = ["lab", cluster, "--scenario", scenario, "--link", link, "--period", PERIOD];
     let out_argument = ["--out", out.to_str().expect("text")];
     let (_, document, errors) = answer(&[&arguments[..], &out_argument, more].concat());
     no_orphan(&out);

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use understudy_network::{Hosts, NetworkError, Share};
 use understudy_testing::skip;
+use understudy_wire::Via;
 
 /// For what comes at once or never.
 const PATIENCE: Duration = Duration::from_secs(2);

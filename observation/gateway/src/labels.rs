@@ -52,6 +52,12 @@ pub(crate) struct OfAlarm {
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+pub(crate) struct OfNetwork {
+    /// 1 or 2.
+    pub(crate) network: u32,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
 pub(crate) struct OfAlarms {
     pub(crate) priority: &'static str,
     pub(crate) state: &'static str,

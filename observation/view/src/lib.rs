@@ -59,9 +59,9 @@ pub use run::{Run, find_run, find_run_of, find_running, find_running_of};
 pub use series::Series;
 pub use shown_text::{NamedValue, ShownLine, Uses};
 pub use snapshot::{
-    LinkSnapshot, MarginSnapshot, OutcomeSnapshot, PlantSnapshot, PlantState, ProgramSnapshot,
-    RemoteIoSnapshot, RemoteIoState, RunState, Snapshot, StationSnapshot, TimingSnapshot,
-    WordSnapshot,
+    LinkSnapshot, MarginSnapshot, NetworkSnapshot, OutcomeSnapshot, PlantSnapshot, PlantState,
+    ProgramSnapshot, RemoteIoSnapshot, RemoteIoState, RunState, Snapshot, StationSnapshot,
+    TimingSnapshot, WordSnapshot,
 };
 pub use source::{BEHIND, Feed, Progress, Reading, Source, Trouble};
 pub use state_signal::{StateKind, StateSignal};

@@ -80,6 +80,9 @@ pub struct Snapshot {
     pub plants: Vec<PlantSnapshot>,
     /// The remaining redundancy.
     pub margin: MarginSnapshot,
+    /// The networks of a cluster with two; none of a cluster with one.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub networks: Vec<NetworkSnapshot>,
     /// Times of the newest cycle whose times are known.
     pub timing: Option<TimingSnapshot>,
     /// Late wake-ups of all members so far.
@@ -100,6 +103,17 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
+    /// What one of two networks has left, in words; nothing in a cluster with one network.
+    pub fn networks_text(&self) -> Option<String> {
+        let faults = self.networks.iter().filter(|network| !network.in_order);
+        let faults: Vec<&str> = faults.map(|network| network.text.as_str()).collect();
+        match (self.networks.is_empty(), faults.is_empty()) {
+            (true, _) => None,
+            (false, true) => Some("either network may fail".to_owned()),
+            (false, false) => Some(faults.join("; ")),
+        }
+    }
+
     /// The links of every member, by its name.
     pub fn links(&self) -> impl Iterator<Item = (&str, &LinkSnapshot)> {
         let stations = self.stations.iter().map(|of| (of.name.as_str(), &of.link));
@@ -340,6 +354,17 @@ pub struct MarginSnapshot {
     pub singles: Vec<OutcomeSnapshot>,
     /// Each pair of stations that publish.
     pub pairs: Vec<OutcomeSnapshot>,
+}
+
+/// One of two networks.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct NetworkSnapshot {
+    /// 1 or 2.
+    pub network: u8,
+    /// Whether every member that reports receives over it what it receives over the other one.
+    pub in_order: bool,
+    /// What is wrong; empty where nothing is.
+    pub text: String,
 }
 
 /// Consequence of a failure.

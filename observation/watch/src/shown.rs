@@ -392,6 +392,16 @@ fn redundancy(snapshot: &Snapshot) -> Redundancy {
         let words = format!("{lost} has no provable outputs; of the others: {words}");
         ("some", words)
     };
+    let (level, words) = match snapshot.networks_text() {
+        None => (level, words),
+        Some(networks) => {
+            let in_order = snapshot.networks.iter().all(|network| network.in_order);
+            (
+                if in_order || level == "none" { level } else { "some" },
+                format!("{words}; {networks}"),
+            )
+        }
+    };
     let unmasked_pairs = margin.pairs.iter().filter(|pair| !pair.masked);
     let failures = singles.into_iter().chain(unmasked_pairs);
     Redundancy {

@@ -243,7 +243,7 @@ mod tests {
     #[test]
     fn a_lost_network_is_reported_within_a_second_and_its_return_later() {
         let lost = |period, via| {
-            let is_lost = via == Via::Second && (300..900).contains(&period);
+            let is_lost = via == Via::Second && (320..900).contains(&period);
             (!is_lost).then_some(Duration::ZERO)
         };
         let found = reports(20, lost);

@@ -19,13 +19,16 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use members::{Chat, Chatter, agreement, endpoints, guard, peers, plant, remote_io, station};
+use members::{
+    Chat, Chatter, PERIOD, agreement, endpoints, guard, peers, plant, remote_io, station,
+};
 use understudy_bus::{
-    Clock, Control, Endpoints, EventSink, FieldDriver, Host, HostEvent, LinkKind, NoField, Noted,
-    Order, Peer, SimulatedField, Summary, loopback_groups, orders,
+    Clock, Control, Cuts, Endpoints, EventSink, FieldDriver, Host, HostEvent, LinkKind,
+    NetworkReception, NoField, Noted, Order, Peer, SimulatedField, Summary, free_addresses,
+    loopback_groups, orders,
 };
 use understudy_testing::skip;
-use understudy_wire::{Member, Time};
+use understudy_wire::{Member, Time, Via};
 use wires::{BreakingWire, LossyWire};
 
 /// Past it a test has failed; nothing waits for it otherwise.
@@ -68,6 +71,8 @@ impl Running {
         reports: &Sender<(Member, Noted<Chat>)>,
     ) -> Self {
         let own = endpoints.own().member;
+        let second = endpoints.own().second;
+        let networks = second.map(|_| NetworkReception::new(Time::default(), PERIOD));
         let mut link = link.open(&endpoints).expect("a free port");
         let mut guard = guard(own, life, peers);
         let (control, orders) = orders().expect("an eventfd");
@@ -83,7 +88,7 @@ impl Running {
                 guard: &mut guard,
                 field: field.as_mut(),
                 sink: &mut sink,
-                networks: None,
+                networks,
                 retainer: None,
                 watchdog: None,
                 orders: &orders,
@@ -313,7 +318,7 @@ fn a_session_without_peers_is_opened_anew_over_zenoh() {
         let (member, event) = reports.recv_timeout(DEADLINE).expect("it is reported");
         if let Noted::Host(event) = event {
             match event {
-                HostEvent::LinkReopened { silence_ms, peer: None } => {
+                HostEvent::LinkReopened { silence_ms, peer: None, .. } => {
                     assert!(silence_ms >= 1000, "after {silence_ms} ms");
                     missing.remove(&member);
                 }
@@ -454,4 +459,90 @@ fn all_hear_all_where_streams_break_on_zenoh() {
         peers.iter().zip(1..).map(|(peer, seed)| BreakingWire::to(peer.address, seed)).collect();
     let addresses: Vec<SocketAddr> = wires.iter().map(|wire| wire.address).collect();
     all_hear_all_by(LinkKind::Zenoh, &peers, &addresses);
+}
+
+/// The cell, each member at two addresses.
+fn peers_on_two_networks() -> Vec<Peer> {
+    let second = free_addresses(CELL.len()).expect("free ports");
+    let peers = peers(&cell()).into_iter().zip(second);
+    peers.map(|(peer, second)| Peer { second: Some(second), ..peer }).collect()
+}
+
+/// What is reported of networks, until `is_last`.
+fn of_networks(
+    reports: &Receiver<(Member, Noted<Chat>)>,
+    mut is_last: impl FnMut(Member, &HostEvent) -> bool,
+) {
+    loop {
+        let (member, event) = reports.recv_timeout(DEADLINE).expect("it is reported");
+        if let Noted::Host(event) = event
+            && is_last(member, &event)
+        {
+            return;
+        }
+    }
+}
+
+/// Whether a member says that it receives nothing of this one over a network.
+fn has_lost(event: &HostEvent, of: Member, over: Via) -> bool {
+    matches!(event, HostEvent::NetworkReception { network, lost, .. } if *network == over && lost.contains(&of))
+}
+
+#[test]
+fn each_frame_counts_once_over_two_networks_and_a_pulled_cable_is_reported() {
+    for link in [LinkKind::Udp, LinkKind::Zenoh] {
+        let peers = peers_on_two_networks();
+        let (sender, reports) = channel();
+        let start = |own| Running::start(own, 1, link, &peers, &sender);
+        let running: Vec<Running> = cell().into_iter().map(start).collect();
+        wait_for(&reports, expected(station(0), 1), "over two networks");
+        let (pulled, other) = (&running[0], station(1));
+        let mut cuts = Cuts::default();
+        cuts.unplug(Via::First, true);
+        pulled.control.give(Order::Cut(cuts));
+        of_networks(&reports, |by, event| by == other && has_lost(event, station(0), Via::First));
+        cuts.unplug(Via::First, false);
+        pulled.control.give(Order::Cut(cuts));
+        of_networks(&reports, |by, event| {
+            by == other
+                && matches!(event, HostEvent::NetworkReception { network: Via::First, lost, impaired }
+                    if lost.is_empty() && impaired.is_empty())
+        });
+        // Frames are still received: the other network carried them all the time.
+        for summary in running.into_iter().map(Running::stop) {
+            assert_eq!(summary.refused, 0, "a second copy is no replay: {summary:?}");
+            assert!(summary.second_copies > 0, "{summary:?}");
+        }
+    }
+}
+
+/// An address that no interface of this machine has.
+const NOWHERE: &str = "192.0.2.1";
+
+#[test]
+fn a_member_starts_with_the_network_that_there_is() {
+    for link in [LinkKind::Udp, LinkKind::Zenoh] {
+        for missing in Via::BOTH {
+            let mut peers = peers_on_two_networks();
+            let own = &mut peers[0];
+            let place = match missing {
+                Via::First => &mut own.address,
+                Via::Second => own.second.as_mut().expect("two"),
+            };
+            place.set_ip(NOWHERE.parse().expect("an address"));
+            let (sender, reports) = channel();
+            let start = |own| Running::start(own, 1, link, &peers, &sender);
+            let running: Vec<Running> = cell().into_iter().map(start).collect();
+            of_networks(&reports, |by, event| {
+                by == station(0)
+                    && matches!(event, HostEvent::LinkFailed { network, .. } if *network == Some(missing))
+            });
+            of_networks(&reports, |by, event| {
+                by == station(1) && has_lost(event, station(0), missing)
+            });
+            for one in running {
+                one.stop();
+            }
+        }
+    }
 }

@@ -13,7 +13,7 @@ use understudy_cluster::Cluster;
 use understudy_cycle::Schedule;
 use understudy_remote_io::{OperatorInput, OperatorInputKind};
 use understudy_simulator::{Action, Disturbance, Fault, Network};
-use understudy_wire::{Member, PointValue, ProgramId, StationId};
+use understudy_wire::{Member, PointValue, ProgramId, StationId, Via};
 
 use super::faultload::{Faultload, Injection};
 use super::kind::{Kind, Role};
@@ -32,6 +32,7 @@ pub(super) struct Target<'a> {
     pub(super) schedule: &'a Schedule,
     /// Inputs that operators write.
     inputs: Vec<(ProgramId, OperatorInput)>,
+    has_two_networks: bool,
 }
 
 impl<'a> Target<'a> {
@@ -41,13 +42,22 @@ impl<'a> Target<'a> {
             let inputs = remote_io.operator_inputs();
             inputs.map(move |declared| (program, declared.input))
         });
-        Self { schedule: &cluster.agreement().schedule, inputs: inputs.collect() }
+        Self {
+            schedule: &cluster.agreement().schedule,
+            inputs: inputs.collect(),
+            has_two_networks: cluster.has_two_networks(),
+        }
     }
 
-    /// The kinds that can be drawn: a cluster without operator inputs has no writes.
+    /// The kinds that can be drawn: a cluster without operator inputs has no writes, and one with one network none that may fail.
     pub(super) fn kinds(&self, kinds: &[Kind]) -> Vec<Kind> {
         let kinds = kinds.iter().copied();
-        kinds.filter(|kind| *kind != Kind::Write || !self.inputs.is_empty()).collect()
+        let can_be = |kind: &Kind| match kind {
+            Kind::Write => !self.inputs.is_empty(),
+            Kind::NetworkFailure => self.has_two_networks,
+            _ => true,
+        };
+        kinds.filter(can_be).collect()
     }
 }
 
@@ -227,6 +237,17 @@ impl Draw<'_> {
                 lasting(Action::Delay { to, by }, Action::Delay { to, by: end })
             }
             Kind::Isolation => cuts(&self.others(member), member, phase, from, to),
+            Kind::NetworkFailure => {
+                let network = Via::BOTH[self.random.random_range(0..2)];
+                let all = self.random.random_range(0..2) == 0;
+                let mut struck = vec![member];
+                struck.extend(self.others(member).into_iter().filter(|_| all));
+                let steps = |at: u64, action| {
+                    struck.iter().map(move |&member| Fault { at_cycle: at, phase, member, action })
+                };
+                let back = steps(to, Action::Plug { network });
+                steps(from, Action::Unplug { network }).chain(back).collect()
+            }
             Kind::CorruptFrames => {
                 let frames = self.random.random_range(1..=8);
                 vec![step(from, Action::Corrupt { frames })]

@@ -37,6 +37,8 @@ pub enum Kind {
     LateLink,
     /// A member hears nobody and is heard by nobody for a while.
     Isolation,
+    /// Of two networks one fails, or the cable of one member to it is pulled, for a while.
+    NetworkFailure,
     /// Bits of some of its frames flip on their way.
     CorruptFrames,
     /// An old frame of it comes once more.
@@ -63,7 +65,7 @@ pub enum Kind {
 
 impl Kind {
     /// In the order in which they are explained.
-    pub const ALL: [Self; 24] = [
+    pub const ALL: [Self; 25] = [
         Self::Write,
         Self::Crash,
         Self::RestartStorm,
@@ -77,6 +79,7 @@ impl Kind {
         Self::Cut,
         Self::LateLink,
         Self::Isolation,
+        Self::NetworkFailure,
         Self::CorruptFrames,
         Self::Replay,
         Self::Forgery,
@@ -106,6 +109,7 @@ impl Kind {
             Self::Cut => "cut",
             Self::LateLink => "late-link",
             Self::Isolation => "isolation",
+            Self::NetworkFailure => "network-failure",
             Self::CorruptFrames => "corrupt-frames",
             Self::Replay => "replay",
             Self::Forgery => "forgery",

@@ -13,7 +13,8 @@ use understudy_wire::{Member, ProgramId};
 
 use super::Metrics;
 use crate::labels::{
-    OfAlarm, OfAlarms, OfLacking, OfMember, OfProgram, OfRemoteIo, OfSource, OfState, OfTurn,
+    OfAlarm, OfAlarms, OfLacking, OfMember, OfNetwork, OfProgram, OfRemoteIo, OfSource, OfState,
+    OfTurn,
 };
 
 impl Metrics {
@@ -21,6 +22,11 @@ impl Metrics {
     pub fn show(&self, model: &Model, snapshot: &Snapshot) {
         self.values.cycle.set(snapshot.cycle.unwrap_or_default());
         self.values.survives.set(i64::from(snapshot.margin.survives));
+        for network in &snapshot.networks {
+            let of_network = OfNetwork { network: network.network.into() };
+            let in_order = self.values.networks.get_or_create(&of_network);
+            in_order.set(i64::from(network.in_order));
+        }
         self.values.open_alarms.set(whole(snapshot.alarms.len() as u64));
         self.values.records.set(whole(snapshot.records));
         self.values.left_out.set(whole(snapshot.left_out));

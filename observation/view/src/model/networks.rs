@@ -7,10 +7,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use understudy_wire::{Member, Via};
 
 use super::Model;
-use crate::alarm::listed;
+use crate::alarm::{Alarm, listed};
+use crate::snapshot::NetworkSnapshot;
 
 /// Alarm of one of two networks.
-pub(crate) const NETWORK_FAULT: &str = "network-fault";
+const NETWORK_FAULT: &str = "network-fault";
 
 /// By network, the peers of which each member receives nothing over it, and of which it receives less than over the other one.
 #[derive(Debug, Clone, Default)]
@@ -25,7 +26,7 @@ struct Faults {
 }
 
 /// The name under which a network is an alarm.
-pub(crate) fn network_name(via: Via) -> String {
+fn network_name(via: Via) -> String {
     format!("network {via}")
 }
 
@@ -55,6 +56,27 @@ impl Model {
                 self.network_changed(via, cycle);
             }
         }
+    }
+
+    /// The networks as they were in a cycle; none in a cluster with one.
+    pub(crate) fn networks_at(&self, cycle: i64) -> Vec<NetworkSnapshot> {
+        if !self.cluster.has_two_networks() {
+            return Vec::new();
+        }
+        let faults: Vec<Alarm> = self.alarms.iter().filter_map(|alarm| alarm.at(cycle)).collect();
+        let networks = Via::BOTH.into_iter().map(|via| {
+            let name = network_name(via);
+            let lasts = |alarm: &&Alarm| {
+                alarm.alarm == NETWORK_FAULT && alarm.name == name && alarm.over.is_none()
+            };
+            let fault = faults.iter().find(lasts);
+            NetworkSnapshot {
+                network: via.into(),
+                in_order: fault.is_none(),
+                text: fault.map_or_else(String::new, |alarm| alarm.text.clone()),
+            }
+        });
+        networks.collect()
     }
 
     fn network_changed(&mut self, via: Via, cycle: i64) {

@@ -122,6 +122,7 @@ impl Picture<'_> {
             remote_ios: model.program_ids().map(|id| self.remote_io(id)).collect(),
             plants: model.program_ids().filter_map(|id| self.plant(id)).collect(),
             margin: self.margin(&margin),
+            networks: model.networks_at(cycle),
             timing: timing.map(|timing| TimingSnapshot {
                 cycle: timing.cycle,
                 token_us: timing.token_ns as f64 / 1e3,

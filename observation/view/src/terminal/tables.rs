@@ -165,6 +165,8 @@ pub(super) fn survives(snapshot: &Snapshot) -> Paragraph<'static> {
             sentence(margin)
         ),
     };
+    let networks = snapshot.networks_text().map(|networks| format!("; {networks}"));
+    let sentence = sentence + &networks.unwrap_or_default();
     let line = Line::from(vec![label("redundancy"), sentence.into()]);
     Paragraph::new(line).wrap(Wrap { trim: false })
 }

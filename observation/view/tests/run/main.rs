@@ -15,6 +15,7 @@ mod forced;
 mod hostile;
 mod losses;
 mod margin;
+mod networks;
 mod numbers;
 mod past;
 mod process_alarms;

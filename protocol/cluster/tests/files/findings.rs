@@ -487,3 +487,39 @@ fn addresses_that_the_link_cannot_use() {
         assert_eq!(!found.contains("U0210"), is_right, "{first}: {found}");
     }
 }
+
+/// Each member of a cluster with two networks has an address on each, and each host is on one of them.
+#[test]
+fn addresses_of_two_networks() {
+    let check = |cluster: &str, robot: &str, understudy: &str| {
+        check(&format!(
+            "[cluster]\nname = \"line\"\n{cluster}\n\
+             [[controller]]\nname = \"robot\"\nladder = \"robot.ladder\"\n{robot}\n\
+             [[understudy]]\nname = \"understudy\"\n{understudy}\n"
+        ))
+    };
+    let at = |first: &str, second: &str| {
+        format!("address = \"{first}:7450\"\nsecond_address = \"{second}:7450\"")
+    };
+    let (robot, understudy) = (at("10.0.1.11", "10.0.2.11"), at("10.0.1.12", "10.0.2.12"));
+    let two = "networks = 2";
+    assert!(!check(two, &robot, &understudy).contains("error"));
+    assert!(!check(two, "", "").contains("error"), "the laboratory chooses addresses");
+    let found = check("", &robot, "");
+    assert!(found.contains("U0235") && found.contains("networks = 2"), "{found}");
+    for one in ["address = \"10.0.1.11:7450\"", "second_address = \"10.0.2.11:7450\""] {
+        let found = check(two, one, &understudy);
+        assert!(found.contains("U0235"), "{found}");
+    }
+    for second in ["10.0.1.11", "10.0.1.12"] {
+        let found = check(two, &at("10.0.1.11", second), &understudy);
+        assert!(
+            found.contains("on the first and on the second network") || found.contains("U0210"),
+            "{found}"
+        );
+    }
+    assert!(check(two, &at("10.0.2.12", "10.0.2.11"), &understudy).contains("U0210"));
+    assert!(check("networks = 3", "", "").contains("U0205"));
+    let found = check(two, &at("127.0.0.1", "127.0.0.2"), &understudy);
+    assert!(!found.contains("U0235"), "the loopback interface is for tests: {found}");
+}
