@@ -343,7 +343,7 @@ impl<M: Machine> Host<'_, M> {
                     round.moves_on_to(frame.header.moment);
                     self.say(&frame, round);
                 }
-                Output::Drive(outputs) => {
+                Output::Drive { outputs, .. } => {
                     let age = self.clock.now().since(now);
                     if let Some(frame) = self.field.drive(round.moment, &outputs, age) {
                         self.say(&frame, round);

@@ -119,6 +119,7 @@ fn the_command_line_replaces_what_the_file_says() {
         link: Some(Link::Zenoh),
         security: Some(Security::Off),
         mode: None,
+        turns: None,
     });
     let loaded = loaded.cluster.expect("it is in bounds");
     assert_eq!(loaded.link(), Link::Zenoh);
