@@ -131,6 +131,8 @@ mod tests {
             assert_eq!(attendance.published(), StationSet::only(StationId(1)));
             assert!(attendance.receive_turn(StationId(1)));
             attendance.close_cycle(|_| ());
+            assert!(attendance.published_last(StationSet::from_bits(0b1011)));
+            assert!(!attendance.published_last(StationSet::from_bits(0b1101)));
         }
         let flagged = StationSet::from_bits(0b101);
         assert_eq!(attendance.flagged(), flagged);
