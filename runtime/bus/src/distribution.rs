@@ -5,6 +5,7 @@
 
 use std::time::Duration;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Ranges in each doubling.
@@ -24,7 +25,7 @@ pub struct Distribution {
 }
 
 /// Half, 99 and 99.9 of 100 durations were at most so long, in nanoseconds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Quantiles {
     /// Durations that were measured.
     pub count: u64,

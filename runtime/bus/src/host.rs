@@ -25,6 +25,7 @@ use crate::journal::{EventSink, Noted};
 use crate::link::{Link, LinkCounters, Reopening};
 use crate::orders::{Obeyed, Order, Orders};
 use crate::retained::Retainer;
+use crate::timing::Timing;
 use crate::trouble::{Duplicates, Refusals};
 use crate::unreceived::Unreceived;
 use crate::watchdog::Watchdog;
@@ -116,6 +117,7 @@ struct Round {
     /// When the field was looked at last.
     looked_at: Time,
     reported: Time,
+    timing: Timing,
     summary: Summary,
 }
 
@@ -179,6 +181,7 @@ impl<M: Machine> Host<'_, M> {
                 // What it asks for before its first input is asked of a clock that it has not seen yet.
                 if due > Time::default() {
                     round.summary.latest_wakeup_ns = round.summary.latest_wakeup_ns.max(late_ns);
+                    round.timing.woken(now.since(due));
                 }
                 if let Some(watchdog) = &mut self.watchdog {
                     watchdog.woken(now);
@@ -195,9 +198,11 @@ impl<M: Machine> Host<'_, M> {
             }
             self.report_reopenings(now);
             self.report_trouble(now, TROUBLE_PERIOD, &mut round);
+            self.report_timing(now, false, &mut round);
         }
         let now = self.clock.now();
         self.report_trouble(now, Duration::ZERO, &mut round);
+        self.report_timing(now, true, &mut round);
         if let Some(watchdog) = &self.watchdog {
             watchdog.stopping();
         }
@@ -343,10 +348,13 @@ impl<M: Machine> Host<'_, M> {
                     round.moves_on_to(frame.header.moment);
                     self.say(&frame, round);
                 }
-                Output::Drive { outputs, .. } => {
+                Output::Drive { outputs, sampled } => {
                     let age = self.clock.now().since(now);
                     if let Some(frame) = self.field.drive(round.moment, &outputs, age) {
                         self.say(&frame, round);
+                    }
+                    if let Some(sampled) = sampled {
+                        round.timing.driven(sampled, self.clock.now());
                     }
                 }
                 Output::Report(event) => self.sink.record(now, Noted::Member(event)),
@@ -406,6 +414,12 @@ impl<M: Machine> Host<'_, M> {
                 None => HostEvent::LinkReopened { silence_ms, peer },
                 Some(reason) => HostEvent::LinkFailed { silence_ms, peer, reason },
             };
+            self.sink.record(now, Noted::Host(event));
+        }
+    }
+
+    fn report_timing(&mut self, now: Time, is_last: bool, round: &mut Round) {
+        if let Some(event) = round.timing.record(now, is_last) {
             self.sink.record(now, Noted::Host(event));
         }
     }

@@ -35,6 +35,7 @@ mod refused_orders;
 mod retained;
 mod rights;
 mod tally;
+mod timing;
 mod trouble;
 mod udp;
 mod unreceived;

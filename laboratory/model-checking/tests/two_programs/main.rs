@@ -36,30 +36,30 @@ fn check_turns(turns: Turns, start: Start, understudies: usize, budget: Budget, 
 
 #[test]
 fn one_of_each_in_four_cycles() {
-    check_all(1, ONE, [28_964, 0]);
+    check_all(1, ONE, [28_964, 29_099]);
 }
 
 #[test]
 fn one_of_each_with_two_understudies() {
-    check_all(2, Budget { cycles: 3, ..ONE }, [19_169, 0]);
+    check_all(2, Budget { cycles: 3, ..ONE }, [19_169, 19_446]);
 }
 
 #[test]
 fn two_losses_in_two_cycles() {
     let budget = Budget { losses: 2, total: 2, cycles: 2, ..NONE };
-    check_all(1, budget, [11_541, 0]);
+    check_all(1, budget, [11_541, 12_022]);
 }
 
 #[test]
 fn a_crash_and_a_stop_in_two_cycles() {
     let budget = Budget { crashes: 1, stops: 1, total: 2, cycles: 2, ..NONE };
-    check_all(1, budget, [558_065, 0]);
+    check_all(1, budget, [558_065, 570_079]);
 }
 
 #[test]
 fn a_crash_and_a_loss_in_two_cycles() {
     let budget = Budget { losses: 1, crashes: 1, total: 2, cycles: 2, ..NONE };
-    check_all(1, budget, [90_628, 0]);
+    check_all(1, budget, [90_628, 94_806]);
 }
 
 /// Without an understudy a lost station does cost a cycle: the checker finds it, and the simulator replays what it found.
