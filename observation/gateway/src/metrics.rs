@@ -24,7 +24,8 @@ use crate::error::GatewayError;
 use crate::feed::STATES;
 use crate::followed::{BOUNDS, Observation};
 use crate::labels::{
-    OfAlarm, OfAlarms, OfLacking, OfMember, OfProgram, OfQuantile, OfRemoteIo, OfRun, OfSource, OfState, OfTurn,
+    OfAlarm, OfAlarms, OfLacking, OfMember, OfProgram, OfQuantile, OfRemoteIo, OfRun, OfSource,
+    OfState, OfTurn,
 };
 
 /// Bounds of the buckets of times within a cycle, as shares of the time to the deadline.

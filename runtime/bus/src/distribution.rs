@@ -169,7 +169,10 @@ mod tests {
         for per_mille in [1, 500, 990, 999, 1000] {
             let exact = times[(5000 * per_mille as usize).div_ceil(1000) - 1];
             let found = left.quantile(per_mille).as_nanos() as u64;
-            assert!(found >= exact && found <= exact + exact / FINE, "{per_mille}: {exact} {found}");
+            assert!(
+                found >= exact && found <= exact + exact / FINE,
+                "{per_mille}: {exact} {found}"
+            );
         }
         assert_eq!(left.quantiles().maximum_ns, times[4999]);
         assert_eq!(left.count(), 5000);

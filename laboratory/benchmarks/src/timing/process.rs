@@ -99,7 +99,8 @@ pub(crate) struct TimedArguments {
 }
 
 fn processor_seconds() -> f64 {
-    let seconds = |time: nix::sys::time::TimeVal| time.tv_sec() as f64 + time.tv_usec() as f64 / 1e6;
+    let seconds =
+        |time: nix::sys::time::TimeVal| time.tv_sec() as f64 + time.tv_usec() as f64 / 1e6;
     getrusage(UsageWho::RUSAGE_CHILDREN)
         .map_or(0.0, |usage| seconds(usage.user_time()) + seconds(usage.system_time()))
 }
@@ -185,9 +186,7 @@ fn peers(controllers: usize) -> io::Result<Vec<Peer>> {
 /// Runs one process of a cluster.
 pub(crate) fn run_timed(arguments: &TimedArguments) -> Answer {
     let part = serde_json::from_str(&arguments.part);
-    let ran = part
-        .map_err(|error| Answer::failed(Status::BadInput, "U0607", error))
-        .and_then(play);
+    let ran = part.map_err(|error| Answer::failed(Status::BadInput, "U0607", error)).and_then(play);
     ran.map_or_else(|answer| answer, |()| Answer::done("", json!(null)))
 }
 

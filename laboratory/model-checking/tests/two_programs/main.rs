@@ -65,7 +65,8 @@ fn a_crash_and_a_loss_in_two_cycles() {
 /// Without an understudy a lost station does cost a cycle: the checker finds it, and the simulator replays what it found.
 #[test]
 fn a_counterexample_is_found_and_replayed() {
-    let model = || Model::new(parts(0, Turns::Token), Start::default(), ONE).expect("it comes into step");
+    let model =
+        || Model::new(parts(0, Turns::Token), Start::default(), ONE).expect("it comes into step");
     let verdict = check(model(), 1);
     let [example] = &verdict.counterexamples[..] else {
         panic!("{:?}", verdict.counterexamples);

@@ -16,7 +16,8 @@ use understudy_wire::{Member, ProgramId};
 
 use super::Metrics;
 use crate::labels::{
-    OfAlarm, OfAlarms, OfLacking, OfMember, OfProgram, OfQuantile, OfRemoteIo, OfSource, OfState, OfTurn,
+    OfAlarm, OfAlarms, OfLacking, OfMember, OfProgram, OfQuantile, OfRemoteIo, OfSource, OfState,
+    OfTurn,
 };
 
 /// Times of remote I/Os, by quantiles.

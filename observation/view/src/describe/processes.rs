@@ -55,7 +55,7 @@ descriptions! { host: HostEvent, members: Members;
     WallClockStepped { unix_ns, step_ns } => "wall-clock-stepped" Warning
         format!("its wall clock was set by {} s to {}", seconds_of(*step_ns), date_of(*unix_ns));
     Timed { sample_to_output, wakeups } => "timed" Info format!(
-        "took {} from its samples to its outputs, and was woken {} late", times(*sample_to_output), times(*wakeups)
+        "from a sample to its outputs {}; woken late by {}", times(*sample_to_output), times(*wakeups)
     );
     JournalLost { records } => "journal-lost" Warning format!("{records} records are lost");
     UnknownCommand { line } => "unknown-command" Warning format!("received an unknown command: {line}");
@@ -66,7 +66,10 @@ descriptions! { host: HostEvent, members: Members;
 fn times(quantiles: Quantiles) -> String {
     let [half, most, longest] = [quantiles.p50_ns, quantiles.p999_ns, quantiles.maximum_ns]
         .map(|ns| format!("{:.3}", ns as f64 / 1e6));
-    format!("{half} ms at the median, at most {most} ms in 99.9 % and {longest} ms in all of {} cases", quantiles.count)
+    format!(
+        "{half} ms at the median, {most} ms in 99.9 %, {longest} ms at most of {}",
+        quantiles.count
+    )
 }
 
 /// An order that was refused, with the person and the names in it.

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use crate::common::{load, load_with, split};
 use proptest::prelude::*;
-use understudy_cycle::{Mode, Turns};
 use understudy_cluster::{Cluster, Link, Overrides, Security, press_cell};
+use understudy_cycle::{Mode, Turns};
 use understudy_wire::ConfigurationHash;
 
 /// Loads the press cell with pieces of its files replaced; each piece has to be there.
@@ -60,7 +60,8 @@ fn what_does_not_matter_is_not_in_the_hash() {
 /// The schedule is in the hash, so members that disagree refuse each other; a file that does not name the token keeps its hash.
 #[test]
 fn members_with_another_schedule_have_another_hash() {
-    let schedule = |word: &str| hash(&[(FILE, "period", &format!("schedule = \"{word}\"\nperiod"))]);
+    let schedule =
+        |word: &str| hash(&[(FILE, "period", &format!("schedule = \"{word}\"\nperiod"))]);
     assert_eq!(schedule("token"), hash(&[]));
     assert_ne!(schedule("parallel"), hash(&[]));
     let overrides = Overrides { turns: Some(Turns::Parallel), ..Overrides::default() };
