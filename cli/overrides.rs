@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use understudy_bus::LinkKind;
 use understudy_cluster::{Link, Overrides, Security};
-use understudy_cycle::Mode;
+use understudy_cycle::{Mode, Turns};
 use understudy_text::duration::parse_positive;
 
 /// Overrides of the cluster file.
@@ -24,6 +24,9 @@ pub struct OverrideArguments {
     /// Redundancy mode, overrides the cluster file
     #[arg(long, value_enum)]
     mode: Option<ModeArgument>,
+    /// Schedule of the turns, overrides the cluster file
+    #[arg(long, value_enum)]
+    schedule: Option<ScheduleArgument>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -50,6 +53,14 @@ enum ModeArgument {
     Paper,
 }
 
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum ScheduleArgument {
+    /// Each controller waits for the one before it
+    Token,
+    /// Controllers wait for nobody, understudies for the controllers
+    Parallel,
+}
+
 impl OverrideArguments {
     pub(crate) fn overrides(&self) -> Overrides {
         Overrides {
@@ -65,6 +76,10 @@ impl OverrideArguments {
             mode: self.mode.map(|mode| match mode {
                 ModeArgument::Full => Mode::Full,
                 ModeArgument::Paper => Mode::Paper,
+            }),
+            turns: self.schedule.map(|schedule| match schedule {
+                ScheduleArgument::Token => Turns::Token,
+                ScheduleArgument::Parallel => Turns::Parallel,
             }),
         }
     }
@@ -105,6 +120,7 @@ impl OverrideArguments {
         word("--link", self.link.and_then(|link| link.to_possible_value()));
         word("--security", self.security.and_then(|security| security.to_possible_value()));
         word("--mode", self.mode.and_then(|mode| mode.to_possible_value()));
+        word("--schedule", self.schedule.and_then(|schedule| schedule.to_possible_value()));
         arguments
     }
 }

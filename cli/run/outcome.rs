@@ -4,10 +4,11 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use serde::Serialize;
+use understudy_bus::Quantiles;
 use understudy_cluster::Cluster;
 use understudy_cycle::Mode;
 use understudy_member::link_kind;
-use understudy_scenarios::{Circumstances, Summary, Table, World};
+use understudy_scenarios::{Circumstances, RemoteIoSummary, Summary, Table, World};
 use understudy_text::shell;
 
 use crate::answer::{Answer, Status};
@@ -172,5 +173,23 @@ fn push_cycles(text: &mut String, summary: &Summary) {
             counts.wrong
         );
     }
+    push_times(text, &summary.remote_ios);
     text.push('\n');
+}
+
+/// How long the slowest remote I/O took from its samples to its outputs, beside how late this machine woke it.
+fn push_times(text: &mut String, remote_ios: &[RemoteIoSummary]) {
+    let timed = remote_ios.iter().filter_map(|remote_io| {
+        Some((remote_io.sample_to_output?, remote_io.wakeups?, remote_io.name.as_str()))
+    });
+    let Some((taken, late, name)) = timed.max_by_key(|(taken, ..)| taken.p999_ns) else {
+        return;
+    };
+    let times = |of: Quantiles| {
+        let [half, most, longest] =
+            [of.p50_ns, of.p999_ns, of.maximum_ns].map(|ns| ns as f64 / 1e6);
+        format!("half within {half:.2} ms, 99.9 % within {most:.2} ms, the longest {longest:.2} ms")
+    };
+    let _ = writeln!(text, "sample to output of {name}: {}", times(taken));
+    let _ = writeln!(text, "late wake-ups of {name} by this machine: {}", times(late));
 }

@@ -24,9 +24,9 @@ pub(crate) fn with_period(arguments: &RunArguments, console: &mut Console) -> Ru
     let period = measured.period();
     console.note(&format!(
         "{}: period {} ms{}",
-        late(measured),
+        late(&measured),
         period.as_millis(),
-        rights(measured)
+        rights(&measured)
     ));
     RunArguments { overrides: arguments.overrides.with_period(period), ..arguments.clone() }
 }
@@ -52,19 +52,19 @@ pub(crate) fn warn(cluster: &Cluster, console: &mut Console) {
     }
     console.note(&format!(
         "warning: {}, too long for a period of {} ms: outputs will be held; use --period {}ms{}",
-        late(measured),
+        late(&measured),
         period.as_secs_f64() * 1e3,
         measured.period().as_millis(),
-        rights(measured)
+        rights(&measured)
     ));
 }
 
-fn late(measured: Wakefulness) -> String {
-    let late = measured.latest.as_secs_f64() * 1e3;
+fn late(measured: &Wakefulness) -> String {
+    let late = measured.latest().as_secs_f64() * 1e3;
     format!("wake-up latency of this host: up to {late:.1} ms")
 }
 
-fn rights(measured: Wakefulness) -> &'static str {
+fn rights(measured: &Wakefulness) -> &'static str {
     if measured.real_time || measured.keeps(Duration::from_millis(10)) {
         ""
     } else {

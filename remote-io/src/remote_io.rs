@@ -73,6 +73,8 @@ pub struct RemoteIo {
     sensors: Option<Image>,
     /// What the program sees of it, as of the last sample.
     field: Image,
+    /// When the last sample was taken; only said with the outputs.
+    sampled_at: Time,
     diagnosing: Diagnosing,
     /// Statuses that the diagnosis found to be 1 in the last scan.
     diagnosed: Image,
@@ -182,6 +184,7 @@ impl RemoteIo {
             authority: Authority::Proof,
             sensors: Some(settings.undriven.clone()),
             field: settings.undriven.clone(),
+            sampled_at: now,
             diagnosing: Diagnosing::new(settings.diagnosis.as_deref()),
             diagnosed: Image::zero(settings.undriven.width()),
             looked: now,
@@ -425,6 +428,8 @@ impl Hash for RemoteIo {
             authority,
             sensors,
             field,
+            // Only said with the outputs.
+            sampled_at: _,
             diagnosing,
             diagnosed,
             looked,

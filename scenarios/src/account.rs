@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_bus::HostEvent;
+use understudy_bus::{HostEvent, Quantiles};
 use understudy_cluster::AlarmDeclaration;
 use understudy_cycle::Agreement;
 use understudy_journal::{
@@ -174,6 +174,8 @@ pub struct Account {
     pub(crate) refused: Vec<(String, String)>,
     /// Records that members could not write, because their journals were too slow.
     pub(crate) unwritten: BTreeMap<Member, u64>,
+    /// How long a remote I/O took from its samples to its outputs, and how late it was woken, as it said last.
+    pub(crate) timed: BTreeMap<ProgramId, (Quantiles, Quantiles)>,
     /// Whether the run was asked to end early.
     pub interrupted: bool,
     /// Whether everybody was synchronised in the last cycle of the scenario.
@@ -222,6 +224,7 @@ impl Account {
                 .collect(),
             refused: Vec::new(),
             unwritten: BTreeMap::new(),
+            timed: BTreeMap::new(),
             interrupted: false,
             protected: false,
             records: 0,
@@ -305,6 +308,12 @@ impl Account {
             (Happening::Plant(event), Some(Member::Plant(program))) => self.plant(program, event),
             (Happening::Host(HostEvent::JournalLost { records }), Some(member)) => {
                 self.unwritten(member, *records);
+            }
+            (
+                Happening::Host(HostEvent::Timed { sample_to_output, wakeups }),
+                Some(Member::RemoteIo(program)),
+            ) => {
+                self.timed.insert(program, (*sample_to_output, *wakeups));
             }
             (Happening::Host(HostEvent::Ready { .. }), Some(Member::RemoteIo(program))) => {
                 if let Some(referee) = self.terms.referees.get_mut(program.index()) {

@@ -2,6 +2,7 @@
 
 use minijinja::value::Serde;
 use minijinja::{Environment, Value, context};
+use understudy_bus::Quantiles;
 
 use crate::account::Counts;
 use crate::summary::Summary;
@@ -38,10 +39,20 @@ pub fn report(summary: &Summary, figure: &str) -> Result<String, ReportError> {
         .iter()
         .map(|remote_io| (remote_io.name.clone(), count(&remote_io.counts)))
         .collect();
+    let times = |quantiles: &Quantiles| {
+        let Quantiles { p50_ns, p99_ns, p999_ns, maximum_ns, .. } = *quantiles;
+        [p50_ns, p99_ns, p999_ns, maximum_ns].map(|ns| format!("{:.3}", ns as f64 / 1e6))
+    };
+    let timed = summary.remote_ios.iter().filter_map(|remote_io| {
+        let (taken, late) = (remote_io.sample_to_output.as_ref()?, remote_io.wakeups.as_ref()?);
+        Some((remote_io.name.clone(), taken.count, [times(taken), times(late)].concat()))
+    });
+    let timed: Vec<_> = timed.collect();
     Ok(template.render(context! {
         summary => Value::from(Serde(summary)),
         table => Value::from(Serde(Table::new(summary))),
         counts => counts,
+        timed => timed,
         period_ms => summary.circumstances.period_us as f64 / 1000.0,
         // The figure is this program's own and must not be escaped.
         figure => Value::from_safe_string(figure.to_owned()),

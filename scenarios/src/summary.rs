@@ -6,6 +6,7 @@ use std::fmt;
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use understudy_bus::Quantiles;
 use understudy_cluster::{Priority, value_text};
 use understudy_journal::{JournalState, Members};
 use understudy_wire::{Member, ProgramId};
@@ -121,6 +122,12 @@ pub struct RemoteIoSummary {
     pub name: String,
     /// What it applied.
     pub counts: Counts,
+    /// From its samples to the outputs that are proved for them, since its process runs; nothing in a simulated run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sample_to_output: Option<Quantiles>,
+    /// How late the system woke it meanwhile.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wakeups: Option<Quantiles>,
 }
 
 /// A plant.
@@ -312,9 +319,15 @@ impl Summary {
             },
         );
         let services = account.services.iter().enumerate();
-        let remote_ios = services.clone().map(|(program, service)| RemoteIoSummary {
-            name: name(Member::RemoteIo(ProgramId(program as u8))),
-            counts: service.counts,
+        let remote_ios = services.clone().map(|(program, service)| {
+            let program = ProgramId(program as u8);
+            let timed = account.timed.get(&program);
+            RemoteIoSummary {
+                name: name(Member::RemoteIo(program)),
+                counts: service.counts,
+                sample_to_output: timed.map(|(taken, _)| *taken),
+                wakeups: timed.map(|(_, late)| *late),
+            }
         });
         let plants = services.filter_map(|(program, service)| {
             let plant = Member::Plant(ProgramId(program as u8));

@@ -99,7 +99,7 @@ impl Module {
             self.outputs.clone_from(outputs);
         }
         let differ = self.driven.iter().any(|(_, outputs)| *outputs != self.outputs);
-        self.outbox.push_back(Output::Drive(self.outputs.clone()));
+        self.outbox.push_back(Output::Drive { outputs: self.outputs.clone(), sampled: None });
         self.outbox.push_back(Output::Report(Deadline { drivers: self.driven.len(), differ }));
     }
 }

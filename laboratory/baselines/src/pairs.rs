@@ -220,7 +220,7 @@ impl Pairs {
                 while let Some(output) = self.cells[cell].module.poll_output() {
                     match output {
                         Output::Send(frame) => self.send(cell, &frame),
-                        Output::Drive(outputs) => self.drive(cell, &outputs),
+                        Output::Drive { outputs, .. } => self.drive(cell, &outputs),
                         Output::Report(deadline) => {
                             let standby = self.redundancy != Redundancy::ActiveActive;
                             let account = &mut self.account;
@@ -247,7 +247,7 @@ impl Pairs {
                             self.account.forgotten += forgotten;
                         }
                         Output::Report(Event::SteppedDown)
-                        | Output::Drive(_)
+                        | Output::Drive { .. }
                         | Output::Answer(_)
                         | Output::Obeyed(_)
                         | Output::Retain(_) => {}

@@ -8,7 +8,7 @@
 //! remote I/Os      └ Sample Sample Sample ┘└ station 2: Turn └ station 3: Turn └ station 4: Turn
 //! ```
 
-mod meter;
+pub(crate) mod meter;
 mod pattern;
 mod process;
 mod raw;

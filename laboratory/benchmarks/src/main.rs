@@ -2,6 +2,7 @@
 
 #![allow(clippy::disallowed_methods, reason = "a benchmark measures the time of this machine")]
 
+mod children;
 mod exchange;
 mod failover;
 mod join;
@@ -10,6 +11,7 @@ mod log;
 mod memory;
 mod scan;
 mod simulate;
+mod timing;
 
 use std::process::ExitCode;
 
@@ -33,6 +35,7 @@ Example:
   understudy-bench scan examples/press-cell/robot.ladder
   understudy-bench join --trials 50 --loss 10%
   understudy-bench log --cycles 2000
+  understudy-bench timing --controllers 4,16 --period 10ms --seconds 10
 
 Exit status: 0 if the targets are met, 1 if not, 2 for invalid input."
 )]
@@ -54,8 +57,11 @@ enum Benchmark {
     Log(Box<log::Arguments>),
     Memory(memory::Arguments),
     Scan(scan::Arguments),
+    Timing(timing::Arguments),
     #[command(hide = true)]
     Member(exchange::MemberArguments),
+    #[command(hide = true)]
+    Timed(timing::TimedArguments),
     #[command(hide = true)]
     Node(MemberArguments),
     #[command(hide = true)]
@@ -77,6 +83,8 @@ impl Benchmark {
             Self::Log(arguments) => ("log", log::run(arguments, console).into()),
             Self::Memory(arguments) => ("memory", memory::run(arguments).into()),
             Self::Scan(arguments) => ("scan", scan::run(arguments).into()),
+            Self::Timing(arguments) => ("timing", timing::run(arguments, console).into()),
+            Self::Timed(arguments) => ("timed", timing::run_timed(arguments)),
             Self::Member(arguments) => ("member", exchange::run_member(arguments)),
             Self::Node(arguments) => ("node", run_station(arguments).into()),
             Self::RemoteIo(arguments) => ("remote-io", run_remote_io(arguments).into()),

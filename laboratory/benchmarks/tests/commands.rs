@@ -108,6 +108,24 @@ fn each_carrier_completes_its_exchanges() {
 }
 
 #[test]
+fn clusters_are_timed_with_each_schedule() {
+    let arguments = ["--controllers", "2", "--period", "20ms", "--seconds", "1", "--no-real-time"];
+    let (status, document) = answer(&[&["timing"], &arguments[..]].concat());
+    assert_eq!(status, Some(0), "{document:#}");
+    let result = &document["result"];
+    assert!(result["machine"]["wakeups"]["count"].as_u64() > Some(0), "{document:#}");
+    let clusters = result["clusters"].as_array().unwrap_or_else(|| panic!("{document:#}"));
+    let schedules: Vec<&Value> = clusters.iter().map(|cluster| &cluster["schedule"]).collect();
+    assert_eq!(schedules, ["token", "parallel"]);
+    for cluster in clusters {
+        assert_eq!((&cluster["members"], &cluster["of_members"]), (&5.into(), &5.into()));
+        // All remote I/Os decide once in a period, whatever the machine lets them prove.
+        assert!(cluster["deadlines"].as_u64() > Some(20), "{document:#}");
+        assert!(cluster["wakeups"]["count"].as_u64() > Some(20), "{document:#}");
+    }
+}
+
+#[test]
 fn stations_join_where_a_tenth_of_all_frames_is_lost() {
     let links = on_processes("join", &["join", "--trials", "2"]);
     assert_eq!(links.as_array().map(Vec::len), Some(1), "one link");

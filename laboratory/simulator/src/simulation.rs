@@ -437,7 +437,7 @@ impl Simulation {
                     observe(self.now, self.pace.cycle(), member, Record::Station(&event));
                 }
                 Output::Retain(record) => self.disks.write(member, record),
-                Output::Drive(_) | Output::Answer(_) | Output::Obeyed(_) => {}
+                Output::Drive { .. } | Output::Answer(_) | Output::Obeyed(_) => {}
             }
         }
     }
@@ -451,7 +451,7 @@ impl Simulation {
         while let Some(output) = self.poll_remote_io(program) {
             match output {
                 Output::Send(frame) => self.send(frame),
-                Output::Drive(outputs) => {
+                Output::Drive { outputs, .. } => {
                     self.plants.drive(program, &outputs);
                     if let Some(field) = self.plants.field(program) {
                         let plant = Member::Plant(program);

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_cycle::{Agreement, Input, Machine, Mode, Output, Schedule};
+use understudy_cycle::{Agreement, Input, Machine, Mode, Output, Schedule, Turns};
 use understudy_logic::{Circuit, CircuitBuilder};
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
@@ -76,11 +76,13 @@ fn state_before(born: u64, cycle: u64) -> Image {
     Image::from_bits([(cycle - born) % 2 == 1])
 }
 
-fn settings(rank: u8, shadow_cycles: u32) -> Settings {
+fn settings(rank: u8, shadow_cycles: u32, turns: Turns) -> Settings {
     let agreement = Agreement {
         cluster: ClusterHash(1),
         configuration: ConfigurationHash(2),
-        schedule: Schedule::new(PERIOD, CONTROLLERS, 1, 1).expect("within the bounds"),
+        schedule: Schedule::new(PERIOD, CONTROLLERS, 1, 1)
+            .expect("within the bounds")
+            .with_turns(turns),
         mode: Mode::Full,
         history: 2,
         flag_after: 2,
@@ -216,7 +218,11 @@ fn describe(output: Output<Event>) -> Option<String> {
 /// What the station of `rank` does, with the time in microseconds, where the others send `script`: (cycle, microseconds
 /// after its start, what is sent).
 fn check(rank: u8, script: &[(u64, u64, Sent)]) -> String {
-    let mut station = Station::new(Time(0), settings(rank, 1));
+    check_turns(Turns::Token, rank, script)
+}
+
+fn check_turns(turns: Turns, rank: u8, script: &[(u64, u64, Sent)]) -> String {
+    let mut station = Station::new(Time(0), settings(rank, 1, turns));
     let mut text = String::new();
     let mut drain = |station: &mut Station, now: Time| {
         while let Some(output) = station.poll_output() {
@@ -298,6 +304,21 @@ fn an_understudy_publishes_last() {
     }
     script.push((3, 9_000, Nothing));
     insta::assert_snapshot!(check(UNDERSTUDY, &script));
+}
+
+/// With turns in parallel a controller publishes with its sample, once an understudy was received: in the cycle after one without an understudy it
+/// waits for its predecessor.
+#[test]
+fn a_controller_waits_for_nobody_where_turns_are_parallel() {
+    let mut script = Vec::new();
+    for cycle in 1..=4 {
+        script.extend([(cycle, 0, Sync(0)), (cycle, 100, Sample(1, 1)), (cycle, 900, Turn(0))]);
+        if cycle != 2 {
+            script.push((cycle, 1_000, Turn(UNDERSTUDY)));
+        }
+    }
+    script.push((4, 9_000, Nothing));
+    insta::assert_snapshot!(check_turns(Turns::Parallel, 1, &script));
 }
 
 /// A station without a state asks for it, adopts it, computes in shadow mode, and then publishes.

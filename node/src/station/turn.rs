@@ -1,8 +1,9 @@
-//! The token: turns that were received, and the time at which this station publishes its own.
+//! The turns: those that were received, and the time at which this station publishes its own.
 
 use std::time::Duration;
 
 use smallvec::SmallVec;
+use understudy_cycle::Turns;
 use understudy_wire::{
     Holding, Moment, ProgramId, ProgramSet, Segment, StationId, StationSet, Time, Turn, Word,
 };
@@ -103,18 +104,30 @@ impl Station {
         }
     }
 
-    /// Whether all stations that it must wait for have published: its predecessor, or for an understudy all lower
-    /// ranks.
+    /// Whether all stations that it waits for have published; see [`Turns`].
     pub(super) fn has_token(&self) -> bool {
+        let schedule = &self.settings.agreement.schedule;
+        let controllers = StationSet::first(schedule.controllers());
         let before = StationSet::first(self.own().index());
         let waited_for = before.without(self.member.flagged());
         let missing = waited_for.without(self.member.published());
-        if self.is_understudy() {
-            missing.is_empty()
-        } else {
-            let predecessor = waited_for.iter().last();
-            predecessor.is_none_or(|predecessor| !missing.contains(predecessor))
+        match (self.is_understudy(), schedule.turns()) {
+            (true, Turns::Token) => missing.is_empty(),
+            (true, Turns::Parallel) => missing.and(controllers).is_empty(),
+            (false, Turns::Parallel) if self.received_understudy() => true,
+            (false, _) => {
+                let predecessor = waited_for.iter().last();
+                predecessor.is_none_or(|predecessor| !missing.contains(predecessor))
+            }
         }
+    }
+
+    /// Whether an understudy told it in the last cycle who published.
+    fn received_understudy(&self) -> bool {
+        let schedule = &self.settings.agreement.schedule;
+        let controllers = StationSet::first(schedule.controllers());
+        let understudies = StationSet::first(schedule.stations()).without(controllers);
+        self.member.attendance.published_last(understudies)
     }
 
     pub(super) fn knows_all_outputs(&self, moment: Moment) -> bool {

@@ -34,6 +34,12 @@ pub(crate) struct OfMember {
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+pub(crate) struct OfQuantile {
+    pub(crate) remote_io: String,
+    pub(crate) quantile: &'static str,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
 pub(crate) struct OfRun {
     pub(crate) state: &'static str,
 }

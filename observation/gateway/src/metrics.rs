@@ -24,8 +24,8 @@ use crate::error::GatewayError;
 use crate::feed::STATES;
 use crate::followed::{BOUNDS, Observation};
 use crate::labels::{
-    OfAlarm, OfAlarms, OfLacking, OfMember, OfNetwork, OfProgram, OfRemoteIo, OfRun, OfSource,
-    OfState, OfTurn,
+    OfAlarm, OfAlarms, OfLacking, OfMember, OfNetwork, OfProgram, OfQuantile, OfRemoteIo, OfRun,
+    OfSource, OfState, OfTurn,
 };
 
 /// Bounds of the buckets of times within a cycle, as shares of the time to the deadline.
@@ -89,6 +89,8 @@ metrics! {
     "journal_records" records: Gauge, "Records that were read";
     "journal_left_out" left_out: Gauge, "Records that were gone or could not be read, at least";
     "host_stall" stall_seconds: Family<OfMember, Counter<f64, AtomicU64>>, "Total delay of the late wake-ups of the member" Seconds;
+    "sample_to_output" sample_to_output: Family<OfQuantile, Gauge<f64, AtomicU64>>, "From a sample to the outputs that are proved for it, since the remote I/O runs; 1 is the longest" Seconds;
+    "wakeup_delay" wakeup_delay: Family<OfQuantile, Gauge<f64, AtomicU64>>, "How late the system woke the remote I/O meanwhile" Seconds;
     "journal_age" journal_age: Gauge<f64, AtomicU64>, "Age of the newest record; it grows while the journal of a live run does not" Seconds;
     "last_record_timestamp" record_time: Gauge<f64, AtomicU64>, "Time of the newest record, since 1970; NaN where there is none" Seconds;
     "newest_cycle_timestamp" cycle_time: Gauge<f64, AtomicU64>, "Time at which the newest cycle was recorded, since 1970; NaN where there is none" Seconds;

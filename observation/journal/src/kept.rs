@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use understudy_cluster::{Cluster, Link, Overrides, Security, read_with};
-use understudy_cycle::Mode;
+use understudy_cycle::{Mode, Turns};
 use understudy_text::{Report, decode};
 
 use crate::named_files::{named_bytes, named_file};
@@ -33,6 +33,7 @@ struct Kept {
     link: Option<Link>,
     security: Option<Security>,
     mode: Option<Mode>,
+    turns: Option<Turns>,
 }
 
 /// Why the cluster of a run is not known.
@@ -70,6 +71,7 @@ pub fn keep_cluster(run: &Path, file: &Path, cluster: &Cluster) -> Result<(), Ru
         link: Some(cluster.link()),
         security: Some(cluster.security()),
         mode: Some(cluster.agreement().mode),
+        turns: Some(cluster.agreement().schedule.turns()),
     };
     let folder = run.join(FOLDER);
     let write = |name: &str, bytes: &[u8]| {
@@ -98,6 +100,7 @@ pub fn keep_cluster(run: &Path, file: &Path, cluster: &Cluster) -> Result<(), Ru
         link: overrides.link,
         security: overrides.security,
         mode: overrides.mode,
+        turns: overrides.turns,
     };
     for (name, ladder) in &ladders {
         let file = unique(name, &kept.ladders);
@@ -139,6 +142,7 @@ pub fn kept_cluster(run: &Path) -> Result<Cluster, KeptError> {
         link: kept.link,
         security: kept.security,
         mode: kept.mode,
+        turns: kept.turns,
     };
     let name = file.display().to_string();
     let loaded = read_with(&name, &cluster, overrides, &mut |name| {
@@ -197,6 +201,7 @@ mod tests {
         let overrides = Overrides {
             period: Some(Duration::from_millis(7)),
             mode: Some(Mode::Paper),
+            turns: None,
             link: Some(Link::Udp),
             security: Some(Security::Off),
         };

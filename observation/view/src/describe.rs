@@ -92,6 +92,7 @@ pub(crate) fn describe(record: &Record, names: &Members, writes: &Writes) -> Des
                 | "checkpoint"
                 | "continues"
                 | "in-effect"
+                | "timed"
                 | "wall-clock"
         ),
     }

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
+use understudy_bus::Quantiles;
 use understudy_journal::{ClocksApart, TimeOfDay};
 use understudy_wire::Force;
 
@@ -228,6 +229,10 @@ pub struct RemoteIoSnapshot {
     pub state: RemoteIoState,
     /// Its links.
     pub link: LinkSnapshot,
+    /// From its samples to the outputs that are proved for them, since it runs; in the newest cycle only.
+    pub sample_to_output: Option<Quantiles>,
+    /// How late the system woke it meanwhile.
+    pub wakeups: Option<Quantiles>,
 }
 
 /// State of a simulated plant.

@@ -6,13 +6,14 @@ use std::time::Instant;
 
 use serde::Serialize;
 use serde_json::Value;
+use understudy_bus::Quantiles;
 use understudy_cluster::{Controller, Priority};
 use understudy_journal::{ClocksApart, TimeOfDay};
 use understudy_remote_io::SignalInput;
 use understudy_typed::{Point, Points};
 use understudy_view::{
     Alarm, LostState, MarginSnapshot, Model as RunModel, OutcomeSnapshot, ProcessAlarm,
-    ProgramSnapshot, Protection, Snapshot, forced_point, forced_value, value_of,
+    ProgramSnapshot, Protection, RemoteIoSnapshot, Snapshot, forced_point, forced_value, value_of,
 };
 use understudy_wire::{Force, Member, ProgramId, SignalPlace, StationId};
 
@@ -149,6 +150,15 @@ struct Timing {
     margin_us: Option<i64>,
     least_margin_us: Option<i64>,
     stalls: u64,
+    slowest: Option<Slowest>,
+}
+
+/// The remote I/O that takes longest from its samples to its outputs, beside how late it is woken.
+#[derive(Debug, Serialize)]
+struct Slowest {
+    name: String,
+    sample_to_output: Quantiles,
+    wakeups: Quantiles,
 }
 
 /// The remaining redundancy.
@@ -371,6 +381,18 @@ fn timing(run: &RunModel, snapshot: &Snapshot) -> Timing {
         margin_us: own.map(|timing| timing.margin_ns / 1000),
         least_margin_us: least.map(|least| least / 1000),
         stalls: snapshot.host_stalls,
+        slowest: snapshot.remote_ios.iter().filter_map(timed).max_by_key(Slowest::longest),
+    }
+}
+
+fn timed(remote_io: &RemoteIoSnapshot) -> Option<Slowest> {
+    let (name, sample_to_output) = (remote_io.name.clone(), remote_io.sample_to_output?);
+    Some(Slowest { name, sample_to_output, wakeups: remote_io.wakeups? })
+}
+
+impl Slowest {
+    fn longest(&self) -> u64 {
+        self.sample_to_output.p999_ns
     }
 }
 

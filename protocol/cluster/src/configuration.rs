@@ -4,7 +4,7 @@
 
 use std::fmt::Write;
 
-use understudy_cycle::Mode;
+use understudy_cycle::{Mode, Turns};
 use understudy_plant::{Followed, ModelKind, Signals};
 use understudy_wire::ProgramId;
 
@@ -32,6 +32,10 @@ pub(crate) fn configuration_text(cluster: &Cluster, plants: &[String]) -> String
         Mode::Paper => "paper",
     };
     line(format_args!("mode {mode}"));
+    // As it was before there was a choice, so that such a cluster keeps its hash.
+    if schedule.turns() == Turns::Parallel {
+        line(format_args!("schedule parallel"));
+    }
     line(format_args!("copies {}", schedule.copies()));
     line(format_args!("history {}", agreement.history));
     line(format_args!("flag after {}", agreement.flag_after));

@@ -57,6 +57,8 @@ pub(crate) struct ClusterSection {
     pub(crate) period: Duration,
     /// Index into [`crate::format::MODES`].
     pub(crate) mode: usize,
+    /// Index into [`crate::format::SCHEDULES`].
+    pub(crate) schedule: usize,
     pub(crate) copies: u32,
     pub(crate) history: u32,
     pub(crate) flag_after: u32,
@@ -265,6 +267,7 @@ fn cluster(root: &DeTable<'_>, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
         name: fields.name("name", diagnostics),
         period: fields.time("period", diagnostics),
         mode: fields.word("mode", diagnostics),
+        schedule: fields.word("schedule", diagnostics),
         copies: fields.count("copies", diagnostics),
         history: fields.count("history", diagnostics),
         flag_after: fields.count("flag_after", diagnostics),

@@ -26,6 +26,7 @@
 //! | U0225 | a source of an input that does not fit its type |
 //! | U0226 | an alarm whose condition does not fit its signal |
 //! | U0227 | a sender and a receiver of different types or ranges |
+//! | U0228 | a schedule that the mode does not have |
 //! | U0235 | addresses that are not of two networks, or of one network only |
 //! | U0251 | warning: an input that no sensor drives |
 //! | U0252 | warning: an output that moves nothing |
@@ -51,7 +52,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_cycle::{Agreement, Mode, Schedule};
+use understudy_cycle::{Agreement, Mode, Schedule, Turns};
 use understudy_executable::Interface;
 use understudy_logic::Circuit;
 use understudy_node::Program;
@@ -91,6 +92,8 @@ pub struct Overrides {
     pub security: Option<Security>,
     /// In place of `mode`.
     pub mode: Option<Mode>,
+    /// In place of `schedule`.
+    pub turns: Option<Turns>,
 }
 
 /// Reads a cluster file; `open` gives the text of a ladder by the name that stands in the file, or says why it cannot.
@@ -174,6 +177,13 @@ fn build(
     limits::check(&members, &remote_ios, cluster.history, diagnostics);
     let mode = overrides.mode.unwrap_or([Mode::Full, Mode::Paper][cluster.mode]);
     check_understudies(&understudies, mode, &cluster.span, diagnostics);
+    let turns = overrides.turns.unwrap_or([Turns::Token, Turns::Parallel][cluster.schedule]);
+    if (mode, turns) == (Mode::Paper, Turns::Parallel) {
+        let message = "the paper's mode passes the token: `schedule = \"parallel\"` is not for it";
+        let help = "use `schedule = \"token\"`, or `mode = \"full\"`";
+        let found = Diagnostic::error("U0228", message, cluster.span.clone());
+        diagnostics.push(found.with_help(help));
+    }
 
     let controllers: Option<Vec<Controller>> = members.into_iter().map(controller).collect();
     let (controllers, name) = (controllers?, cluster.name.as_ref()?.value.clone());
@@ -200,7 +210,10 @@ fn build(
     let agreement = Agreement {
         cluster: ClusterHash::of(name.as_bytes()),
         configuration: ConfigurationHash::default(),
-        schedule: schedule.ok()?.with_spare_slots(spare_slots(controllers.len(), &understudies)),
+        schedule: schedule
+            .ok()?
+            .with_turns(turns)
+            .with_spare_slots(spare_slots(controllers.len(), &understudies)),
         mode,
         history: cluster.history as usize,
         flag_after: cluster.flag_after,

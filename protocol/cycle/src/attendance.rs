@@ -58,6 +58,11 @@ impl Attendance {
         self.published.or(self.attested)
     }
 
+    /// Whether any of these stations published in the last cycle, as this one or another one received it.
+    pub fn published_last(&self, stations: StationSet) -> bool {
+        stations.iter().any(|station| self.silent.get(station.index()) == Some(&0))
+    }
+
     /// Flagged stations: not received for too long up to the last cycle, and not in this one.
     pub fn flagged(&self) -> StationSet {
         self.flagged.without(self.published())
@@ -126,6 +131,8 @@ mod tests {
             assert_eq!(attendance.published(), StationSet::only(StationId(1)));
             assert!(attendance.receive_turn(StationId(1)));
             attendance.close_cycle(|_| ());
+            assert!(attendance.published_last(StationSet::from_bits(0b1011)));
+            assert!(!attendance.published_last(StationSet::from_bits(0b1101)));
         }
         let flagged = StationSet::from_bits(0b101);
         assert_eq!(attendance.flagged(), flagged);

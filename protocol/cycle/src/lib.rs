@@ -21,4 +21,4 @@ pub use clock::{Arrival, CycleClock};
 pub use copies::Copies;
 pub use machine::{Input, Machine, Output, Outvoted, RemoteIoInput};
 pub use participant::{Endpoint, Notice, Participant, Refusal};
-pub use schedule::{Schedule, ScheduleError};
+pub use schedule::{Schedule, ScheduleError, Turns};

@@ -48,7 +48,12 @@ pub enum Output<Event> {
     /// A frame for all members that take its kind.
     Send(Arc<Frame>),
     /// Outputs that a remote I/O drives from now on.
-    Drive(Image),
+    Drive {
+        /// The outputs.
+        outputs: Image,
+        /// When the sample was taken that they are proved for; none where they are held or fail-safe.
+        sampled: Option<Time>,
+    },
     /// An event for the journal.
     Report(Event),
     /// A record for the disk, for the time after a power failure.

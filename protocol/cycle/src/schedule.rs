@@ -6,13 +6,28 @@
 //!                                                      last call
 //! ```
 //!
-//! A station publishes when its slot starts, or earlier when its predecessor has published. A station that does not
-//! know its outputs by then, because a sample is late, waits for it until the last call. Copies of a frame follow it
-//! `copy_spacing` apart, and the last copy of the last turn leaves before the deadline.
+//! A station publishes when its slot starts, or earlier when those have published that its [`Turns`] let it wait for. A
+//! station that does not know its outputs by then, because a sample is late, waits for it until the last call. Copies of
+//! a frame follow it `copy_spacing` apart, and the last copy of the last turn leaves before the deadline.
 
 use std::time::Duration;
 
+use serde::{Deserialize, Serialize};
 use understudy_wire::{MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, StationId, StationSet};
+
+/// Whom a station waits for before it publishes in its turn; its slot ends the wait in either case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Turns {
+    /// The token of the paper: each controller waits for the one before it, an understudy for all stations of lower rank. The
+    /// exchange of a cycle is a chain of N + S turns.
+    #[default]
+    Token,
+    /// A controller waits for nobody, an understudy for the controllers: the exchange of a cycle has four hops for any
+    /// number of controllers. A controller that received no understudy in the last cycle waits as with the token, because it
+    /// learns from the understudies, or else from the chain, who published.
+    Parallel,
+}
 
 /// The timing of a cluster. All offsets are from the start of a cycle.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -30,6 +45,7 @@ pub struct Schedule {
     guard: Duration,
     grace: Duration,
     stall: Duration,
+    turns: Turns,
     /// Stations that are normally absent.
     spare_slots: StationSet,
 }
@@ -112,6 +128,7 @@ impl Schedule {
             guard: share(GUARD_PER_MILLE),
             grace: (share(GUARD_PER_MILLE) * (controllers + understudies) as u32).min(period),
             stall: share(STALL_PER_MILLE),
+            turns: Turns::default(),
             spare_slots: StationSet::EMPTY,
         })
     }
@@ -121,6 +138,17 @@ impl Schedule {
     pub fn with_spare_slots(mut self, slots: StationSet) -> Self {
         self.spare_slots = slots;
         self
+    }
+
+    /// The same schedule, with these turns.
+    #[must_use]
+    pub fn with_turns(self, turns: Turns) -> Self {
+        Self { turns, ..self }
+    }
+
+    /// Whom a station waits for before it publishes.
+    pub fn turns(&self) -> Turns {
+        self.turns
     }
 
     /// Stations that are the slots of spares.

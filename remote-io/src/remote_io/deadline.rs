@@ -183,7 +183,10 @@ impl RemoteIo {
         if let Some(stop) = self.settings.stop {
             driven.set(stop.stopped, self.program != Execution::Running);
         }
-        self.member.put(Output::Drive(driven.clone()));
+        self.member.put(Output::Drive {
+            outputs: driven.clone(),
+            sampled: missing.is_none().then_some(self.sampled_at),
+        });
         self.report(Event::Applied {
             moment,
             sampled,

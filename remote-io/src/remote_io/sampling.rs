@@ -47,6 +47,7 @@ impl RemoteIo {
             return;
         };
         let moment = self.moment();
+        self.sampled_at = now;
         self.see(moment, sensors);
         let floor = self.knowledge.floor();
         let Some(run) = self.knowledge.run_mut() else {

@@ -74,7 +74,7 @@ fn a_forced_signal_is_sampled_and_driven_so_until_its_time_is_over() {
             _ => None,
         });
         let driven = said.iter().find_map(|output| match output {
-            Output::Drive(outputs) => Some(outputs.clone()),
+            Output::Drive { outputs, .. } => Some(outputs.clone()),
             _ => None,
         });
         let applied = said.iter().find_map(|output| match output {
@@ -233,7 +233,7 @@ fn a_deadline_that_was_slept_through_is_neither_driven_nor_recorded() {
         }
         let late = bench.remote_io.wakeup().max(now);
         said.extend(bench.give(late, Input::Wakeup));
-        let driven = said.iter().filter(|it| matches!(it, Output::Drive(_))).count();
+        let driven = said.iter().filter(|it| matches!(it, Output::Drive { .. })).count();
         let applied: Vec<u64> = said
             .iter()
             .filter_map(|output| match output {

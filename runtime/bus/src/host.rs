@@ -3,6 +3,8 @@
 //! Invariants: the loop never waits for anything but [`ppoll`]; it never spins; and between two looks at the member's own
 //! times it takes [`INPUTS_IN_A_ROW`] datagrams at most, so that no flood keeps a member from its turn.
 
+mod reports;
+
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -22,13 +24,15 @@ use crate::field::{FieldDriver, Look};
 use crate::guard::{Guard, Opened, Refused};
 use crate::host_event::HostEvent;
 use crate::journal::{EventSink, Noted};
-use crate::link::{Link, LinkCounters, Reopening};
+use crate::link::{Link, LinkCounters};
 use crate::network_reception::{Arrival, NetworkReception};
 use crate::orders::{Obeyed, Order, Orders};
 use crate::retained::Retainer;
+use crate::timing::Timing;
 use crate::trouble::{Duplicates, Refusals};
 use crate::unreceived::Unreceived;
 use crate::watchdog::Watchdog;
+use reports::Unsendable;
 
 /// Datagrams taken before the member's own times are looked at again.
 const INPUTS_IN_A_ROW: usize = 64;
@@ -83,25 +87,6 @@ pub struct Host<'a, M: Machine> {
     pub clock: Clock,
 }
 
-/// Frames that could not be sent and are not yet reported.
-#[derive(Debug, Default)]
-struct Unsendable {
-    count: u64,
-    last: Option<String>,
-}
-
-impl Unsendable {
-    fn note(&mut self, reason: String) {
-        self.count += 1;
-        self.last = Some(reason);
-    }
-
-    fn take(&mut self) -> Option<(u64, String)> {
-        let last = self.last.take()?;
-        Some((std::mem::take(&mut self.count), last))
-    }
-}
-
 /// What the loop keeps from one round to the next.
 #[derive(Debug, Default)]
 struct Round {
@@ -122,6 +107,7 @@ struct Round {
     /// When the field was looked at last.
     looked_at: Time,
     reported: Time,
+    timing: Timing,
     summary: Summary,
 }
 
@@ -188,6 +174,7 @@ impl<M: Machine> Host<'_, M> {
                 // What it asks for before its first input is asked of a clock that it has not seen yet.
                 if due > Time::default() {
                     round.summary.latest_wakeup_ns = round.summary.latest_wakeup_ns.max(late_ns);
+                    round.timing.woken(now.since(due));
                 }
                 if let Some(watchdog) = &mut self.watchdog {
                     watchdog.woken(now);
@@ -204,9 +191,11 @@ impl<M: Machine> Host<'_, M> {
             }
             self.report_reopenings(now);
             self.report_trouble(now, TROUBLE_PERIOD, &mut round);
+            self.report_timing(now, false, &mut round);
         }
         let now = self.clock.now();
         self.report_trouble(now, Duration::ZERO, &mut round);
+        self.report_timing(now, true, &mut round);
         if let Some(watchdog) = &self.watchdog {
             watchdog.stopping();
         }
@@ -388,10 +377,13 @@ impl<M: Machine> Host<'_, M> {
                     round.moves_on_to(frame.header.moment);
                     self.say(&frame, round);
                 }
-                Output::Drive(outputs) => {
+                Output::Drive { outputs, sampled } => {
                     let age = self.clock.now().since(now);
                     if let Some(frame) = self.field.drive(round.moment, &outputs, age) {
                         self.say(&frame, round);
+                    }
+                    if let Some(sampled) = sampled {
+                        round.timing.driven(sampled, self.clock.now());
                     }
                 }
                 Output::Report(event) => self.sink.record(now, Noted::Member(event)),
@@ -441,60 +433,5 @@ impl<M: Machine> Host<'_, M> {
             poll_for(std::slice::from_mut(orders), patience.min(left))?;
         }
         Ok(())
-    }
-
-    fn report_reopenings(&mut self, now: Time) {
-        while let Some(reopening) = self.link.reopening() {
-            let Reopening { via: network, silence, peer, failure } = reopening;
-            let silence_ms = u64::try_from(silence.as_millis()).unwrap_or(u64::MAX);
-            let event = match failure {
-                None => HostEvent::LinkReopened { network, silence_ms, peer },
-                Some(reason) => HostEvent::LinkFailed { network, silence_ms, peer, reason },
-            };
-            self.sink.record(now, Noted::Host(event));
-        }
-    }
-
-    fn report_trouble(&mut self, now: Time, period: Duration, round: &mut Round) {
-        for event in round.duplicates.over(now) {
-            self.sink.record(now, Noted::Host(event));
-        }
-        for event in self.networks.as_mut().map(|it| it.judge(now)).into_iter().flatten() {
-            self.sink.record(now, Noted::Host(event));
-        }
-        if let Some(begun) = self.guard.begin_life() {
-            let event = match begun {
-                Ok(life) => HostEvent::NewLife { life },
-                Err(reason) => HostEvent::NoNewLife { reason },
-            };
-            self.sink.record(now, Noted::Host(event));
-        }
-        if now.since(round.reported) < period {
-            return;
-        }
-        if let Some(change) = self.retainer.as_mut().and_then(Retainer::take_change) {
-            round.reported = now;
-            let event = match change {
-                Some(reason) => HostEvent::RetainFailed { reason },
-                None => HostEvent::RetainRegained,
-            };
-            self.sink.record(now, Noted::Host(event));
-        }
-        let writes = self.orders.take_refused_writes();
-        if writes > 0 {
-            round.reported = now;
-            self.sink.record(now, Noted::Host(HostEvent::RefusedWrites { writes }));
-        }
-        let unsendable = round.unsendable.take();
-        if !round.refused.is_empty() || unsendable.is_some() {
-            round.reported = now;
-        }
-        for event in round.refused.take() {
-            self.sink.record(now, Noted::Host(event));
-        }
-        if let Some((frames, reason)) = unsendable {
-            let event = HostEvent::UnsendableFrames { frames, reason };
-            self.sink.record(now, Noted::Host(event));
-        }
     }
 }

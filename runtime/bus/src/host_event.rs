@@ -5,6 +5,7 @@ use std::net::{IpAddr, SocketAddr};
 use serde::{Deserialize, Serialize};
 use understudy_wire::{Member, Via};
 
+use crate::distribution::Quantiles;
 use crate::host::Summary;
 use crate::link::LinkKind;
 use crate::refused_as::RefusedAs;
@@ -181,6 +182,13 @@ pub enum HostEvent {
         unix_ns: u64,
         /// By how much, in nanoseconds; negative for one that was set back.
         step_ns: i64,
+    },
+    /// How long a remote I/O took from its samples to its outputs since it runs, once in ten seconds and before it ends.
+    Timed {
+        /// From the sample until the field had the outputs that are proved for it. Deadlines with held or fail-safe outputs are not in it.
+        sample_to_output: Quantiles,
+        /// How late the system woke it.
+        wakeups: Quantiles,
     },
     /// Records were lost because the journal was too slow, since the last such record.
     JournalLost {

@@ -10,6 +10,7 @@ mod channel;
 mod clock;
 mod connections;
 mod control;
+mod distribution;
 pub mod doctor;
 mod documents;
 mod doorbell;
@@ -36,6 +37,7 @@ mod refused_orders;
 mod retained;
 mod rights;
 mod tally;
+mod timing;
 mod trouble;
 mod two_networks;
 mod udp;
@@ -53,6 +55,7 @@ pub use connections::{
     Slot, inner_address, relay, relay_known,
 };
 pub use control::{Commands, Interruption, hold_back_signals};
+pub use distribution::{Distribution, Quantiles};
 pub use documents::Documents;
 pub use endpoints::{Endpoints, Peer};
 pub use error::BusError;

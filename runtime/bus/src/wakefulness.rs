@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use nix::poll::ppoll;
 use nix::sys::time::TimeSpec;
-use serde::Serialize;
 
 use crate::clock::Clock;
+use crate::distribution::{Distribution, Quantiles};
 use crate::rights::{CYCLE_PRIORITY, run_in_real_time, sleep_exactly};
 
 /// Threads that sleep at the same time: a member of a small cluster is never alone.
@@ -28,16 +28,10 @@ const PERIODS: [Duration; 4] = [
 const SHARE: u32 = 5;
 
 /// How late sleepers were woken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Wakefulness {
-    /// How many sleeps were measured.
-    pub sleeps: usize,
-    /// Half of them ended so late at most.
-    pub median: Duration,
-    /// 99 of 100 ended so late at most.
-    pub p99: Duration,
-    /// The latest.
-    pub latest: Duration,
+    /// How late each sleep ended.
+    pub late: Distribution,
     /// Whether they slept with real-time rights.
     pub real_time: bool,
 }
@@ -47,29 +41,23 @@ impl Wakefulness {
     pub fn measure(span: Duration, real_time: bool) -> Self {
         let sleepers: Vec<_> =
             (0..SLEEPERS).map(|_| std::thread::spawn(move || sleep_for(span, real_time))).collect();
-        let (mut late, mut granted) = (Vec::new(), real_time);
+        let (mut late, mut granted) = (Distribution::default(), real_time);
         for sleeper in sleepers {
             let (measured, rights) = sleeper.join().unwrap_or_default();
-            late.extend(measured);
+            late.add(&measured);
             granted &= rights;
         }
-        late.sort_unstable();
-        let at = |share: f64| {
-            let place = (late.len() as f64 * share) as usize;
-            late.get(place).or(late.last()).copied().unwrap_or_default()
-        };
-        Self {
-            sleeps: late.len(),
-            median: at(0.5),
-            p99: at(0.99),
-            latest: at(1.0),
-            real_time: granted,
-        }
+        Self { late, real_time: granted }
+    }
+
+    /// The latest that a sleep ended.
+    pub fn latest(&self) -> Duration {
+        self.late.quantile(1000)
     }
 
     /// Whether cycles of `period` can be kept.
     pub fn keeps(&self, period: Duration) -> bool {
-        self.latest.saturating_mul(SHARE) <= period
+        self.latest().saturating_mul(SHARE) <= period
     }
 
     /// The shortest of 10, 20, 50 and 100 ms that can be kept; 100 ms where none can.
@@ -82,31 +70,32 @@ impl Wakefulness {
 
 impl fmt::Display for Wakefulness {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let late = |time: Duration| time.as_secs_f64() * 1e3;
+        let late = |ns: u64| ns as f64 / 1e6;
+        let Quantiles { count, p50_ns, p99_ns, p999_ns, maximum_ns } = self.late.quantiles();
         write!(
             formatter,
-            "of {} sleeps of 1 ms half ended at most {:.2} ms late, 99 % at most {:.2} ms, the latest {:.2} ms",
-            self.sleeps,
-            late(self.median),
-            late(self.p99),
-            late(self.latest)
+            "of {count} sleeps of 1 ms half ended at most {:.2} ms late, 99 % at most {:.2} ms, 99.9 % at most {:.2} ms, the latest {:.2} ms",
+            late(p50_ns),
+            late(p99_ns),
+            late(p999_ns),
+            late(maximum_ns)
         )
     }
 }
 
 /// How late each sleep of one thread ended, and whether it had real-time rights.
-fn sleep_for(span: Duration, real_time: bool) -> (Vec<Duration>, bool) {
+fn sleep_for(span: Duration, real_time: bool) -> (Distribution, bool) {
     sleep_exactly();
     let granted = real_time && run_in_real_time(CYCLE_PRIORITY).is_ok();
     let clock = Clock::start();
     let end = clock.now() + span;
-    let mut late = Vec::new();
+    let mut late = Distribution::default();
     while clock.now() < end {
         let due = clock.now() + SLEEP;
         // Interrupted or not, what counts is when it comes back.
         let _ = ppoll(&mut [], Some(TimeSpec::from_duration(SLEEP)), None);
         let woken = clock.now();
-        late.push(woken.since(due));
+        late.note(woken.since(due));
         while clock.now().since(woken) < WORK {}
     }
     (late, granted)
@@ -119,9 +108,8 @@ mod tests {
     #[test]
     fn the_period_grows_with_the_latest_wake_up() {
         let late = |milliseconds| {
-            let latest = Duration::from_millis(milliseconds);
-            let wakefulness =
-                Wakefulness { sleeps: 1, median: latest, p99: latest, latest, real_time: false };
+            let mut wakefulness = Wakefulness { late: Distribution::default(), real_time: false };
+            wakefulness.late.note(Duration::from_millis(milliseconds));
             wakefulness.period().as_millis()
         };
         let periods: Vec<u128> = [0, 2, 3, 4, 5, 10, 11, 20, 500].map(late).into();
@@ -131,7 +119,8 @@ mod tests {
     #[test]
     fn a_measurement_is_in_order() {
         let measured = Wakefulness::measure(Duration::from_millis(20), false);
-        assert!(measured.sleeps >= SLEEPERS && !measured.real_time);
-        assert!(measured.median <= measured.p99 && measured.p99 <= measured.latest);
+        let Quantiles { count, p50_ns, p99_ns, p999_ns, maximum_ns } = measured.late.quantiles();
+        assert!(count >= SLEEPERS as u64 && !measured.real_time);
+        assert!([p50_ns, p99_ns, p999_ns, maximum_ns].is_sorted());
     }
 }

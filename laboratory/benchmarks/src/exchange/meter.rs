@@ -1,5 +1,7 @@
 //! The measuring point, at the cycle master.
 
+use std::time::Duration;
+
 use serde::{Deserialize, Serialize};
 use understudy_wire::{StationId, StationSet, Time};
 
@@ -44,20 +46,28 @@ impl Meter {
         }
     }
 
-    /// A frame of a cycle that is sent or received: the turn of a station, or another one.
-    pub(crate) fn frame(&mut self, now: Time, cycle: u64, turn: Option<StationId>) {
+    /// A frame of a cycle that is sent or received: the turn of a station, or another one. The duration of the exchange that it completes.
+    pub(crate) fn frame(
+        &mut self,
+        now: Time,
+        cycle: u64,
+        turn: Option<StationId>,
+    ) -> Option<Duration> {
         if cycle > self.cycle {
             self.begin(now, cycle);
         }
-        let Some(station) = turn else {
-            return;
-        };
-        if self.cycle == cycle && !self.published.contains(station) {
+        let station = turn?;
+        let first = self.cycle == cycle && !self.published.contains(station);
+        if first {
             self.published.insert(station);
-            if self.published.len() == self.stations {
-                self.complete(now);
-            }
         }
+        let complete = first && self.published.len() == self.stations;
+        complete.then(|| self.complete(now))
+    }
+
+    /// Cycles in which a turn was not received.
+    pub(crate) fn incomplete(&self) -> u64 {
+        self.incomplete
     }
 
     fn begin(&mut self, now: Time, cycle: u64) {
@@ -70,13 +80,14 @@ impl Meter {
         self.published = StationSet::EMPTY;
     }
 
-    fn complete(&mut self, now: Time) {
+    fn complete(&mut self, now: Time) -> Duration {
+        let duration = now.since(self.first);
         if self.skip > 0 {
             self.skip -= 1;
         } else if self.durations_ns.len() < self.wanted {
-            let duration_ns = now.since(self.first).as_nanos();
-            self.durations_ns.push(u64::try_from(duration_ns).unwrap_or(u64::MAX));
+            self.durations_ns.push(u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX));
         }
+        duration
     }
 
     /// The result, once enough cycles are measured.

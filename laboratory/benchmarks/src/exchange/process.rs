@@ -2,8 +2,7 @@
 
 use std::io::{self, BufRead, BufReader};
 use std::net::UdpSocket;
-use std::process::{Child, ChildStdout, Command, Stdio};
-use std::sync::Arc;
+use std::process::{ChildStdout, Command, Stdio};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
@@ -14,11 +13,12 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use understudy::{Answer, Status};
 use understudy_bus::{
-    BusError, Clock, Commands, Endpoints, EventSink as _, Guard, Journal, LinkKind, MemberSettings,
+    BusError, Clock, Commands, Endpoints, EventSink as _, Journal, LinkKind, MemberSettings,
     NoField, Noted, Peer, Record, ZENOH_RUNTIME, free_addresses, keep_times,
 };
-use understudy_seal::{ClusterSecret, KEY_BYTES, Opener, Seal, Title};
 use understudy_wire::{ClusterHash, Member, ProgramId, Roster, StationId};
+
+use crate::children::{Running, guard, refused};
 
 use super::meter::{Exchange, Meter};
 use super::pattern::{PROGRAMS, Pattern, STATIONS};
@@ -67,10 +67,6 @@ pub(crate) struct MemberArguments {
 fn failed(reason: &str) -> Answer {
     let message = format!("the cycle master of the benchmark {reason}");
     Answer::failed(Status::Failed, "U0508", message)
-}
-
-fn refused(what: &'static str) -> impl FnOnce(io::Error) -> BusError {
-    move |source| BusError::System { what, source }
 }
 
 /// Measures one carrier.
@@ -164,20 +160,6 @@ fn play_part(part: Part) -> Result<(), BusError> {
     }
 }
 
-/// Keys derived from no secret: the time that they cost is measured.
-fn guard(endpoints: &Endpoints) -> Guard {
-    let secret = ClusterSecret::new([0; KEY_BYTES]);
-    let key = |peer: &Peer| {
-        secret.frame_key(Title { cluster: "exchange", member: &peer.name, generation: 1 })
-    };
-    let own = endpoints.own();
-    let senders = endpoints.others().iter().map(|peer| (peer.member, key(peer)));
-    Guard::with_keys(
-        Seal::new(own.member, key(own), 1, []),
-        Opener::new(own.member, senders, [], Arc::default()),
-    )
-}
-
 fn run_raw(endpoints: &Endpoints, settings: Settings, meter: Meter) -> Result<(), BusError> {
     set_pdeathsig(Signal::SIGKILL)
         .map_err(io::Error::from)
@@ -205,17 +187,4 @@ fn members() -> io::Result<Vec<Peer>> {
     let peer =
         |(member, address)| Peer { member, name: format!("{member:?}"), address, second: None };
     Ok(members.into_iter().zip(addresses).map(peer).collect())
-}
-
-/// Processes that end with their measurement.
-struct Running(Vec<Child>);
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        for child in &mut self.0 {
-            // It can only fail where the child has ended by itself.
-            let _ = child.kill();
-            let _ = child.wait();
-        }
-    }
 }

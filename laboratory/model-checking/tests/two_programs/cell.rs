@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_cycle::{Agreement, Mode, Schedule};
+use understudy_cycle::{Agreement, Mode, Schedule, Turns};
 use understudy_logic::{Circuit, CircuitBuilder};
 use understudy_plant::{ModelKind, Plant, Signals};
 use understudy_remote_io::{Release, StaleState, ValueFault};
@@ -40,12 +40,14 @@ fn plant() -> Circuit {
 }
 
 /// The limits of the protocol are as low as they can be, so that a few cycles pass all of them.
-pub(crate) fn parts(understudies: usize) -> Parts {
+pub(crate) fn parts(understudies: usize, turns: Turns) -> Parts {
     let circuits = [program(false), program(true)];
     let agreement = Arc::new(Agreement {
         cluster: ClusterHash(1),
         configuration: ConfigurationHash(2),
-        schedule: Schedule::new(PERIOD, circuits.len(), understudies, 1).expect("within bounds"),
+        schedule: Schedule::new(PERIOD, circuits.len(), understudies, 1)
+            .expect("within bounds")
+            .with_turns(turns),
         mode: Mode::Full,
         history: 2,
         flag_after: 1,

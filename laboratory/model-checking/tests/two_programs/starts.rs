@@ -1,9 +1,10 @@
 //! Runs that do not begin synchronised: everybody or some have just restarted, or stood still for a cycle, and something more happens.
 
+use understudy_cycle::Turns;
 use understudy_model_checking::{Budget, Start};
 use understudy_wire::{Member, ProgramId, StationId};
 
-use crate::{NONE, ONE, check_from};
+use crate::{NONE, ONE, check_from, check_turns};
 
 const STATIONS: [Member; 3] = [station(0), station(1), station(2)];
 const REMOTE_IOS: [Member; 2] = [remote_io(0), remote_io(1)];
@@ -56,6 +57,7 @@ fn one_in(cycles: u64) -> Budget {
 fn everybody_starts_together() {
     let everybody = [&STATIONS[..], &REMOTE_IOS[..]].concat();
     check_from(restarted(&everybody), 1, one_in(5), 35_144);
+    check_turns(Turns::Parallel, restarted(&everybody), 1, one_in(5), 35_248);
 }
 
 #[test]

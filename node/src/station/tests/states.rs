@@ -58,7 +58,7 @@ struct Bench {
 impl Bench {
     fn new() -> Self {
         Self {
-            station: Station::new(Time(0), settings(OWN, 2)),
+            station: Station::new(Time(0), settings(OWN, 2, Turns::Token)),
             now: Time(0),
             born: 0,
             samples: 50,

@@ -1,9 +1,12 @@
 //! The values of the metrics, from the model and the snapshot of a run.
 
 use std::sync::PoisonError;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use prometheus_client::metrics::counter::Counter;
+use prometheus_client::metrics::family::Family;
+use prometheus_client::metrics::gauge::Gauge;
+use understudy_bus::Quantiles;
 use understudy_cluster::Priority;
 use understudy_view::{
     AlarmState, Counters, Model, ProcessAlarm, ProgramSnapshot, RemoteIoState, Snapshot,
@@ -13,9 +16,12 @@ use understudy_wire::{Member, ProgramId};
 
 use super::Metrics;
 use crate::labels::{
-    OfAlarm, OfAlarms, OfLacking, OfMember, OfNetwork, OfProgram, OfRemoteIo, OfSource, OfState,
-    OfTurn,
+    OfAlarm, OfAlarms, OfLacking, OfMember, OfNetwork, OfProgram, OfQuantile, OfRemoteIo, OfSource,
+    OfState, OfTurn,
 };
+
+/// Times of remote I/Os, by quantiles.
+type OfQuantiles = Family<OfQuantile, Gauge<f64, AtomicU64>>;
 
 impl Metrics {
     /// Sets every metric but the times of cycles.
@@ -115,12 +121,25 @@ impl Metrics {
             let lost = self.values.records_lost.get_or_create(&of_member);
             set(&lost, counted.records_lost);
             drop(lost);
+            if let Some((taken, late)) = counted.timed {
+                self.timed(name, &self.values.sample_to_output, taken);
+                self.timed(name, &self.values.wakeup_delay, late);
+            }
             if !matches!(member, Member::Plant(_)) {
                 let differences = self.values.digest_differences.get_or_create(&of_member);
                 set(&differences, counted.digest_differences);
                 drop(differences);
                 set(&self.values.flagged.get_or_create(&of_member), counted.flagged);
             }
+        }
+    }
+
+    fn timed(&self, remote_io: &str, family: &OfQuantiles, quantiles: Quantiles) {
+        let Quantiles { p50_ns, p99_ns, p999_ns, maximum_ns, .. } = quantiles;
+        let shares = [("0.5", p50_ns), ("0.99", p99_ns), ("0.999", p999_ns), ("1", maximum_ns)];
+        for (quantile, ns) in shares {
+            let of = OfQuantile { remote_io: remote_io.to_owned(), quantile };
+            family.get_or_create(&of).set(ns as f64 / 1e9);
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, UNIX_EPOCH};
 
-use understudy_bus::{HostEvent, RefusedOrder};
+use understudy_bus::{HostEvent, Quantiles, RefusedOrder};
 use understudy_journal::{Action, Command, Members, RunEvent, time_text};
 use understudy_wire::{Member, SignalPlace, StateChoice, Via};
 
@@ -63,9 +63,22 @@ descriptions! { host: HostEvent, members: Members;
     WallClock { unix_ns } => "wall-clock" Info format!("its wall clock shows {}", date_of(*unix_ns));
     WallClockStepped { unix_ns, step_ns } => "wall-clock-stepped" Warning
         format!("its wall clock was set by {} s to {}", seconds_of(*step_ns), date_of(*unix_ns));
+    Timed { sample_to_output, wakeups } => "timed" Info format!(
+        "from a sample to its outputs {}; woken late by {}", times(*sample_to_output), times(*wakeups)
+    );
     JournalLost { records } => "journal-lost" Warning format!("{records} records are lost");
     UnknownCommand { line } => "unknown-command" Warning format!("received an unknown command: {line}");
     Stopped(_) => "stopped" Info "ended as requested";
+}
+
+/// What half and 99.9 % of them were at most, and the longest.
+fn times(quantiles: Quantiles) -> String {
+    let [half, most, longest] = [quantiles.p50_ns, quantiles.p999_ns, quantiles.maximum_ns]
+        .map(|ns| format!("{:.3}", ns as f64 / 1e6));
+    format!(
+        "{half} ms at the median, {most} ms in 99.9 %, {longest} ms at most of {}",
+        quantiles.count
+    )
 }
 
 /// An order that was refused, with the person and the names in it.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use understudy_bus::HostEvent;
+use understudy_bus::{HostEvent, Quantiles};
 use understudy_journal::{Happening, Record};
 use understudy_node::Event as StationEvent;
 use understudy_remote_io::Event as RemoteIoEvent;
@@ -24,6 +24,8 @@ pub struct MemberCounters {
     pub stalled: Duration,
     /// Records that the member could not write.
     pub records_lost: u64,
+    /// How long a remote I/O took from its samples to its outputs, and how late it was woken, as it said last.
+    pub timed: Option<(Quantiles, Quantiles)>,
 }
 
 /// Counts of one program.
@@ -118,6 +120,9 @@ impl Counters {
             HostEvent::RefusedBytes { datagrams, .. }
             | HostEvent::RefusedFrames { datagrams, .. } => own.refused_frames += datagrams,
             HostEvent::JournalLost { records } => own.records_lost += records,
+            HostEvent::Timed { sample_to_output, wakeups } => {
+                own.timed = Some((*sample_to_output, *wakeups));
+            }
             _ => {}
         }
     }

@@ -202,7 +202,10 @@ impl Model {
         }
         self.fold_process_alarms(record, cycle);
         self.host_alarm(record, member, cycle, event);
-        self.happened(record, cycle, None);
+        // Counted, and no event: one comes every few seconds.
+        if !matches!(event, HostEvent::Timed { .. }) {
+            self.happened(record, cycle, None);
+        }
     }
 
     /// A process begins, unless it is known to have ended: its records may be read afterwards.

@@ -336,7 +336,15 @@ impl Picture<'_> {
             _ if driven.is_none() => RemoteIoState::Listening,
             _ => RemoteIoState::Serving,
         };
-        RemoteIoSnapshot { name: self.name(member), state, link: self.link(member) }
+        let is_present = self.cycle >= self.model.newest();
+        let timed = self.model.counters().member(member).timed.filter(|_| is_present);
+        RemoteIoSnapshot {
+            name: self.name(member),
+            state,
+            link: self.link(member),
+            sample_to_output: timed.map(|(taken, _)| taken),
+            wakeups: timed.map(|(_, late)| late),
+        }
     }
 
     fn plant(&self, program: ProgramId) -> Option<PlantSnapshot> {

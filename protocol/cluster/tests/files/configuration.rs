@@ -6,6 +6,7 @@ use std::time::Duration;
 use crate::common::{load, load_with, split};
 use proptest::prelude::*;
 use understudy_cluster::{Cluster, Link, Overrides, Security, press_cell};
+use understudy_cycle::{Mode, Turns};
 use understudy_wire::ConfigurationHash;
 
 /// Loads the press cell with pieces of its files replaced; each piece has to be there.
@@ -54,6 +55,19 @@ fn what_does_not_matter_is_not_in_the_hash() {
     for edits in same {
         assert_eq!(hash(edits), hash(&[]), "{edits:?}");
     }
+}
+
+/// The schedule is in the hash, so members that disagree refuse each other; a file that does not name the token keeps its hash.
+#[test]
+fn members_with_another_schedule_have_another_hash() {
+    let schedule =
+        |word: &str| hash(&[(FILE, "period", &format!("schedule = \"{word}\"\nperiod"))]);
+    assert_eq!(schedule("token"), hash(&[]));
+    assert_ne!(schedule("parallel"), hash(&[]));
+    let overrides = Overrides { turns: Some(Turns::Parallel), ..Overrides::default() };
+    let (cluster, ladders) = split(press_cell());
+    let loaded = load_with(cluster, &ladders, overrides).cluster.expect("it has no errors");
+    assert_eq!(loaded.agreement().configuration, schedule("parallel"));
 }
 
 #[test]
@@ -119,12 +133,17 @@ fn the_command_line_replaces_what_the_file_says() {
         link: Some(Link::Zenoh),
         security: Some(Security::Off),
         mode: None,
+        turns: None,
     });
     let loaded = loaded.cluster.expect("it is in bounds");
     assert_eq!(loaded.link(), Link::Zenoh);
     assert_eq!(loaded.security(), Security::Off);
     let written = hash(&[(FILE, "10ms", "20ms")]);
     assert_eq!(loaded.agreement().configuration, written);
+    let (mode, turns) = (Some(Mode::Paper), Some(Turns::Parallel));
+    let loaded = replaced(Overrides { mode, turns, ..Overrides::default() });
+    assert!(loaded.cluster.is_none());
+    assert!(crate::common::findings(&loaded.reports).contains("U0228"));
     for period in [Duration::ZERO, Duration::from_micros(199), Duration::from_secs(9999)] {
         let loaded = replaced(Overrides { period: Some(period), ..Overrides::default() });
         assert!(loaded.cluster.is_none());

@@ -77,7 +77,8 @@ impl Machine for Chatter {
                     body,
                 })));
                 if matches!(self.own, Member::RemoteIo(_)) {
-                    self.said.push_back(Output::Drive(Image::zero(3)));
+                    self.said
+                        .push_back(Output::Drive { outputs: Image::zero(3), sampled: Some(now) });
                 }
             }
             Input::Frame(frame) => {
