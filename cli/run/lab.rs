@@ -13,6 +13,7 @@ use understudy_processes::{
     run_commanded,
 };
 use understudy_scenarios::{ResultsError, Scenario, Summary, World, write_results};
+use understudy_wire::Via;
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
@@ -76,6 +77,9 @@ pub struct NetworkArguments {
     hosts: HostArgument,
     #[command(flatten)]
     impairment: ImpairmentArguments,
+    /// Only impaired network of a cluster with two, 1 or 2
+    #[arg(long, value_name = "NETWORK", value_parser = parse_network)]
+    impaired_network: Option<Via>,
     /// Seed of the random network faults
     #[arg(long, value_name = "SEED", default_value_t)]
     network_seed: u64,
@@ -88,6 +92,11 @@ enum HostArgument {
     Loopback,
     /// Network namespaces joined by a bridge: one per station, one per remote I/O with its plant; requires root
     Netns,
+}
+
+fn parse_network(text: &str) -> Result<Via, String> {
+    let number: u8 = text.parse().map_err(|_| format!("{text:?} is not 1 or 2"))?;
+    Via::try_from(number).map_err(|error| error.to_string())
 }
 
 impl NetworkArguments {
@@ -108,6 +117,7 @@ impl NetworkArguments {
                 HostArgument::Netns => HostKind::Namespaces,
             },
             impairment: self.impairment.impairment(),
+            impaired: self.impaired_network,
             seed: self.network_seed,
         }
     }

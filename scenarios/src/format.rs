@@ -77,6 +77,7 @@ pub(crate) static NETWORK: Table = Table {
         key("corruption", SHARE),
         key("latency", LATENCY),
         key("jitter", LATENCY),
+        key("network", Kind::Count(1, 2)),
         key("from", ANY),
         key("to", ANY),
     ],

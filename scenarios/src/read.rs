@@ -23,11 +23,17 @@ use understudy_simulator::{Disturbance, Network};
 use understudy_text::spelling::suggestion;
 use understudy_text::tables::{Codes, Fields, Placed, parse};
 use understudy_text::{Diagnostic, Report, has_errors};
-use understudy_wire::{Member, ProgramId, Source};
+use understudy_wire::{Member, ProgramId, Source, Via};
 
 pub use crate::format::MAXIMUM_CYCLES;
 use crate::format::SCENARIO;
 use crate::scenario::{During, Expectation, Scenario};
+
+/// Something about one of two networks, in a cluster that has one.
+fn one_network(span: Range<usize>, instead: &str) -> Diagnostic {
+    let help = format!("{instead}, or add `networks = 2` to `[cluster]` in the cluster file");
+    Diagnostic::error("U0309", "the cluster has one network", span).with_help(help)
+}
 
 /// Steps of one scenario, at most.
 pub const MAXIMUM_STEPS: usize = 10_000;
@@ -117,10 +123,18 @@ impl Reader<'_> {
             let share = fields.format_number(key, found);
             share.map_or(0.0, |share| share.value)
         };
+        let shares = [share("loss"), share("duplicate"), share("corruption")];
+        let over = fields.format_count("network", found);
+        let has_two = self.members.is_none_or(|members| members.have_two_networks());
+        if let Some(over) = over.as_ref().filter(|_| !has_two) {
+            found.push(one_network(over.span.clone(), "leave `network` out"));
+        }
+        let [loss, duplicate, corruption] = shares;
         let network = Network {
-            loss: share("loss"),
-            duplicate: share("duplicate"),
-            corruption: share("corruption"),
+            loss,
+            duplicate,
+            corruption,
+            over: over.and_then(|over| Via::try_from(over.value as u8).ok()),
             latency: latency.unwrap_or(usual.latency),
             jitter: jitter.unwrap_or(usual.jitter),
         };

@@ -42,6 +42,9 @@ fn write_network(text: &mut String, disturbance: &Disturbance) {
     for (key, share) in shares.into_iter().filter(|(_, share)| *share > 0.0) {
         let _ = writeln!(text, "{key} = {share:?}");
     }
+    if let Some(via) = network.over {
+        let _ = writeln!(text, "network = {via}");
+    }
     if network.latency != usual.latency {
         let _ = writeln!(text, "latency = {}", time(network.latency));
     }

@@ -92,6 +92,11 @@ pub enum LaboratoryError {
         /// Their actions.
         words: Vec<&'static str>,
     },
+    /// One of two networks was to be impaired, and the cluster has one.
+    #[error(
+        "U0547: the cluster has one network: leave out --impaired-network, or add `networks = 2` to `[cluster]` in the cluster file"
+    )]
+    OneNetwork,
     /// The network that was asked for is not to be had.
     #[error(transparent)]
     Network(#[from] NetworkError),
@@ -129,6 +134,7 @@ impl LaboratoryError {
             Self::Record { .. } => "U0527",
             Self::Version { .. } => "U0535",
             Self::OnlySimulated { .. } => "U0528",
+            Self::OneNetwork => "U0547",
             Self::Network(error) => error.code(),
             Self::Endpoints(error) => error.code(),
             Self::Keys { errors } => errors.first().map_or("U0902", KeysError::code),

@@ -47,6 +47,8 @@ pub struct NetworkSettings {
     pub hosts: HostKind,
     /// What every link does in every direction; in place of the scenario's where it does anything.
     pub impairment: Impairment,
+    /// Of two networks the one that does so; both where absent.
+    pub impaired: Option<Via>,
     /// What the fates of datagrams come from.
     pub seed: u64,
 }
@@ -64,6 +66,8 @@ pub(super) struct Site {
     /// The address of each route that a member is given for another member's.
     stand_ins: Vec<SocketAddr>,
     impairment: Impairment,
+    /// Of two networks the one that is impaired; both where absent.
+    impaired: Option<Via>,
     /// The first multicast group of the frames.
     multicast: Option<SocketAddrV4>,
 }
@@ -77,12 +81,14 @@ impl Site {
         directory: &RunDirectory,
     ) -> Result<Self, LaboratoryError> {
         let (link, settings) = (laboratory.link, laboratory.network);
+        if settings.impaired.is_some() && !cluster.has_two_networks() {
+            return Err(LaboratoryError::OneNetwork);
+        }
         let system = |what| move |source| LaboratoryError::System { what, source };
         let members: Vec<Member> = cluster.members().collect();
-        let impairment = if settings.impairment.is_none() {
-            scenario.network.map_or(settings.impairment, impairment_of)
-        } else {
-            settings.impairment
+        let (impairment, impaired) = match (settings.impairment.is_none(), scenario.network) {
+            (true, Some(network)) => (impairment_of(network), network.over),
+            _ => (settings.impairment, settings.impaired),
         };
         let host_of = hosts_of(&members);
         let mut hosts = match settings.hosts {
@@ -117,11 +123,12 @@ impl Site {
             routes: BTreeMap::new(),
             stand_ins: Vec::new(),
             impairment,
+            impaired,
             multicast: None,
         };
         let only_loss = impairment == Impairment { loss: impairment.loss, ..Impairment::default() };
         match &mut hosts {
-            Some(hosts) if only_loss => {
+            Some(hosts) if only_loss && impaired.is_none() => {
                 let pairs = site.pairs_of_hosts();
                 hosts.lose(&pairs, impairment.loss)?;
             }
@@ -221,6 +228,10 @@ impl Site {
         let host = |via| hosts.map_or(Ipv4Addr::LOCALHOST, |_| Hosts::switch(via));
         let mut routes: Vec<Route> = Vec::new();
         let mut networks: Vec<Via> = Vec::new();
+        let impairment = |via| {
+            let is_impaired = self.impaired.is_none_or(|impaired| impaired == via);
+            if is_impaired { self.impairment } else { Impairment::default() }
+        };
         for first in peers {
             let own = Endpoints::new(
                 cluster.agreement().cluster,
@@ -245,8 +256,8 @@ impl Site {
                             LinkKind::Zenoh => Transport::Tcp,
                             LinkKind::Udp => Transport::Udp,
                         },
-                        forth: self.impairment,
-                        back: self.impairment,
+                        forth: impairment(via),
+                        back: impairment(via),
                     });
                 }
             }

@@ -344,7 +344,8 @@ impl Links {
             metered.bytes += receivers * bytes.len() as u64;
         }
         let all_plugged = self.unplugged.iter().all(|unplugged| *unplugged == [false; 2]);
-        if self.network.is_even() && !self.anybody_late && sender.delays.is_empty() && all_plugged {
+        let is_even = self.network.is_even() && self.network.over.is_none();
+        if is_even && !self.anybody_late && sender.delays.is_empty() && all_plugged {
             let at = now + self.network.latency;
             self.queue.push(at, frame, stations, remote_ios);
             return;
@@ -372,9 +373,10 @@ impl Links {
         let late = delays.filter(|(to, _)| *to == receiver).map(|(_, by)| *by);
         let late = self.late[receiver] + late.sum::<Duration>();
         let mut copies = SmallVec::<[(Time, Arc<Frame>); 4]>::new();
-        for _ in self.joins(sender, receiver) {
-            for delay in self.network.arrivals(&mut self.random) {
-                let share = self.network.corruption;
+        for via in self.joins(sender, receiver) {
+            let network = self.network.at(via);
+            for delay in network.arrivals(&mut self.random) {
+                let share = network.corruption;
                 let frame = if share > 0.0 && self.random.random::<f64>() < share {
                     self.corrupted(frame)
                 } else {

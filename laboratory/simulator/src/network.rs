@@ -6,6 +6,7 @@ use std::time::Duration;
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 use serde::{Deserialize, Serialize};
+use understudy_wire::Via;
 
 /// The same for every pair of members.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -21,6 +22,9 @@ pub struct Network {
     /// Share of arriving frames of which a bit has flipped on their way, from 0 to 1, for each receiver.
     #[serde(default)]
     pub corruption: f64,
+    /// Of two networks the one that is so, while the other one is quiet; both where absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub over: Option<Via>,
 }
 
 /// A network that is another one for a while.
@@ -52,11 +56,17 @@ impl Default for Network {
             loss: 0.0,
             duplicate: 0.0,
             corruption: 0.0,
+            over: None,
         }
     }
 }
 
 impl Network {
+    /// What one of two networks is.
+    pub(crate) fn at(self, via: Via) -> Self {
+        if self.over.is_none_or(|over| over == via) { self } else { Self::default() }
+    }
+
     /// Whether all receivers hear a frame at the same time, and surely.
     pub(crate) fn is_even(&self) -> bool {
         let shares = [self.loss, self.duplicate, self.corruption];

@@ -13,7 +13,7 @@ use understudy_text::spelling::suggestion;
 use understudy_text::tables::{Fields, Placed};
 use understudy_wire::{Member, PointValue, ProgramId, StateChoice, Via};
 
-use super::{MAXIMUM_STEPS, Reader};
+use super::{MAXIMUM_STEPS, Reader, one_network};
 use crate::format::{STEP, action_keys};
 use crate::scenario::{ACTIONS, action_word};
 
@@ -326,12 +326,7 @@ impl Reader<'_> {
         let network = fields.format_count("network", &mut self.diagnostics)?;
         let members = self.members?;
         if !members.have_two_networks() {
-            let message = "the cluster has one network, so this would cut every link";
-            self.diagnostics.push(
-                Diagnostic::error("U0309", message, network.span).with_help(
-                    "use `cut`, or add `networks = 2` to `[cluster]` in the cluster file",
-                ),
-            );
+            self.diagnostics.push(one_network(network.span, "use `cut`"));
             return None;
         }
         let via = Via::try_from(network.value as u8).ok()?;
