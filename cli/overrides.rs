@@ -57,7 +57,7 @@ enum ModeArgument {
 enum ScheduleArgument {
     /// Each controller waits for the one before it
     Token,
-    /// Controllers wait for nobody, understudies for the controllers
+    /// Controllers wait for no station, understudies for the controllers
     Parallel,
 }
 

@@ -177,7 +177,7 @@ fn push_cycles(text: &mut String, summary: &Summary) {
     text.push('\n');
 }
 
-/// How long the slowest remote I/O took from its samples to its outputs, beside how late this machine woke it.
+/// How long the slowest remote I/O took from its samples to its outputs, and how late this machine woke it.
 fn push_times(text: &mut String, remote_ios: &[RemoteIoSummary]) {
     let timed = remote_ios.iter().filter_map(|remote_io| {
         Some((remote_io.sample_to_output?, remote_io.wakeups?, remote_io.name.as_str()))

@@ -300,18 +300,17 @@ fn exposed_while_a_state_is_lost(folder: &Path) -> String {
     answer.output
 }
 
-/// Metrics of a cluster with alarms.
-fn exposed_with_alarms(folder: &Path) -> String {
-    let example = |file: &str| {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-        root.join("examples/heated-tank").join(file).display().to_string()
-    };
-    let (cluster, scenario) = (example("cluster.toml"), example("kill-each.toml"));
+/// Metrics of an example.
+fn exposed_by(folder: &Path, example: &str, scenario: &str) -> String {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(example);
+    let path = |file: &str| root.join(file).display().to_string();
+    let (cluster, scenario) = (path("cluster.toml"), path(scenario));
     let arguments =
-        ["simulate", &cluster, "--scenario", &scenario, "--seed", "1", "--out", "alarms"];
+        ["simulate", &cluster, "--scenario", &scenario, "--seed", "1", "--out", example];
     let run = understudy_in(folder, &arguments);
     assert_eq!(run.status, 0, "{}", run.errors);
-    understudy_in(folder, &["gateway", "metrics", "alarms/latest", "--once"]).output
+    let latest = format!("{example}/latest");
+    understudy_in(folder, &["gateway", "metrics", &latest, "--once"]).output
 }
 
 /// The names of metrics in a text.
@@ -323,6 +322,16 @@ pub(crate) fn metric_names(text: &str) -> std::collections::BTreeSet<String> {
         .collect()
 }
 
+/// Metrics of a run of processes.
+fn exposed_by_processes(folder: &Path) -> String {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let cluster = root.join("examples/press-cell/cluster.toml").display().to_string();
+    let arguments =
+        ["lab", &cluster, "--cycles", "20", "--link", "udp", "--period", "50ms", "--out", "lab"];
+    understudy_in(folder, &arguments);
+    understudy_in(folder, &["gateway", "metrics", "lab/latest", "--once"]).output
+}
+
 #[test]
 fn the_dashboard_and_the_page_name_metrics_that_there_are() {
     let folder = finished_run("gateway_dashboard");
@@ -331,8 +340,11 @@ fn the_dashboard_and_the_page_name_metrics_that_there_are() {
     let exposed: std::collections::BTreeSet<&str> =
         samples.filter_map(|line| line.split(['{', ' ']).next()).collect();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    // Some have a sample only while something is wrong, or where alarms are declared.
-    let at_times = exposed_while_a_state_is_lost(&folder) + &exposed_with_alarms(&folder);
+    // Some have a sample only while something is wrong, where alarms are declared, with two networks, or in processes.
+    let at_times = exposed_while_a_state_is_lost(&folder)
+        + &exposed_by(&folder, "heated-tank", "kill-each.toml")
+        + &exposed_by(&folder, "two-networks", "network-fails.toml")
+        + &exposed_by_processes(&folder);
     let read = |path: &str| fs::read_to_string(root.join(path)).expect("a file");
     let dashboard = read("deployment/monitoring/dashboards/understudy.json");
     let document: Value = serde_json::from_str(&dashboard).expect("JSON");

@@ -128,7 +128,7 @@ pub(crate) static CLUSTER: Section = Section {
         required name: Kind::Name, "names the cluster; frames of other clusters on the same network are ignored";
         key period: time(SHORTEST_PERIOD, LONGEST_PERIOD, Duration::from_millis(10)), "T, from one cycle to the next; timers of the ladders count in it";
         key mode: word(&MODES), "masked failures: `full`, any number of controllers as long as one understudy lives; `paper`, one failure, and all outputs become fail-safe at the second";
-        key schedule: word(&SCHEDULES), "whom a station waits for before it publishes: `token`, each controller for the one before it, so that a cycle's exchange grows with their number; `parallel`, controllers for nobody and understudies for the controllers, so that it has four hops for any number; not with `mode = \"paper\"`";
+        key schedule: word(&SCHEDULES), "whom a station waits for before it publishes: `token`, each controller for the one before it, so that a cycle's exchange grows with their number; `parallel`, controllers for no station and understudies for the controllers, so that it has four hops for any number; not with `mode = \"paper\"`";
         key copies: count(1, 4, 2), "number of times that each cyclic frame is sent, against loss";
         key history: count(1, MAXIMUM_HISTORY as u32, 8), "samples that a remote I/O keeps and sends along, so that lost cycles are replayed";
         key flag_after: count(1, MANY_CYCLES, 3), "cycles without a turn after which a station is flagged, and its slot is closed";
