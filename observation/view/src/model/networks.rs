@@ -115,7 +115,10 @@ impl Model {
             let affected: BTreeSet<Member> =
                 all.iter().flat_map(|&(from, to)| [from, to]).collect();
             let names: Vec<&str> = affected.into_iter().map(name).collect();
-            format!("between {}", listed(&names))
+            match names.len() == self.members.iter().len() {
+                true => "between any members".to_owned(),
+                false => format!("between {}", listed(&names)),
+            }
         };
         let left = via.other();
         Some(format!("all depends on network {left}: over network {via} {what} {whom}"))
