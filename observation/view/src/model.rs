@@ -13,6 +13,7 @@ mod protection;
 mod reports;
 mod run_events;
 mod silence;
+mod spares;
 mod standing;
 mod turns;
 
@@ -41,6 +42,7 @@ use cycle::{LastMargin, Received};
 use programs::ProgramTrack;
 use protection::Attribution;
 use reports::Reports;
+use spares::Spares;
 pub(crate) use standing::{ForcedSignal, Standing};
 pub use turns::SentTurn;
 use turns::Turns;
@@ -97,6 +99,7 @@ pub struct Model {
     attributions: Vec<Attribution>,
     /// Who refuses whom.
     refusals: BTreeSet<members::Refusal>,
+    spares: Spares,
     pub(crate) process_alarms: ProcessAlarms,
     timings: Timings,
     pub(crate) times: TimesOfDay,
@@ -145,6 +148,7 @@ impl Model {
             events: Events::new(bounds.events),
             attributions: vec![Attribution::default(); programs],
             refusals: BTreeSet::new(),
+            spares: Spares::default(),
             process_alarms: ProcessAlarms::new(cluster.alarms(), programs),
             timings: Timings::new(schedule, bounds.timings),
             times: TimesOfDay::new(schedule.period()),

@@ -11,6 +11,7 @@
 //! | `write/operator`, `write/engineer` | asked with a write as JSON: its outcome | operators; engineers | no |
 //! | `command/force`, `command/unforce` | asked with a force or a signal as JSON: done, or why not | engineers | no |
 //! | `refused` | asked with a refused order of a person as JSON: it is recorded | all | no |
+//! | `spare` | asked with the report of a spare as JSON: changes are recorded | all | no |
 //! | `journal` | told: the lines of its journal, those of a moment at once; twice a second those in effect again; with its configuration | all | no |
 //!
 //! and under `understudy/cluster/<member>`, for callers whose cluster file may be another one: asked, the hash of the configuration.
@@ -20,6 +21,7 @@
 
 mod followed;
 mod refused;
+mod spares;
 mod tls;
 
 use std::net::{SocketAddr, TcpListener};
@@ -50,11 +52,13 @@ use crate::writes::{self, Callers};
 
 pub use followed::Reporter;
 pub(crate) use followed::{Gaps, Head, Telemetry, followed};
+pub use spares::{SPARE_REPORTS_EVERY, SpareReport};
 pub use tls::{Admitted, TlsKeys, Validity};
-pub(crate) use tls::{REFUSED_KEY, WRITE_KEYS, endpoint, hash_key, insert, prefix, tls_config};
+pub(crate) use tls::{REFUSED_KEY, SPARE_KEY, WRITE_KEYS, endpoint, hash_key, insert, prefix, tls_config};
 
 use followed::Line;
 use refused::RefusedReports;
+use spares::SpareReports;
 use tls::access_control;
 
 /// How often it is looked who is admitted.
@@ -150,6 +154,7 @@ pub(crate) struct Channel<E> {
     clock: Clock,
     connections: Connections,
     refused: RefusedReports,
+    spares: SpareReports,
     stop: Arc<AtomicBool>,
     /// An operator wants the member to end.
     stop_wanted: Arc<AtomicBool>,
@@ -206,6 +211,7 @@ impl<E: Send + 'static> Channel<E> {
             clock,
             connections: Connections::new(MOST_CONNECTIONS, 3),
             refused: RefusedReports::default(),
+            spares: SpareReports::default(),
             stop: Arc::clone(&stop),
             stop_wanted: Arc::default(),
         };
@@ -284,6 +290,7 @@ impl<E: Send + 'static> Channel<E> {
                 self.sink.record(now, Noted::Host(event));
             }
             self.note_refused(now, &mut is_valid);
+            self.note_spares(now);
         }
         // The journal ends when nobody reports any more.
         drop(self.sink);
@@ -371,6 +378,7 @@ impl<E: Send + 'static> Channel<E> {
             answers.push(self.answer_writes(&session, role, key, own)?);
         }
         answers.push(self.answer_refused(&session)?);
+        answers.push(self.answer_spares(&session)?);
         let relay = Relay::start(listener, self.connections.clone(), PATIENCE, inner)?;
         Ok(Opened { session, relay, journal, _answers: answers })
     }

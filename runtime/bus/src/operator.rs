@@ -11,7 +11,7 @@ use understudy_wire::{
 use zenoh::Wait;
 
 use crate::channel::{
-    Gaps, Head, REFUSED_KEY, Reporter, TlsKeys, WRITE_KEYS, endpoint, hash_key, insert, prefix,
+    Gaps, Head, REFUSED_KEY, Reporter, SPARE_KEY, SpareReport, TlsKeys, WRITE_KEYS, endpoint, hash_key, insert, prefix,
     tls_config,
 };
 use crate::error::{BusError, reason};
@@ -47,6 +47,8 @@ pub enum Request {
     Write(Write),
     /// To record an order that was refused before it was sent.
     Refused(RefusedOrder),
+    /// To record where a spare is.
+    Spare(SpareReport),
     /// To end.
     Stop,
 }
@@ -64,6 +66,7 @@ impl Request {
             Self::Write(write) if write.role >= Role::Engineer => WRITE_KEYS[1].1,
             Self::Write(_) => WRITE_KEYS[0].1,
             Self::Refused(_) => REFUSED_KEY,
+            Self::Spare(_) => SPARE_KEY,
             Self::Stop => "command/stop",
         }
     }
@@ -86,6 +89,7 @@ impl Request {
             Self::Unforce(signal) => serde_json::to_string(signal),
             Self::Write(write) => serde_json::to_string(write),
             Self::Refused(order) => serde_json::to_string(&order.clone().bounded()),
+            Self::Spare(report) => serde_json::to_string(report),
             _ => return String::new(),
         };
         text.unwrap_or_default()
@@ -216,6 +220,13 @@ impl Call {
             });
         }
         Err(unanswered())
+    }
+
+    /// Sends a request without waiting for its answer; whether it was sent.
+    pub fn tell(&self, request: &Request) -> bool {
+        let asked = self.session.get(format!("{}/{}", self.prefix, request.key()));
+        // Without its receiver the answer is dropped.
+        asked.payload(request.payload()).timeout(PATIENCE).wait().is_ok()
     }
 
     fn is_connected(&self) -> bool {

@@ -1,9 +1,12 @@
 //! Follows the journals of a few remote I/Os of a group.
 
 use std::sync::mpsc::Sender;
-use std::time::Duration;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
-use understudy_bus::{BusError, Call, Peer, TlsKeys, Told};
+use understudy_bus::{
+    BusError, Call, Peer, Request, SPARE_REPORTS_EVERY, SpareReport, TlsKeys, Told,
+};
 use understudy_journal::{Happening, Record};
 use understudy_remote_io::Event;
 use understudy_wire::{ClusterHash, ConfigurationHash, StationSet};
@@ -22,8 +25,26 @@ pub(crate) enum Seen {
     Lost(String),
 }
 
+/// Where a spare is awake, for the reports of all its witnesses.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Whereabouts(Arc<Mutex<Option<String>>>);
+
+impl Whereabouts {
+    /// It is awake in this group, or asleep.
+    pub(crate) fn set(&self, group: Option<String>) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = group;
+    }
+
+    fn get(&self) -> Option<String> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
 /// A witness: one of the remote I/Os of a group, another one where that is not received.
 pub(crate) struct Watch {
+    /// Name of the spare.
+    pub(crate) spare: String,
+    pub(crate) whereabouts: Whereabouts,
     pub(crate) cluster: ClusterHash,
     pub(crate) configuration: ConfigurationHash,
     pub(crate) period: Duration,
@@ -55,8 +76,10 @@ impl Watch {
     fn follow(&self, call: &Call, mut deadline: impl FnMut(StationSet) -> bool) -> String {
         let mut other = None;
         let patience = (self.period * 10).max(SILENT_AFTER);
+        let mut reported = None;
         let ended = call.follow(patience, |told| match told {
             Told::By(reporter) => {
+                self.report(call, &mut reported);
                 let theirs = reporter.map(|by| by.configuration.as_str()).unwrap_or_default();
                 let same = theirs == self.configuration.to_string();
                 if !same {
@@ -70,6 +93,22 @@ impl Watch {
         });
         let silent = || ended.err().map(|_| "it sends no journal".to_owned());
         other.or_else(silent).unwrap_or_else(|| "the call ended".to_owned())
+    }
+}
+
+/// The report that was sent last, and when.
+type Reported = Option<(Instant, SpareReport)>;
+
+impl Watch {
+    /// Reports to the witness that the spare watches, and where it is awake.
+    fn report(&self, call: &Call, reported: &mut Reported) {
+        let report = SpareReport { spare: self.spare.clone(), serves: self.whereabouts.get() };
+        let is_known = reported.as_ref().is_some_and(|(at, last)| {
+            at.elapsed() < SPARE_REPORTS_EVERY && *last == report
+        });
+        if !is_known && call.tell(&Request::Spare(report.clone())) {
+            *reported = Some((Instant::now(), report));
+        }
     }
 }
 

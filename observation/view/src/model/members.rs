@@ -202,6 +202,7 @@ impl Model {
         }
         self.fold_process_alarms(record, cycle);
         self.host_alarm(record, member, cycle, event);
+        self.spare_reported(member, cycle, event);
         self.happened(record, cycle, None);
     }
 

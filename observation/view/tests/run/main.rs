@@ -16,6 +16,7 @@ mod hostile;
 mod losses;
 mod margin;
 mod numbers;
+mod overview;
 mod past;
 mod process_alarms;
 mod protection;

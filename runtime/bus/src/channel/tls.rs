@@ -73,6 +73,9 @@ pub(crate) const WRITE_KEYS: [(Role, &str); 2] =
 /// Where a member is told of orders that were refused before they were sent.
 pub(crate) const REFUSED_KEY: &str = "refused";
 
+/// Where a spare reports.
+pub(crate) const SPARE_KEY: &str = "spare";
+
 /// Where a member's keys begin.
 pub(crate) fn prefix(cluster: ClusterHash, name: &str) -> String {
     format!("understudy/{cluster}/{name}")
@@ -131,7 +134,7 @@ pub(super) fn access_control(prefix: &str, hash: &str, admitted: &Admitted) -> s
     let commands = vec![format!("{prefix}/command/*")];
     let writes = WRITE_KEYS.map(|(_, key)| vec![format!("{prefix}/{key}")]);
     let journal = vec![format!("{prefix}/journal")];
-    let refused = vec![format!("{prefix}/{REFUSED_KEY}")];
+    let refused = [REFUSED_KEY, SPARE_KEY].map(|what| format!("{prefix}/{what}"));
     let rule = |id: &str, messages: &[&str], flow: &str, keys: &[String]| {
         json!({
             "id": id,
