@@ -10,6 +10,7 @@ mod log;
 mod memory;
 mod scan;
 mod simulate;
+mod spares;
 
 use std::process::ExitCode;
 
@@ -33,6 +34,7 @@ Example:
   understudy-bench scan examples/press-cell/robot.ladder
   understudy-bench join --trials 50 --loss 10%
   understudy-bench log --cycles 2000
+  understudy-bench spares --rounds 200
 
 Exit status: 0 if the targets are met, 1 if not, 2 for invalid input."
 )]
@@ -54,6 +56,7 @@ enum Benchmark {
     Log(Box<log::Arguments>),
     Memory(memory::Arguments),
     Scan(scan::Arguments),
+    Spares(Box<spares::Arguments>),
     #[command(hide = true)]
     Member(exchange::MemberArguments),
     #[command(hide = true)]
@@ -77,6 +80,7 @@ impl Benchmark {
             Self::Log(arguments) => ("log", log::run(arguments, console).into()),
             Self::Memory(arguments) => ("memory", memory::run(arguments).into()),
             Self::Scan(arguments) => ("scan", scan::run(arguments).into()),
+            Self::Spares(arguments) => ("spares", spares::run(arguments, console).into()),
             Self::Member(arguments) => ("member", exchange::run_member(arguments)),
             Self::Node(arguments) => ("node", run_station(arguments).into()),
             Self::RemoteIo(arguments) => ("remote-io", run_remote_io(arguments).into()),
