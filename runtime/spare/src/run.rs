@@ -8,11 +8,10 @@ use std::time::{Duration, Instant};
 
 use understudy_bus::{BusError, Peer, TlsKeys};
 use understudy_cluster::{Cluster, PlantSpare};
+use understudy_cycle::spare::{Attention, Order, Rule, WITNESSES};
 use understudy_wire::{Member, StationId};
 
-use crate::attention::{Attention, WITNESSES};
 use crate::post::Post;
-use crate::rule::{Order, Rule};
 use crate::watch::{Seen, Watch, Whereabouts};
 
 /// How often the end of the process is looked for when nothing happens.

@@ -9,8 +9,9 @@
 //!   witness 1  ■ ■ ■ ■ ■ □ □ □ □    flagged for 4      the station: flagged for 4
 //! ```
 
-use understudy_cycle::{Agreement, Mode};
 use understudy_wire::{ProgramId, StationId, StationSet};
+
+use crate::{Agreement, Mode};
 
 /// Remote I/Os of a group that are followed, at most.
 pub const WITNESSES: usize = 3;
@@ -22,7 +23,7 @@ const NEXT_SLOT_AFTER: u32 = 100;
 const FIRST_TIME: u32 = 10;
 
 /// Attention to one group.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Hash)]
 pub struct Attention {
     controllers: usize,
     /// Understudies that are no slots of spares.
@@ -38,7 +39,7 @@ pub struct Attention {
 }
 
 /// A remote I/O that is followed.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Hash)]
 struct Witness {
     /// By rank: deadlines in a row without a turn of the station.
     silent: Vec<u32>,

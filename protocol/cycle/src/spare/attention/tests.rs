@@ -3,11 +3,11 @@
 use std::time::Duration;
 
 use proptest::prelude::*;
-use understudy_cycle::Schedule;
 use understudy_wire::{ClusterHash, ConfigurationHash};
 
 use super::*;
-use crate::rule::wanted;
+use crate::Schedule;
+use crate::spare::wanted;
 
 const SPARE_AFTER: u32 = 20;
 
