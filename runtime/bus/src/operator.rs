@@ -11,7 +11,7 @@ use understudy_wire::{
 use zenoh::Wait;
 
 use crate::channel::{
-    Gaps, Head, REFUSED_KEY, Reporter, SPARE_KEY, SpareReport, TlsKeys, WRITE_KEYS, endpoint, hash_key, insert, prefix,
+    ATTENDANCE_KEY, Gaps, Head, JOURNAL_KEY, REFUSED_KEY, Reporter, SPARE_KEY, SpareReport, TlsKeys, WRITE_KEYS, endpoint, hash_key, insert, prefix,
     tls_config,
 };
 use crate::error::{BusError, reason};
@@ -242,16 +242,37 @@ impl Call {
     pub fn follow(
         &self,
         patience: Duration,
+        take: impl FnMut(Told<'_>) -> bool,
+    ) -> Result<(), BusError> {
+        self.follow_key(JOURNAL_KEY, patience, take)
+    }
+
+    /// The same for the lines that tell which stations a remote I/O misses.
+    ///
+    /// # Errors
+    /// [`BusError::Unanswered`] where they cannot be followed.
+    pub fn follow_attendance(
+        &self,
+        patience: Duration,
+        take: impl FnMut(Told<'_>) -> bool,
+    ) -> Result<(), BusError> {
+        self.follow_key(ATTENDANCE_KEY, patience, take)
+    }
+
+    fn follow_key(
+        &self,
+        key: &'static str,
+        patience: Duration,
         mut take: impl FnMut(Told<'_>) -> bool,
     ) -> Result<(), BusError> {
         let unanswered = || BusError::Unanswered {
             name: self.name.clone(),
             address: self.address,
-            request: "journal",
+            request: key,
         };
         let subscriber = self
             .session
-            .declare_subscriber(format!("{}/journal", self.prefix))
+            .declare_subscriber(format!("{}/{key}", self.prefix))
             .with(zenoh::handlers::FifoChannel::new(WAITING_LINES))
             .wait()
             .map_err(|_| unanswered())?;

@@ -233,8 +233,8 @@ impl Keeper<'_> {
     fn saw(&mut self, group: usize, witness: usize, what: Seen, say: &mut dyn FnMut(&Report)) {
         let name = &self.settings.duties[group].group;
         match what {
-            Seen::Deadline(heard) => {
-                self.groups[group].deadline(witness, heard);
+            Seen::Report(report) => {
+                self.groups[group].told(witness, &report);
                 let seen = self.groups[group].standing().seen;
                 if seen && self.seen[group].replace(true) != Some(true) {
                     say(&Report::Watches { group: name.clone() });

@@ -1,4 +1,4 @@
-//! Follows the journals of a few remote I/Os of a group.
+//! Follows the reports of a few remote I/Os of a group.
 
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -7,20 +7,19 @@ use std::time::{Duration, Instant};
 use understudy_bus::{
     BusError, Call, Peer, Request, SPARE_REPORTS_EVERY, SpareReport, TlsKeys, Told,
 };
-use understudy_journal::{Happening, Record};
-use understudy_remote_io::Event;
-use understudy_wire::{ClusterHash, ConfigurationHash, StationSet};
+use understudy_cycle::spare::AttendanceReport;
+use understudy_wire::{ClusterHash, ConfigurationHash};
 
 /// Between two calls.
 const AGAIN: Duration = Duration::from_secs(1);
 
-/// The shortest time without a line after which a remote I/O is no longer followed.
-const SILENT_AFTER: Duration = Duration::from_secs(2);
+/// The shortest time without a report after which a remote I/O is no longer followed.
+const SILENT_AFTER: Duration = Duration::from_millis(2_500);
 
 /// What comes of a witness.
 pub(crate) enum Seen {
-    /// A deadline, at which it had received these stations.
-    Deadline(StationSet),
+    /// The stations that it misses.
+    Report(AttendanceReport),
     /// It is not followed, and why.
     Lost(String),
 }
@@ -58,8 +57,8 @@ impl Watch {
     pub(crate) fn run(self, group: usize, witness: usize, seen: &Sender<(usize, usize, Seen)>) {
         for peer in self.peers.iter().cycle() {
             let lost = match Call::to(peer.address, self.cluster, &peer.name, &self.keys) {
-                Ok(call) => self.follow(&call, |deadline| {
-                    seen.send((group, witness, Seen::Deadline(deadline))).is_ok()
+                Ok(call) => self.follow(&call, |report| {
+                    seen.send((group, witness, Seen::Report(report))).is_ok()
                 }),
                 Err(BusError::Uncalled { reason, .. }) => reason,
                 Err(error) => error.to_string(),
@@ -73,11 +72,11 @@ impl Watch {
     }
 
     /// Until the journal ends: the reason.
-    fn follow(&self, call: &Call, mut deadline: impl FnMut(StationSet) -> bool) -> String {
+    fn follow(&self, call: &Call, mut report: impl FnMut(AttendanceReport) -> bool) -> String {
         let mut other = None;
         let patience = (self.period * 10).max(SILENT_AFTER);
         let mut reported = None;
-        let ended = call.follow(patience, |told| match told {
+        let ended = call.follow_attendance(patience, |told| match told {
             Told::By(reporter) => {
                 self.report(call, &mut reported);
                 let theirs = reporter.map(|by| by.configuration.as_str()).unwrap_or_default();
@@ -87,11 +86,12 @@ impl Watch {
                 }
                 same
             }
-            Told::Line(line) => heard(line).is_none_or(&mut deadline),
-            // Missed deadlines are not counted, so the spare wakes later.
+            // Another line is of a later version.
+            Told::Line(line) => serde_json::from_str(line).map_or(true, &mut report),
+            // The next report is complete in itself.
             Told::Lost(_) => true,
         });
-        let silent = || ended.err().map(|_| "it sends no journal".to_owned());
+        let silent = || ended.err().map(|_| "it sends no report".to_owned());
         other.or_else(silent).unwrap_or_else(|| "the call ended".to_owned())
     }
 }
@@ -109,18 +109,5 @@ impl Watch {
         if !is_known && call.tell(&Request::Spare(report.clone())) {
             *reported = Some((Instant::now(), report));
         }
-    }
-}
-
-/// The stations of a line that records a deadline.
-fn heard(line: &str) -> Option<StationSet> {
-    // Most lines are of other events.
-    if !line.contains("\"applied\"") {
-        return None;
-    }
-    let record: Record = serde_json::from_str(line).ok()?;
-    match record.event {
-        Happening::RemoteIo(Event::Applied { heard, .. }) => Some(heard),
-        _ => None,
     }
 }
