@@ -1,7 +1,7 @@
 //! `understudy allocate`: selection of controllers for programs.
 
-pub(crate) mod programs;
 mod plant;
+pub(crate) mod programs;
 mod verified;
 
 use std::path::{Path, PathBuf};

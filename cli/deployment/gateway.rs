@@ -10,8 +10,8 @@ use clap::{Args, Subcommand};
 use serde_json::json;
 use understudy_bus::interruption;
 use understudy_gateway::{
-    Area, Followed, GatewayError, Notified, PlantMetrics, Rate, RegisterMap, Run, WriteGate, forward_signals,
-    mirror, notify, serve_metrics, serve_modbus,
+    Area, Followed, GatewayError, Notified, PlantMetrics, Rate, RegisterMap, Run, WriteGate,
+    forward_signals, mirror, notify, serve_metrics, serve_modbus,
 };
 use understudy_keys::{Date, OperatorKeys};
 use understudy_member::tls_keys;

@@ -149,9 +149,9 @@ impl Page {
         commanding: Commanding,
         console: &mut Console,
     ) -> Result<Served, Answer> {
-        let served = self.place().and_then(|place| {
-            serve(Settings { run: run.to_owned(), place, commanding })
-        });
+        let served = self
+            .place()
+            .and_then(|place| serve(Settings { run: run.to_owned(), place, commanding }));
         let served = served.map_err(|error| failed(&error))?;
         note_place(&served, "page of the run", console);
         Ok(served)

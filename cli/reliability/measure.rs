@@ -6,8 +6,8 @@ use std::time::{Duration, SystemTime};
 
 use clap::Args;
 use understudy_campaigns::{
-    Measured, Planned, Question, QuestionError, RealCampaign, SpareTimes, Speed, hold_against_model,
-    measure_shared, plan_campaign, run_campaign, run_real_campaign,
+    Measured, Planned, Question, QuestionError, RealCampaign, SpareTimes, Speed,
+    hold_against_model, measure_shared, plan_campaign, run_campaign, run_real_campaign,
 };
 use understudy_cluster::Cluster;
 use understudy_cycle::Mode;
@@ -183,7 +183,8 @@ fn with_spares(
     groups: u32,
     console: &mut Console,
 ) -> Result<Answer, Answer> {
-    if cluster.agreement().schedule.spare_slots().is_empty() || cluster.lasting_understudies() != 1 {
+    if cluster.agreement().schedule.spare_slots().is_empty() || cluster.lasting_understudies() != 1
+    {
         let message = "--groups is for a cluster with one understudy and a slot (`spare = true`)";
         return Err(Answer::failed(Status::BadInput, "U0600", message));
     }

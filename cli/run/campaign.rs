@@ -127,7 +127,10 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
 fn campaign(arguments: &Arguments, path: &Path, console: &mut Console) -> Result<Answer, Answer> {
     let (cluster, reports) = files::cluster(path, arguments.overrides.overrides())?;
     if arguments.spare_after.is_some() && cluster.agreement().schedule.spare_slots().is_empty() {
-        let message = format!("--spare-after is for a cluster with a slot (`spare = true`), and {} has none", path.display());
+        let message = format!(
+            "--spare-after is for a cluster with a slot (`spare = true`), and {} has none",
+            path.display()
+        );
         return Err(Answer::failed(Status::BadInput, "U0600", message));
     }
     let mut kinds: Vec<Kind> = arguments.faults.iter().flatten().copied().collect();

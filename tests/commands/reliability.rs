@@ -83,7 +83,8 @@ fn shared_spares_are_compared_with_pairs() {
     }
     let none = ["--controllers", "8", "--groups", "2", "--shared-spares", "1", "--too-large", "2"];
     let refused = reliability(&[&none[..], &RATES[..]].concat());
-    let wanted = "the number of groups that are too large for the spares is 2; it must be between 0 and 1";
+    let wanted =
+        "the number of groups that are too large for the spares is 2; it must be between 0 and 1";
     assert!(refused.status == 2 && refused.errors.contains(wanted), "{}", refused.errors);
 }
 

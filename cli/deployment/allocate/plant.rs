@@ -23,7 +23,8 @@ pub(super) fn place(arguments: &Arguments, path: &Path) -> Result<Answer, Answer
     }
     let (plant, reports) = plants::valid(path)?;
     if plant.machines.is_empty() {
-        let message = format!("{} has no [[machine]] on which to place its stations", path.display());
+        let message =
+            format!("{} has no [[machine]] on which to place its stations", path.display());
         return Err(Answer::failed(Status::BadInput, "U1147", message));
     }
     let roles = roles(&plant);
@@ -40,11 +41,8 @@ pub(super) fn place(arguments: &Arguments, path: &Path) -> Result<Answer, Answer
 }
 
 fn machine(of: &PlantMachine) -> Machine {
-    let domains = [
-        (Domain::Rack, &of.rack),
-        (Domain::Feeder, &of.feeder),
-        (Domain::Switch, &of.switch),
-    ];
+    let domains =
+        [(Domain::Rack, &of.rack), (Domain::Feeder, &of.feeder), (Domain::Switch, &of.switch)];
     let domains = domains.into_iter().filter_map(|(kind, name)| Some((kind, name.clone()?)));
     Machine {
         name: of.name.clone(),
@@ -122,8 +120,10 @@ fn conflicts(plant: &PlantFile, roles: &[PlantRole], found: &Distribution) -> Ve
         let names: Vec<&str> = conflict.roles.iter().map(|&it| roles[it].name.as_str()).collect();
         let kind = conflict.kind.word();
         let domain = &conflict.domain;
-        let of_kind =
-            found.shortages.iter().find(|it| (it.group, it.kind) == (conflict.group, conflict.kind));
+        let of_kind = found
+            .shortages
+            .iter()
+            .find(|it| (it.group, it.kind) == (conflict.group, conflict.kind));
         let reason = match of_kind {
             Some(shortage) => format!(
                 "the group has {} roles with its spares, and there are {} such domains",

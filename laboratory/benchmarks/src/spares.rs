@@ -208,8 +208,7 @@ fn answer(found: &Found) -> Answer {
     let before: u64 = rounds.iter().map(|round| round.before).sum();
     let in_time = rounds.iter().filter(|round| round.protected_ms.is_some());
     let after: u64 = in_time.clone().map(|round| round.after).sum();
-    let unexplained: u64 =
-        in_time.filter(|round| round.stalls == 0).map(|round| round.after).sum();
+    let unexplained: u64 = in_time.filter(|round| round.stalls == 0).map(|round| round.after).sum();
     let cycles = |ms: f64| ms / PERIOD.as_secs_f64() / 1e3 - f64::from(found.spare_after);
     let mut text = format!(
         "{} rounds: {} wrong, {} gaps in the judgement\n\
@@ -229,8 +228,13 @@ fn answer(found: &Found) -> Answer {
         cycles(at(0.99)),
         cycles(at(1.0)),
     );
-    let _ = writeln!(text, "the spare takes {:.2} % of a core while it waits", found.waiting_cpu * 100.0);
-    let passed = found.wrong == 0 && found.unjudged == 0 && unexplained == 0 && late == 0 && never == 0;
+    let _ = writeln!(
+        text,
+        "the spare takes {:.2} % of a core while it waits",
+        found.waiting_cpu * 100.0
+    );
+    let passed =
+        found.wrong == 0 && found.unjudged == 0 && unexplained == 0 && late == 0 && never == 0;
     let status = if passed { Status::Done } else { Status::Failed };
     Answer::done(text, found).with_status(status)
 }

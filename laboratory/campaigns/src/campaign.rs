@@ -27,8 +27,8 @@ pub use found::{Found, hold_against_model};
 pub use question::{
     Planned, Question, QuestionError, Speed, options_of, plan_campaign, set_unequal,
 };
-pub use shared::{SharedFound, measure_shared};
 pub use real::{RealCampaign, RealCampaignRun, run_real_campaign};
+pub use shared::{SharedFound, measure_shared};
 
 use lives::{Run, Stage};
 use replica::simulated;
@@ -127,8 +127,7 @@ fn replicas<R: Send>(
                 loop {
                     let number = next.fetch_add(1, Ordering::Relaxed);
                     // One that cannot be run ends the campaign; nobody listens then.
-                    if number >= plan.failures
-                        || sender.send((number, simulated(number))).is_err()
+                    if number >= plan.failures || sender.send((number, simulated(number))).is_err()
                     {
                         return;
                     }

@@ -250,7 +250,9 @@ fn refuse_what_is_simulated(scenario: &Scenario) -> Result<(), LaboratoryError> 
         words.insert("a network that is disturbed for some of its cycles");
     }
     if scenario.spare_after.is_some() {
-        words.insert("spares that wake by their rule (`understudy spare` does that beside processes)");
+        words.insert(
+            "spares that wake by their rule (`understudy spare` does that beside processes)",
+        );
     }
     if words.is_empty() {
         return Ok(());

@@ -26,6 +26,6 @@ pub use links::Metered;
 pub use network::{Disturbance, Network};
 pub use parts::{Parts, parts};
 pub use referee::{Referee, Violation};
-pub use spares::{SpareBeside, SpareOrder, SpareTimes};
 pub use simulation::{NotReady, Observe, Record, Simulation};
+pub use spares::{SpareBeside, SpareOrder, SpareTimes};
 pub use tally::Tally;

@@ -45,8 +45,9 @@ pub struct SpareOrder {
 impl SpareBeside {
     /// An idle spare. For each group: what its members agree on, and the slot of the spare.
     pub fn new(groups: &[(&Agreement, StationId)], times: SpareTimes) -> Self {
-        let attention =
-            |(agreement, slot): &(&Agreement, StationId)| Attention::new(agreement, *slot, times.spare_after);
+        let attention = |(agreement, slot): &(&Agreement, StationId)| {
+            Attention::new(agreement, *slot, times.spare_after)
+        };
         Self {
             groups: groups.iter().map(attention).collect(),
             slots: groups.iter().map(|(_, slot)| *slot).collect(),

@@ -56,7 +56,8 @@ pub use listing::{Filter, JournalLine, JournalText, Listing};
 pub use margin::{Holders, Loss, Margin, Outcome};
 pub use model::{Bounds, Counters, MemberCounters, Model, ProgramCounters, SentTurn};
 pub use overview::{
-    FollowedPlant, GroupOverview, GroupState, GroupView, PlantAlarm, PlantOverview, SpareOverview, SpareState,
+    FollowedPlant, GroupOverview, GroupState, GroupView, PlantAlarm, PlantOverview, SpareOverview,
+    SpareState,
 };
 pub use process_alarm::{ProcessAlarm, Shelved};
 pub use protection::{LackingStation, LostState, Protection};

@@ -17,7 +17,7 @@ use serde::Serialize;
 use understudy_cluster::{PlantFile, PlantSpare};
 use understudy_cycle::Mode;
 
-use crate::snapshot::{Snapshot, StationSnapshot};
+use crate::snapshot::{ProgramSnapshot, Snapshot, StationSnapshot};
 use crate::station::StationState;
 
 pub use followed::FollowedPlant;
@@ -243,8 +243,17 @@ fn group_overview(
     let failed = failed.filter(|station| station.state != StationState::Publishing);
     let failed: Vec<String> = failed.map(|station| station.name.clone()).collect();
     let programs = snapshot.programs.iter();
-    let unprotected = programs.filter(|it| it.protection.as_ref().is_none_or(|it| !it.protected));
+    let is_unprotected = |it: &ProgramSnapshot| it.protection.as_ref().map(|it| !it.protected);
+    let unprotected = programs.clone().filter(|it| is_unprotected(it) == Some(true));
     let unprotected: Vec<String> = unprotected.map(|it| it.program.clone()).collect();
+    let unreported = programs.filter(|it| is_unprotected(it).is_none());
+    let unreported = unreported
+        .map(|it| format!("protection of {}: {}", it.program, snapshot.protection_text(it)));
+    let unreported: Vec<String> = unreported.collect();
+    // What is not known does not hide what is known to lack.
+    if unprotected.is_empty() && !unreported.is_empty() {
+        return GroupOverview { failed, cycle: snapshot.cycle, ..unknown(unreported.join("; ")) };
+    }
     let survives = snapshot.margin.survives;
     let state = match (survives, failed.is_empty()) {
         (0, _) => GroupState::Unprotected,
@@ -289,7 +298,10 @@ fn no_spare(plant: &PlantFile, group: usize, spares: &[SpareOverview]) -> String
                 format!("{name} {does} {at}")
             }
             (_, None) => {
-                format!("{name} wakes when a station has been flagged for {} cycles", spare.spare_after)
+                format!(
+                    "{name} wakes when a station has been flagged for {} cycles",
+                    spare.spare_after
+                )
             }
         });
     }
@@ -312,7 +324,9 @@ fn alarms(groups: &[GroupOverview], spares: &[SpareOverview]) -> Vec<PlantAlarm>
                 };
                 ("unprotected", format!("{name} is UNPROTECTED{failed}: {reason}"))
             }
-            GroupState::NotObserved => ("not-observed", format!("{name} is not observed: {reason}")),
+            GroupState::NotObserved => {
+                ("not-observed", format!("{name} is not observed: {reason}"))
+            }
         };
         Some(PlantAlarm { alarm, name: name.clone(), text })
     });

@@ -53,11 +53,11 @@ use crate::writes::Callers;
 pub use followed::Reporter;
 pub(crate) use followed::{Gaps, Head, Telemetry, followed};
 pub use spares::{SPARE_REPORTS_EVERY, SpareReport};
-pub use tls::{Admitted, TlsKeys, Validity};
 pub(crate) use tls::{
     ATTENDANCE_KEY, JOURNAL_KEY, REFUSED_KEY, SPARE_KEY, WRITE_KEYS, endpoint, hash_key, insert,
     prefix, tls_config,
 };
+pub use tls::{Admitted, TlsKeys, Validity};
 
 use followed::Line;
 use refused::RefusedReports;

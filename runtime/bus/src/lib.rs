@@ -44,8 +44,8 @@ mod zenoh_link;
 
 pub use announcer::{Announcer, Question};
 pub use channel::{
-    Admitted, ChannelSettings, DONE, LinesInEffect, Reporter, SPARE_REPORTS_EVERY, SpareReport, TlsKeys,
-    Validity,
+    Admitted, ChannelSettings, DONE, LinesInEffect, Reporter, SPARE_REPORTS_EVERY, SpareReport,
+    TlsKeys, Validity,
 };
 pub use clock::Clock;
 pub use connections::{

@@ -11,8 +11,8 @@ use understudy_wire::{
 use zenoh::Wait;
 
 use crate::channel::{
-    ATTENDANCE_KEY, Gaps, Head, JOURNAL_KEY, REFUSED_KEY, Reporter, SPARE_KEY, SpareReport, TlsKeys, WRITE_KEYS, endpoint, hash_key, insert, prefix,
-    tls_config,
+    ATTENDANCE_KEY, Gaps, Head, JOURNAL_KEY, REFUSED_KEY, Reporter, SPARE_KEY, SpareReport,
+    TlsKeys, WRITE_KEYS, endpoint, hash_key, insert, prefix, tls_config,
 };
 use crate::error::{BusError, reason};
 use crate::refused_orders::RefusedOrder;

@@ -103,9 +103,9 @@ impl Watch {
     /// Reports to the witness that the spare watches, and where it is awake.
     fn report(&self, call: &Call, reported: &mut Reported) {
         let report = SpareReport { spare: self.spare.clone(), serves: self.whereabouts.get() };
-        let is_known = reported.as_ref().is_some_and(|(at, last)| {
-            at.elapsed() < SPARE_REPORTS_EVERY && *last == report
-        });
+        let is_known = reported
+            .as_ref()
+            .is_some_and(|(at, last)| at.elapsed() < SPARE_REPORTS_EVERY && *last == report);
         if !is_known && call.tell(&Request::Spare(report.clone())) {
             *reported = Some((Instant::now(), report));
         }

@@ -155,7 +155,8 @@ impl Group {
             found.map(|(_, text)| text.clone()).ok_or_else(|| "no such file".to_owned())
         });
         let reports = loaded.reports;
-        let cluster = loaded.cluster.ok_or_else(|| failed("cluster.toml", &format!("{reports:?}")))?;
+        let cluster =
+            loaded.cluster.ok_or_else(|| failed("cluster.toml", &format!("{reports:?}")))?;
         let mut group = Self {
             name: name.to_owned(),
             folder: folder.to_owned(),
@@ -208,7 +209,11 @@ impl Group {
         }
         let mut process = command.spawn().map_err(|error| failed(&name, &error))?;
         if let (Member::RemoteIo(program), Some(journal)) = (member, process.stdout.take()) {
-            witness::follow(journal, self.referee(program)?, Arc::clone(&self.counts[program.index()]));
+            witness::follow(
+                journal,
+                self.referee(program)?,
+                Arc::clone(&self.counts[program.index()]),
+            );
         }
         self.processes.insert(name, process);
         Ok(())

@@ -64,7 +64,12 @@ pub(super) fn carry_out(simulation: &mut Simulation, lives: &mut Lives<'_>) {
 }
 
 /// What of a record concerns the campaign.
-pub(super) fn look(now: Time, member: Member, record: Record<'_>, deadlines: &mut Deadlines) -> Option<Seen> {
+pub(super) fn look(
+    now: Time,
+    member: Member,
+    record: Record<'_>,
+    deadlines: &mut Deadlines,
+) -> Option<Seen> {
     match (member, record) {
         (Member::Station(station), Record::Fault(fault)) => match fault.action {
             Action::Crash => Some(Seen::Crashed(station)),

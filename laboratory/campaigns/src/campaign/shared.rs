@@ -241,8 +241,7 @@ fn simulated(
     let mut all = Vec::new();
     for group in 0..u64::from(groups) {
         let mut lives = Lives::new(cluster, plan, number * u64::from(groups) + group);
-        let mut simulation =
-            Simulation::new(parts(cluster), Network::default(), lives.draw_seed());
+        let mut simulation = Simulation::new(parts(cluster), Network::default(), lives.draw_seed());
         simulation.run(0, PATIENCE_CYCLES, &mut |_, _, _, _| {})?;
         lives.begin();
         carry_out(&mut simulation, &mut lives);

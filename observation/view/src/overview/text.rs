@@ -11,7 +11,11 @@ impl PlantOverview {
         let names = self.groups.iter().map(|group| &group.name);
         let names = names.chain(self.spares.iter().map(|spare| &spare.name));
         let width = names.map(|name| name.chars().count()).max().unwrap_or(0).max(5);
-        let _ = writeln!(text, "{:width$}  {:12}  {:>8}  {:>10}  details", "group", "state", "survives", "cycle");
+        let _ = writeln!(
+            text,
+            "{:width$}  {:12}  {:>8}  {:>10}  details",
+            "group", "state", "survives", "cycle"
+        );
         for group in &self.groups {
             let number = |number: Option<i64>| number.map_or("?".to_owned(), |it| it.to_string());
             let mut details = Vec::new();

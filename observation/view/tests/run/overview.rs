@@ -72,7 +72,9 @@ fn the_overview_says_which_group_is_unprotected_and_where_the_spare_is() {
     check(
         [group("line-1", &["robot"], Standby, Some("")), calm("line-2")],
         (SpareState::Asleep, None),
-        &["line-1 is UNPROTECTED (failed: robot): spare-1 wakes when a station has been flagged for 50 cycles"],
+        &[
+            "line-1 is UNPROTECTED (failed: robot): spare-1 wakes when a station has been flagged for 50 cycles",
+        ],
     );
     // It has started its station, which the group does not show yet.
     check(
@@ -94,12 +96,11 @@ fn the_overview_says_which_group_is_unprotected_and_where_the_spare_is() {
         &["line-2 is UNPROTECTED (failed: press): spare-1 serves line-1"],
     );
     check(
-        [
-            group("line-1", &["robot", "understudy"], Publishing, Some("line-1")),
-            calm("line-2"),
-        ],
+        [group("line-1", &["robot", "understudy"], Publishing, Some("line-1")), calm("line-2")],
         (SpareState::Serving, Some("line-1")),
-        &["line-1 is UNPROTECTED (failed: robot, understudy): spare-1 serves it, which is not enough"],
+        &[
+            "line-1 is UNPROTECTED (failed: robot, understudy): spare-1 serves it, which is not enough",
+        ],
     );
 }
 
@@ -126,6 +127,15 @@ fn nothing_that_is_not_observed_counts_as_protected() {
             "line-2 is UNPROTECTED (failed: press): spare-1 is not received",
             "spare-1 is not received by any group: it may not wake",
         ],
+    );
+    // A remote I/O that does not report: the protection of its program is not known.
+    let GroupView::Present(mut silent) = calm("line-2") else { unreachable!("it is present") };
+    silent.programs[1].protection = None;
+    silent.margin.survives = 0;
+    check(
+        [calm("line-1"), GroupView::Present(silent)],
+        (SpareState::Asleep, None),
+        &["line-2 is not observed: protection of press: not reported yet"],
     );
     let overview = PlantOverview::new(&plant(""), &[unknown(), unknown()]);
     assert!(overview.groups.iter().all(|group| group.state == GroupState::NotObserved));

@@ -38,7 +38,10 @@ pub(crate) async fn log_in(
     Ok(([(SET_COOKIE, cookie)], Json(json!({ "person": name }))).into_response())
 }
 
-pub(crate) async fn log_out(State(gate): State<Arc<Gate>>, headers: HeaderMap) -> Answered<Response> {
+pub(crate) async fn log_out(
+    State(gate): State<Arc<Gate>>,
+    headers: HeaderMap,
+) -> Answered<Response> {
     let Some(logins) = &gate.logins else {
         return Err(Problem::bad("this page has no logins"));
     };

@@ -27,10 +27,7 @@ pub struct PlantMachine {
 /// The keys of failure domains.
 const DOMAINS: [&str; 3] = ["rack", "feeder", "switch"];
 
-pub(super) fn machines(
-    root: &DeTable<'_>,
-    diagnostics: &mut Vec<Diagnostic>,
-) -> Vec<PlantMachine> {
+pub(super) fn machines(root: &DeTable<'_>, diagnostics: &mut Vec<Diagnostic>) -> Vec<PlantMachine> {
     let all = tables(root, &MACHINE, diagnostics).unwrap_or_default();
     // A domain that is not known must not count as one of its own.
     for domain in DOMAINS {

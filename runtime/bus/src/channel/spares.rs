@@ -177,9 +177,8 @@ mod tests {
     #[test]
     fn the_number_of_spares_and_their_names_are_bounded() {
         let mut spares = Spares::default();
-        let told = (0..MOST + 5).filter_map(|number| {
-            spares.take(Time(0), report(&format!("spare-{number}"), None))
-        });
+        let told = (0..MOST + 5)
+            .filter_map(|number| spares.take(Time(0), report(&format!("spare-{number}"), None)));
         assert_eq!(told.count(), MOST);
         assert!(report(&"x".repeat(NAME_LENGTH), None).is_bounded());
         assert!(!report(&"x".repeat(NAME_LENGTH + 1), None).is_bounded());
