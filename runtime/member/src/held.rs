@@ -66,7 +66,6 @@ fn new_life(keys: &Arc<MemberKeys>) -> NewLife {
 
 fn channel(keys: Arc<MemberKeys>, cluster: &Cluster) -> ChannelSettings {
     let tls = keys.tls().clone();
-    let schedule = &cluster.agreement().schedule;
     ChannelSettings {
         keys: tls_keys(&tls),
         admitted: Box::new(move || {
@@ -81,7 +80,7 @@ fn channel(keys: Arc<MemberKeys>, cluster: &Cluster) -> ChannelSettings {
         configuration: cluster.canonical_text().to_owned(),
         in_effect: Box::new(InEffect {
             records: RecordsInEffect::default(),
-            attendance: AttendanceCount::new(schedule.stations(), schedule.period()),
+            attendance: AttendanceCount::new(&cluster.agreement().schedule),
         }),
     }
 }

@@ -8,10 +8,12 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 use understudy_wire::{StationId, StationSet};
 
+use crate::Schedule;
+
 /// Time between two reports while nothing changes.
 pub const REPORTED_EVERY: Duration = Duration::from_secs(1);
 
-/// Deadlines for which a station that is missed causes reports at once; an empty slot is missed for longer.
+/// Deadlines for which a station that is missed causes reports at once; after that all spares know of it.
 const AT_ONCE: u32 = 1_000;
 
 /// The stations that a remote I/O misses.
@@ -29,6 +31,8 @@ pub struct AttendanceReport {
 #[derive(Debug, Clone)]
 pub struct AttendanceCount {
     report: AttendanceReport,
+    /// Stations that are missed when they send nothing: all but the slots of spares.
+    expected: StationSet,
     /// Deadlines that pass between two reports while nothing changes.
     every: u64,
     /// Deadlines at the report before.
@@ -39,14 +43,16 @@ pub struct AttendanceCount {
 
 impl AttendanceCount {
     /// No deadline has passed.
-    pub fn new(stations: usize, period: Duration) -> Self {
-        let every = REPORTED_EVERY.as_nanos() / period.as_nanos().max(1);
+    pub fn new(schedule: &Schedule) -> Self {
+        let every = REPORTED_EVERY.as_nanos() / schedule.period().as_nanos().max(1);
+        let stations = schedule.stations();
         Self {
             report: AttendanceReport {
                 deadlines: 0,
                 silent: vec![0; stations],
                 longest: vec![0; stations],
             },
+            expected: schedule.expected(),
             every: u64::try_from(every).unwrap_or(u64::MAX).max(1),
             told: 0,
             is_urgent: true,
@@ -59,10 +65,14 @@ impl AttendanceCount {
         let counts = self.report.silent.iter_mut().zip(&mut self.report.longest);
         for (rank, (silent, longest)) in counts.enumerate() {
             let before = *silent;
-            let is_present = heard.contains(StationId(rank as u8));
+            let station = StationId(rank as u8);
+            let is_present = heard.contains(station);
             *silent = if is_present { 0 } else { silent.saturating_add(1) };
             *longest = (*longest).max(*silent);
-            self.is_urgent |= (1..=AT_ONCE).contains(silent) || is_present && before > 0;
+            let is_missed = self.expected.contains(station) && (1..=AT_ONCE).contains(silent);
+            // The station of a slot begins, or ends.
+            let is_changed = is_present != (before == 0);
+            self.is_urgent |= is_missed || is_changed;
         }
     }
 
@@ -86,13 +96,19 @@ mod tests {
 
     const PERIOD: Duration = Duration::from_millis(10);
 
+    /// Two stations, and the slot of a spare.
+    fn count() -> AttendanceCount {
+        let schedule = Schedule::new(PERIOD, 1, 2, 2).expect("a schedule");
+        AttendanceCount::new(&schedule.with_spare_slots(set(&[2])))
+    }
+
     fn set(ranks: &[u8]) -> StationSet {
         ranks.iter().map(|rank| StationId(*rank)).collect()
     }
 
     #[test]
     fn a_report_is_due_once_a_second_and_at_once_while_a_station_is_missed() {
-        let mut count = AttendanceCount::new(2, PERIOD);
+        let mut count = count();
         count.deadline(set(&[0, 1]));
         assert!(count.take().is_some(), "the first one");
         for _ in 0..99 {
@@ -102,18 +118,19 @@ mod tests {
         count.deadline(set(&[0, 1]));
         assert_eq!(count.take().expect("due").deadlines, 101);
         count.deadline(set(&[0]));
-        assert_eq!(count.take().expect("one is missed").silent, [0, 1]);
+        assert_eq!(count.take().expect("one is missed").silent, [0, 1, 102]);
         count.deadline(set(&[0]));
         count.deadline(set(&[0, 1]));
         let back = count.take().expect("it is back");
-        assert_eq!((back.silent, back.longest), (vec![0, 0], vec![0, 2]));
+        assert_eq!((back.silent, back.longest), (vec![0, 0, 104], vec![0, 2, 104]));
         assert_eq!(count.take(), None);
+        count.deadline(set(&[0, 1, 2]));
+        assert_eq!(count.take().expect("the spare is awake").silent, [0, 0, 0]);
     }
 
-    /// An empty slot does not keep a remote I/O reporting.
     #[test]
     fn a_station_that_is_missed_for_long_is_reported_once_a_second() {
-        let mut count = AttendanceCount::new(2, PERIOD);
+        let mut count = count();
         let mut told = 0;
         for _ in 0..AT_ONCE + 1_000 {
             count.deadline(set(&[0]));
