@@ -189,7 +189,7 @@ fn a_spare_that_reports_to_no_member_is_an_alarm() {
     };
     assert!(model.snapshot().spares.is_empty());
     let elsewhere = Some("line-2".to_owned());
-    let steps: [(u8, HostEvent, (bool, Option<String>), usize); 7] = [
+    let steps = [
         (0, received(None), (true, None), 0),
         (1, received(Some("line-2")), (true, elsewhere.clone()), 0),
         (0, lost(), (true, elsewhere), 0),
