@@ -4,6 +4,7 @@ mod animate;
 pub(crate) mod attach;
 mod diff;
 mod journal;
+pub(crate) mod plant;
 pub(crate) mod top;
 mod view;
 pub(crate) mod watch;

@@ -1,5 +1,6 @@
 //! `understudy allocate`: selection of controllers for programs.
 
+mod plant;
 pub(crate) mod programs;
 mod verified;
 
@@ -19,6 +20,7 @@ use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::deployment::catalogue;
 use crate::files;
+use crate::inspect::plant::is_plant;
 use crate::patience::Patience;
 use crate::run::outcome::command_line;
 use programs::Programs;
@@ -31,14 +33,16 @@ Example:
   understudy allocate examples/press-cell/cluster.toml --reserve 20% --prefer speed --report plan
   understudy allocate examples/press-cell/robot.ladder examples/press-cell/press.ladder --io local --stock \"CPU 1214C=2\"
   understudy allocate examples/boiler/complete.ladder --budget 20s
+  understudy allocate examples/shared-spare/plant.toml
   understudy allocate examples/press-cell/press.ladder --require \"vendor=Siemens\" --require \"inputs>=12\"
 
 A controller is suitable, unsuitable or unknown: an unknown figure never counts as sufficient. Programs are placed only after they have been
-verified. Calculation of requirements and placement: docs/how-to/allocation.md.
+verified. Calculation of requirements and placement: docs/how-to/allocation.md. The stations, understudies and spares of a plant file are placed
+on its machines, so that no machine, rack, feeder or switch takes two of one group.
 
 Exit status: 0 if every program has a controller, 1 if one has none, 2 for invalid input.")]
 pub(crate) struct Arguments {
-    /// Ladder programs or cluster files
+    /// Ladder programs, cluster files, or one plant file
     #[arg(value_name = "PROGRAM", required = true)]
     programs: Vec<PathBuf>,
     /// Location of the I/O terminals; default: remote for a cluster or several programs, local for one program
@@ -147,6 +151,9 @@ fn properties(text: &str) -> Result<(String, PathBuf), String> {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
+    if let Some(path) = arguments.programs.iter().find(|path| is_plant(path)) {
+        return plant::place(arguments, path);
+    }
     let options = options(arguments)?;
     let programs = Programs::read(&arguments.programs, arguments.period)?;
     let (catalogue, about) = catalogue::read(arguments.catalogue.as_deref())?;
@@ -165,6 +172,26 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     let status = if found.is_complete() { Status::Done } else { Status::Failed };
     let answer = Answer::done(answer_text, json!(found)).with_status(status);
     Ok(answer.with_used(programs.reports))
+}
+
+impl Arguments {
+    /// Whether an option of the selection of controllers is given.
+    fn selects_controllers(&self) -> bool {
+        let lists = [
+            self.require.is_empty(),
+            self.assume.is_empty(),
+            self.stock.is_empty(),
+            self.properties.is_empty(),
+        ];
+        let flags = [self.expansion, self.share_members, self.unverified, self.all];
+        lists.contains(&false)
+            || flags.contains(&true)
+            || self.reserve != 0
+            || self.io.is_some()
+            || self.period.is_some()
+            || self.catalogue.is_some()
+            || self.report.is_some()
+    }
 }
 
 /// Text of an error without its code.

@@ -10,21 +10,25 @@ use clap::{Args, Subcommand};
 use serde_json::json;
 use understudy_bus::interruption;
 use understudy_gateway::{
-    Area, Followed, GatewayError, Notified, Rate, RegisterMap, Run, WriteGate, forward_signals,
-    mirror, notify, serve_metrics, serve_modbus,
+    Area, Followed, GatewayError, Notified, PlantMetrics, Rate, RegisterMap, Run, WriteGate,
+    forward_signals, mirror, notify, serve_metrics, serve_modbus,
 };
 use understudy_keys::{Date, OperatorKeys};
 use understudy_member::tls_keys;
+use understudy_view::FollowedPlant;
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
+use crate::inspect::plant;
 use crate::overrides::parse_address;
+use crate::plants;
 
 /// Publish a run by Prometheus, Modbus or Zenoh, and pass its alarms on
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   understudy gateway metrics runs/latest --listen 127.0.0.1:9464
+  understudy gateway metrics plant.toml
   understudy gateway modbus runs/latest --listen 127.0.0.1:1502
   understudy gateway modbus runs/latest --allow-writes
   understudy gateway registers runs/latest
@@ -44,11 +48,15 @@ pub(crate) struct Arguments {
 enum What {
     /// Prometheus metrics at http://ADDRESS/metrics
     #[command(
-        after_help = "Example:\n  understudy gateway metrics runs/latest --once\n  understudy gateway metrics runs/latest --listen 127.0.0.1:9464"
+        after_help = "Example:\n  understudy gateway metrics runs/latest --once\n  understudy gateway metrics runs/latest --listen 127.0.0.1:9464\n  understudy gateway metrics plant.toml\n\nFor a plant file: the remaining redundancy of each group and where each spare is, from the runs that are recorded below --out."
     )]
     Metrics {
-        #[command(flatten)]
-        run: RunArgument,
+        /// Directory of a run, or plant file
+        #[arg(value_name = "RUN|PLANT.toml", default_value = "runs/latest")]
+        run: PathBuf,
+        /// Directory of the runs of a plant's groups
+        #[arg(long, value_name = "DIR", default_value = "runs")]
+        out: PathBuf,
         /// Listening address; port 0 selects a free port
         #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:9464", value_parser = parse_address)]
         listen: SocketAddr,
@@ -136,13 +144,23 @@ impl RunArgument {
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let mut ready = |address| console.note(&format!("listening on {address}"));
     match &arguments.what {
+        What::Metrics { run, out, listen, once } if plant::is_plant(run) => {
+            let (plant, _) = plants::valid(run)?;
+            let metrics = PlantMetrics::new(FollowedPlant::new(plant), out.clone());
+            if *once {
+                let metrics = metrics.exposition();
+                return Ok(Answer::done(metrics.as_str(), json!({ "text": metrics })));
+            }
+            serve_metrics(move || Ok(metrics.exposition()), *listen, &mut ready).map_err(failed)?;
+            Ok(ended())
+        }
         What::Metrics { run, once, .. } if *once => {
-            let metrics = understudy_gateway::exposition_of(&run.open()?).map_err(failed)?;
+            let metrics = understudy_gateway::exposition_of(&Run::open(run)?).map_err(failed)?;
             Ok(Answer::done(metrics.as_str(), json!({ "text": metrics })))
         }
         What::Metrics { run, listen, .. } => {
-            let run = Followed::new(&run.open()?).map_err(failed)?;
-            serve_metrics(&run, *listen, &mut ready).map_err(failed)?;
+            let run = Followed::new(&Run::open(run)?).map_err(failed)?;
+            serve_metrics(run.exposition(), *listen, &mut ready).map_err(failed)?;
             Ok(ended())
         }
         What::Modbus { run, listen, allow_writes } => {

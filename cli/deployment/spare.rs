@@ -25,7 +25,7 @@ Example:
   understudy spare plant.toml --name spare-1 --keys keys
 
 The folder of --keys has a folder for each group, with the keys of the slot and those of a viewer with the name of the spare:
-keys/line-1/spare and keys/line-1/spare-1. The spare follows the journals of up to three remote I/Os of each group. When a station has been
+keys/line-1/spare and keys/line-1/spare-1. The spare follows the reports of up to three remote I/Os of each group. When a station has been
 flagged for `spare_after` cycles, the spare runs the station of its slot until the group is complete without it (docs/how-to/spares.md).
 SIGINT and SIGTERM end the spare and its station.")]
 pub(crate) struct Arguments {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 use clap::Args;
-use understudy_attach::{AttachError, Attached, find};
+use understudy_attach::{AttachError, Attached, Found, find};
 use understudy_cluster::{Cluster, Security};
 use understudy_journal::{RunDirectory, keep_cluster};
 use understudy_keys::{Date, OperatorKeys};
@@ -39,6 +39,16 @@ impl AttachArguments {
         self.keys.is_some()
     }
 
+    /// Whether addresses are overridden.
+    pub(crate) fn has_endpoints(&self) -> bool {
+        self.endpoints.is_some()
+    }
+
+    /// The same for a group of a plant: the folder of the keys has a folder for each group.
+    pub(crate) fn of_group(&self, group: &str) -> Self {
+        Self { keys: self.keys.as_ref().map(|folder| folder.join(group)), endpoints: None }
+    }
+
     /// Connects to the members and writes their journals to a run below `out`. Answers also with the person of the keys.
     pub(crate) fn attach(
         &self,
@@ -48,6 +58,19 @@ impl AttachArguments {
         journal_limit: u64,
         console: &mut Console,
     ) -> Result<(RunDirectory, Attached, String), Answer> {
+        let (found, person) = self.find(cluster)?;
+        let (heard, unheard) = found.names();
+        console.note(&format!("attached to {}", heard.join(", ")));
+        if !unheard.is_empty() {
+            let unheard = unheard.join(", ");
+            console.note(&format!("not received, retrying: {unheard}"));
+        }
+        let (directory, attached) = record(found, cluster_file, cluster, out, journal_limit)?;
+        Ok((directory, attached, person))
+    }
+
+    /// Connects to the members. Answers also with the person of the keys.
+    pub(crate) fn find(&self, cluster: &Cluster) -> Result<(Found, String), Answer> {
         if cluster.security() == Security::Off {
             let error = AttachError::NoKeys;
             return Err(Answer::failed(Status::BadInput, error.code(), error));
@@ -58,19 +81,24 @@ impl AttachArguments {
         let peers = peers(cluster, self.endpoints.as_deref())?;
         let found = find(cluster, tls_keys(&keys.tls), peers)
             .map_err(|error| Answer::failed(Status::Failed, error.code(), error))?;
-        let (heard, unheard) = found.names();
-        console.note(&format!("attached to {}", heard.join(", ")));
-        if !unheard.is_empty() {
-            let unheard = unheard.join(", ");
-            console.note(&format!("not received, retrying: {unheard}"));
-        }
-        let directory = files::run_directory(out)?;
-        keep_cluster(directory.path(), cluster_file, cluster).map_err(files::unwritable_run)?;
-        let attached = found
-            .record(&directory, journal_limit)
-            .map_err(|error| Answer::failed(Status::Failed, error.code(), error))?;
-        Ok((directory, attached, keys.name))
+        Ok((found, keys.name))
     }
+}
+
+/// Writes the journals of members to a new run below `out`.
+pub(crate) fn record(
+    found: Found,
+    cluster_file: &Path,
+    cluster: &Cluster,
+    out: &Path,
+    journal_limit: u64,
+) -> Result<(RunDirectory, Attached), Answer> {
+    let directory = files::run_directory(out)?;
+    keep_cluster(directory.path(), cluster_file, cluster).map_err(files::unwritable_run)?;
+    let attached = found
+        .record(&directory, journal_limit)
+        .map_err(|error| Answer::failed(Status::Failed, error.code(), error))?;
+    Ok((directory, attached))
 }
 
 /// A member of the cluster file that accepts connections at its address: the cluster is running.

@@ -7,6 +7,7 @@ use clap::Args;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::{self, KeyCode, KeyEventKind, KeyModifiers};
+use ratatui::widgets::{Paragraph, Wrap};
 use understudy_attach::Attached;
 use understudy_journal::{Commander, JOURNAL_LIMIT_BYTES, RunDirectory};
 use understudy_view::{Alarm, Bounds, Following, Key, Model, Run, Screen, Zone};
@@ -15,6 +16,7 @@ use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::files;
 use crate::inspect::attach::AttachArguments;
+use crate::inspect::plant::{self, OpenedPlant};
 use crate::inspect::view::{RunArgument, ZoneArgument};
 
 /// Show a live view of a run on the terminal
@@ -25,8 +27,10 @@ Example:
   understudy top runs/latest --once
   understudy top examples/press-cell/cluster.toml
   understudy top cell/cluster.toml --keys keys/members/engineer
+  understudy top plant.toml --once
 
-For a cluster file the newest run below --out is shown. Keys: q quit, space pause, tab events, alarms and remaining redundancy,
+For a cluster file the newest run below --out is shown, for a plant file the remaining redundancy of all groups and where each spare is
+(docs/how-to/spares.md). Keys: q quit, space pause, tab events, alarms and remaining redundancy,
 a acknowledge, arrows scroll, h help. With --once or --json the current state is printed.")]
 pub(crate) struct Arguments {
     #[command(flatten)]
@@ -54,6 +58,9 @@ const HEARD_FOR: Duration = Duration::from_secs(20);
 const ALL_SAY: Duration = Duration::from_secs(1);
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
+    if plant::is_plant(&arguments.run.run) {
+        return of_plant(arguments, console);
+    }
     let (run, attached) = open(arguments, console)?;
     if console.is_json() || arguments.once {
         if attached.is_some() {
@@ -64,11 +71,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         let snapshot = model.snapshot();
         return Ok(Answer::done(printed(&mut screen, &model)?, &snapshot));
     }
-    if !io::stdout().is_terminal() || !io::stdin().is_terminal() {
-        let message = "not a terminal: use --once to print the current state";
-        return Err(Answer::failed(Status::BadInput, "U0578", message));
-    }
-    let mut terminal = ratatui::try_init().map_err(failed)?;
+    let mut terminal = terminal()?;
     let (commander, owner) = match &attached {
         Some((_, attached, person)) => (attached.commander(), person.clone()),
         None => (run.commander(), owner()),
@@ -77,6 +80,50 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     ratatui::restore();
     shown.map_err(failed)?;
     Ok(Answer::done("", ()))
+}
+
+fn terminal() -> Result<ratatui::DefaultTerminal, Answer> {
+    if !io::stdout().is_terminal() || !io::stdin().is_terminal() {
+        let message = "not a terminal: use --once to print the current state";
+        return Err(Answer::failed(Status::BadInput, "U0578", message));
+    }
+    ratatui::try_init().map_err(failed)
+}
+
+/// All groups of a plant file.
+fn of_plant(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
+    let RunArgument { run: path, out } = &arguments.run;
+    let mut plant = plant::open(path, out, &arguments.elsewhere, JOURNAL_LIMIT_BYTES, console)?;
+    if console.is_json() || arguments.once {
+        let overview = plant.settled();
+        return Ok(Answer::done(overview.text(), &overview));
+    }
+    let mut terminal = terminal()?;
+    let shown = show_plant(&mut terminal, &mut plant);
+    ratatui::restore();
+    shown.map_err(failed)?;
+    Ok(Answer::done("", ()))
+}
+
+/// Shows a plant until the user quits.
+fn show_plant(terminal: &mut ratatui::DefaultTerminal, plant: &mut OpenedPlant) -> io::Result<()> {
+    loop {
+        let text = plant.look().text();
+        terminal.draw(|frame| {
+            let shown = Paragraph::new(text).wrap(Wrap { trim: false });
+            frame.render_widget(shown, frame.area());
+        })?;
+        if event::poll(LOOK)?
+            && let event::Event::Key(pressed) = event::read()?
+        {
+            let control = pressed.modifiers.contains(KeyModifiers::CONTROL);
+            match pressed.code {
+                KeyCode::Char('q') | KeyCode::Esc => return Ok(()),
+                KeyCode::Char('c') if control => return Ok(()),
+                _ => {}
+            }
+        }
+    }
 }
 
 /// Waits until remote members have reported cycles.

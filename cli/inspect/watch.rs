@@ -8,13 +8,16 @@ use serde::Serialize;
 use understudy_cluster::Cluster;
 use understudy_journal::{Commander, Commands, commands};
 use understudy_scenarios::{MAXIMUM_CYCLES, Scenario};
-use understudy_view::{Run, find_running};
-use understudy_watch::{Certificate, Commanding, Logins, Served, Settings, WatchError, serve};
+use understudy_view::{FollowedPlant, Run, find_running};
+use understudy_watch::{
+    Certificate, Commanding, Logins, Place, Served, Settings, WatchError, serve, serve_plant,
+};
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
 use crate::files;
 use crate::inspect::attach::{AttachArguments, who_runs_already};
+use crate::inspect::plant;
 use crate::overrides::parse_address;
 use crate::run::lab::{RunArguments, judged};
 use crate::run::wakefulness;
@@ -31,13 +34,15 @@ Example:
   understudy watch runs/latest
   understudy watch runs/latest --address 0.0.0.0:7480 --logins logins.txt
   understudy watch cell/cluster.toml --keys keys/members/engineer
+  understudy watch plant.toml --keys keys
 
 If a laboratory of the cluster is already running below --out, the page shows that run. The page is read-only by default;
---allow-commands enables commands. At an address that other machines can reach, the page is served over TLS to the users of the --logins
+--allow-commands enables commands. For a plant file the page shows the remaining redundancy of all groups and where each spare is; --keys is
+then a folder with a folder of an operator's keys for each group (docs/how-to/spares.md). At an address that other machines can reach, the page is served over TLS to the users of the --logins
 file (docs/reference/watch.md).")]
 pub(crate) struct Arguments {
-    /// Cluster file to run or attach to, or directory of a run
-    #[arg(value_name = "CLUSTER.toml|RUN")]
+    /// Cluster file to run or attach to, directory of a run, or plant file
+    #[arg(value_name = "CLUSTER.toml|RUN|PLANT.toml")]
     target: PathBuf,
     /// Address of the page
     #[arg(long, value_name = "ADDRESS", default_value_t = ADDRESS, value_parser = parse_address)]
@@ -144,25 +149,30 @@ impl Page {
         commanding: Commanding,
         console: &mut Console,
     ) -> Result<Served, Answer> {
-        let logins = self.arguments.logins.as_deref().map(Logins::of_file);
+        let served = self
+            .place()
+            .and_then(|place| serve(Settings { run: run.to_owned(), place, commanding }));
+        let served = served.map_err(|error| failed(&error))?;
+        note_place(&served, "page of the run", console);
+        Ok(served)
+    }
+
+    fn place(&self) -> Result<Place, WatchError> {
         let certificate = self.arguments.certificate.clone();
         let key = self.arguments.private_key.clone();
-        let served = logins.transpose().and_then(|logins| {
-            serve(Settings {
-                run: run.to_owned(),
-                address: self.address,
-                commanding,
-                logins,
-                certificate: certificate.zip(key).map(|(chain, key)| Certificate { chain, key }),
-                names: self.arguments.known_as.clone(),
-            })
-        });
-        let served = served.map_err(|error| failed(&error))?;
-        console.note(&format!("page of the run: {}", served.url()));
-        if let Some(fingerprint) = served.fingerprint() {
-            console.note(&format!("SHA-256 of the certificate: {fingerprint}"));
-        }
-        Ok(served)
+        Ok(Place {
+            address: self.address,
+            logins: self.arguments.logins.as_deref().map(Logins::of_file).transpose()?,
+            certificate: certificate.zip(key).map(|(chain, key)| Certificate { chain, key }),
+            names: self.arguments.known_as.clone(),
+        })
+    }
+}
+
+fn note_place(served: &Served, page: &str, console: &mut Console) {
+    console.note(&format!("{page}: {}", served.url()));
+    if let Some(fingerprint) = served.fingerprint() {
+        console.note(&format!("SHA-256 of the certificate: {fingerprint}"));
     }
 }
 
@@ -184,11 +194,36 @@ struct Watched {
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let page = Page { address: arguments.address, arguments: arguments.page.clone(), stays: false };
-    if arguments.target.is_dir() {
+    if plant::is_plant(&arguments.target) {
+        watch_plant(arguments, &page, console)
+    } else if arguments.target.is_dir() {
         watch_run(&arguments.target, &page, console)
     } else {
         watch_cluster(arguments, &page, console)
     }
+}
+
+/// Shows all groups of a plant file.
+fn watch_plant(
+    arguments: &Arguments,
+    page: &Page,
+    console: &mut Console,
+) -> Result<Answer, Answer> {
+    if page.may_command() || arguments.start {
+        let message = "the page of a plant is read-only and starts nothing: use --allow-commands and --start with the cluster file of a group";
+        return Err(Answer::failed(Status::BadInput, "U0600", message));
+    }
+    let (target, run) = (&arguments.target, &arguments.run);
+    let plant = plant::open(target, &run.out, &arguments.elsewhere, run.journal_limit, console)?;
+    let served = page.place().and_then(|place| {
+        let (runs, groups) = (plant.runs.clone(), FollowedPlant::new(plant.plant.plant().clone()));
+        serve_plant(groups, runs, place)
+    });
+    let served = served.map_err(|error| failed(&error))?;
+    note_place(&served, "page of the plant", console);
+    served.until_asked_to_end().map_err(|error| failed(&error))?;
+    let target = target.display().to_string();
+    Ok(Answer::done(format!("watched: {target}\n"), Watched { run: target }))
 }
 
 /// Shows a cluster: on other machines, in a running laboratory, or in a new one.

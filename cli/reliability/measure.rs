@@ -6,10 +6,11 @@ use std::time::{Duration, SystemTime};
 
 use clap::Args;
 use understudy_campaigns::{
-    Measured, Planned, Question, QuestionError, RealCampaign, Speed, hold_against_model,
-    plan_campaign, run_campaign, run_real_campaign,
+    Measured, Planned, Question, QuestionError, RealCampaign, SpareTimes, Speed,
+    hold_against_model, measure_shared, plan_campaign, run_campaign, run_real_campaign,
 };
 use understudy_cluster::Cluster;
+use understudy_cycle::Mode;
 use understudy_processes::{LaboratoryError, Progress};
 use understudy_reliability::{Hours, Options};
 
@@ -30,11 +31,15 @@ const LONGEST_LIMIT: Duration = Duration::from_secs(365 * 24 * 3600);
 Example:
   understudy measure examples/press-cell/cluster.toml --mtbf 25h --mttr 30min --failures 200 --seed 1
   understudy measure examples/press-cell/cluster.toml --real --mtbf 3s --mttr 200ms --failures 5
+  understudy measure examples/shared-spare/line-1/cluster.toml --groups 2 --mtbf 10000s --mttr 1000s --cycles-per-mttr 2000 --failures 20
 
 Stations fail and are repaired at random until the system fails. The protocol itself is not accelerated: its time to detect a failure and to
 transfer states is measured and added to the repair time of the model, and the resulting bias is printed. The system fails when a remote
 I/O becomes fail-safe because no station holds the state of its program; in paper mode, at the second failure. Equal arguments and seeds
 give equal simulated campaigns.
+
+With --groups N, copies of the cluster share as many spares as it has slots (`spare = true`), which wake by their rule
+(docs/how-to/spares.md).
 
 Exit status: 1 if the model is outside of the 95 % confidence interval, as happens to a correct model in one of twenty campaigns.")]
 pub(crate) struct Arguments {
@@ -67,6 +72,12 @@ pub(crate) struct Arguments {
     /// Acceleration, as the number of cycles of a mean repair
     #[arg(long, value_name = "CYCLES", allow_hyphen_values = true)]
     cycles_per_mttr: Option<f64>,
+    /// Number of groups, each a copy of the cluster, that share the spares of its slots
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100), conflicts_with_all = ["real", "crews", "report"])]
+    groups: Option<u32>,
+    /// Cycles for which a station must be flagged before a spare wakes
+    #[arg(long, value_name = "N", default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=100_000), requires = "groups")]
+    spare_after: u32,
     /// Kill (kill -9) and restart processes of this machine instead of simulated stations; Ctrl-C ends the measurement with partial results
     #[arg(long)]
     real: bool,
@@ -120,6 +131,9 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         forced: arguments.force,
     };
     let planned = plan_campaign(&cluster, &question).map_err(|errors| not_begun(&errors))?;
+    if let Some(groups) = arguments.groups {
+        return with_spares(arguments, &cluster, &planned, groups, console);
+    }
     let (measured, run) = if arguments.real {
         on_processes(arguments, &cluster, &planned, limit, console)?
     } else {
@@ -156,6 +170,39 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
         }
     }
     Ok(answer)
+}
+
+/// Cycles for which a group must be complete before its spare retires: the model has it free at once.
+const RETIRE_AFTER: u32 = 10;
+
+/// Groups that share spares.
+fn with_spares(
+    arguments: &Arguments,
+    cluster: &Cluster,
+    planned: &Planned,
+    groups: u32,
+    console: &mut Console,
+) -> Result<Answer, Answer> {
+    if cluster.agreement().schedule.spare_slots().is_empty() || cluster.lasting_understudies() != 1
+    {
+        let message = "--groups is for a cluster with one understudy and a slot (`spare = true`)";
+        return Err(Answer::failed(Status::BadInput, "U0600", message));
+    }
+    if cluster.agreement().mode == Mode::Paper {
+        let message = "--groups is for mode `full`: in mode `paper` a spare masks nothing";
+        return Err(Answer::failed(Status::BadInput, "U0600", message));
+    }
+    planned.check_length().map_err(|error| not_begun(&[error]))?;
+    let times = SpareTimes { spare_after: arguments.spare_after, retire_after: RETIRE_AFTER };
+    let of = planned.plan.failures;
+    let found = measure_shared(cluster, planned, groups, times, &mut |done| {
+        console.show(&Progress::Failure { done, of });
+    });
+    console.show(&Progress::Ending);
+    let found = found.map_err(|error| Answer::failed(Status::Failed, "U0530", error))?;
+    let found = found.map_err(|errors| refused(&errors))?;
+    let status = if found.is_met() { Status::Done } else { Status::Failed };
+    Ok(Answer::done(found.to_text(), &found).with_status(status))
 }
 
 fn in_the_simulator(

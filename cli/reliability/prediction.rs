@@ -78,13 +78,25 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "P", conflicts_with_all = UNSHARED)]
     shared_spares: Option<u32>,
     /// Mean time from a failure to the first turn of the spare that wakes
-    #[arg(long, value_name = "TIME", default_value = "1s", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "TIME",
+        default_value = "1s",
+        allow_hyphen_values = true,
+        requires = "shared_spares"
+    )]
     wake: String,
     /// Probability that a spare wakes
-    #[arg(long, value_name = "C", default_value_t = 1.0, allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "C",
+        default_value_t = 1.0,
+        allow_hyphen_values = true,
+        requires = "shared_spares"
+    )]
     wake_coverage: f64,
     /// Number of the groups that are too large for the capacity of the spares
-    #[arg(long, value_name = "G", default_value_t = 0)]
+    #[arg(long, value_name = "G", default_value_t = 0, requires = "shared_spares")]
     too_large: u32,
     /// Mean time to detect a failure, before the repair starts
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]

@@ -65,6 +65,10 @@ pub(crate) struct Arguments {
     /// Run only part K of N of this seed; `merge` combines the parts
     #[arg(long, value_name = "K/N", default_value = "1/1", requires = "seed")]
     shard: Shard,
+    /// The spares of the cluster wake when a station has been flagged for N cycles, and retire when the cluster has been complete for as many;
+    /// without it they do not wake
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    spare_after: Option<u32>,
     #[command(flatten)]
     overrides: OverrideArguments,
     /// Directory for the findings; without it they are only printed
@@ -122,6 +126,13 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
 
 fn campaign(arguments: &Arguments, path: &Path, console: &mut Console) -> Result<Answer, Answer> {
     let (cluster, reports) = files::cluster(path, arguments.overrides.overrides())?;
+    if arguments.spare_after.is_some() && cluster.agreement().schedule.spare_slots().is_empty() {
+        let message = format!(
+            "--spare-after is for a cluster with a slot (`spare = true`), and {} has none",
+            path.display()
+        );
+        return Err(Answer::failed(Status::BadInput, "U0600", message));
+    }
     let mut kinds: Vec<Kind> = arguments.faults.iter().flatten().copied().collect();
     if kinds.is_empty() {
         kinds = Kind::masked_by(cluster.lasting_understudies());
@@ -140,6 +151,7 @@ fn campaign(arguments: &Arguments, path: &Path, console: &mut Console) -> Result
         },
         kinds,
         shard: arguments.shard,
+        spare_after: arguments.spare_after,
     };
     let processors = std::thread::available_parallelism().map_or(1, usize::from);
     let threads = arguments.jobs.map_or(processors, usize::from);

@@ -33,6 +33,7 @@ pub(crate) static SCENARIO: Table = Table {
         required("title", Kind::Text),
         required("cycles", Kind::Count(1, MAXIMUM_CYCLES)),
         key("seed", ANY),
+        key("spare_after", Kind::Count(1, 100_000)),
         key("step", Kind::List(&Kind::Table(&STEP))),
         key("network", Kind::Table(&NETWORK)),
         key("expect", Kind::Table(&EXPECTATION)),

@@ -95,6 +95,7 @@ impl Reader<'_> {
         // Later checks need some end; an unknown one must not bring further errors.
         let end = cycles.unwrap_or(MAXIMUM_CYCLES);
         let seed = fields.format_count("seed", found);
+        let spare_after = fields.format_count("spare_after", found);
         let steps = fields.format_tables("step", found);
         let network = fields.format_table("network", found);
         let expect = fields.format_table("expect", found);
@@ -107,6 +108,7 @@ impl Reader<'_> {
             title: title?.value.to_owned(),
             cycles: cycles?,
             seed: seed.map(|seed| seed.value),
+            spare_after: spare_after.map(|cycles| cycles.value as u32),
             steps,
             network: disturbance.as_ref().map(|disturbance| disturbance.network),
             network_cycles: disturbance.and_then(|disturbance| disturbance.cycles),

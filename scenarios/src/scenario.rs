@@ -10,7 +10,7 @@ use std::ops::Range;
 use serde::Serialize;
 use understudy_cluster::value_text;
 use understudy_journal::{Members, NamedSignal};
-use understudy_simulator::{Action, Disturbance, Fault, Network};
+use understudy_simulator::{Action, Disturbance, Fault, Network, SpareTimes};
 use understudy_wire::{Member, PointValue, ProgramId, SignalPlace, Source};
 
 /// A scenario whose names belong to a cluster.
@@ -22,6 +22,10 @@ pub struct Scenario {
     pub cycles: u64,
     /// What all chance of a simulated run comes from, where the command line does not say.
     pub seed: Option<u64>,
+    /// Cycles for which a station must be flagged before the spares of the cluster wake by their rule; they retire when the cluster has been complete
+    /// for as many. Nothing where only steps start them. Only the simulator does that.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spare_after: Option<u32>,
     /// What is done to whom, in the order of its times.
     pub steps: Vec<Fault>,
     /// Faults of the network; only the simulator has them.
@@ -39,6 +43,12 @@ impl Scenario {
     /// What a simulated network is, and when.
     pub fn disturbance(&self) -> Option<Disturbance> {
         Some(Disturbance { network: self.network?, cycles: self.network_cycles.clone() })
+    }
+
+    /// When spares wake and retire by their rule.
+    pub fn spare_times(&self) -> Option<SpareTimes> {
+        let spare_after = self.spare_after?;
+        Some(SpareTimes { spare_after, retire_after: spare_after })
     }
 
     /// Whether it does nothing to the cluster and expects nothing of it: a cluster that merely runs.

@@ -38,6 +38,9 @@ pub fn simulate(
     if let Some(disturbance) = scenario.disturbance() {
         simulation.disturb(disturbance);
     }
+    if let Some(times) = scenario.spare_times() {
+        simulation.with_spares(times);
+    }
     for fault in &scenario.steps {
         simulation.schedule(*fault);
     }

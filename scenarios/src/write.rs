@@ -21,6 +21,9 @@ pub fn write(scenario: &Scenario, members: &Members, remarks: &[String]) -> Stri
     if let Some(seed) = scenario.seed {
         let _ = writeln!(text, "seed = {seed}");
     }
+    if let Some(cycles) = scenario.spare_after {
+        let _ = writeln!(text, "spare_after = {cycles}");
+    }
     if let Some(disturbance) = scenario.disturbance() {
         write_network(&mut text, &disturbance);
     }

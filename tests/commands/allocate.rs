@@ -227,3 +227,45 @@ fn a_controller_is_removed_from_a_file_and_no_other_is() {
     );
     assert!(!left.output.contains("Works A1"), "{}", left.shown());
 }
+
+const PLANT: &str = "examples/shared-spare/plant.toml";
+
+/// The example, with one rack less: the spare and the stations of a line cannot be kept apart.
+#[test]
+fn a_plant_is_placed_by_failure_domain_or_the_domains_are_named() {
+    assert_snapshot!(understudy(&["allocate", PLANT]).shown());
+    let folder = empty_folder("allocate-plant");
+    let source = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/shared-spare");
+    for line in ["line-1", "line-2"] {
+        fs::create_dir_all(folder.join(line)).expect("a folder");
+        for file in ["cluster.toml", "robot.ladder", "press.ladder"] {
+            fs::copy(source.join(line).join(file), folder.join(line).join(file)).expect("whole");
+        }
+    }
+    let text = fs::read_to_string(source.join("plant.toml")).expect("the example is whole");
+    let plant = folder.join("plant.toml");
+    fs::write(&plant, text.replace("\"rack-4\"", "\"rack-1\"")).expect("it is ours");
+    let plant = plant.to_str().expect("text");
+    let answer = understudy(&["allocate", plant, "--json"]);
+    let document = answer.json();
+    assert_eq!(document["status"], 1, "{document:#}");
+    let failures = document["failures"].as_array().expect("a list");
+    let said = |group: &str, failure: &Value| {
+        let message = failure["message"].as_str().unwrap_or_default();
+        failure["code"] == "U1146"
+            && message.starts_with(&format!("group `{group}`: "))
+            && message.ends_with(
+                "share rack `rack-1`: the group has 4 roles with its spares, and there are 3 such domains",
+            )
+    };
+    for group in ["line-1", "line-2"] {
+        assert!(failures.iter().any(|failure| said(group, failure)), "{failures:#?}");
+    }
+    // Without machines there is nothing to place on, and options of the catalogue are not ignored.
+    let bare = text.split("[[machine]]").next().expect("a beginning");
+    fs::write(plant, bare).expect("it is ours");
+    let document = understudy(&["allocate", plant, "--json"]).json();
+    assert_eq!(document["failures"][0]["code"], "U1147", "{document:#}");
+    let document = understudy(&["allocate", PLANT, "--stock", "CPU 224=2", "--json"]).json();
+    assert_eq!(document["failures"][0]["code"], "U0600", "{document:#}");
+}

@@ -76,6 +76,16 @@ fn shared_spares_are_compared_with_pairs() {
     let refused =
         reliability(&[&["--controllers", "4", "--shared-spares", "9"], &RATES[..]].concat());
     assert_eq!(refused.status, 2, "{}", refused.errors);
+    // Options of spares are not ignored without spares, and one group at least is small enough for them.
+    for option in [["--wake", "2s"], ["--wake-coverage", "0.9"], ["--too-large", "1"]] {
+        let alone = reliability(&[&["--controllers", "4"], &option[..], &RATES[..]].concat());
+        assert!(alone.status == 2 && alone.errors.contains("--shared-spares"), "{}", alone.errors);
+    }
+    let none = ["--controllers", "8", "--groups", "2", "--shared-spares", "1", "--too-large", "2"];
+    let refused = reliability(&[&none[..], &RATES[..]].concat());
+    let wanted =
+        "the number of groups that are too large for the spares is 2; it must be between 0 and 1";
+    assert!(refused.status == 2 && refused.errors.contains(wanted), "{}", refused.errors);
 }
 
 #[test]

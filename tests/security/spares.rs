@@ -60,8 +60,11 @@ impl Plant {
     /// All members of a group but its spare, with keys for the spare.
     fn start(&self, group: &str) -> Deployed {
         let own = self.folder.join(group);
-        let deployed = Deployed::of(&own, own.join("cluster.toml"), &["spare-1"]);
+        let deployed = Deployed::of(&own, own.join("cluster.toml"), &["spare-1", "desk"]);
         self.link_keys(group);
+        let desk = self.folder.join("desk");
+        fs::create_dir_all(&desk).expect("a folder");
+        symlink(own.join("keys/members/desk"), desk.join(group)).expect("a link");
         deployed
     }
 
@@ -82,6 +85,30 @@ impl Plant {
             .stderr(fs::File::create(self.folder.join("spare.errors")).expect("a file"))
             .spawn();
         Running(child.expect("the binary is built"))
+    }
+
+    /// Attaches to all groups for the overview of the plant, and records below `runs`.
+    fn desk(&self) -> Running {
+        let (plant, keys) = (self.folder.join("plant.toml"), self.folder.join("desk"));
+        let watch = ["watch", text(&plant), "--address", "127.0.0.1:0", "--keys", text(&keys)];
+        let child = understudy(&[&watch[..], &["--out"]].concat())
+            .arg(self.folder.join("runs"))
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(fs::File::create(self.folder.join("desk.errors")).expect("a file"))
+            .spawn();
+        Running(child.expect("the binary is built"))
+    }
+
+    /// Until the overview of the plant contains each of these texts.
+    fn overview_has(&self, wanted: &[&str]) {
+        let (plant, runs) = (self.folder.join("plant.toml"), self.folder.join("runs"));
+        let top = ["top", text(&plant), "--once", "--json", "--out", text(&runs)];
+        let look = || {
+            let answer = understudy(&top).output().expect("it runs");
+            String::from_utf8_lossy(&answer.stdout).into_owned()
+        };
+        until(&look, &|found| wanted.iter().all(|text| found.contains(text)));
     }
 
     /// Until the spare has reported this.
@@ -156,6 +183,8 @@ fn a_spare_masks_the_second_failure_and_retires_when_the_station_is_back() {
             protection_is(deployed, name, 1, "protected");
         }
     }
+    let mut desk = plant.desk();
+    plant.overview_has(&[r#""alarms":[]"#, r#""state":"asleep""#]);
     groups[0].signal("robot", Signal::SIGKILL);
     plant.reported("line-1: wakes as spare; failed: robot (flagged for 10 cycles)");
     plant.reported("line-1: publishes");
@@ -183,6 +212,11 @@ fn a_spare_masks_the_second_failure_and_retires_when_the_station_is_back() {
     groups[1].signal("understudy", Signal::SIGKILL);
     plant.reported("line-2: publishes");
     plant.slot_is_taken("line-2", true);
+    // A failure in each group, and capacity for one: the overview names the other.
+    groups[0].signal("robot", Signal::SIGKILL);
+    plant.overview_has(&["line-1 is UNPROTECTED (failed: robot): spare-1 serves line-2"]);
+    assert!(terminate(&mut desk).success());
+    plant.overview_has(&["line-1 is not observed: no process records its run"]);
     assert!(terminate(&mut spare).success());
     plant.slot_is_taken("line-2", false);
     let mut spare = plant.spare();

@@ -4,7 +4,9 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 use serde_json::json;
-use understudy_reliability::{Hours, Options, Probability, SharedSpares, grouped};
+use understudy_reliability::{
+    Hours, Options, Probability, ReliabilityError, SharedSpares, grouped,
+};
 
 use super::{Arguments, Times, refused};
 use crate::answer::Answer;
@@ -27,6 +29,15 @@ pub(super) fn compared(
     let wake = times.required("wake", Some(&arguments.wake));
     let coverage = Probability::new("the coverage of the wake-up", arguments.wake_coverage);
     times.finish(coverage.clone().err().into_iter().collect())?;
+    if arguments.too_large >= options.groups {
+        let wrong = ReliabilityError::Count {
+            what: "the number of groups that are too large for the spares".to_owned(),
+            count: u64::from(arguments.too_large),
+            minimum: 0,
+            maximum: u64::from(options.groups.saturating_sub(1)),
+        };
+        return Err(refused(&[wrong]));
+    }
     let (wake, coverage): (Option<Hours>, _) = (wake, coverage.unwrap_or(Probability::ONE));
     let pairs = options.system().and_then(|system| system.copies_chain(2));
     let pairs = pairs.map_err(|errors| refused(&errors))?;

@@ -5,12 +5,15 @@
 //! controllers is that of the paper on the deployment of controllers, sections 2 and 3; what it adds is the plant's
 //! redundancy: one failure must not take two.
 //!
+//! [`distribute`] places the stations, understudies and spares of a plant on the machines that it has, by failure domain.
+//!
 //! Unknown is unknown: a figure that is not in the catalogue never counts as 0 and never as enough.
 
 mod additions;
 mod allocate;
 mod controller;
 mod csv;
+mod domains;
 mod ethernet;
 mod figures;
 pub mod file;
@@ -32,6 +35,7 @@ pub use allocate::{
     Verification, allocate,
 };
 pub use controller::{Catalogue, Controller, Family, Kind};
+pub use domains::{Conflict, Distribution, Domain, Machine, PlantRole, Shortage, distribute};
 pub use figures::{FamilyQuantity, Figure, Quantity, Statement};
 pub use fit::{Dimension, Finding, Fit, Load, Verdict, fit};
 pub use instructions::{Instruction, Operator, instructions};

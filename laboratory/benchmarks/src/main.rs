@@ -11,6 +11,7 @@ mod log;
 mod memory;
 mod scan;
 mod simulate;
+mod spares;
 mod timing;
 
 use std::process::ExitCode;
@@ -36,6 +37,7 @@ Example:
   understudy-bench join --trials 50 --loss 10%
   understudy-bench log --cycles 2000
   understudy-bench timing --controllers 4,16 --period 10ms --seconds 10
+  understudy-bench spares --rounds 200
 
 Exit status: 0 if the targets are met, 1 if not, 2 for invalid input."
 )]
@@ -58,6 +60,7 @@ enum Benchmark {
     Memory(memory::Arguments),
     Scan(scan::Arguments),
     Timing(timing::Arguments),
+    Spares(Box<spares::Arguments>),
     #[command(hide = true)]
     Member(exchange::MemberArguments),
     #[command(hide = true)]
@@ -85,6 +88,7 @@ impl Benchmark {
             Self::Scan(arguments) => ("scan", scan::run(arguments).into()),
             Self::Timing(arguments) => ("timing", timing::run(arguments, console).into()),
             Self::Timed(arguments) => ("timed", timing::run_timed(arguments)),
+            Self::Spares(arguments) => ("spares", spares::run(arguments, console).into()),
             Self::Member(arguments) => ("member", exchange::run_member(arguments)),
             Self::Node(arguments) => ("node", run_station(arguments).into()),
             Self::RemoteIo(arguments) => ("remote-io", run_remote_io(arguments).into()),

@@ -12,6 +12,7 @@ mod question;
 mod real;
 mod replica;
 mod seen;
+mod shared;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::channel;
@@ -27,6 +28,7 @@ pub use question::{
     Planned, Question, QuestionError, Speed, options_of, plan_campaign, set_unequal,
 };
 pub use real::{RealCampaign, RealCampaignRun, run_real_campaign};
+pub use shared::{SharedFound, measure_shared};
 
 use lives::{Run, Stage};
 use replica::simulated;
@@ -105,6 +107,16 @@ pub fn run_campaign(
     plan: &CampaignPlan,
     watch: &mut dyn FnMut(u64),
 ) -> Result<Measured, CampaignError> {
+    let runs = replicas(plan, watch, &|number| simulated(cluster, plan, number))?;
+    Ok(gathered(cluster, plan, "simulator", runs.into_iter()))
+}
+
+/// All replicas of a plan, in the order of their numbers.
+fn replicas<R: Send>(
+    plan: &CampaignPlan,
+    watch: &mut dyn FnMut(u64),
+    simulated: &(dyn Fn(u64) -> Result<R, NotReady> + Sync),
+) -> Result<Vec<R>, CampaignError> {
     let next = AtomicU64::new(0);
     let (sender, receiver) = channel();
     let mut runs = Vec::new();
@@ -115,8 +127,7 @@ pub fn run_campaign(
                 loop {
                     let number = next.fetch_add(1, Ordering::Relaxed);
                     // One that cannot be run ends the campaign; nobody listens then.
-                    if number >= plan.failures
-                        || sender.send((number, simulated(cluster, plan, number))).is_err()
+                    if number >= plan.failures || sender.send((number, simulated(number))).is_err()
                     {
                         return;
                     }
@@ -134,8 +145,7 @@ pub fn run_campaign(
         return Err(CampaignError::Lost);
     }
     runs.sort_by_key(|(number, _)| *number);
-    let runs = runs.into_iter().map(|(_, run)| run);
-    Ok(gathered(cluster, plan, "simulator", runs))
+    Ok(runs.into_iter().map(|(_, run)| run).collect())
 }
 
 fn gathered(

@@ -68,6 +68,10 @@ pub struct InjectionPlan {
     pub kinds: Vec<Kind>,
     /// The part of the campaign that is run here.
     pub shard: Shard,
+    /// Cycles for which a station must be flagged before the spares of the cluster wake, and for which the cluster must be complete before they
+    /// retire; nothing where they do not wake.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spare_after: Option<u32>,
 }
 
 impl InjectionPlan {
@@ -112,7 +116,7 @@ pub fn inject(
     threads: usize,
     watch: &(dyn Fn() -> bool + Sync),
 ) -> Result<Findings, NotReady> {
-    let bench = Bench::new(cluster)?;
+    let bench = Bench::new(cluster, plan.spare_after)?;
     let target = Target::of(cluster);
     let plan = &InjectionPlan { kinds: target.kinds(&plan.kinds), ..plan.clone() };
     let next = AtomicU64::new(0);

@@ -10,8 +10,8 @@ mod outlook;
 
 pub use campaign::{
     CampaignError, CampaignPlan, Found, Measured, OwnTime, Planned, Question, QuestionError,
-    RealCampaign, RealCampaignRun, Speed, hold_against_model, options_of, plan_campaign,
-    run_campaign, run_real_campaign, set_unequal,
+    RealCampaign, RealCampaignRun, SharedFound, Speed, hold_against_model, measure_shared,
+    options_of, plan_campaign, run_campaign, run_real_campaign, set_unequal,
 };
 pub use injection::{
     CoverageRow, Deadlines, Failure, Findings, FindingsError, InjectionPlan, Kind,
@@ -20,3 +20,6 @@ pub use injection::{
 };
 pub use observed::{JournalView, ObservationError, observe_journal};
 pub use outlook::{JournalOutlook, look_ahead};
+
+/// When spares wake and retire in a simulated plant.
+pub use understudy_simulator::SpareTimes;

@@ -251,6 +251,11 @@ fn refuse_what_is_simulated(scenario: &Scenario) -> Result<(), LaboratoryError> 
     if scenario.network_cycles.is_some() {
         words.insert("a network that is disturbed for some of its cycles");
     }
+    if scenario.spare_after.is_some() {
+        words.insert(
+            "spares that wake by their rule (`understudy spare` does that beside processes)",
+        );
+    }
     if words.is_empty() {
         return Ok(());
     }

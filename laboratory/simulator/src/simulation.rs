@@ -6,6 +6,7 @@
 mod disturbance;
 mod identity;
 mod judging;
+mod spares;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -30,6 +31,7 @@ use crate::queue::Delivery;
 use crate::referee::{Referee, Violation};
 use crate::signals::SignalReferee;
 use crate::slot::Slot;
+use crate::spares::SpareBeside;
 use crate::tally::Tally;
 use crate::wakeups::Wakeups;
 use judging::{Misled, Synchronised};
@@ -93,6 +95,8 @@ pub struct Simulation {
     unannounced: StationSet,
     violations: Vec<Violation>,
     faults: Vec<Fault>,
+    /// Spares that wake by their rule, one for each slot.
+    spares: Vec<SpareBeside>,
     pace: Pace,
     founded: u64,
 }
@@ -155,6 +159,7 @@ impl Simulation {
             unannounced: StationSet::EMPTY,
             violations: Vec::new(),
             faults: Vec::new(),
+            spares: Vec::new(),
             pace: Pace::new(parts.stations[0].agreement.schedule.period()),
             founded: parts.stations.len() as u64,
             parts: Arc::new(parts),
@@ -187,21 +192,6 @@ impl Simulation {
     pub fn write(&mut self, program: ProgramId, write: &Write, observe: &mut Observe<'_>) {
         let input = Input::RemoteIo(RemoteIoInput::Write(write));
         self.give(Member::RemoteIo(program), input, observe);
-    }
-
-    /// The last `steps` of each program that a station has kept are not on its disk, as where the power fails before they are written.
-    pub fn lose_steps(&mut self, station: StationId, steps: usize) {
-        self.disks.lose(station, steps);
-    }
-
-    /// The notes of a remote I/O cannot be read any more.
-    pub fn damage_notes(&mut self, program: ProgramId) {
-        self.disks.damage(program);
-    }
-
-    /// A station gets an empty disk.
-    pub fn lose_disk(&mut self, station: StationId) {
-        self.disks.empty(station);
     }
 
     /// The network is another one while `disturbance` lasts; a later one takes its place.
@@ -461,6 +451,7 @@ impl Simulation {
                 }
                 Output::Report(event) => {
                     self.judge(program, &event, observe);
+                    self.show_spares(program, &event);
                     observe(self.now, self.pace.cycle(), member, Record::RemoteIo(&event));
                 }
                 Output::Retain(record) => self.disks.write(member, record),

@@ -2,7 +2,7 @@
 
 use understudy_cycle::Mode;
 use understudy_remote_io::Event;
-use understudy_simulator::{Action, Fault, Network, Record, Simulation, parts};
+use understudy_simulator::{Action, Fault, Network, Record, Simulation, SpareTimes, parts};
 use understudy_wire::{Member, ProgramId, StationId};
 
 const CONTROLLER: Member = Member::Station(StationId(0));
@@ -118,4 +118,69 @@ fn protection_returns_within_twenty_cycles_and_stays_when_the_spare_retires() {
     };
     assert!((20..=24).contains(&lost), "{outcome:?}");
     assert!((41..=60).contains(&back), "{outcome:?}");
+}
+
+/// What happens to the slot when the spare follows its rule: the cycle, and whether it starts.
+fn by_its_rule(steps: &[(u64, Member, Action)], cycles: u64) -> (Vec<(u64, bool)>, u64) {
+    let cluster = understudy_testing::cluster(CELL, Mode::Full);
+    let mut simulation = Simulation::new(parts(&cluster), Network::default(), 1);
+    simulation.with_spares(SpareTimes { spare_after: 20, retire_after: 30 });
+    for &(at_cycle, member, action) in steps {
+        simulation.schedule(Fault { at_cycle, phase: 0.3, member, action });
+    }
+    let mut woke = Vec::new();
+    let mut observe = |_, cycle: Option<u64>, member, record: Record<'_>| {
+        if let (SPARE, Record::Fault(fault), Some(cycle)) = (member, record, cycle) {
+            woke.push((cycle, fault.action == Action::Restart));
+        }
+    };
+    simulation.run(cycles, 200, &mut observe).expect("the cell starts without its spare");
+    assert_eq!(simulation.violations().first(), None);
+    let missed = simulation.tallies().iter().map(|tally| tally.held + tally.fail_safe).sum();
+    (woke, missed)
+}
+
+/// It wakes 20 cycles after the failure of any station, masks the second failure, and retires 30 cycles after both are back.
+#[test]
+fn a_spare_in_the_simulator_wakes_and_retires_by_the_rule() {
+    for first in [CONTROLLER, Member::Station(StationId(1)), UNDERSTUDY] {
+        let second = if first == UNDERSTUDY { CONTROLLER } else { UNDERSTUDY };
+        let steps = [
+            (50, first, Action::Crash),
+            (100, second, Action::Crash),
+            (150, first, Action::Restart),
+            (160, second, Action::Restart),
+        ];
+        let (woke, missed) = by_its_rule(&steps, 300);
+        let [(wakes, true), (retires, false)] = woke[..] else { panic!("{first:?}: {woke:?}") };
+        assert!((70..=72).contains(&wakes), "{first:?}: {woke:?}");
+        assert!((190..=215).contains(&retires), "{first:?}: {woke:?}");
+        assert_eq!(missed, 0, "{first:?}");
+    }
+}
+
+/// A station that flaps, each time back within `spare_after`, wakes no spare; neither does a remote I/O that is gone.
+#[test]
+fn what_wakes_no_spare_in_the_simulator() {
+    let mut flaps = Vec::new();
+    for number in 0..10 {
+        flaps.push((50 + 40 * number, CONTROLLER, Action::Crash));
+        flaps.push((62 + 40 * number, CONTROLLER, Action::Restart));
+    }
+    assert_eq!(by_its_rule(&flaps, 500).0, []);
+    let remote_io = [(50, Member::RemoteIo(ProgramId(1)), Action::Crash)];
+    assert_eq!(by_its_rule(&remote_io, 200).0, []);
+}
+
+/// A station that fails again and again for longer than `spare_after` wakes the spare once: it stays until the cluster is complete for long enough.
+#[test]
+fn a_station_that_fails_and_returns_keeps_its_spare() {
+    let mut steps = Vec::new();
+    for number in 0..6 {
+        steps.push((50 + 60 * number, CONTROLLER, Action::Crash));
+        steps.push((90 + 60 * number, CONTROLLER, Action::Restart));
+    }
+    let (woke, missed) = by_its_rule(&steps, 600);
+    assert!(matches!(woke[..], [(_, true), (_, false)]), "{woke:?}");
+    assert_eq!(missed, 0);
 }

@@ -13,7 +13,6 @@ use understudy_bus::{Connection, Connections, Listener};
 use understudy_view::Reading;
 
 use crate::error::GatewayError;
-use crate::followed::Followed;
 use crate::serve_until_asked;
 
 /// What OpenMetrics 1.0 wants to be called.
@@ -25,16 +24,15 @@ const MOST_CONNECTIONS: usize = 64;
 /// Who has not sent a whole request by then, or does not take the answer, is gone.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// Serves the metrics of `run` until SIGINT or SIGTERM; `ready` gets the address.
+/// Serves the metrics that `exposition` gives until SIGINT or SIGTERM; `ready` gets the address.
 ///
 /// # Errors
 /// It cannot listen there.
 pub fn serve_metrics(
-    run: &Followed,
+    exposition: impl Fn() -> Result<String, Reading> + Clone + Send + Sync + 'static,
     address: SocketAddr,
     ready: impl FnOnce(SocketAddr),
 ) -> Result<(), GatewayError> {
-    let exposition = run.exposition();
     serve_until_asked(address, ready, |listener| async move {
         axum::serve(Limited::new(listener), router(exposition)).await
     })
@@ -65,15 +63,16 @@ impl axum::serve::Listener for Limited {
 fn router(
     exposition: impl Fn() -> Result<String, Reading> + Clone + Send + Sync + 'static,
 ) -> Router {
-    let exposed = move || {
-        let answer = match exposition() {
+    let exposed = move || async move {
+        // The journals of a plant are read when it is asked.
+        let answer = tokio::task::spawn_blocking(exposition).await;
+        match answer.unwrap_or(Err(Reading { percent: 0 })) {
             Ok(text) => ([(header::CONTENT_TYPE, CONTENT_TYPE)], text).into_response(),
             Err(reading) => {
                 let body = format!("{}: {reading}\n", Reading::CODE);
                 (StatusCode::SERVICE_UNAVAILABLE, body).into_response()
             }
-        };
-        async move { answer }
+        }
     };
     Router::new()
         .route("/metrics", get(exposed))

@@ -27,6 +27,7 @@ mod metrics;
 mod mirror;
 mod modbus;
 mod notify;
+mod plant;
 mod questions;
 mod register_map;
 mod requests;
@@ -42,6 +43,7 @@ pub use metrics::{Metrics, exposition_of};
 pub use mirror::{Rate, mirror};
 pub use modbus::serve_modbus;
 pub use notify::{Change, Notification, Notified, NotifyError, notify};
+pub use plant::PlantMetrics;
 pub use register_map::{Area, Place, ProcessImage, RegisterMap};
 pub use writing::{MAXIMUM_WRITES, WRITES_PER_SECOND, WriteGate};
 

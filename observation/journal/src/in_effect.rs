@@ -145,6 +145,9 @@ fn effect(record: &Record) -> Option<Effect> {
             HostEvent::DuplicateGone { member } => {
                 return Some(Effect::Ends(about("duplicate", member)));
             }
+            HostEvent::SpareReceived { spare, .. } | HostEvent::SpareLost { spare } => {
+                about("spare", spare)
+            }
             HostEvent::RetainFailed { .. } | HostEvent::RetainRegained => of("retain"),
             HostEvent::LinkFailed { network, .. } | HostEvent::LinkReopened { network, .. } => {
                 about("link", network)

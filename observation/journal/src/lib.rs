@@ -48,7 +48,7 @@ pub use operator::{
 pub use packed_file::{SegmentFile, open_file};
 pub use place::{CheckpointPlace, Place, continuation_before, place_before};
 pub use record::{Happening, LABORATORY, Record, RunEvent, moment};
-pub use repeated::{RecordsInEffect, repeated};
+pub use repeated::{RecordsInEffect, heard_at_deadline, repeated};
 pub use rules::{Process, SourceCounts, is_blocked, is_provable};
 pub use run_directory::{KEYS, RETAINED, RunDirectory, RunDirectoryError, time_name, time_text};
 pub use segments::{Segments, closed_segments, segments_of};

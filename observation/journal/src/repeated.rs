@@ -9,6 +9,7 @@
 //! A line of this form is no record: a reader that does not know it leaves it out.
 
 use serde::{Deserialize, Serialize};
+use understudy_wire::StationSet;
 
 use crate::in_effect::InEffect;
 use crate::record::{Happening, Record};
@@ -72,6 +73,16 @@ impl RecordsInEffect {
     }
 }
 
+/// The stations that a remote I/O had received at a deadline; nothing for a line of another event. The line is not parsed.
+pub fn heard_at_deadline(line: &str) -> Option<StationSet> {
+    let (_, event) = line.split_once("\"event\":{\"event\":")?;
+    if !event.starts_with("\"applied\"") {
+        return None;
+    }
+    let (_, heard) = event.rsplit_once("\"heard\":")?;
+    serde_json::from_str(heard.trim_end_matches(['}', '\n'])).ok()
+}
+
 /// A line of a repetition: a record in effect, or nothing at its end. An error for any other line.
 ///
 /// # Errors
@@ -98,6 +109,28 @@ mod tests {
         let event = Happening::RemoteIo(event(moment));
         let member = Some(Member::RemoteIo(ProgramId(0)));
         Record { at_ns: cycle, name: "robot-io".to_owned(), member, event }
+    }
+
+    /// Of a deadline the stations are found without parsing, and no other line is taken for one.
+    #[test]
+    fn the_stations_of_a_deadline_are_found_in_its_line() {
+        let heard: StationSet = [0, 3, 17].map(understudy_wire::StationId).into_iter().collect();
+        let applied = record(7, |moment| RemoteIo::Applied {
+            moment,
+            sampled: None,
+            outputs: Image::default(),
+            driven: None,
+            source: Source::Direct,
+            word_of: None,
+            missing: None,
+            heard,
+        });
+        let line = |record: &Record| serde_json::to_string(record).expect("JSON") + "\n";
+        assert_eq!(heard_at_deadline(&line(&applied)), Some(heard));
+        let lost = HostEvent::FieldLost { reason: "\"applied\" \"heard\":3".to_owned() };
+        let other = Record { event: Happening::Host(lost), ..applied };
+        assert_eq!(heard_at_deadline(&line(&other)), None);
+        assert_eq!(heard_at_deadline("{"), None);
     }
 
     #[test]

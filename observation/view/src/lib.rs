@@ -4,7 +4,8 @@
 //!   journal ──► Source ──► Model::note(record) ──┬─► snapshot(cycle): states, sources, remaining redundancy, alarms
 //!   (files that grow, or a channel)              ├─► events, counters, trends, bands
 //!                                                ├─► History: x(i), u(i) of each cycle ──► why, power flow
-//!                                                └─► diff of two runs
+//!                                                ├─► diff of two runs
+//!                                                └─► with those of other groups: the overview of a plant
 //! ```
 //!
 //! This is the only fold of the journal for views: page, terminal, metrics, Modbus, OPC UA and Zenoh show its snapshot. It reads files only
@@ -24,6 +25,7 @@ mod history;
 mod listing;
 mod margin;
 mod model;
+mod overview;
 mod process_alarm;
 mod protection;
 mod run;
@@ -53,6 +55,10 @@ pub use history::{Driven, History, Sampled, Step};
 pub use listing::{Filter, JournalLine, JournalText, Listing};
 pub use margin::{Holders, Loss, Margin, Outcome};
 pub use model::{Bounds, Counters, MemberCounters, Model, ProgramCounters, SentTurn};
+pub use overview::{
+    FollowedPlant, GroupOverview, GroupState, GroupView, PlantAlarm, PlantOverview, SpareOverview,
+    SpareState,
+};
 pub use process_alarm::{ProcessAlarm, Shelved};
 pub use protection::{LackingStation, LostState, Protection};
 pub use run::{Run, find_run, find_run_of, find_running, find_running_of};
@@ -60,8 +66,8 @@ pub use series::Series;
 pub use shown_text::{NamedValue, ShownLine, Uses};
 pub use snapshot::{
     LinkSnapshot, MarginSnapshot, NetworkSnapshot, OutcomeSnapshot, PlantSnapshot, PlantState,
-    ProgramSnapshot, RemoteIoSnapshot, RemoteIoState, RunState, Snapshot, StationSnapshot,
-    TimingSnapshot, WordSnapshot,
+    ProgramSnapshot, RemoteIoSnapshot, RemoteIoState, RunState, Snapshot, SpareSnapshot,
+    StationSnapshot, TimingSnapshot, WordSnapshot,
 };
 pub use source::{BEHIND, Feed, Progress, Reading, Source, Trouble};
 pub use state_signal::{StateKind, StateSignal};

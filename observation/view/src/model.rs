@@ -14,6 +14,7 @@ mod protection;
 mod reports;
 mod run_events;
 mod silence;
+mod spares;
 mod standing;
 mod turns;
 
@@ -44,6 +45,7 @@ use networks::Networks;
 use programs::ProgramTrack;
 use protection::Attribution;
 use reports::Reports;
+use spares::Spares;
 pub(crate) use standing::{ForcedSignal, Standing};
 pub use turns::SentTurn;
 use turns::Turns;
@@ -101,6 +103,7 @@ pub struct Model {
     /// Who refuses whom.
     refusals: BTreeSet<members::Refusal>,
     networks: Networks,
+    spares: Spares,
     pub(crate) process_alarms: ProcessAlarms,
     timings: Timings,
     pub(crate) times: TimesOfDay,
@@ -150,6 +153,7 @@ impl Model {
             events: Events::new(bounds.events),
             attributions: vec![Attribution::default(); programs],
             refusals: BTreeSet::new(),
+            spares: Spares::default(),
             process_alarms: ProcessAlarms::new(cluster.alarms(), programs),
             timings: Timings::new(schedule, bounds.timings),
             times: TimesOfDay::new(schedule.period()),

@@ -86,6 +86,9 @@ pub struct Snapshot {
     pub networks: Vec<NetworkSnapshot>,
     /// Times of the newest cycle whose times are known.
     pub timing: Option<TimingSnapshot>,
+    /// Spares that have reported to a member, in the present cycle.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub spares: Vec<SpareSnapshot>,
     /// Late wake-ups of all members so far.
     pub host_stalls: u64,
     /// Alarms that last or are not acknowledged, without the shelved ones.
@@ -383,6 +386,17 @@ pub struct OutcomeSnapshot {
     pub lost: Vec<String>,
     /// Why, in words; empty where the failure is masked.
     pub why: String,
+}
+
+/// A spare that watches the cluster.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct SpareSnapshot {
+    /// Its name in the plant file.
+    pub name: String,
+    /// Whether a member receives its reports.
+    pub received: bool,
+    /// The group in which it is awake, as it reports.
+    pub serves: Option<String>,
 }
 
 /// Times of one cycle, in microseconds.

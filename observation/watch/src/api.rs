@@ -25,7 +25,7 @@ use axum::routing::{get, post};
 use crate::app::App;
 use crate::assets::asset;
 use crate::error::Problem;
-use crate::guard::guard;
+use crate::guard::{Gate, guard};
 
 pub(crate) use facts::not_remembered;
 
@@ -49,13 +49,28 @@ pub(crate) fn router(app: Arc<App>) -> Router {
         .route("/api/alarms/shelve", post(alarms::shelve))
         .route("/api/alarms/unshelve", post(alarms::unshelve))
         .route("/api/command", post(command::command))
-        .route("/api/login", post(session::log_in))
-        .route("/api/logout", post(session::log_out))
-        .method_not_allowed_fallback(wrong_method)
         .fallback(page)
-        .layer(DefaultBodyLimit::max(BODY_BYTES))
-        .layer(from_fn_with_state(Arc::clone(&app), guard))
-        .with_state(app)
+        .with_state(Arc::clone(&app))
+        .guarded(&app.gate)
+}
+
+/// What every page has: logins, and a guard before all of its paths.
+pub(crate) trait Guarded {
+    /// The same with a guard.
+    fn guarded(self, gate: &Arc<Gate>) -> Self;
+}
+
+impl Guarded for Router {
+    fn guarded(self, gate: &Arc<Gate>) -> Self {
+        let sessions = Router::new()
+            .route("/api/login", post(session::log_in))
+            .route("/api/logout", post(session::log_out))
+            .with_state(Arc::clone(gate));
+        self.merge(sessions)
+            .method_not_allowed_fallback(wrong_method)
+            .layer(DefaultBodyLimit::max(BODY_BYTES))
+            .layer(from_fn_with_state(Arc::clone(gate), guard))
+    }
 }
 
 async fn page(uri: Uri) -> Response {

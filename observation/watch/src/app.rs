@@ -13,7 +13,8 @@ use crate::error::Problem;
 use crate::follower::Newest;
 use understudy_wire::Role;
 
-use crate::login::{Logins, Person};
+use crate::guard::Gate;
+use crate::login::Person;
 use crate::model::{Known, Model};
 
 /// Viewers at once that follow the newest state.
@@ -48,9 +49,7 @@ pub(crate) struct App {
     pub(crate) commanding: Commanding,
     /// Writes to operator inputs.
     pub(crate) writes: WriteSessions,
-    pub(crate) logins: Option<Logins>,
-    /// Names of the page besides its addresses.
-    pub(crate) names: Vec<String>,
+    pub(crate) gate: Arc<Gate>,
     pub(crate) run: PathBuf,
     pub(crate) viewers: Arc<Semaphore>,
     /// One other journal is read at a time.
@@ -64,8 +63,7 @@ impl App {
         model: Arc<RwLock<Model>>,
         newest: watch::Receiver<Newest>,
         commanding: Commanding,
-        logins: Option<Logins>,
-        names: Vec<String>,
+        gate: Gate,
         run: PathBuf,
     ) -> Self {
         Self {
@@ -73,8 +71,7 @@ impl App {
             newest,
             writes: WriteSessions::new(commanding.commander.clone()),
             commanding,
-            logins,
-            names,
+            gate: Arc::new(gate),
             run,
             viewers: Arc::new(Semaphore::new(MAXIMUM_VIEWERS)),
             reader: Semaphore::new(1),

@@ -20,9 +20,11 @@ macro_rules! assets {
 const ASSETS: &[(&str, &str, &str)] = assets![
     "index.html": HTML,
     "login.html": HTML,
+    "plant.html": HTML,
     "page.css": STYLE,
     "ladder.css": STYLE,
     "login.js": SCRIPT,
+    "plant.js": SCRIPT,
     "page.js": SCRIPT,
     "address.js": SCRIPT,
     "ask.js": SCRIPT,

@@ -18,23 +18,32 @@ use axum::http::{HeaderMap, HeaderValue, Method, StatusCode};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
-use crate::app::App;
 use crate::assets::BEFORE_LOGIN;
 use crate::error::Problem;
 use understudy_wire::Role;
 
-use crate::login::Person;
+use crate::login::{Logins, Person};
+
+/// Who is let in.
+#[derive(Debug)]
+pub(crate) struct Gate {
+    pub(crate) logins: Option<Logins>,
+    /// Names of the page besides its addresses.
+    pub(crate) names: Vec<String>,
+    /// The person of a page without logins.
+    pub(crate) person: Option<String>,
+}
 
 /// Pictures of ladders set their own lengths and fonts, so inline styles are allowed; inline scripts are not.
 const POLICY: &str = "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'none'; form-action 'self'; base-uri 'none'";
 
 pub(crate) async fn guard(
-    State(app): State<Arc<App>>,
+    State(gate): State<Arc<Gate>>,
     mut request: Request,
     next: Next,
 ) -> Response {
     let path = request.uri().path().to_owned();
-    let answered = match admit(&app, &request) {
+    let answered = match admit(&gate, &request) {
         Ok(person) => {
             request.extensions_mut().insert(person);
             next.run(request).await
@@ -55,24 +64,24 @@ enum Refused {
     Foreign(String),
 }
 
-fn admit(app: &App, request: &Request) -> Result<Person, Refused> {
+fn admit(gate: &Gate, request: &Request) -> Result<Person, Refused> {
     let headers = request.headers();
     let host = headers.get(HOST).and_then(|host| host.to_str().ok());
     // Without a name there is nothing that could be confused; only HTTP/1.0 leaves it away.
     let host = host.ok_or_else(|| Refused::Foreign("the request does not say its host".into()))?;
-    if !app.names.iter().any(|name| name == name_of(host)) && !is_own_name(name_of(host)) {
+    if !gate.names.iter().any(|name| name == name_of(host)) && !is_own_name(name_of(host)) {
         return Err(Refused::Foreign(format!(
             "this page is not known as {host:.80}: use its address, or serve it with --known-as"
         )));
     }
     if request.method() != Method::GET && request.method() != Method::HEAD {
-        from_this_page(headers, host, app.logins.is_some()).map_err(Refused::Foreign)?;
+        from_this_page(headers, host, gate.logins.is_some()).map_err(Refused::Foreign)?;
     }
     let path = request.uri().path();
-    match &app.logins {
+    match &gate.logins {
         // The loopback interface is reached from this machine only.
         None => {
-            let name = app.commanding.person.clone().unwrap_or_default();
+            let name = gate.person.clone().unwrap_or_default();
             Ok(Person { name, role: Role::Engineer })
         }
         Some(logins) => match logins.person(headers, Instant::now()) {

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, RwLock};
 use std::thread::JoinHandle;
 
+use axum::Router;
 use thread_priority::{
     NormalThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy,
     set_thread_priority_and_policy, thread_native_id,
@@ -12,14 +13,17 @@ use thread_priority::{
 use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::{oneshot, watch};
+use understudy_view::FollowedPlant;
 
 use crate::api::router;
 use crate::app::{App, Commanding};
 use crate::error::WatchError;
 use crate::follower::{self, Newest};
+use crate::guard::Gate;
 use crate::listener::Doors;
 use crate::login::Logins;
 use crate::model::Model;
+use crate::plant;
 use crate::tls::{Certificate, acceptor};
 
 /// Few: what they do has time.
@@ -30,16 +34,10 @@ const THREADS: usize = 2;
 pub struct Settings {
     /// The directory of the run: finished, being written, or not there yet.
     pub run: PathBuf,
-    /// Where the page is served.
-    pub address: SocketAddr,
+    /// Where the page is served, and to whom.
+    pub place: Place,
     /// Whether it may command.
     pub commanding: Commanding,
-    /// Who may log in; needed where other machines can reach the address, and then the page is served over TLS.
-    pub logins: Option<Logins>,
-    /// Its certificate; without one it makes its own.
-    pub certificate: Option<Certificate>,
-    /// Names under which browsers reach it, besides its addresses.
-    pub names: Vec<String>,
 }
 
 /// A page that is being served, until this is dropped.
@@ -99,25 +97,55 @@ impl Drop for Served {
     }
 }
 
+/// Where a page is served, and to whom.
+#[derive(Debug)]
+pub struct Place {
+    /// Its address.
+    pub address: SocketAddr,
+    /// Who may log in; needed where other machines can reach the address, and then the page is served over TLS.
+    pub logins: Option<Logins>,
+    /// Its certificate; without one it makes its own.
+    pub certificate: Option<Certificate>,
+    /// Names under which browsers reach it, besides its addresses.
+    pub names: Vec<String>,
+}
+
+/// A place that is taken.
+struct Taken {
+    listener: StdListener,
+    address: SocketAddr,
+    tls: Option<tokio_rustls::TlsAcceptor>,
+    fingerprint: Option<String>,
+    gate: Gate,
+}
+
+impl Place {
+    fn take(self, person: Option<String>) -> Result<Taken, WatchError> {
+        let Self { address, logins, certificate, names } = self;
+        if !address.ip().is_loopback() && logins.is_none() {
+            return Err(WatchError::NoLogins(address));
+        }
+        let listen = |source| WatchError::Listen { address, source };
+        let listener = StdListener::bind(address).map_err(listen)?;
+        listener.set_nonblocking(true).map_err(listen)?;
+        let address = listener.local_addr().map_err(listen)?;
+        let tls = match &logins {
+            Some(_) => Some(acceptor(certificate.as_ref(), address, &names)?),
+            None => None,
+        };
+        let (tls, fingerprint) = tls.map_or((None, None), |(tls, print)| (Some(tls), Some(print)));
+        Ok(Taken { listener, address, tls, fingerprint, gate: Gate { logins, names, person } })
+    }
+}
+
 /// Serves the page of a run in threads of its own.
 ///
 /// # Errors
 /// [`WatchError`].
 pub fn serve(settings: Settings) -> Result<Served, WatchError> {
-    let Settings { run, address, commanding, logins, certificate, names } = settings;
-    if !address.ip().is_loopback() && logins.is_none() {
-        return Err(WatchError::NoLogins(address));
-    }
-    let listen = |source| WatchError::Listen { address, source };
-    let listener = StdListener::bind(address).map_err(listen)?;
-    listener.set_nonblocking(true).map_err(listen)?;
-    let address = listener.local_addr().map_err(listen)?;
-    let tls = match &logins {
-        Some(_) => Some(acceptor(certificate.as_ref(), address, &names)?),
-        None => None,
-    };
-    let (tls, fingerprint) = tls.map_or((None, None), |(tls, print)| (Some(tls), Some(print)));
-
+    let Settings { run, place, commanding } = settings;
+    let Taken { listener, address, tls, fingerprint, gate } =
+        place.take(commanding.person.clone())?;
     let model = Arc::new(RwLock::new(Model::new(&run)));
     let (newest, taken) = watch::channel(Newest::default());
     let (ending, ends) = watch::channel(false);
@@ -131,16 +159,41 @@ pub fn serve(settings: Settings) -> Result<Served, WatchError> {
             })
             .map_err(system("a thread that follows the journal"))?
     };
-    let app = Arc::new(App::new(model, taken, commanding, logins, names, run));
+    let app = Arc::new(App::new(model, taken, commanding, gate, run));
+    let (stop, server) = start(listener, tls, router(app))?;
+    Ok(Served { address, fingerprint, stop: Some(stop), threads: vec![server, follower], ending })
+}
+
+/// Serves the page of a plant: all groups of a plant file, each as the process records it that writes its run below `runs`.
+///
+/// # Errors
+/// [`WatchError`].
+pub fn serve_plant(
+    plant: FollowedPlant,
+    runs: PathBuf,
+    place: Place,
+) -> Result<Served, WatchError> {
+    let Taken { listener, address, tls, fingerprint, gate } = place.take(None)?;
+    let pages = plant::router(plant, runs, Arc::new(gate));
+    let (stop, server) = start(listener, tls, pages)?;
+    let (ending, _) = watch::channel(false);
+    Ok(Served { address, fingerprint, stop: Some(stop), threads: vec![server], ending })
+}
+
+fn start(
+    listener: StdListener,
+    tls: Option<tokio_rustls::TlsAcceptor>,
+    pages: Router,
+) -> Result<(oneshot::Sender<()>, JoinHandle<()>), WatchError> {
     let (stop, stopped) = oneshot::channel();
     let server = std::thread::Builder::new()
         .name("watch-server".to_owned())
         .spawn(move || {
             step_back();
-            run_server(listener, tls, app, stopped);
+            run_server(listener, tls, pages, stopped);
         })
         .map_err(system("a thread that serves the page"))?;
-    Ok(Served { address, fingerprint, stop: Some(stop), threads: vec![server, follower], ending })
+    Ok((stop, server))
 }
 
 fn system(what: &'static str) -> impl Fn(std::io::Error) -> WatchError {
@@ -150,7 +203,7 @@ fn system(what: &'static str) -> impl Fn(std::io::Error) -> WatchError {
 fn run_server(
     listener: StdListener,
     tls: Option<tokio_rustls::TlsAcceptor>,
-    app: Arc<App>,
+    pages: Router,
     stopped: oneshot::Receiver<()>,
 ) {
     let runtime = tokio::runtime::Builder::new_multi_thread()
@@ -178,7 +231,7 @@ fn run_server(
         };
         tokio::select! {
             // It only ends with the runtime.
-            _ = axum::serve(doors, router(app)) => {}
+            _ = axum::serve(doors, pages) => {}
             _ = stopped => {}
         }
     });

@@ -12,7 +12,9 @@ use std::time::Duration;
 use rustls::pki_types::ServerName;
 use rustls::{ClientConfig, ClientConnection, RootCertStore, StreamOwned};
 use understudy_journal::{Commander, Done, OperatorAction};
-use understudy_watch::{Certificate, Commanding, Logins, Served, Settings, WatchError, serve};
+use understudy_watch::{
+    Certificate, Commanding, Logins, Place, Served, Settings, WatchError, serve,
+};
 
 const OPERATOR: &str = "0123456789abcdef0123456789abcdef";
 const VIEWER: &str = "fedcba9876543210fedcba9876543210";
@@ -67,11 +69,13 @@ impl Page {
         fs::write(&key, made.signing_key.serialize_pem()).expect("written");
         let served = serve(Settings {
             run: folder.join("nothing"),
-            address: "127.0.0.1:0".parse().expect("an address"),
             commanding,
-            logins: Some(Logins::of_file(&logins_file(folder, 0o600)).expect("logins")),
-            certificate: Some(Certificate { chain, key }),
-            names: Vec::new(),
+            place: Place {
+                address: "127.0.0.1:0".parse().expect("an address"),
+                logins: Some(Logins::of_file(&logins_file(folder, 0o600)).expect("logins")),
+                certificate: Some(Certificate { chain, key }),
+                names: Vec::new(),
+            },
         });
         let served = served.expect("served");
         let url = served.url();
@@ -203,11 +207,13 @@ fn a_name_in_a_request_counts_only_where_neither_keys_nor_logins_say_one() {
         } else {
             let settings = Settings {
                 run: folder.join("nothing"),
-                address: "127.0.0.1:0".parse().expect("an address"),
                 commanding,
-                logins: None,
-                certificate: None,
-                names: Vec::new(),
+                place: Place {
+                    address: "127.0.0.1:0".parse().expect("an address"),
+                    logins: None,
+                    certificate: None,
+                    names: Vec::new(),
+                },
             };
             let served = serve(settings).expect("served");
             spawn(move || {
@@ -256,11 +262,13 @@ fn other_machines_need_logins_that_are_secret() {
     let folder = empty_folder("rights");
     let settings = |logins| Settings {
         run: folder.join("nothing"),
-        address: "0.0.0.0:0".parse().expect("an address"),
         commanding: looking(),
-        logins,
-        certificate: None,
-        names: Vec::new(),
+        place: Place {
+            address: "0.0.0.0:0".parse().expect("an address"),
+            logins,
+            certificate: None,
+            names: Vec::new(),
+        },
     };
     assert!(matches!(serve(settings(None)), Err(WatchError::NoLogins(_))));
     let readable = Logins::of_file(&logins_file(&folder, 0o644));

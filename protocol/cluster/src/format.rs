@@ -303,7 +303,10 @@ pub(crate) static SECTIONS: [&Section; 7] =
     [&CLUSTER, &CONTROLLER, &UNDERSTUDY, &REMOTE_IO, &PLANT, &ALARM, &NOTIFY];
 
 /// Sections of a plant file.
-pub(crate) static PLANT_FILE_SECTIONS: [&Section; 2] = [&GROUP, &SPARE];
+pub(crate) static PLANT_FILE_SECTIONS: [&Section; 3] = [&GROUP, &SPARE, &MACHINE];
+
+/// Those that a plant file must have.
+pub(crate) static PLANT_FILE_REQUIRED: [&Section; 2] = [&GROUP, &SPARE];
 
 pub(crate) static GROUP: Section = Section {
     name: "group",
@@ -327,6 +330,20 @@ pub(crate) static SPARE: Section = Section {
         key failure_domain: Kind::Text, "its rack, feeder or switch";
         key spare_after: count(1, MANY_CYCLES, 50), "cycles for which a station must be flagged before the spare wakes";
         key retire_after: time(Duration::from_millis(100), Duration::from_secs(86_400), Duration::from_secs(30)), "time for which the group must be complete without the spare before it retires";
+    },
+};
+
+pub(crate) static MACHINE: Section = Section {
+    name: "machine",
+    repeated: true,
+    meaning: "a machine on which `understudy allocate` places stations, understudies and spares",
+    keys: keys! {
+        required name: Kind::Name, "names the machine";
+        key rack: Kind::Text, "its rack";
+        key feeder: Kind::Text, "the feeder of its power";
+        key switch: Kind::Text, "the switch that it is connected to";
+        key stations: count(1, u32::MAX, 1), "stations, understudies and spares that it executes at most";
+        key capacity: count(1, u32::MAX, u32::MAX), "operations in a second that it executes for all of them";
     },
 };
 

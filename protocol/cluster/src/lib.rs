@@ -40,8 +40,8 @@ pub use draft::{Draft, DraftProgram, MAXIMUM_PROGRAM_NAME};
 pub use notify::Notify;
 pub use place::{BitPlace, ByteOrder, Place, PlaceError, RegisterTable, Registers};
 pub use plant_file::{
-    LoadedPlant, PlantFile, PlantGroup, PlantSpare, Serves, load_of, looks_like_a_plant_file,
-    read_plant_file,
+    LoadedPlant, PlantFile, PlantGroup, PlantMachine, PlantSpare, Serves, load_of,
+    looks_like_a_plant_file, read_plant_file, station_load,
 };
 pub use read::{Loaded, MAXIMUM_TEXT_BYTES, Overrides, read, read_with};
 pub use schema::{plant_file_schema, schema};

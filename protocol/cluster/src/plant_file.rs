@@ -10,7 +10,10 @@
 //! | U0232 | a station that is not the slot of a spare |
 //! | U0233 | a spare whose capacity fits none of its groups |
 //! | U0234 | two spares in one slot |
+//! | U0235 | a machine without a failure domain that other machines have |
 //! | U0257 | warning: a group that no spare serves, that its spare cannot serve, or that it serves from the same failure domain |
+
+mod machines;
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -26,7 +29,9 @@ use understudy_wire::{Member, StationId};
 use crate::cluster::Cluster;
 use crate::fields::{CODES, Fields, Placed};
 use crate::file::tables;
-use crate::format::{GROUP, PLANT_FILE_SECTIONS, SPARE};
+use crate::format::{GROUP, PLANT_FILE_REQUIRED, PLANT_FILE_SECTIONS, SPARE};
+
+pub use machines::PlantMachine;
 
 /// The groups of a plant and their spares.
 #[derive(Debug, Clone)]
@@ -35,6 +40,8 @@ pub struct PlantFile {
     pub groups: Vec<PlantGroup>,
     /// Its spares, in the order of their ranks.
     pub spares: Vec<PlantSpare>,
+    /// Its machines, in the order of the file; none where it names none.
+    pub machines: Vec<PlantMachine>,
 }
 
 /// A group of the plant.
@@ -89,7 +96,19 @@ pub struct LoadedPlant {
 
 /// Operations in a second that a station needs which executes all programs of a group, at most.
 pub fn load_of(cluster: &Cluster) -> u64 {
-    let operations = cluster.controllers().iter().map(|it| Cost::new(it.code.typed()).worst_case());
+    load_of_programs(cluster, 0..cluster.controllers().len())
+}
+
+/// Operations in a second that a station of a group needs at most: a controller executes its own program, an understudy all of them.
+pub fn station_load(cluster: &Cluster, station: StationId) -> u64 {
+    let rank = station.index();
+    let is_controller = rank < cluster.controllers().len();
+    if is_controller { load_of_programs(cluster, rank..rank + 1) } else { load_of(cluster) }
+}
+
+fn load_of_programs(cluster: &Cluster, programs: Range<usize>) -> u64 {
+    let controllers = cluster.controllers()[programs].iter();
+    let operations = controllers.map(|it| Cost::new(it.code.typed()).worst_case());
     let cycle = operations.fold(0, u64::saturating_add);
     let period = cluster.agreement().schedule.period().as_nanos().max(1);
     let load = u128::from(cycle) * 1_000_000_000 / period;
@@ -134,7 +153,7 @@ fn build(
             diagnostics.push(unknown_key(&CODES, "a plant file", key, &known));
         }
     }
-    for section in PLANT_FILE_SECTIONS {
+    for section in PLANT_FILE_REQUIRED {
         if !root.contains_key(section.name) {
             let message = format!("there is no [[{}]]", section.name);
             diagnostics.push(Diagnostic::error("U0203", message, 0..0).with_help(section.meaning));
@@ -177,7 +196,8 @@ fn build(
         }
     }
     let groups: Option<Vec<PlantGroup>> = groups.into_iter().map(|(_, group)| group).collect();
-    Some(PlantFile { groups: groups?, spares })
+    let machines = machines::machines(root, diagnostics);
+    Some(PlantFile { groups: groups?, spares, machines })
 }
 
 /// The name of a section, where it has one that is given once.

@@ -27,7 +27,7 @@
 //! | U0226 | an alarm whose condition does not fit its signal |
 //! | U0227 | a sender and a receiver of different types or ranges |
 //! | U0228 | a schedule that the mode does not have |
-//! | U0235 | addresses that are not of two networks, or of one network only |
+//! | U0240 | addresses that are not of two networks, or of one network only |
 //! | U0251 | warning: an input that no sensor drives |
 //! | U0252 | warning: an output that moves nothing |
 //! | U0253 | warning: not one understudy where the mode wants one |

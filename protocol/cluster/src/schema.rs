@@ -6,8 +6,9 @@ use understudy_text::duration;
 
 use crate::address::MAXIMUM_NAME_LENGTH;
 use crate::format::{
-    CLUSTER, CONTROLLER, FIELD, Key, Kind, OPERATOR_INPUT, PLANT_FILE_SECTIONS, POINT,
-    PRESS_PARAMETERS, ROBOT_PARAMETERS, SECTIONS, SIGNAL_INPUT, Section,
+    CLUSTER, CONTROLLER, FIELD, Key, Kind, OPERATOR_INPUT, PLANT_FILE_REQUIRED,
+    PLANT_FILE_SECTIONS, POINT, PRESS_PARAMETERS, ROBOT_PARAMETERS, SECTIONS, SIGNAL_INPUT,
+    Section,
 };
 use crate::place::{ByteOrder, Registers};
 
@@ -46,7 +47,7 @@ pub fn plant_file_schema() -> Schema {
         "title": "Plant file of Understudy",
         "type": "object",
         "additionalProperties": false,
-        "required": PLANT_FILE_SECTIONS.map(|section| section.name),
+        "required": PLANT_FILE_REQUIRED.map(|section| section.name),
         "properties": Value::Object(sections.into_iter().collect()),
     })
 }

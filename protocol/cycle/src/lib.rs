@@ -13,6 +13,7 @@ mod machine;
 mod participant;
 mod reception;
 mod schedule;
+pub mod spare;
 mod waking;
 
 pub use agreement::{Agreement, Mode};

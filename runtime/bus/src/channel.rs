@@ -11,6 +11,8 @@
 //! | `write/operator`, `write/engineer` | asked with a write as JSON: its outcome | operators; engineers | no |
 //! | `command/force`, `command/unforce` | asked with a force or a signal as JSON: done, or why not | engineers | no |
 //! | `refused` | asked with a refused order of a person as JSON: it is recorded | all | no |
+//! | `spare` | asked with the report of a spare as JSON: changes are recorded | all | no |
+//! | `attendance` | told by a remote I/O, once a second and at once while a station is missed: the stations that it misses; with its configuration | all | no |
 //! | `journal` | told: the lines of its journal, those of a moment at once; twice a second those in effect again; with its configuration | all | no |
 //!
 //! and under `understudy/cluster/<member>`, for callers whose cluster file may be another one: asked, the hash of the configuration.
@@ -21,7 +23,9 @@
 mod answers;
 mod followed;
 mod refused;
+mod spares;
 mod tls;
+mod writing;
 
 use std::collections::BTreeMap;
 use std::io;
@@ -32,9 +36,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, channel};
 use std::time::Duration;
 
 use serde_json::json;
-use understudy_wire::{
-    ConfigurationHash, Role, Time, Write, WriteAnswer, WriteOutcome, WriteRefusal,
-};
+use understudy_wire::{ConfigurationHash, Time};
 use zenoh::Wait;
 use zenoh::pubsub::Publisher;
 use zenoh::qos::CongestionControl;
@@ -48,16 +50,21 @@ use crate::host_event::HostEvent;
 use crate::journal::{EventSink, JournalSender, Noted};
 use crate::orders::{Control, Order};
 use crate::rights::run_in_background;
-use crate::writes::{self, Callers};
+use crate::writes::Callers;
 
 pub use followed::Reporter;
 pub(crate) use followed::{Gaps, Head, Telemetry, followed};
+pub use spares::{SPARE_REPORTS_EVERY, SpareReport};
+pub(crate) use tls::{
+    ATTENDANCE_KEY, JOURNAL_KEY, REFUSED_KEY, SPARE_KEY, WRITE_KEYS, endpoint, hash_key, insert,
+    prefix, tls_config,
+};
 pub use tls::{Admitted, TlsKeys, Validity};
-pub(crate) use tls::{REFUSED_KEY, WRITE_KEYS, endpoint, hash_key, insert, prefix, tls_config};
 
 use answers::{answer, given, of_configuration, with_value};
 use followed::Line;
 use refused::RefusedReports;
+use spares::SpareReports;
 use tls::access_control;
 
 /// How often it is looked who is admitted.
@@ -109,6 +116,9 @@ pub trait LinesInEffect: Send {
 
     /// Those in effect now, as lines that can be told from others.
     fn repetition(&self) -> Vec<u8>;
+
+    /// The line that tells spares which stations are missed, where it is due.
+    fn attendance(&mut self) -> Option<Vec<u8>>;
 }
 
 /// A channel that runs; ends when it is dropped.
@@ -154,6 +164,7 @@ pub(crate) struct Channel<E> {
     clock: Clock,
     connections: Connections,
     refused: RefusedReports,
+    spares: SpareReports,
     stop: Arc<AtomicBool>,
     /// An operator wants the member to end.
     stop_wanted: Arc<AtomicBool>,
@@ -167,6 +178,7 @@ struct Opened {
     /// By the address at which operators call.
     relays: BTreeMap<SocketAddr, Relay>,
     journal: Publisher<'static>,
+    attendance: Publisher<'static>,
     _answers: Vec<Queryable<()>>,
 }
 
@@ -213,6 +225,7 @@ impl<E: Send + 'static> Channel<E> {
             clock,
             connections: Connections::new(MOST_CONNECTIONS, 3),
             refused: RefusedReports::default(),
+            spares: SpareReports::default(),
             stop: Arc::clone(&stop),
             stop_wanted: Arc::default(),
         };
@@ -249,10 +262,14 @@ impl<E: Send + 'static> Channel<E> {
                 Ok(line) if line.text.is_empty() => {}
                 Ok(line) => {
                     let lines = self.gather(line);
+                    let attendance = self.settings.in_effect.attendance();
                     if let Some(opened) = &opened {
                         // What is not sent is in the journal, and those who follow know by the numbers of the lines that they lack it.
                         if let Err(error) = opened.journal.put(lines).wait() {
                             tracing::debug!(%error, "lines of the journal were not published");
+                        }
+                        if let Some(line) = attendance {
+                            let _ = opened.attendance.put(self.telemetry.repeated(&line)).wait();
                         }
                     }
                 }
@@ -294,6 +311,7 @@ impl<E: Send + 'static> Channel<E> {
                 self.sink.record(now, Noted::Host(event));
             }
             self.note_refused(now, &mut is_valid);
+            self.note_spares(now);
         }
         // The journal ends when nobody reports any more.
         drop(self.sink);
@@ -340,10 +358,11 @@ impl<E: Send + 'static> Channel<E> {
         let rules = access_control(&self.prefix, &hash_key(&self.name), admitted);
         insert(&mut config, "access_control", &rules)?;
         let session = zenoh::open(config).wait()?;
-        let journal = session
-            .declare_publisher(format!("{}/journal", self.prefix))
-            .congestion_control(CongestionControl::Drop)
-            .wait()?;
+        let publisher = |key: &str| {
+            let publisher = session.declare_publisher(format!("{}/{key}", self.prefix));
+            publisher.congestion_control(CongestionControl::Drop).wait()
+        };
+        let (journal, attendance) = (publisher(JOURNAL_KEY)?, publisher(ATTENDANCE_KEY)?);
         let mut answers = Vec::new();
         for (what, text) in [
             ("configuration", self.settings.configuration.clone()),
@@ -382,8 +401,15 @@ impl<E: Send + 'static> Channel<E> {
             answers.push(self.answer_writes(&session, role, key, own)?);
         }
         answers.push(self.answer_refused(&session)?);
-        let mut opened =
-            Opened { session, inner, relays: BTreeMap::new(), journal, _answers: answers };
+        answers.push(self.answer_spares(&session)?);
+        let mut opened = Opened {
+            session,
+            inner,
+            relays: BTreeMap::new(),
+            journal,
+            attendance,
+            _answers: answers,
+        };
         self.relay(&mut opened, listener)?;
         self.relay_all(&mut opened);
         Ok(opened)
@@ -420,48 +446,6 @@ impl<E: Send + 'static> Channel<E> {
                 tracing::debug!(%error, %address, "operators cannot call here");
             }
         }
-    }
-}
-
-impl<E> Channel<E> {
-    /// Takes writes under the key of a role; the answer follows when the member knows the outcome.
-    fn answer_writes(
-        &self,
-        session: &zenoh::Session,
-        role: Role,
-        key: &str,
-        own: ConfigurationHash,
-    ) -> zenoh::Result<Queryable<()>> {
-        let key = format!("{}/{key}", self.prefix);
-        let (control, callers, clock) = (self.control.clone(), self.callers.clone(), self.clock);
-        let declared = key.clone();
-        session
-            .declare_queryable(declared)
-            .callback(move |query: Query| {
-                let order =
-                    of_configuration(&query, own).and_then(|()| with_value("write", &query));
-                let refused = match order {
-                    Ok(Order::Write(write)) => {
-                        let write = Write { role, ..write };
-                        let id = write.id;
-                        if callers.wait(&write, &query, &key, clock.now()) {
-                            if control.give(Order::Write(write)) {
-                                return;
-                            }
-                            callers.forget(id);
-                        }
-                        let refusal = WriteRefusal::Busy;
-                        let outcome = WriteOutcome::Refused { refusal };
-                        writes::text(&WriteAnswer { id, outcome })
-                    }
-                    Ok(_) => return,
-                    Err(reason) => reason,
-                };
-                if let Err(error) = query.reply(key.clone(), refused).wait() {
-                    tracing::debug!(%error, "an answer was not sent");
-                }
-            })
-            .wait()
     }
 }
 

@@ -120,6 +120,18 @@ pub enum HostEvent {
     },
     /// An order of a person to this member was refused before it was sent: it names something that does not exist, or the person has no right to it.
     OrderRefused(RefusedOrder),
+    /// A spare reports here for the first time, again, or from another place.
+    SpareReceived {
+        /// Its name in the plant file.
+        spare: String,
+        /// The group in which it is awake, as the plant file names it.
+        serves: Option<String>,
+    },
+    /// A spare that has reported here has not done so for 15 s.
+    SpareLost {
+        /// Its name in the plant file.
+        spare: String,
+    },
     /// The member said frames that break a bound of the wire, since the last such record: a mistake in this program.
     UnsendableFrames {
         /// How many.

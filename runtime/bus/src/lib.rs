@@ -48,7 +48,10 @@ mod writes;
 mod zenoh_link;
 
 pub use announcer::{Announcer, Question};
-pub use channel::{Admitted, ChannelSettings, DONE, LinesInEffect, Reporter, TlsKeys, Validity};
+pub use channel::{
+    Admitted, ChannelSettings, DONE, LinesInEffect, Reporter, SPARE_REPORTS_EVERY, SpareReport,
+    TlsKeys, Validity,
+};
 pub use clock::Clock;
 pub use connections::{
     Connection, Connections, Listener, RESERVED_DESCRIPTORS, RefusedConnections, RelayedCallers,

@@ -11,8 +11,8 @@ use understudy_wire::{
 use zenoh::Wait;
 
 use crate::channel::{
-    Gaps, Head, REFUSED_KEY, Reporter, TlsKeys, WRITE_KEYS, endpoint, hash_key, insert, prefix,
-    tls_config,
+    ATTENDANCE_KEY, Gaps, Head, JOURNAL_KEY, REFUSED_KEY, Reporter, SPARE_KEY, SpareReport,
+    TlsKeys, WRITE_KEYS, endpoint, hash_key, insert, prefix, tls_config,
 };
 use crate::error::{BusError, reason};
 use crate::refused_orders::RefusedOrder;
@@ -47,6 +47,8 @@ pub enum Request {
     Write(Write),
     /// To record an order that was refused before it was sent.
     Refused(RefusedOrder),
+    /// To record where a spare is.
+    Spare(SpareReport),
     /// To end.
     Stop,
 }
@@ -64,6 +66,7 @@ impl Request {
             Self::Write(write) if write.role >= Role::Engineer => WRITE_KEYS[1].1,
             Self::Write(_) => WRITE_KEYS[0].1,
             Self::Refused(_) => REFUSED_KEY,
+            Self::Spare(_) => SPARE_KEY,
             Self::Stop => "command/stop",
         }
     }
@@ -86,6 +89,7 @@ impl Request {
             Self::Unforce(signal) => serde_json::to_string(signal),
             Self::Write(write) => serde_json::to_string(write),
             Self::Refused(order) => serde_json::to_string(&order.clone().bounded()),
+            Self::Spare(report) => serde_json::to_string(report),
             _ => return String::new(),
         };
         text.unwrap_or_default()
@@ -218,6 +222,13 @@ impl Call {
         Err(unanswered())
     }
 
+    /// Sends a request without waiting for its answer; whether it was sent.
+    pub fn tell(&self, request: &Request) -> bool {
+        let asked = self.session.get(format!("{}/{}", self.prefix, request.key()));
+        // Without its receiver the answer is dropped.
+        asked.payload(request.payload()).timeout(PATIENCE).wait().is_ok()
+    }
+
     fn is_connected(&self) -> bool {
         let info = self.session.info();
         info.routers_zid().wait().next().is_some() || info.peers_zid().wait().next().is_some()
@@ -231,16 +242,37 @@ impl Call {
     pub fn follow(
         &self,
         patience: Duration,
+        take: impl FnMut(Told<'_>) -> bool,
+    ) -> Result<(), BusError> {
+        self.follow_key(JOURNAL_KEY, patience, take)
+    }
+
+    /// The same for the lines that tell which stations a remote I/O misses.
+    ///
+    /// # Errors
+    /// [`BusError::Unanswered`] where they cannot be followed.
+    pub fn follow_attendance(
+        &self,
+        patience: Duration,
+        take: impl FnMut(Told<'_>) -> bool,
+    ) -> Result<(), BusError> {
+        self.follow_key(ATTENDANCE_KEY, patience, take)
+    }
+
+    fn follow_key(
+        &self,
+        key: &'static str,
+        patience: Duration,
         mut take: impl FnMut(Told<'_>) -> bool,
     ) -> Result<(), BusError> {
         let unanswered = || BusError::Unanswered {
             name: self.name.clone(),
             address: self.address,
-            request: "journal",
+            request: key,
         };
         let subscriber = self
             .session
-            .declare_subscriber(format!("{}/journal", self.prefix))
+            .declare_subscriber(format!("{}/{key}", self.prefix))
             .with(zenoh::handlers::FifoChannel::new(WAITING_LINES))
             .wait()
             .map_err(|_| unanswered())?;

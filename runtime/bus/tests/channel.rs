@@ -39,6 +39,10 @@ impl LinesInEffect for NothingInEffect {
     fn repetition(&self) -> Vec<u8> {
         Vec::new()
     }
+
+    fn attendance(&mut self) -> Option<Vec<u8>> {
+        None
+    }
 }
 
 /// Keys of the robot, of the router, and of two who call through it.

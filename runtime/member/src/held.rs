@@ -7,7 +7,8 @@ use understudy_bus::{
     Admitted, ChannelSettings, Guard, LinesInEffect, NewLife, TlsKeys, Validity, hold_back_signals,
 };
 use understudy_cluster::{Cluster, Security};
-use understudy_journal::RecordsInEffect;
+use understudy_cycle::spare::AttendanceCount;
+use understudy_journal::{RecordsInEffect, heard_at_deadline};
 use understudy_keys::{Date, MemberKeys, RevocationWatch, TlsFiles};
 use understudy_wire::Member;
 
@@ -77,24 +78,38 @@ fn channel(keys: Arc<MemberKeys>, cluster: &Cluster) -> ChannelSettings {
             }
         }),
         configuration: cluster.canonical_text().to_owned(),
-        in_effect: Box::new(InEffect::default()),
+        in_effect: Box::new(InEffect {
+            records: RecordsInEffect::default(),
+            attendance: AttendanceCount::new(&cluster.agreement().schedule),
+        }),
     }
 }
 
-/// The records of a member that are in effect, in the lines of its journal.
-#[derive(Default)]
-struct InEffect(RecordsInEffect);
+/// The records of a member that are in effect, and the stations that it misses, in the lines of its journal.
+struct InEffect {
+    records: RecordsInEffect,
+    attendance: AttendanceCount,
+}
 
 impl LinesInEffect for InEffect {
     fn note(&mut self, line: &[u8]) {
         // A line that was cut is no record.
         if let Ok(line) = std::str::from_utf8(line) {
-            self.0.note_line(line);
+            self.records.note_line(line);
+            if let Some(heard) = heard_at_deadline(line) {
+                self.attendance.deadline(heard);
+            }
         }
     }
 
     fn repetition(&self) -> Vec<u8> {
-        self.0.repetition()
+        self.records.repetition()
+    }
+
+    fn attendance(&mut self) -> Option<Vec<u8>> {
+        let mut line = serde_json::to_vec(&self.attendance.take()?).ok()?;
+        line.push(b'\n');
+        Some(line)
     }
 }
 

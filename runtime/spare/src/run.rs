@@ -8,12 +8,11 @@ use std::time::{Duration, Instant};
 
 use understudy_bus::{BusError, Peer, TlsKeys};
 use understudy_cluster::{Cluster, PlantSpare};
+use understudy_cycle::spare::{Attention, Order, Rule, WITNESSES};
 use understudy_wire::{Member, StationId};
 
-use crate::attention::{Attention, WITNESSES};
 use crate::post::Post;
-use crate::rule::{Order, Rule};
-use crate::watch::{Seen, Watch};
+use crate::watch::{Seen, Watch, Whereabouts};
 
 /// How often the end of the process is looked for when nothing happens.
 const TICK: Duration = Duration::from_millis(100);
@@ -158,12 +157,15 @@ pub fn run(
 ) -> Result<u64, BusError> {
     let SpareSettings { spare, duties, .. } = settings;
     let (sender, seen) = channel();
+    let whereabouts = Whereabouts::default();
     for (group, duty) in duties.iter().enumerate() {
         let agreement = duty.cluster.agreement();
         let is_remote_io = |peer: &&Peer| matches!(peer.member, Member::RemoteIo(_));
         let remote_ios: Vec<&Peer> = duty.peers.iter().filter(is_remote_io).collect();
         for witness in 0..remote_ios.len().min(WITNESSES) {
             let watch = Watch {
+                spare: spare.name.clone(),
+                whereabouts: whereabouts.clone(),
                 cluster: agreement.cluster,
                 configuration: agreement.configuration,
                 period: agreement.schedule.period(),
@@ -198,6 +200,7 @@ pub fn run(
             retire_after: duties.iter().map(retire_after).collect(),
         },
         awake: None,
+        whereabouts,
         not_before: Instant::now(),
         woke: 0,
     };
@@ -220,6 +223,7 @@ struct Keeper<'a> {
     seen: Vec<Option<bool>>,
     rule: Rule,
     awake: Option<Awake>,
+    whereabouts: Whereabouts,
     /// No station is started earlier.
     not_before: Instant,
     woke: u64,
@@ -229,8 +233,8 @@ impl Keeper<'_> {
     fn saw(&mut self, group: usize, witness: usize, what: Seen, say: &mut dyn FnMut(&Report)) {
         let name = &self.settings.duties[group].group;
         match what {
-            Seen::Deadline(heard) => {
-                self.groups[group].deadline(witness, heard);
+            Seen::Report(report) => {
+                self.groups[group].told(witness, &report);
                 let seen = self.groups[group].standing().seen;
                 if seen && self.seen[group].replace(true) != Some(true) {
                     say(&Report::Watches { group: name.clone() });
@@ -254,7 +258,7 @@ impl Keeper<'_> {
             if let Some(status) = awake.post.ended() {
                 say(&Report::Ended { group: duty.group.clone(), how: status.to_string() });
                 self.not_before = Instant::now() + START_AGAIN_AFTER;
-                self.awake = None;
+                self.sleeps();
                 return;
             }
             if !awake.publishes && standings[awake.group].publishes {
@@ -273,9 +277,15 @@ impl Keeper<'_> {
                 let group_name = self.settings.duties[group].group.clone();
                 let cycles = standings[group].complete;
                 say(&Report::Retires { group: group_name, cycles });
-                self.awake = None;
+                self.sleeps();
             }
         }
+    }
+
+    /// The station of its slot ends, if it has not.
+    fn sleeps(&mut self) {
+        self.awake = None;
+        self.whereabouts.set(None);
     }
 
     fn wake(&mut self, group: usize, say: &mut dyn FnMut(&Report)) {
@@ -293,6 +303,7 @@ impl Keeper<'_> {
         match Post::start(&self.settings.program, duty, self.settings.real_time) {
             Ok(post) => {
                 self.woke += 1;
+                self.whereabouts.set(Some(duty.group.clone()));
                 self.awake =
                     Some(Awake { group, post, silent: silent(attention), publishes: false });
             }

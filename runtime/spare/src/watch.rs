@@ -1,23 +1,25 @@
-//! Follows the journals of a few remote I/Os of a group.
+//! Follows the reports of a few remote I/Os of a group.
 
 use std::sync::mpsc::Sender;
-use std::time::Duration;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
-use understudy_bus::{BusError, Call, Peer, TlsKeys, Told};
-use understudy_journal::{Happening, Record};
-use understudy_remote_io::Event;
-use understudy_wire::{ClusterHash, ConfigurationHash, StationSet};
+use understudy_bus::{
+    BusError, Call, Peer, Request, SPARE_REPORTS_EVERY, SpareReport, TlsKeys, Told,
+};
+use understudy_cycle::spare::AttendanceReport;
+use understudy_wire::{ClusterHash, ConfigurationHash};
 
 /// Between two calls.
 const AGAIN: Duration = Duration::from_secs(1);
 
-/// The shortest time without a line after which a remote I/O is no longer followed.
-const SILENT_AFTER: Duration = Duration::from_secs(2);
+/// The shortest time without a report after which a remote I/O is no longer followed.
+const SILENT_AFTER: Duration = Duration::from_millis(2_500);
 
 /// What comes of a witness.
 pub(crate) enum Seen {
-    /// A deadline, at which it had received these stations.
-    Deadline(StationSet),
+    /// The stations that it misses.
+    Report(AttendanceReport),
     /// It is not followed, and why.
     Lost(String),
 }
@@ -25,8 +27,26 @@ pub(crate) enum Seen {
 /// How long a remote I/O is given to take a call at one of its addresses.
 const REACH: Duration = Duration::from_millis(1500);
 
+/// Where a spare is awake, for the reports of all its witnesses.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Whereabouts(Arc<Mutex<Option<String>>>);
+
+impl Whereabouts {
+    /// It is awake in this group, or asleep.
+    pub(crate) fn set(&self, group: Option<String>) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = group;
+    }
+
+    fn get(&self) -> Option<String> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
 /// A witness: one of the remote I/Os of a group, another one where that is not received.
 pub(crate) struct Watch {
+    /// Name of the spare.
+    pub(crate) spare: String,
+    pub(crate) whereabouts: Whereabouts,
     pub(crate) cluster: ClusterHash,
     pub(crate) configuration: ConfigurationHash,
     pub(crate) period: Duration,
@@ -41,8 +61,8 @@ impl Watch {
         for peer in self.peers.iter().cycle() {
             let address = peer.reachable(REACH).unwrap_or(peer.address);
             let lost = match Call::to(address, self.cluster, &peer.name, &self.keys) {
-                Ok(call) => self.follow(&call, |deadline| {
-                    seen.send((group, witness, Seen::Deadline(deadline))).is_ok()
+                Ok(call) => self.follow(&call, |report| {
+                    seen.send((group, witness, Seen::Report(report))).is_ok()
                 }),
                 Err(BusError::Uncalled { reason, .. }) => reason,
                 Err(error) => error.to_string(),
@@ -56,11 +76,13 @@ impl Watch {
     }
 
     /// Until the journal ends: the reason.
-    fn follow(&self, call: &Call, mut deadline: impl FnMut(StationSet) -> bool) -> String {
+    fn follow(&self, call: &Call, mut report: impl FnMut(AttendanceReport) -> bool) -> String {
         let mut other = None;
         let patience = (self.period * 10).max(SILENT_AFTER);
-        let ended = call.follow(patience, |told| match told {
+        let mut reported = None;
+        let ended = call.follow_attendance(patience, |told| match told {
             Told::By(reporter) => {
+                self.report(call, &mut reported);
                 let theirs = reporter.map(|by| by.configuration.as_str()).unwrap_or_default();
                 let same = theirs == self.configuration.to_string();
                 if !same {
@@ -68,24 +90,28 @@ impl Watch {
                 }
                 same
             }
-            Told::Line(line) => heard(line).is_none_or(&mut deadline),
-            // Missed deadlines are not counted, so the spare wakes later.
+            // Another line is of a later version.
+            Told::Line(line) => serde_json::from_str(line).map_or(true, &mut report),
+            // The next report is complete in itself.
             Told::Lost(_) => true,
         });
-        let silent = || ended.err().map(|_| "it sends no journal".to_owned());
+        let silent = || ended.err().map(|_| "it sends no report".to_owned());
         other.or_else(silent).unwrap_or_else(|| "the call ended".to_owned())
     }
 }
 
-/// The stations of a line that records a deadline.
-fn heard(line: &str) -> Option<StationSet> {
-    // Most lines are of other events.
-    if !line.contains("\"applied\"") {
-        return None;
-    }
-    let record: Record = serde_json::from_str(line).ok()?;
-    match record.event {
-        Happening::RemoteIo(Event::Applied { heard, .. }) => Some(heard),
-        _ => None,
+/// The report that was sent last, and when.
+type Reported = Option<(Instant, SpareReport)>;
+
+impl Watch {
+    /// Reports to the witness that the spare watches, and where it is awake.
+    fn report(&self, call: &Call, reported: &mut Reported) {
+        let report = SpareReport { spare: self.spare.clone(), serves: self.whereabouts.get() };
+        let is_known = reported
+            .as_ref()
+            .is_some_and(|(at, last)| at.elapsed() < SPARE_REPORTS_EVERY && *last == report);
+        if !is_known && call.tell(&Request::Spare(report.clone())) {
+            *reported = Some((Instant::now(), report));
+        }
     }
 }

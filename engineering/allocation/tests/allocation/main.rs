@@ -1,6 +1,7 @@
 //! What programs need, what controllers have, and which are taken.
 
 mod additions;
+mod domains;
 mod files;
 mod fitting;
 mod instruction_list;

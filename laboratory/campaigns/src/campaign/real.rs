@@ -130,6 +130,7 @@ fn endless(cluster: &Cluster) -> Scenario {
         network: None,
         network_cycles: None,
         seed: None,
+        spare_after: None,
         expect: Expectation::default(),
     }
 }

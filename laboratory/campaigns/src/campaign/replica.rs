@@ -12,7 +12,7 @@ use super::seen::{Deadlines, Seen, of_station};
 use understudy_simulator::parts;
 
 /// Cycles that the cluster gets to come into step.
-const PATIENCE_CYCLES: u64 = 10_000;
+pub(super) const PATIENCE_CYCLES: u64 = 10_000;
 
 /// Runs replica `number` of `plan`.
 pub(super) fn simulated(
@@ -46,7 +46,7 @@ pub(super) fn simulated(
     Ok(lives.end(now, now.0 - origin.0, false))
 }
 
-fn carry_out(simulation: &mut Simulation, lives: &mut Lives<'_>) {
+pub(super) fn carry_out(simulation: &mut Simulation, lives: &mut Lives<'_>) {
     for order in lives.take_orders() {
         match order {
             Order::Do { station, action, after_cycles } => {
@@ -64,7 +64,12 @@ fn carry_out(simulation: &mut Simulation, lives: &mut Lives<'_>) {
 }
 
 /// What of a record concerns the campaign.
-fn look(now: Time, member: Member, record: Record<'_>, deadlines: &mut Deadlines) -> Option<Seen> {
+pub(super) fn look(
+    now: Time,
+    member: Member,
+    record: Record<'_>,
+    deadlines: &mut Deadlines,
+) -> Option<Seen> {
     match (member, record) {
         (Member::Station(station), Record::Fault(fault)) => match fault.action {
             Action::Crash => Some(Seen::Crashed(station)),

@@ -22,6 +22,21 @@ pub(super) enum Seen {
     Violation(String),
 }
 
+impl Seen {
+    /// The station that it is about.
+    pub(super) fn station(&self) -> Option<StationId> {
+        match self {
+            Self::Crashed(station)
+            | Self::Restarted(station)
+            | Self::Flagged(station)
+            | Self::Cleared(station)
+            | Self::Adopted(station, _)
+            | Self::Synchronised(station, _) => Some(*station),
+            Self::Missed | Self::Lost(_) | Self::Stalled | Self::Violation(_) => None,
+        }
+    }
+}
+
 /// Since when each remote I/O has had nothing true to apply.
 #[derive(Debug)]
 pub(super) struct Deadlines(Vec<Option<Time>>);

@@ -1,6 +1,6 @@
 use understudy_cycle::Mode;
 use understudy_reliability::Hours;
-use understudy_simulator::Action;
+use understudy_simulator::{Action, SpareTimes};
 use understudy_testing::press_cell;
 use understudy_wire::{ProgramId, StationId, Time};
 
@@ -178,4 +178,53 @@ fn a_deadline_beside_a_stall_of_the_host_says_nothing_of_the_masking() {
     check(&[(1, Seen::Missed), (3, Seen::Stalled)], 0, 0, 1);
     check(&[(1, Seen::Stalled), (3, Seen::Missed)], 0, 0, 1);
     check(&[(1, Seen::Missed), (30, Seen::Stalled)], 1, 1, 0);
+}
+
+const SHARED: &str = r#"
+[cluster]
+name = "cell"
+[[controller]]
+name = "robot"
+ladder = "robot.ladder"
+[[controller]]
+name = "press"
+ladder = "press.ladder"
+[[understudy]]
+name = "understudy"
+[[understudy]]
+name = "spare"
+spare = true
+[[plant]]
+controller = "robot"
+model = "robot"
+[[plant]]
+controller = "press"
+model = "press"
+"#;
+
+/// Two groups share a spare: the measured MTTF agrees with the model of shared spares, and is well above that without them.
+#[test]
+fn groups_that_share_a_spare_live_as_long_as_the_model_says() {
+    let cell = understudy_testing::cluster(SHARED, Mode::Full);
+    let question = Question {
+        mtbf: hours(1500.0),
+        mttr: hours(300.0),
+        crews: None,
+        failures: 40,
+        seed: 1,
+        speed: Speed::Factor(1.0),
+        forced: false,
+    };
+    let planned = plan_campaign(&cell, &question).expect("a campaign");
+    let times = SpareTimes { spare_after: 20, retire_after: 5 };
+    let found = |threads| {
+        let planned = Planned { plan: CampaignPlan { threads, ..planned.plan }, ..planned.clone() };
+        let found = measure_shared(&cell, &planned, 2, times, &mut |_| {});
+        found.expect("synchronised").expect("a model")
+    };
+    let (one, two) = (found(1), found(2));
+    assert!(one.is_met(), "{}", one.to_text());
+    assert!(one.model_hours > 1.5 * one.without_hours, "{}", one.to_text());
+    assert!(one.joined_cycles.is_some_and(|cycles| cycles < 20.0), "{}", one.to_text());
+    assert_eq!(one.mttf_hours, two.mttf_hours, "on any number of threads");
 }

@@ -87,6 +87,7 @@ impl Faultload {
             title,
             cycles,
             seed: Some(seed),
+            spare_after: None,
             steps: self.steps(),
             network: self.network.as_ref().map(|disturbance| disturbance.network),
             network_cycles: self

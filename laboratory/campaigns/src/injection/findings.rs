@@ -110,7 +110,8 @@ impl Failure {
         let members = Members::of(cluster);
         let title = format!("{} in run {run} of seed {}", plan.property.word(), plan.seed);
         let expect = plan.property.expectation();
-        let scenario = small.faultload.scenario(title, small.cycles, small.seed, expect);
+        let mut scenario = small.faultload.scenario(title, small.cycles, small.seed, expect);
+        scenario.spare_after = plan.spare_after;
         let remarks = [
             format!("Cycle {}: {}", small.symptom.cycle, small.symptom.what),
             format!(

@@ -22,6 +22,7 @@ fn plan(runs: u64, property: Property, kinds: &[Kind]) -> InjectionPlan {
         property,
         kinds: kinds.to_vec(),
         shard: Shard::WHOLE,
+        spare_after: None,
     }
 }
 
@@ -138,7 +139,7 @@ fn small_failures_are_repeated_by_a_scenario() {
 /// Where protection is hunted, one crash without a repair is found as the whole cause.
 #[test]
 fn a_station_that_stays_away_is_one_crash() {
-    let bench = Bench::new(&cell()).expect("the cell comes into step");
+    let bench = Bench::new(&cell(), None).expect("the cell comes into step");
     let cell = cell();
     let plan = plan(1, Property::Unprotected, &[Kind::Crash, Kind::Stop]);
     let schedule = &cell.agreement().schedule;

@@ -6,7 +6,7 @@
 use std::cell::RefCell;
 
 use understudy_cluster::Cluster;
-use understudy_simulator::{Network, NotReady, Simulation, Tally, parts};
+use understudy_simulator::{Network, NotReady, Simulation, SpareTimes, Tally, parts};
 use understudy_wire::Member;
 
 use super::faultload::Faultload;
@@ -42,8 +42,11 @@ pub(super) struct Outcome {
 }
 
 impl Bench {
-    pub(super) fn new(cluster: &Cluster) -> Result<Self, NotReady> {
+    pub(super) fn new(cluster: &Cluster, spare_after: Option<u32>) -> Result<Self, NotReady> {
         let mut synchronised = Simulation::new(parts(cluster), Network::default(), 0);
+        if let Some(spare_after) = spare_after {
+            synchronised.with_spares(SpareTimes { spare_after, retire_after: spare_after });
+        }
         synchronised.run(0, PATIENCE_CYCLES, &mut |_, _, _, _| {})?;
         Ok(Self { synchronised })
     }

@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use understudy_cycle::{Agreement, Input, Machine, RemoteIoInput};
 use understudy_node::Program;
-use understudy_wire::{ConfigurationHash, Epoch, Frame, Member, ProgramHash, SignalPlace};
+use understudy_wire::{
+    ConfigurationHash, Epoch, Frame, Member, ProgramHash, ProgramId, SignalPlace, StationId,
+};
 
 use super::{Observe, Record, Simulation};
 use crate::fault::{Action, Fault};
@@ -65,6 +67,7 @@ impl Simulation {
             (Member::Station(station), _) => {
                 if action == Action::Crash {
                     self.note_crash(station);
+                    self.spare_ended(station);
                 }
                 let slot = &mut self.stations[station.index()];
                 let waiting = disturb(slot, action);
@@ -78,6 +81,21 @@ impl Simulation {
                 self.catch_up(member, waiting, observe);
             }
         }
+    }
+
+    /// The last `steps` of each program that a station has kept are not on its disk, as where the power fails before they are written.
+    pub fn lose_steps(&mut self, station: StationId, steps: usize) {
+        self.disks.lose(station, steps);
+    }
+
+    /// The notes of a remote I/O cannot be read any more.
+    pub fn damage_notes(&mut self, program: ProgramId) {
+        self.disks.damage(program);
+    }
+
+    /// A station gets an empty disk.
+    pub fn lose_disk(&mut self, station: StationId) {
+        self.disks.empty(station);
     }
 
     fn restart(&mut self, member: Member, action: Action) {

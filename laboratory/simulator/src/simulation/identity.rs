@@ -29,12 +29,13 @@ impl Hash for Simulation {
             unannounced,
             violations,
             faults,
+            spares,
             pace,
             founded,
         } = self;
         (links, stations, remote_ios, plants, disks, referees).hash(hasher);
         (ready, arrived, holders, misled, unannounced).hash(hasher);
-        (violations.len(), pace, founded).hash(hasher);
+        (violations.len(), spares, pace, founded).hash(hasher);
         for fault in faults {
             (fault.at_cycle, fault.phase.to_bits(), fault.member, fault.action).hash(hasher);
         }

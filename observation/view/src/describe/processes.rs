@@ -34,6 +34,12 @@ descriptions! { host: HostEvent, members: Members;
     RefusedCertificates { connections, reason } => "refused-certificates" Warning
         format!("{connections} certificates of callers were refused, the last because of: {reason}");
     OrderRefused(order) => "order-refused" Warning refused_text(order);
+    SpareReceived { spare, serves } => "spare-received" Info match serves {
+        Some(group) => format!("{spare} reports: it is awake in {group}"),
+        None => format!("{spare} reports: it is asleep and watches this group"),
+    };
+    SpareLost { spare } => "spare-lost" Warning
+        format!("{spare} has not reported for 15 s: it may not wake in this group");
     UnsendableFrames { frames, reason } => "unsendable-frames" Warning
         format!("{frames} frames could not be sent: {reason}");
     NetworkReception { network, lost, impaired } => "network-reception" Warning

@@ -129,6 +129,10 @@ impl Picture<'_> {
                 margin_us: timing.margin_ns as f64 / 1e3,
                 cycle_us: timing.cycle_ns.map(|cycle| cycle as f64 / 1e3),
             }),
+            spares: match self.cycle == model.newest() {
+                true => model.spares_in(self.standing),
+                false => Vec::new(),
+            },
             host_stalls: self.host_stalls(),
             alarms,
             process_alarms,

@@ -17,6 +17,7 @@ mod losses;
 mod margin;
 mod networks;
 mod numbers;
+mod overview;
 mod past;
 mod process_alarms;
 mod protection;

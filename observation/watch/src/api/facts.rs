@@ -141,7 +141,7 @@ pub(super) async fn run(
             impossible: app.commanding.impossible.iter().cloned().collect(),
         },
         person: Some(person.name).filter(|name| !name.is_empty()),
-        logged_in: app.logins.is_some(),
+        logged_in: app.gate.logins.is_some(),
         others: others(&app.run),
     }))
 }

@@ -13,20 +13,20 @@ use serde::Deserialize;
 use serde_json::json;
 
 use super::Answered;
-use crate::app::App;
 use crate::error::Problem;
+use crate::guard::Gate;
 
 #[derive(Deserialize)]
-pub(super) struct Login {
+pub(crate) struct Login {
     token: String,
 }
 
-pub(super) async fn log_in(
-    State(app): State<Arc<App>>,
+pub(crate) async fn log_in(
+    State(gate): State<Arc<Gate>>,
     body: Result<Json<Login>, JsonRejection>,
 ) -> Answered<Response> {
     let Json(Login { token }) = body?;
-    let Some(logins) = &app.logins else {
+    let Some(logins) = &gate.logins else {
         return Err(Problem::bad("this page has no logins"));
     };
     let person = logins.admit(&token).await;
@@ -38,8 +38,11 @@ pub(super) async fn log_in(
     Ok(([(SET_COOKIE, cookie)], Json(json!({ "person": name }))).into_response())
 }
 
-pub(super) async fn log_out(State(app): State<Arc<App>>, headers: HeaderMap) -> Answered<Response> {
-    let Some(logins) = &app.logins else {
+pub(crate) async fn log_out(
+    State(gate): State<Arc<Gate>>,
+    headers: HeaderMap,
+) -> Answered<Response> {
+    let Some(logins) = &gate.logins else {
         return Err(Problem::bad("this page has no logins"));
     };
     let cookie = logins.close(&headers);

@@ -64,7 +64,7 @@ impl Names {
     ) {
         let mut report = |message: String, place: &Placed<SocketAddr>, help: &str| {
             let span = place.span.clone();
-            diagnostics.push(Diagnostic::error("U0235", message, span).with_help(help));
+            diagnostics.push(Diagnostic::error("U0240", message, span).with_help(help));
         };
         match (&addresses.first, &addresses.second) {
             (_, Some(second)) if !self.has_two_networks => report(
@@ -107,7 +107,7 @@ impl Names {
         if *known != is_second {
             let message = format!("{host} is on the first and on the second network");
             diagnostics.push(
-                Diagnostic::error("U0235", message, span.clone())
+                Diagnostic::error("U0240", message, span.clone())
                     .with_related(first.clone(), "the other network is here")
                     .with_help(
                         "each network needs an interface of its own, with an address of its own",

@@ -506,10 +506,10 @@ fn addresses_of_two_networks() {
     assert!(!check(two, &robot, &understudy).contains("error"));
     assert!(!check(two, "", "").contains("error"), "the laboratory chooses addresses");
     let found = check("", &robot, "");
-    assert!(found.contains("U0235") && found.contains("networks = 2"), "{found}");
+    assert!(found.contains("U0240") && found.contains("networks = 2"), "{found}");
     for one in ["address = \"10.0.1.11:7450\"", "second_address = \"10.0.2.11:7450\""] {
         let found = check(two, one, &understudy);
-        assert!(found.contains("U0235"), "{found}");
+        assert!(found.contains("U0240"), "{found}");
     }
     for second in ["10.0.1.11", "10.0.1.12"] {
         let found = check(two, &at("10.0.1.11", second), &understudy);
@@ -521,5 +521,5 @@ fn addresses_of_two_networks() {
     assert!(check(two, &at("10.0.2.12", "10.0.2.11"), &understudy).contains("U0210"));
     assert!(check("networks = 3", "", "").contains("U0205"));
     let found = check(two, &at("127.0.0.1", "127.0.0.2"), &understudy);
-    assert!(!found.contains("U0235"), "the loopback interface is for tests: {found}");
+    assert!(!found.contains("U0240"), "the loopback interface is for tests: {found}");
 }

@@ -87,6 +87,16 @@ fn one_run_finds_everything_that_is_wrong() {
     let near = spare("x", "groups = { a = \"spare\" }\nfailure_domain = \"rack-1\"");
     check(&format!("{GROUPS}{near}"), &["warning U0257 group `a` is in the failure domain"]);
     check(&format!("{GROUPS}[[spares]]\n"), &["U0202"]);
+    let one = spare("x", "groups = { a = \"spare\" }");
+    let machines = "[[machine]]\nname = \"m\"\nrack = \"r\"\n[[machine]]\nname = \"m\"\nfeeder = \"f\"\nstations = 0\n";
+    check(
+        &format!("{GROUPS}{one}{machines}"),
+        &[
+            "error U0235 a machine has no `rack`, and another one has",
+            "error U0235 a machine has no `feeder`, and another one has",
+            "U0208 two machines are named `m`",
+        ],
+    );
 }
 
 /// The slot is part of the configuration, and only there where a file has one.
@@ -119,7 +129,7 @@ fn a_cluster_with_spares_alone_or_in_the_mode_of_the_paper_is_warned_about() {
 fn the_schema_of_a_plant_file_has_its_sections() {
     let schema = plant_file_schema();
     let properties = schema.get("properties").and_then(|it| it.as_object()).expect("an object");
-    assert_eq!(properties.keys().collect::<Vec<_>>(), ["group", "spare"]);
+    assert_eq!(properties.keys().collect::<Vec<_>>(), ["group", "machine", "spare"]);
 }
 
 #[test]

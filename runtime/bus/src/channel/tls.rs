@@ -73,6 +73,15 @@ pub(crate) const WRITE_KEYS: [(Role, &str); 2] =
 /// Where a member is told of orders that were refused before they were sent.
 pub(crate) const REFUSED_KEY: &str = "refused";
 
+/// Where the lines of a journal are told.
+pub(crate) const JOURNAL_KEY: &str = "journal";
+
+/// Where a remote I/O tells which stations it misses.
+pub(crate) const ATTENDANCE_KEY: &str = "attendance";
+
+/// Where a spare reports.
+pub(crate) const SPARE_KEY: &str = "spare";
+
 /// Where a member's keys begin.
 pub(crate) fn prefix(cluster: ClusterHash, name: &str) -> String {
     format!("understudy/{cluster}/{name}")
@@ -130,8 +139,8 @@ pub(super) fn access_control(prefix: &str, hash: &str, admitted: &Admitted) -> s
     let asked: Vec<String> = asked.into_iter().chain([hash.to_owned()]).collect();
     let commands = vec![format!("{prefix}/command/*")];
     let writes = WRITE_KEYS.map(|(_, key)| vec![format!("{prefix}/{key}")]);
-    let journal = vec![format!("{prefix}/journal")];
-    let refused = vec![format!("{prefix}/{REFUSED_KEY}")];
+    let told = [JOURNAL_KEY, ATTENDANCE_KEY].map(|what| format!("{prefix}/{what}"));
+    let refused = [REFUSED_KEY, SPARE_KEY].map(|what| format!("{prefix}/{what}"));
     let rule = |id: &str, messages: &[&str], flow: &str, keys: &[String]| {
         json!({
             "id": id,
@@ -145,8 +154,8 @@ pub(super) fn access_control(prefix: &str, hash: &str, admitted: &Admitted) -> s
     let rules = [
         rule("ask", &["query"], "ingress", &asked),
         rule("ask-answer", &answers, "egress", &asked),
-        rule("follow", &["declare_subscriber"], "ingress", &journal),
-        rule("follow-lines", &["put"], "egress", &journal),
+        rule("follow", &["declare_subscriber"], "ingress", &told),
+        rule("follow-lines", &["put"], "egress", &told),
         rule("refused", &["query"], "ingress", &refused),
         rule("refused-answer", &answers, "egress", &refused),
         rule("write", &["query"], "ingress", &writes[0]),

@@ -1,16 +1,17 @@
 //! What a spare knows of a group, from the deadlines of a few of its remote I/Os.
 //!
-//! A *witness* is a remote I/O whose journal is followed. Each of its deadlines names the stations whose turns it
-//! received; turns go to all remote I/Os, so a few witnesses see every station. A station is flagged for as many cycles as
-//! every followed witness has missed it in a row: a broken link of one witness is no failure of a station.
+//! A *witness* is a remote I/O whose reports are followed. Each report names the stations whose turns it misses; turns go to all
+//! remote I/Os, so a few witnesses see every station. A station is flagged for as many cycles as every followed witness has missed it in a row: a broken link of one witness is no failure of a station.
 //!
 //! ```text
 //!   witness 0  ■ ■ ■ □ □ □ □ □ □    flagged for 6
 //!   witness 1  ■ ■ ■ ■ ■ □ □ □ □    flagged for 4      the station: flagged for 4
 //! ```
 
-use understudy_cycle::{Agreement, Mode};
 use understudy_wire::{ProgramId, StationId, StationSet};
+
+use super::attendance::AttendanceReport;
+use crate::{Agreement, Mode};
 
 /// Remote I/Os of a group that are followed, at most.
 pub const WITNESSES: usize = 3;
@@ -22,7 +23,7 @@ const NEXT_SLOT_AFTER: u32 = 100;
 const FIRST_TIME: u32 = 10;
 
 /// Attention to one group.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Hash)]
 pub struct Attention {
     controllers: usize,
     /// Understudies that are no slots of spares.
@@ -38,12 +39,14 @@ pub struct Attention {
 }
 
 /// A remote I/O that is followed.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Hash)]
 struct Witness {
     /// By rank: deadlines in a row without a turn of the station.
     silent: Vec<u32>,
     /// Deadlines in a row at which the group was complete without the own slot.
     complete: u32,
+    /// Deadlines that it has passed.
+    deadlines: u64,
 }
 
 /// What is known of a group.
@@ -88,23 +91,43 @@ impl Attention {
 
     /// A witness has passed a deadline at which it had received these stations.
     pub fn deadline(&mut self, witness: usize, heard: StationSet) {
-        let Some(place) = self.witnesses.get_mut(witness) else {
+        let Some(place) = self.witnesses.get(witness) else {
             return;
         };
-        self.known = self.known.or(heard);
-        let stations = self.stations;
-        let fresh = || Witness { silent: vec![0; stations], complete: 0 };
-        let mut seen = place.take().unwrap_or_else(fresh);
-        for (rank, silent) in seen.silent.iter_mut().enumerate() {
+        let before = place.as_ref();
+        let silent = (0..self.stations).map(|rank| {
+            let silent = before.map_or(0, |it| it.silent[rank]);
             let present = heard.contains(StationId(rank as u8));
-            *silent = if present { 0 } else { silent.saturating_add(1) };
-        }
+            if present { 0 } else { silent.saturating_add(1) }
+        });
+        let silent: Vec<u32> = silent.collect();
+        let deadlines = before.map_or(0, |it| it.deadlines).saturating_add(1);
+        self.told(witness, &AttendanceReport { deadlines, longest: silent.clone(), silent });
+    }
+
+    /// A witness reports the stations that it misses.
+    pub fn told(&mut self, witness: usize, report: &AttendanceReport) {
+        let AttendanceReport { deadlines, silent, longest } = report;
+        let has_all = [silent, longest].iter().all(|counts| counts.len() == self.stations);
+        let Some(place) = self.witnesses.get_mut(witness).filter(|_| has_all) else {
+            return;
+        };
+        // What was before the first report is not known.
+        let fresh = || Witness { silent: Vec::new(), complete: 0, deadlines: *deadlines };
+        let mut seen = place.take().unwrap_or_else(fresh);
+        // One that has started again counts from the beginning.
+        let passed = u32::try_from(deadlines.saturating_sub(seen.deadlines)).unwrap_or(u32::MAX);
+        seen.deadlines = *deadlines;
+        seen.silent.clone_from(silent);
+        let ranks = (0..self.stations).map(|rank| StationId(rank as u8));
+        let received = ranks.filter(|it| seen.silent[it.index()] == 0);
+        self.known = self.known.or(received.collect());
         // A slot after the own one does not count: of two spares for one failure the later one retires.
         let before: StationSet = self.slots.iter().filter(|slot| slot.0 < self.own.0).collect();
-        let present = |station: StationId| seen.silent[station.index()] < self.flag_after;
+        let present = |station: StationId| longest[station.index()] < self.flag_after;
         let full = self.full();
         let is_complete = self.masked(before, present).is_some_and(|masked| masked >= full);
-        seen.complete = if is_complete { seen.complete.saturating_add(1) } else { 0 };
+        seen.complete = if is_complete { seen.complete.saturating_add(passed.max(1)) } else { 0 };
         self.witnesses[witness] = Some(seen);
     }
 

@@ -3,9 +3,9 @@
 //! A spare without a post takes the group with the least remaining redundancy among those that lack some, the first one in
 //! the plant file where several have equally little. It stays there until the group has been complete without it for
 //! `retire_after`: a spare that left for another group would take protection from one to give it to the other. Of several
-//! spares of a group the ranks of their slots decide ([`crate::Attention`]).
+//! spares of a group the ranks of their slots decide ([`super::Attention`]).
 
-use crate::attention::Standing;
+use super::attention::Standing;
 
 /// What a spare does next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,7 +19,7 @@ pub enum Order {
 }
 
 /// The rule of one spare.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Hash)]
 pub struct Rule {
     /// By group: whether it fits the capacity of the spare.
     pub fits: Vec<bool>,

@@ -3,11 +3,11 @@
 use std::time::Duration;
 
 use proptest::prelude::*;
-use understudy_cycle::Schedule;
 use understudy_wire::{ClusterHash, ConfigurationHash};
 
 use super::*;
-use crate::rule::wanted;
+use crate::Schedule;
+use crate::spare::{AttendanceCount, wanted};
 
 const SPARE_AFTER: u32 = 20;
 
@@ -242,4 +242,63 @@ proptest! {
             prop_assert_eq!(Some(standing.redundancy), expected);
         }
     }
+}
+
+/// Reports that come once a second, and at once while a station is missed, lead to the same as every deadline.
+#[test]
+fn reports_lead_to_the_same_as_every_deadline() {
+    let agreement = agreement(3, 1, 2);
+    let mut by_deadline = Attention::new(&agreement, StationId(4), SPARE_AFTER);
+    let mut by_report = by_deadline.clone();
+    let mut counts = vec![AttendanceCount::new(&agreement.schedule); 3];
+    let mut compared = 0;
+    for cycle in 0..3000_u32 {
+        let heard: &[u8] = match cycle {
+            400..=410 | 900..=1100 => &[0, 2, 3],
+            1000..=1300 => &[0, 1, 2, 4],
+            1500..=1501 => &[0, 1, 2],
+            _ => &ALL,
+        };
+        for (witness, count) in counts.iter_mut().enumerate() {
+            by_deadline.deadline(witness, set(heard));
+            count.deadline(set(heard));
+            if let Some(report) = count.take() {
+                by_report.told(witness, &report);
+                compared += 1;
+            }
+        }
+        let (every, told) = (by_deadline.standing(), by_report.standing());
+        assert_eq!((every.redundancy, every.served), (told.redundancy, told.served), "{cycle}");
+        assert!(told.complete <= every.complete, "{cycle}: {told:?} {every:?}");
+        assert!(every.complete < told.complete + 110, "{cycle}: {told:?} {every:?}");
+    }
+    assert!(compared > 500, "{compared}");
+}
+
+/// A report of another number of stations is no report of this group.
+#[test]
+fn a_report_of_other_stations_is_not_taken() {
+    let mut bench = Bench::new(4);
+    let strange = AttendanceReport { deadlines: 7, silent: vec![9; 2], longest: vec![9; 2] };
+    let before = bench.attention.standing();
+    bench.attention.told(0, &strange);
+    assert_eq!(bench.attention.standing(), before);
+}
+
+/// A spare that begins to follow a group does not take it for complete in the time before.
+#[test]
+fn the_first_report_says_nothing_of_the_time_before() {
+    let mut attention = Attention::new(&agreement(3, 1, 2), StationId(4), SPARE_AFTER);
+    let report = |deadlines| AttendanceReport {
+        deadlines,
+        silent: vec![0, 0, 0, 0, 9, 9],
+        longest: vec![0, 0, 0, 0, 9, 9],
+    };
+    (0..3).for_each(|witness| attention.told(witness, &report(5_000)));
+    assert_eq!(attention.standing().complete, 1);
+    (0..3).for_each(|witness| attention.told(witness, &report(5_100)));
+    assert_eq!(attention.standing().complete, 101);
+    // It has started again.
+    (0..3).for_each(|witness| attention.told(witness, &report(3)));
+    assert_eq!(attention.standing().complete, 102);
 }

@@ -1,0 +1,115 @@
+//! The groups of a plant, each followed in a run.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use understudy_cluster::PlantFile;
+
+use super::{GroupView, PlantOverview};
+use crate::following::Following;
+use crate::model::{Bounds, Model};
+use crate::run::{Run, find_running};
+
+/// The overview shows the present; the past is for the view of a group.
+const BOUNDS: Bounds = Bounds { cycles: 64, events: 1000, changes: 64, timings: 16 };
+
+/// A group whose journal has not grown for this time is not observed.
+const STALE: Duration = Duration::from_secs(3);
+
+/// Time between two searches for the run of a group.
+const SEARCH_EVERY: Duration = Duration::from_secs(2);
+
+/// A plant whose groups are followed: for each the run that a process writes below a directory of runs.
+#[derive(Debug)]
+pub struct FollowedPlant {
+    plant: PlantFile,
+    groups: Vec<Option<FollowedGroup>>,
+    searched: Vec<Option<Instant>>,
+}
+
+#[derive(Debug)]
+struct FollowedGroup {
+    run: Run,
+    model: Model,
+    following: Following,
+}
+
+impl FollowedPlant {
+    /// Follows a plant, of which no run is known yet.
+    pub fn new(plant: PlantFile) -> Self {
+        let groups = plant.groups.len();
+        let (followed, searched) = ((0..groups).map(|_| None).collect(), vec![None; groups]);
+        Self { plant, groups: followed, searched }
+    }
+
+    /// The plant file.
+    pub fn plant(&self) -> &PlantFile {
+        &self.plant
+    }
+
+    /// Follows a group in this run.
+    pub fn follow(&mut self, group: usize, run: Run) {
+        let (model, following) = Following::of(&run, BOUNDS);
+        if let Some(place) = self.groups.get_mut(group) {
+            *place = Some(FollowedGroup { run, model, following });
+        }
+    }
+
+    /// Reads what is new; runs of groups without one are searched below `runs`.
+    pub fn look(&mut self, runs: &Path, now: Instant) -> PlantOverview {
+        let mut views = Vec::new();
+        for group in 0..self.groups.len() {
+            let is_over = |of: &FollowedGroup| !of.run.is_written();
+            if self.groups[group].as_ref().is_none_or(is_over) {
+                self.search(group, runs, now);
+            }
+            views.push(match &mut self.groups[group] {
+                Some(followed) => followed.view(now),
+                None => GroupView::Unknown("no process records its run".to_owned()),
+            });
+        }
+        PlantOverview::new(&self.plant, &views)
+    }
+
+    fn search(&mut self, group: usize, runs: &Path, now: Instant) {
+        let is_due = |at: Instant| now.saturating_duration_since(at) >= SEARCH_EVERY;
+        if !self.searched[group].is_none_or(is_due) {
+            return;
+        }
+        self.searched[group] = Some(now);
+        if let Some(run) = find_running(runs, &self.plant.groups[group].cluster) {
+            self.follow(group, run);
+        }
+    }
+}
+
+impl FollowedGroup {
+    fn view(&mut self, now: Instant) -> GroupView {
+        let Self { run, model, following } = self;
+        while following.poll(&mut |found| model.take_found(found)) > 0 {
+            // A journal that grows faster than it is read is not followed to its end.
+            if following.progress().is_at_end() {
+                break;
+            }
+        }
+        if !run.is_written() {
+            return GroupView::Unknown("the process that recorded its run has ended".to_owned());
+        }
+        let progress = following.progress();
+        if let Err(reading) = progress.current(now) {
+            return GroupView::Unknown(reading.to_string());
+        }
+        match progress.age(now) {
+            Some(age) if age <= STALE => {}
+            Some(age) => {
+                let seconds = age.as_secs();
+                return GroupView::Unknown(format!("no record for {seconds} s"));
+            }
+            None => return GroupView::Unknown("no record yet".to_owned()),
+        }
+        if model.cycle().is_none() {
+            return GroupView::Unknown("no deadline was reported yet".to_owned());
+        }
+        GroupView::Present(Box::new(model.snapshot()))
+    }
+}
