@@ -45,7 +45,7 @@ impl std::fmt::Debug for Keys {
 #[derive(Debug)]
 pub(crate) enum Opened {
     /// A frame for this member.
-    Frame(Frame),
+    Frame(Arc<Frame>),
     /// For another station.
     ForAnother,
     /// A frame of this member that came over the other network before.
@@ -133,9 +133,12 @@ impl Guard {
     /// What a datagram is that came over a network. Without keys a second copy is a frame like its first.
     pub(crate) fn open(&mut self, via: Via, datagram: &mut [u8]) -> Result<Opened, Refused> {
         match self {
-            Self::Off => decode(datagram).map(Opened::Frame).map_err(Refused::from),
+            Self::Off => {
+                let frame = decode(datagram).map_err(Refused::from)?;
+                Ok(Opened::Frame(Arc::new(frame)))
+            }
             Self::Keys(keys) => match keys.opener.open_over(via, datagram) {
-                Ok(Some(frame)) => Ok(Opened::Frame(frame)),
+                Ok(Some(frame)) => Ok(Opened::Frame(Arc::new(frame))),
                 Ok(None) => Ok(Opened::ForAnother),
                 Err(Refusal::SecondCopy { sender }) => Ok(Opened::SecondCopy(sender)),
                 Err(refusal) => Err(Refused::from(refusal)),

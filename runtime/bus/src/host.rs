@@ -5,7 +5,6 @@
 
 mod reports;
 
-use std::sync::Arc;
 use std::time::Duration;
 
 use nix::errno::Errno;
@@ -300,7 +299,6 @@ impl<M: Machine> Host<'_, M> {
                 Ok(Opened::ForAnother | Opened::SecondCopy(_)) => {}
                 Ok(Opened::Frame(frame)) if self.orders.is_cut(frame.header.sender) => {}
                 Ok(Opened::Frame(frame)) => {
-                    let frame = Arc::new(frame);
                     round.summary.frames_heard += 1;
                     if let Some(unreceived) = &mut round.unreceived
                         && unreceived.shown_by(now, &frame)
