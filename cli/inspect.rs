@@ -4,6 +4,7 @@ mod animate;
 pub(crate) mod attach;
 mod diff;
 mod journal;
+mod retained;
 pub(crate) mod top;
 mod view;
 pub(crate) mod watch;
@@ -22,6 +23,7 @@ pub(crate) fn group() -> Group {
             command("journal", |it, console| journal::run(&it, console.is_json())),
             command("diff", |it, _| diff::run(&it)),
             command("animate", |it, _| animate::run(&it)),
+            command("retained", |it, _| retained::run(&it)),
         ],
     }
 }
