@@ -203,7 +203,7 @@ pub struct Join {
     /// States that it holds.
     pub holdings: SmallVec<[Holding; 2]>,
     /// States that it has kept on disk, of programs whose state it does not hold: they can start warm from these.
-    pub retained: SmallVec<[Kept; 1]>,
+    pub retained: Vec<Kept>,
     /// As in a [`Turn`].
     pub recalled: Vec<Recalled>,
     /// As in a [`Turn`].
