@@ -5,6 +5,7 @@ pub(crate) mod attach;
 mod diff;
 mod journal;
 pub(crate) mod plant;
+mod retained;
 pub(crate) mod top;
 mod view;
 pub(crate) mod watch;
@@ -23,6 +24,7 @@ pub(crate) fn group() -> Group {
             command("journal", |it, console| journal::run(&it, console.is_json())),
             command("diff", |it, _| diff::run(&it)),
             command("animate", |it, _| animate::run(&it)),
+            command("retained", |it, _| retained::run(&it)),
         ],
     }
 }

@@ -187,7 +187,8 @@ impl Station {
     }
 
     /// Keeps the states of programs with retentive variables: whole after every `every` steps, and each step in between
-    /// ([`Output::Retain`]). It starts with what it has kept before, `runs`.
+    /// ([`Output::Retain`]). It starts with what it has kept before, `runs`, of this program or
+    /// taken over from another one.
     #[must_use]
     pub fn retaining(mut self, every: u32, runs: &[RetainedRun]) -> Self {
         let cluster = self.settings.agreement.cluster;
@@ -200,7 +201,8 @@ impl Station {
             let own = |run: &&RetainedRun| {
                 run.state.cluster == cluster && run.state.program == replica.id()
             };
-            let own: Vec<_> = runs.iter().filter(own).collect();
+            let mut own: Vec<_> = runs.iter().filter(own).collect();
+            own.sort_by_key(|run| run.state.number);
             for run in own {
                 replica.find_retained(program, &mut self.scratch, run);
             }

@@ -6,7 +6,7 @@ use std::cmp::Reverse;
 
 use understudy_cycle::Agreement;
 use understudy_wire::{
-    Epoch, Holding, Moment, ProgramId, Recalled, SamplesReceived, StationId, StationSet,
+    Epoch, Holding, Kept, Moment, ProgramId, Recalled, SamplesReceived, StationId, StationSet,
 };
 
 /// One entry for each station that can hold the program's state.
@@ -27,7 +27,7 @@ struct Holder {
     station: StationId,
     holding: Option<Holding>,
     /// The state that it has kept over a power failure, while it holds none.
-    retained: Option<Holding>,
+    retained: Option<Kept>,
     /// What it recalls of this remote I/O's last sample.
     recalled: Option<Recalled>,
     /// Cycles since it was received; `u32::MAX` for never.
@@ -92,7 +92,7 @@ impl Holders {
     }
 
     /// Takes the state that a station has kept over a power failure, while it holds none.
-    pub(crate) fn note_retained(&mut self, station: StationId, retained: Option<&Holding>) {
+    pub(crate) fn note_retained(&mut self, station: StationId, retained: Option<&Kept>) {
         if let Some(entry) = self.entries.iter_mut().find(|entry| entry.station == station) {
             entry.retained = retained.copied();
         }
@@ -247,7 +247,7 @@ impl Holders {
     }
 
     /// States that living stations have retained, but for those of `excluded`.
-    fn retained(&self, excluded: StationSet) -> impl Iterator<Item = (StationId, &Holding)> {
+    fn retained(&self, excluded: StationSet) -> impl Iterator<Item = (StationId, &Kept)> {
         self.entries
             .iter()
             .filter(move |entry| self.lives(entry) && !excluded.contains(entry.station))
@@ -259,8 +259,11 @@ impl Holders {
         &self,
         excluded: StationSet,
         epoch: Option<Epoch>,
-    ) -> Option<(StationId, &Holding)> {
-        let rank = |of: &Holding| (epoch == Some(of.stepped.epoch), of.stepped);
+    ) -> Option<(StationId, &Kept)> {
+        let rank = |of: &Kept| {
+            let stepped = of.holding.stepped;
+            (epoch == Some(stepped.epoch), stepped)
+        };
         self.retained(excluded)
             .reduce(|best, other| if rank(other.1) > rank(best.1) { other } else { best })
     }
@@ -269,10 +272,11 @@ impl Holders {
     pub(crate) fn disputed_retained(
         &self,
         excluded: StationSet,
-        newest: &Holding,
+        newest: &Kept,
     ) -> Option<StationSet> {
-        let equal = || self.retained(excluded).filter(|(_, it)| it.stepped == newest.stepped);
-        let differ = equal().any(|(_, other)| other.lineage != newest.lineage);
+        let Holding { stepped, lineage, .. } = newest.holding;
+        let equal = || self.retained(excluded).filter(|(_, it)| it.holding.stepped == stepped);
+        let differ = equal().any(|(_, other)| other.holding.lineage != lineage);
         differ.then(|| equal().map(|(station, _)| station).collect())
     }
 

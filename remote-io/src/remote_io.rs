@@ -40,8 +40,8 @@ use std::time::Duration;
 
 use understudy_cycle::{Arrival, Input, Machine, Output, Outvoted, Participant, RemoteIoInput};
 use understudy_wire::{
-    Body, ConfigurationHash, Frame, Holding, Image, Join, Member, Moment, OrderRefusal, ProgramId,
-    Recalled, Source, StateChoice, StationId, StationSet, Time,
+    Body, ConfigurationHash, Frame, Holding, Image, Join, Kept, Member, Moment, OrderRefusal,
+    ProgramId, Recalled, Source, StateChoice, StationId, StationSet, Time,
 };
 
 use crate::diagnosis::Diagnosing;
@@ -312,13 +312,14 @@ impl RemoteIo {
         &mut self,
         station: StationId,
         holdings: &[Holding],
-        retained: &[Holding],
+        retained: &[Kept],
         recalled: &[Recalled],
         alone: bool,
     ) {
         let program = self.settings.program;
         let own = Holding::of(holdings, program);
-        self.holders.note_retained(station, Holding::of(retained, program));
+        let retained = retained.iter().find(|kept| kept.holding.program == program);
+        self.holders.note_retained(station, retained);
         let recalled = recalled.iter().find(|recalled| {
             recalled.program == program && recalled.inputs.width() == self.settings.undriven.width()
         });

@@ -105,15 +105,25 @@ impl OperatorInput {
         if !self.place.takes(value) {
             return Err(ValueMismatch::Type);
         }
-        let (of, stored) = (self.place.of, value.stored());
+        let stored = value.stored();
         match self.kind {
             OperatorInputKind::Level
             | OperatorInputKind::Pulse(_)
             | OperatorInputKind::Group { .. } => Ok(()),
-            OperatorInputKind::Setpoint { low, high } => {
-                let is_inside = in_order(of, low, stored) && in_order(of, stored, high);
-                is_inside.then_some(()).ok_or(ValueMismatch::Limits)
+            OperatorInputKind::Setpoint { .. } => {
+                self.admits(stored).then_some(()).ok_or(ValueMismatch::Limits)
             }
+        }
+    }
+
+    /// Whether a stored value of its type is within the limits.
+    pub(crate) fn admits(&self, stored: u64) -> bool {
+        let of = self.place.of;
+        match self.kind {
+            OperatorInputKind::Setpoint { low, high } => {
+                in_order(of, low, stored) && in_order(of, stored, high)
+            }
+            _ => true,
         }
     }
 }

@@ -100,6 +100,14 @@ fn what_is_retentive_is_listed_and_proved_about() {
     let property = &program["properties"][0];
     assert_eq!(property["verdict"], "fails");
     assert_eq!(property["scans"]["signals"]["power.returns"], serde_json::json!([0, 1]));
+    // What is assumed not to happen is no assumption that it may.
+    for (assumed, restarts) in
+        [("!power.returns", 0), ("a & !power.returns", 0), ("!a | !power.returns", 1)]
+    {
+        let proved = understudy_in(&folder, &[&proof[..], &["--assume", assumed]].concat()).json();
+        let restarted = &proved["result"]["programs"][0]["restarted_by"];
+        assert_eq!(restarted.as_array().map(Vec::len), Some(restarts), "{assumed}: {proved}");
+    }
 }
 
 #[test]

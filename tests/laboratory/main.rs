@@ -16,6 +16,7 @@ mod gates;
 mod handshake;
 mod hosts;
 mod power;
+mod program_change;
 mod set_inputs;
 #[allow(dead_code, reason = "each test uses its part")]
 #[path = "../shared/mod.rs"]

@@ -98,7 +98,8 @@ impl Model {
         let restarting = restarting.map(|(place, _)| place).collect();
         let subject = Subject::of(derivation.circuit.clone(), outputs)
             .with_assumed(assumed)
-            .with_restarts(restarting);
+            .with_restarts(restarting)
+            .never_restarted(&asked.assumed);
         Ok(Self { system, derivation, subject, refused })
     }
 

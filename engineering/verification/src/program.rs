@@ -103,6 +103,8 @@ pub struct Subject {
     assumed: Option<Signal>,
     /// The inputs that restart a program.
     restarting: Vec<usize>,
+    /// Those that an assumption keeps FALSE.
+    never_restarting: Vec<usize>,
     /// All reachable states, computed on first use.
     listed: OnceCell<Explicit>,
 }
@@ -124,6 +126,7 @@ impl Subject {
         }
         let right = asked.assumed.iter().filter(|it| subject.wrong_assumption(it).is_empty());
         let assumed: Vec<Resolved> = right.filter_map(|it| subject.resolve(it).ok()).collect();
+        subject = subject.never_restarted(&asked.assumed);
         if !assumed.is_empty() {
             subject.circuit = with_assumptions(&subject.circuit, &assumed);
             subject.assumed = Some(Signal::Output(subject.circuit.outputs().len() - 1));
@@ -133,7 +136,24 @@ impl Subject {
 
     /// A circuit as it is, of which the first outputs are the program's own.
     pub(crate) fn of(circuit: Circuit, outputs: usize) -> Self {
-        Self { outputs, circuit, assumed: None, restarting: Vec::new(), listed: OnceCell::new() }
+        Self {
+            outputs,
+            circuit,
+            assumed: None,
+            restarting: Vec::new(),
+            never_restarting: Vec::new(),
+            listed: OnceCell::new(),
+        }
+    }
+
+    /// The same where these assumptions may say that a program is not restarted.
+    pub(crate) fn never_restarted(mut self, assumed: &[&Property]) -> Self {
+        let forbidden = |input: &&usize| {
+            let name = &self.circuit.inputs()[**input];
+            assumed.iter().any(|assumed| assumed.forbids(name))
+        };
+        self.never_restarting = self.restarting.iter().filter(forbidden).copied().collect();
+        self
     }
 
     /// The same where these inputs restart a program.
@@ -141,9 +161,11 @@ impl Subject {
         Self { restarting, ..self }
     }
 
-    /// The inputs that are TRUE in the first scan of a warm start, of programs with retentive variables.
+    /// The inputs that are TRUE in the first scan of a warm start, of programs with retentive variables; without those that an assumption keeps FALSE.
     pub fn restarting(&self) -> impl Iterator<Item = &str> {
-        self.restarting.iter().map(|&input| self.circuit.inputs()[input].as_str())
+        let restarting = self.restarting.iter();
+        let restarting = restarting.filter(|input| !self.never_restarting.contains(input));
+        restarting.map(|&input| self.circuit.inputs()[input].as_str())
     }
 
     /// The same where an output of the circuit says whether the assumptions have held so far.

@@ -146,6 +146,31 @@ impl<S> Formula<S> {
         }
     }
 
+    /// Its value in one scan where these signals are known and all others are not.
+    fn value_where(&self, known: &dyn Fn(&S) -> Option<bool>) -> Option<bool> {
+        match self {
+            Self::Constant(value) => Some(*value),
+            Self::Signal(signal) => known(signal),
+            Self::Not(inner) => inner.value_where(known).map(|value| !value),
+            Self::And(left, right) => match (left.value_where(known), right.value_where(known)) {
+                (Some(false), _) | (_, Some(false)) => Some(false),
+                (left, right) => Some(left? && right?),
+            },
+            Self::Or(left, right) => match (left.value_where(known), right.value_where(known)) {
+                (Some(true), _) | (_, Some(true)) => Some(true),
+                (left, right) => Some(left? || right?),
+            },
+            Self::Implies(left, right) => {
+                match (left.value_where(known), right.value_where(known)) {
+                    (Some(false), _) | (_, Some(true)) => Some(true),
+                    (left, right) => Some(!left? || right?),
+                }
+            }
+            Self::Same(left, right) => Some(left.value_where(known)? == right.value_where(known)?),
+            _ => None,
+        }
+    }
+
     /// Whether it speaks of one scan only.
     pub fn is_of_one_scan(&self) -> bool {
         match self {
@@ -281,6 +306,14 @@ impl Property {
             wrong.push(not_of_one_scan("an assumption", place.unwrap_or_default()));
         }
         wrong
+    }
+}
+
+impl Property {
+    /// Whether a BOOL is FALSE in each scan in which this holds, whatever the others are.
+    pub(crate) fn forbids(&self, name: &str) -> bool {
+        let is_it = |named: &Named| named.compared.is_none() && named.name == name;
+        self.formula.value_where(&|named| is_it(named).then_some(true)) == Some(false)
     }
 }
 

@@ -56,7 +56,7 @@ impl Disks {
                 {
                     runs.remove(oldest);
                 }
-                runs.push(RetainedRun { state, steps: Vec::new() });
+                runs.push(RetainedRun::from(state));
             }
             (Member::Station(station), Retained::Step(step)) => {
                 let runs = &mut self.stations[station.index()];

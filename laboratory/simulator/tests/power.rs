@@ -241,10 +241,13 @@ fn a_note_of_another_program_proves_nothing() {
             simulation.schedule(fault((120, 0.5), member, Action::Crash));
             simulation.schedule(fault((122 + returns, 0.5), member, Action::Restart));
         }
+        // The wrong program finds the note of the right one, and asks too.
+        let choice = StateChoice::Cold;
+        simulation.schedule(fault((100, 0.5), REMOTE_IO, Action::Choose { choice }));
         simulation.schedule(fault((124, 0.5), CONTROLLER, Action::Restart));
         let seen = run(&mut simulation, 250);
         assert_eq!(simulation.violations(), [], "{crash} {returns}");
-        assert_eq!((seen.warm.len(), seen.asked), (0, 1), "{crash} {returns}");
+        assert_eq!((seen.warm.len(), seen.asked), (0, 2), "{crash} {returns}");
     }
 }
 

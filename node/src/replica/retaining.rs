@@ -11,8 +11,8 @@ use std::collections::VecDeque;
 
 use understudy_executable::Scratch;
 use understudy_wire::{
-    ClusterHash, Digest, Holding, Image, Lineage, ProgramId, Retained, RetainedRun, RetainedState,
-    RetainedStep, Sample,
+    Carried, ClusterHash, Digest, Image, Kept, Lineage, ProgramId, Retained, RetainedRun,
+    RetainedState, RetainedStep, Sample,
 };
 
 use super::{Held, Replica, State};
@@ -24,6 +24,8 @@ pub(super) struct Retaining {
     keeps: Option<Keeps>,
     /// The state that was found at the start; none any more once a state is held.
     found: Option<Held>,
+    /// The program whose values `found` has, where they were taken over from another one.
+    carried: Option<Carried>,
     /// The states before it, oldest first: its last samples may be void.
     before: VecDeque<State>,
     /// Records that are not taken yet.
@@ -93,7 +95,7 @@ impl Replica {
         self.retaining.keeps = Some(Keeps { cluster, every, at: None, steps: 0, number: 0 });
     }
 
-    /// Takes what was kept before the power failed; of another program it takes nothing.
+    /// Takes what was kept before the power failed, in the order of its numbers; of another program it takes the number alone.
     pub(crate) fn find_retained(
         &mut self,
         program: &Program,
@@ -101,6 +103,10 @@ impl Replica {
         run: &RetainedRun,
     ) {
         let kept = &run.state;
+        let Some(keeps) = &mut self.retaining.keeps else {
+            return;
+        };
+        keeps.number = keeps.number.max(kept.number.saturating_add(1));
         let inputs = program.executable.input_count();
         if kept.hash != program.hash
             || kept.state.width() != program.executable.state_count()
@@ -130,25 +136,25 @@ impl Replica {
             state.lineage = step.after;
             state.stepped = step.stepped;
         }
-        let Some(keeps) = &mut self.retaining.keeps else {
-            return;
-        };
-        if keeps.number <= kept.number {
-            keeps.number = kept.number.saturating_add(1);
-            self.retaining.found = Some(Held { born: kept.born, state });
-            self.retaining.before = before;
-        }
+        self.retaining.found = Some(Held { born: kept.born, state });
+        self.retaining.carried = run.carried;
+        self.retaining.before = before;
     }
 
     /// The retained state that it reports, while it holds none.
-    pub(crate) fn retained(&self) -> Option<Holding> {
+    pub(crate) fn retained(&self, program: &Program) -> Option<Kept> {
         let found = self.retaining.found.as_ref().filter(|_| self.held.is_none())?;
-        Some(found.holding(self.id))
+        let (of, is_whole) = match self.retaining.carried {
+            Some(carried) => (carried.from, carried.is_whole),
+            None => (program.hash, true),
+        };
+        Some(Kept { holding: found.holding(self.id), of, is_whole })
     }
 
     /// Forgets the retained state.
     pub(super) fn forget_retained(&mut self) {
         self.retaining.found = None;
+        self.retaining.carried = None;
         self.retaining.before.clear();
     }
 
@@ -159,7 +165,9 @@ impl Replica {
 
     /// Goes on from the retained state, or from one before it, where that is in the history: its place there.
     pub(super) fn take_up_retained(&mut self, lineages: &[Lineage]) -> Option<usize> {
-        self.retaining.found.as_ref().filter(|_| self.held.is_none())?;
+        // Values of another program are not a state of this one: it only starts from them.
+        let may_continue = self.held.is_none() && self.retaining.carried.is_none();
+        self.retaining.found.as_ref().filter(|_| may_continue)?;
         // From here on it is a state that the replica held.
         let found = self.retaining.found.take();
         let past = std::mem::replace(&mut self.past, std::mem::take(&mut self.retaining.before));

@@ -80,7 +80,11 @@ impl Station {
             self.member.send(Body::Join(Join {
                 wants,
                 holdings,
-                retained: self.replicas.iter().filter_map(Replica::retained).collect(),
+                retained: self
+                    .replicas
+                    .iter()
+                    .filter_map(|it| it.retained(&self.settings.programs[it.id().index()]))
+                    .collect(),
                 recalled,
                 lacks: self.lacks(),
                 partial,

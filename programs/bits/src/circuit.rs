@@ -21,7 +21,7 @@ use understudy_typed::Elementary;
 
 use crate::System;
 use crate::execute::Unsupported;
-use crate::extent::Extents;
+use crate::extent::{Extent, Extents};
 use crate::number::Number;
 use crate::term::Term;
 
@@ -117,6 +117,11 @@ impl Derivation {
     /// Whether a BOOL is FALSE in every run.
     pub(crate) fn is_never(&self, term: Term) -> bool {
         self.extents.get(term).high == 0
+    }
+
+    /// Between which numbers a value lies.
+    pub(crate) fn extent(&self, term: Term) -> Extent {
+        self.extents.get(term)
     }
 
     /// What a number is a multiple of.

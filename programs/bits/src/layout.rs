@@ -1,5 +1,7 @@
 //! What the registers of an exact circuit are in the state of its program.
 
+mod registers;
+
 use std::collections::{BTreeMap, BTreeSet};
 
 use understudy_logic::Variable as Bit;
@@ -8,8 +10,11 @@ use understudy_typed::Program;
 use crate::System;
 use crate::circuit::Derivation;
 use crate::exact::registers;
+use crate::extent::Extent;
 use crate::program::together;
 use crate::system::Holds;
+
+pub use self::registers::Registers;
 
 /// The slot of the scans since the start.
 const SCANS: usize = Program::HEADER as usize - 1;
@@ -20,8 +25,8 @@ pub struct Layout {
     initial: Vec<u64>,
     period: i64,
     together: u64,
-    /// The cells that registers hold.
-    cells: Vec<Holds>,
+    /// The cells that registers hold, those with one value, and between which numbers their values lie.
+    cells: Vec<(Holds, Extent)>,
     /// For each register its cell, and the weight of its bit.
     registers: Vec<(usize, i128)>,
 }
@@ -38,12 +43,28 @@ impl Layout {
         let registers = registers(live).filter_map(|register| derivation.held[register]);
         let registers = registers.map(|held| {
             let place = *places.entry(held.cell).or_insert_with(|| {
-                cells.push(system.cells[held.cell as usize].holds.clone());
+                let cell = &system.cells[held.cell as usize];
+                cells.push((cell.holds.clone(), derivation.extent(cell.term)));
                 cells.len() - 1
             });
             (place, held.weight)
         });
         let registers = registers.collect();
+        // What never changes has no register, and the circuit has its one value.
+        for &cell in system.seen.iter().filter(|cell| !places.contains_key(cell)) {
+            let cell = &system.cells[cell as usize];
+            let extent = derivation.extent(cell.term);
+            let Holds::Value(address, _) = cell.holds else {
+                continue;
+            };
+            let of_timer = cells.iter().any(|(holds, _): &(Holds, Extent)| match holds {
+                Holds::Count(counted) => counted.keeps(address),
+                _ => false,
+            });
+            if extent.low == extent.high && !of_timer {
+                cells.push((cell.holds.clone(), extent));
+            }
+        }
         let initial = program.initial_state();
         let together = together(program);
         Self { initial, period: program.period.max(1), together, cells, registers }
@@ -51,7 +72,8 @@ impl Layout {
 
     /// The registers that a warm start keeps, packed; see [`Program::retentive_mask`].
     pub fn retentive_mask(&self, program: &Program) -> Vec<u64> {
-        let kept: Vec<bool> = self.cells.iter().map(|holds| holds.is_retentive(program)).collect();
+        let kept = self.cells.iter().map(|(holds, _)| holds.is_retentive(program));
+        let kept: Vec<bool> = kept.collect();
         let mut mask = vec![0; self.registers.len().div_ceil(64)];
         for (place, &(cell, _)) in self.registers.iter().enumerate() {
             mask[place / 64] |= u64::from(kept[cell]) << (place % 64);
@@ -65,7 +87,8 @@ impl Layout {
     /// # Panics
     /// If there are fewer registers than the circuit has.
     pub fn state(&self, registers: &[u64]) -> Vec<u64> {
-        let mut values = vec![0_i128; self.cells.len()];
+        let only = |extent: &Extent| if extent.low == extent.high { extent.low } else { 0 };
+        let mut values: Vec<i128> = self.cells.iter().map(|(_, extent)| only(extent)).collect();
         for (place, &(cell, weight)) in self.registers.iter().enumerate() {
             if registers[place / 64] >> (place % 64) & 1 == 1 {
                 values[cell] += weight;
@@ -80,7 +103,7 @@ impl Layout {
             *slot = *slot & !(mask << bit) | (value & mask) << bit;
         };
         // What a timer keeps comes first: its output may be a register too.
-        for (holds, &value) in self.cells.iter().zip(&values) {
+        for ((holds, _), &value) in self.cells.iter().zip(&values) {
             match holds {
                 Holds::Count(counted) => {
                     let kept = counted.kept(value as u64, now, self.period);
@@ -92,7 +115,7 @@ impl Layout {
                 _ => {}
             }
         }
-        let own = self.cells.iter().zip(&values).filter_map(|(holds, &value)| match holds {
+        let own = self.cells.iter().zip(&values).filter_map(|((holds, _), &value)| match holds {
             Holds::Value(address, of) => Some((*address, of.mask(), value)),
             _ => None,
         });
@@ -106,7 +129,7 @@ impl Layout {
     fn scans(&self, values: &[i128]) -> u64 {
         let mut least = 0;
         let mut phase = 0;
-        for (holds, &value) in self.cells.iter().zip(values) {
+        for ((holds, _), &value) in self.cells.iter().zip(values) {
             match holds {
                 Holds::Count(counted) => least = least.max(counted.reach()),
                 Holds::Age(_) => least = least.max(value as u64 / self.period as u64),

@@ -24,7 +24,7 @@ pub use circuit::boundaries::{between, boundary_text, position};
 pub use circuit::{Derivation, Meaning};
 pub use exact::{Compared, Exact, Gap, Inexact, Shown, exact};
 pub use execute::Unsupported;
-pub use layout::Layout;
+pub use layout::{Layout, Registers};
 pub use program::{Member, POWER_RETURNS};
 pub use system::{Cell, Input, Source, System};
 pub use term::{Node, Term, Terms, Variable};

@@ -331,6 +331,10 @@ impl System {
                 self.cells[cell as usize].holds = Holds::Count(Box::new(counted.clone()));
             }
         }
+        let outputs = program.outputs.iter().map(|point| 64 * u64::from(point.slot));
+        let shown = outputs.filter(|address| !scan.memory.contains_key(address));
+        let seen = scan.read.iter().copied().chain(shown);
+        self.seen.extend(seen.filter_map(|address| numbers.get(&address)));
         let read = scan.read.iter().filter(|address| scan.memory.contains_key(address));
         self.read.extend(read.filter_map(|address| numbers.get(address)));
         let can_fault = scan.faulted;

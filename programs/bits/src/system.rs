@@ -70,6 +70,8 @@ pub struct System {
     pub cells: Vec<Cell>,
     /// Cells that a scan reads and then writes.
     pub(crate) read: BTreeSet<u32>,
+    /// Cells that a scan reads before it writes them, if it writes them, and outputs that it does not write.
+    pub(crate) seen: BTreeSet<u32>,
     /// BOOLs that properties can name.
     pub observed: Vec<(String, Term)>,
     /// Values that a run shows beside them.
@@ -131,6 +133,7 @@ impl System {
             inputs: Vec::new(),
             cells: Vec::new(),
             read: BTreeSet::new(),
+            seen: BTreeSet::new(),
             observed: Vec::new(),
             shown: Vec::new(),
             restarts: false,

@@ -368,25 +368,6 @@ impl<'a> Lowering<'a> {
 
     /// A type as it is written.
     fn describe(&self, of: &Type) -> String {
-        match of {
-            Type::Elementary(elementary) => elementary.name().to_owned(),
-            Type::Enumeration(id, elementary) => {
-                match self.program.enumerations.get(id.0 as usize) {
-                    Some(found) if !found.name.is_empty() => found.name.clone(),
-                    _ => format!("an enumeration of {elementary}"),
-                }
-            }
-            Type::Text(capacity) => format!("STRING[{capacity}]"),
-            Type::Array(array) => {
-                let ranges = array.ranges.iter().map(|(low, high)| format!("{low}..{high}"));
-                let ranges: Vec<String> = ranges.collect();
-                let element = self.describe(&array.element);
-                format!("ARRAY [{}] OF {element}", ranges.join(", "))
-            }
-            Type::Structure(id, _) => match self.program.structures.get(id.0 as usize) {
-                Some(found) if !found.name.is_empty() => found.name.clone(),
-                _ => "a structure".to_owned(),
-            },
-        }
+        self.program.type_name(of)
     }
 }

@@ -123,3 +123,28 @@ fn the_parts_of_a_data_block_say_what_is_kept() {
     assert_eq!(program(&text("")).retentive_names(), ["d.a", "d.b"]);
     assert_eq!(program(&text("NON_RETAIN")).retentive_names(), ["d.b"]);
 }
+
+#[test]
+fn retain_and_non_retain_contradict_each_other() {
+    let errors = |text: &str| shown(text, &read(text, None).1, Severity::Error);
+    for declared in
+        ["VAR RETAIN NON_RETAIN", "VAR NON_RETAIN PERSISTENT", "VAR NON_RETAIN CONSTANT RETAIN"]
+    {
+        let text = format!("PROGRAM main {declared} n : INT; END_VAR n := n + 1; END_PROGRAM");
+        let found = errors(&text);
+        assert!(found.contains("U1035") && found.contains("not both"), "{declared}: {found}");
+    }
+    for declared in ["VAR RETAIN PERSISTENT", "VAR RETAIN RETAIN"] {
+        let text = format!("PROGRAM main {declared} n : INT; END_VAR n := n + 1; END_PROGRAM");
+        assert_eq!(errors(&text), "", "{declared}");
+    }
+}
+
+/// A variable of a routine that keeps its value between calls.
+#[test]
+fn static_variables_of_routines_are_listed() {
+    let text = "FUNCTION count : INT VAR_STAT RETAIN n : INT; END_VAR VAR_STAT m : INT; END_VAR n := n + 1; m := m + 1; count := n; END_FUNCTION
+        FUNCTION_BLOCK b METHOD up : INT VAR_INST RETAIN k : INT; END_VAR k := k + 1; up := k; END_METHOD END_FUNCTION_BLOCK
+        PROGRAM main VAR x : INT; own : b; END_VAR x := count() + own.up(); END_PROGRAM";
+    assert_eq!(program(text).retentive_names(), ["count.n", "b.up.k"]);
+}

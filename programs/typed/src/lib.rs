@@ -8,6 +8,7 @@
 //! x, u and y are images of bits as those of a circuit are, so everything that carries, adds and compares images holds for numbers too: a
 //! point is a name, a type and a range of bits ([`Point`]).
 
+mod carried;
 mod cost;
 mod fault;
 mod form;
@@ -25,6 +26,7 @@ mod types;
 mod validate;
 mod visit;
 
+pub use self::carried::{CarriedPath, CarriedState, Fate, Told};
 pub use self::cost::Cost;
 pub use self::fault::{Cause, Fault};
 pub use self::form::{

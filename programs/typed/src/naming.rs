@@ -32,6 +32,28 @@ impl Elementary {
 }
 
 impl Program {
+    /// A type as it is written; `a structure` and `an enumeration of INT` where it has no name.
+    pub fn type_name(&self, of: &Type) -> String {
+        match of {
+            Type::Elementary(elementary) => elementary.name().to_owned(),
+            Type::Enumeration(id, elementary) => match self.enumerations.get(id.0 as usize) {
+                Some(found) if !found.name.is_empty() => found.name.clone(),
+                _ => format!("an enumeration of {elementary}"),
+            },
+            Type::Text(capacity) => format!("STRING[{capacity}]"),
+            Type::Array(array) => {
+                let ranges = array.ranges.iter().map(|(low, high)| format!("{low}..{high}"));
+                let ranges: Vec<String> = ranges.collect();
+                let element = self.type_name(&array.element);
+                format!("ARRAY [{}] OF {element}", ranges.join(", "))
+            }
+            Type::Structure(id, _) => match self.structures.get(id.0 as usize) {
+                Some(found) if !found.name.is_empty() => found.name.clone(),
+                _ => "a structure".to_owned(),
+            },
+        }
+    }
+
     /// The variable, or the part of one, that lies at an address of the state. Of an address within a text, the text.
     pub fn part_at(&self, address: u64) -> Option<Part> {
         let slot = address / 64;

@@ -40,6 +40,28 @@ impl Program {
         behind > 0 && self.retained[behind - 1].contains(&slot)
     }
 
+    /// Whether a slot among these is of a retentive variable.
+    pub(crate) fn retains_any(&self, slots: Range<u32>) -> bool {
+        let behind = self.retained.partition_point(|known| known.end <= slots.start);
+        self.retained.get(behind).is_some_and(|known| known.start < slots.end)
+    }
+
+    /// Whether a slot is retentive that no variable has.
+    pub(crate) fn has_unnamed_retentive(&self) -> bool {
+        let mut named = Self { state: self.state, ..Self::default() };
+        for variable in &self.variables {
+            named.retain(variable.slot..variable.slot.saturating_add(variable.of.slots() as u32));
+        }
+        let is_named = |slots: &Range<u32>| {
+            let behind = named.retained.partition_point(|known| known.end <= slots.start);
+            named
+                .retained
+                .get(behind)
+                .is_some_and(|known| known.start <= slots.start && slots.end <= known.end)
+        };
+        !self.retained.iter().all(is_named)
+    }
+
     /// The bits of the state that a warm start keeps; none where no variable is retentive.
     pub fn retentive_mask(&self) -> Vec<u64> {
         let mut mask = vec![0; self.state as usize];

@@ -3,19 +3,21 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use understudy_bits::{Exact, Inexact, exact};
+use understudy_bits::{Exact, Inexact, Layout, exact};
 use understudy_executable::{Executable, Interface};
 use understudy_ladder::{LowerError, Program as LadderProgram, circuit};
 use understudy_logic::Circuit;
-use understudy_typed::Program as TypedProgram;
+use understudy_typed::{CarriedPath, CarriedState, Fate, Program as TypedProgram, Told};
 use understudy_wire::ProgramHash;
 
 use crate::canonical::{circuit_text, typed_text};
+use crate::source_text::SourceText;
 
 /// A program, read.
 #[derive(Debug, Clone)]
 pub struct Code {
     typed: Arc<TypedProgram>,
+    source: Arc<SourceText>,
     body: Body,
 }
 
@@ -24,8 +26,8 @@ pub struct Code {
 enum Body {
     /// Rungs. They are executed as the circuit for the period of the cluster, and what is proved is proved of it.
     Rungs(Box<Rungs>),
-    /// The text of its file, whose lines a program fault names.
-    Text(Arc<str>),
+    /// Statements, charts and networks. A program fault names lines of the text.
+    Text,
 }
 
 /// Rungs and their circuit.
@@ -33,6 +35,8 @@ enum Body {
 struct Rungs {
     ladder: LadderProgram,
     circuit: Circuit,
+    /// What its registers are in the state of the program.
+    layout: Layout,
     /// The registers that a warm start keeps, packed.
     retentive: Vec<u64>,
 }
@@ -42,17 +46,26 @@ impl Code {
     ///
     /// # Errors
     /// A ladder that is too large for a circuit.
-    pub fn of_ladder(typed: Arc<TypedProgram>, ladder: LadderProgram) -> Result<Self, LowerError> {
+    pub fn of_ladder(
+        typed: Arc<TypedProgram>,
+        ladder: LadderProgram,
+        source: Arc<SourceText>,
+    ) -> Result<Self, LowerError> {
         let Exact { circuit, layout } = circuit(&typed)?;
         let circuit = circuit.named(ladder.name.as_str());
         let retentive = layout.retentive_mask(&typed);
-        let rungs = Rungs { ladder, circuit, retentive };
-        Ok(Self { typed, body: Body::Rungs(Box::new(rungs)) })
+        let rungs = Rungs { ladder, circuit, layout, retentive };
+        Ok(Self { typed, source, body: Body::Rungs(Box::new(rungs)) })
     }
 
     /// A program of a text.
-    pub fn of_text(typed: Arc<TypedProgram>, text: Arc<str>) -> Self {
-        Self { typed, body: Body::Text(text) }
+    pub fn of_text(typed: Arc<TypedProgram>, source: Arc<SourceText>) -> Self {
+        Self { typed, source, body: Body::Text }
+    }
+
+    /// The file that it was read from.
+    pub fn source(&self) -> &SourceText {
+        &self.source
     }
 
     /// The program.
@@ -64,7 +77,7 @@ impl Code {
     pub fn ladder(&self) -> Option<&LadderProgram> {
         match &self.body {
             Body::Rungs(rungs) => Some(&rungs.ladder),
-            Body::Text(_) => None,
+            Body::Text => None,
         }
     }
 
@@ -72,7 +85,7 @@ impl Code {
     pub fn circuit(&self) -> Option<&Circuit> {
         match &self.body {
             Body::Rungs(rungs) => Some(&rungs.circuit),
-            Body::Text(_) => None,
+            Body::Text => None,
         }
     }
 
@@ -91,7 +104,7 @@ impl Code {
     pub fn source_text(&self) -> Option<&Arc<str>> {
         match &self.body {
             Body::Rungs(..) => None,
-            Body::Text(text) => Some(text),
+            Body::Text => Some(&self.source.text),
         }
     }
 
@@ -104,15 +117,63 @@ impl Code {
     pub fn executable(&self) -> Executable {
         match &self.body {
             Body::Rungs(rungs) => Executable::from(&rungs.circuit).keeping(rungs.retentive.clone()),
-            Body::Text(_) => self.typed.as_ref().into(),
+            Body::Text => self.typed.as_ref().into(),
         }
+    }
+
+    /// The state with which it starts warm from a state of the program before it, both as stations hold them, and what has become of each retentive path.
+    ///
+    /// # Panics
+    /// If `state` is shorter than a state of `before`.
+    pub fn carried(&self, before: &Self, state: &[u64]) -> CarriedState {
+        let (old, new) = (before.layout(), self.layout());
+        let held =
+            |layout: Option<&Layout>, address| layout.is_none_or(|layout| layout.holds(address));
+        let told = Told {
+            is_known: &|address| held(old, address),
+            is_read: &|address| held(new, address),
+        };
+        let mut carried = self.typed.carried(&before.typed, &before.typed_state(state), told);
+        if let Some(layout) = new {
+            let executable = self.executable();
+            let registers = layout.registers(&self.typed, &carried.state, executable.initial());
+            carried.paths.retain(|path| !registers.lost.contains(&path.path));
+            carried.paths.extend(registers.lost.iter().map(|path| self.without_registers(path)));
+            carried.state = registers.packed;
+        }
+        carried
+    }
+
+    /// A state of the program in the order of its variables, for one as stations hold it.
+    ///
+    /// # Panics
+    /// If `state` is shorter than a state of the program.
+    pub fn typed_state<'s>(&self, state: &'s [u64]) -> Cow<'s, [u64]> {
+        match self.layout() {
+            Some(layout) => Cow::Owned(layout.state(state)),
+            None => Cow::Borrowed(state),
+        }
+    }
+
+    fn layout(&self) -> Option<&Layout> {
+        match &self.body {
+            Body::Rungs(rungs) => Some(&rungs.layout),
+            Body::Text => None,
+        }
+    }
+
+    /// The entry of a path whose value the circuit cannot hold.
+    fn without_registers(&self, path: &str) -> CarriedPath {
+        let part = self.typed.part(path);
+        let of = part.map(|part| self.typed.type_name(&part.of));
+        CarriedPath { path: path.to_owned(), fate: Fate::Dropped, before: of.clone(), now: of }
     }
 
     /// The canonical text that its hash is of: equal texts mean equal behaviour, and equal states.
     pub(crate) fn text(&self) -> String {
         match &self.body {
             Body::Rungs(rungs) => circuit_text(&rungs.circuit, &rungs.retentive),
-            Body::Text(_) => typed_text(&self.typed),
+            Body::Text => typed_text(&self.typed),
         }
     }
 

@@ -25,6 +25,7 @@ mod read;
 mod retention;
 mod schema;
 mod source;
+mod source_text;
 mod template;
 mod undriven;
 mod value;
@@ -48,5 +49,6 @@ pub use schema::{plant_file_schema, schema};
 pub use source::{
     GroupSignal, InputSource, InputSourceKind, OperatorDeclaration, SignalDeclaration,
 };
+pub use source_text::{SourceText, read_kept};
 pub use template::{TemplateFile, minimal, modbus_cell, press_cell, read_with_files, template};
 pub use understudy_executable::{stored_value, typed_value, value_text};

@@ -13,8 +13,8 @@
 
 use bincode::config::{Configuration, Limit};
 
-use crate::frame::{Body, Frame, Holding, MAXIMUM_HISTORY, Recalled, Relayed, Sample, Word};
-use crate::identifier::{MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, Member};
+use crate::frame::{Body, Frame, MAXIMUM_HISTORY, Recalled, Relayed, Sample, Word};
+use crate::identifier::{MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, Member, ProgramId};
 use crate::set::ProgramSet;
 use crate::write::{MAXIMUM_PULSES, MAXIMUM_SESSIONS, Pulse, WriteId};
 
@@ -22,7 +22,7 @@ use crate::write::{MAXIMUM_PULSES, MAXIMUM_SESSIONS, Pulse, WriteId};
 pub const MAXIMUM_FRAME_BYTES: usize = 32 * 1024;
 
 const MAGIC: [u8; 4] = *b"UNDR";
-const VERSION: u8 = 9;
+const VERSION: u8 = 10;
 const PREFIX_BYTES: usize = 5;
 const CHECKSUM_BYTES: usize = 4;
 /// Maximum number of positions that a plant shows.
@@ -151,7 +151,7 @@ fn keeps_promises(frame: &Frame) -> Result<(), FrameError> {
         }
         Body::Turn(turn) => {
             kept(station, "only a station takes turns")?;
-            let held = kept_holdings(&turn.holdings)?;
+            let held = kept_programs(turn.holdings.iter().map(|holding| holding.program))?;
             kept_recalled(&turn.recalled)?;
             kept_relayed(&turn.relayed)?;
             kept(turn.words.len() <= MAXIMUM_PROGRAMS + 1, "a turn has at most 65 words")?;
@@ -167,8 +167,8 @@ fn keeps_promises(frame: &Frame) -> Result<(), FrameError> {
                 programs.len() == join.partial.len() && programs.without(join.wants).is_empty(),
                 "a station has segments of a state that it wants, once for each program",
             )?;
-            kept_holdings(&join.retained)?;
-            kept_holdings(&join.holdings).map(|_| ())
+            kept_programs(join.retained.iter().map(|kept| kept.holding.program))?;
+            kept_programs(join.holdings.iter().map(|holding| holding.program)).map(|_| ())
         }
         Body::Transfer(transfer) => {
             kept(station, "only a station gives a state")?;
@@ -249,10 +249,12 @@ fn kept_recalled(recalled: &[Recalled]) -> Result<(), FrameError> {
     }
 }
 
-fn kept_holdings(holdings: &[Holding]) -> Result<ProgramSet, FrameError> {
-    let held: ProgramSet = holdings.iter().map(|holding| holding.program).collect();
-    let ascending = holdings.is_sorted_by(|one, next| one.program < next.program);
-    if held.len() == holdings.len() && ascending {
+fn kept_programs(
+    programs: impl ExactSizeIterator<Item = ProgramId> + Clone,
+) -> Result<ProgramSet, FrameError> {
+    let held: ProgramSet = programs.clone().collect();
+    let ascending = programs.clone().is_sorted_by(|one, next| one < next);
+    if held.len() == programs.len() && ascending {
         Ok(held)
     } else {
         Err(FrameError::Promise(

@@ -175,6 +175,17 @@ impl Holding {
     }
 }
 
+/// State that a station has kept on disk.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Kept {
+    /// The state, as of one that a station holds.
+    pub holding: Holding,
+    /// Hash of the program that was in this state: another one than that of the cluster where its values were taken over.
+    pub of: ProgramHash,
+    /// Whether each of its retentive values is in what the program starts from.
+    pub is_whole: bool,
+}
+
 /// A sum of outputs over GF(2): of all members of its mask, (9) where the mask is every program.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Word {
@@ -192,7 +203,7 @@ pub struct Join {
     /// States that it holds.
     pub holdings: SmallVec<[Holding; 2]>,
     /// States that it has kept on disk, of programs whose state it does not hold: they can start warm from these.
-    pub retained: SmallVec<[Holding; 1]>,
+    pub retained: Vec<Kept>,
     /// As in a [`Turn`].
     pub recalled: Vec<Recalled>,
     /// As in a [`Turn`].

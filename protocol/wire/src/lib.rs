@@ -25,7 +25,7 @@ pub use force::{
     OrderRefusal, PointValue, SignalPlace, check_owner_and_reason,
 };
 pub use frame::{
-    Actuation, Body, Field, Frame, Header, Holding, Join, MAXIMUM_HISTORY, Partial, Recalled,
+    Actuation, Body, Field, Frame, Header, Holding, Join, Kept, MAXIMUM_HISTORY, Partial, Recalled,
     Relayed, Sample, SamplesReceived, Source, Transfer, Turn, Word,
 };
 pub use identifier::{
@@ -34,7 +34,10 @@ pub use identifier::{
 };
 pub use image::{Image, ImageError, MAXIMUM_IMAGE_BITS, MAXIMUM_STATE_BITS};
 pub use lineage::{Digest, Lineage};
-pub use retained::{Note, Retained, RetainedError, RetainedRun, RetainedState, RetainedStep};
+pub use retained::{
+    Carried, MAXIMUM_KEPT_TEXT_BYTES, Note, Retained, RetainedError, RetainedProgram, RetainedRun,
+    RetainedState, RetainedStep,
+};
 pub use segment::{MAXIMUM_SEGMENTS, Segment, SegmentMask};
 pub use set::{Element, ProgramSet, Set, StationSet};
 pub use state_choice::StateChoice;

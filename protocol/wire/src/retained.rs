@@ -1,13 +1,15 @@
 //! What a member keeps on disk for the time after a power failure, and its bytes.
 //!
 //! A station keeps the state of each program that has retentive variables, and the steps since, so that it can come to the
-//! state after any of them. A remote I/O keeps a note of the newest sample whose outputs it applied.
+//! state after any of them. A remote I/O keeps a note of the newest sample whose outputs it applied. Each of them keeps the text of the program next to
+//! that, so that a changed program can take over its values.
 //!
 //! ```text
 //!   length │ CRC-32 │ record      a file is one record after another; what follows a torn one is not read
 //! ```
 
 use bincode::config::{Configuration, Limit, LittleEndian, Varint};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -19,11 +21,16 @@ use crate::lineage::{Digest, Lineage};
 /// Bytes before the content of a record: its length and its checksum.
 const PREFIX_BYTES: usize = 8;
 
-/// Bytes of a record, at most: the widest state, each of its words with its length, and what names it.
-const MAXIMUM_RECORD_BYTES: usize = MAXIMUM_STATE_BITS / 64 * 9 + 4096;
+/// Bytes of the text of a program that is kept, at most.
+pub const MAXIMUM_KEPT_TEXT_BYTES: usize = 16 << 20;
+
+/// Bytes of a record, at most: the longest text with what names it, which is more than the widest state.
+const MAXIMUM_RECORD_BYTES: usize = MAXIMUM_KEPT_TEXT_BYTES + 4096;
+
+const _: () = assert!(MAXIMUM_STATE_BITS / 64 * 9 + 4096 <= MAXIMUM_RECORD_BYTES);
 
 /// Version of the records.
-const VERSION: u8 = 1;
+const VERSION: u8 = 2;
 
 type Layout = Configuration<LittleEndian, Varint, Limit<MAXIMUM_RECORD_BYTES>>;
 
@@ -87,6 +94,8 @@ pub struct Note {
     pub configuration: ConfigurationHash,
     /// Hash of its program.
     pub hash: ProgramHash,
+    /// Whether that program has retentive variables.
+    pub is_retentive: bool,
     /// Number of the note among those that this remote I/O has made.
     pub number: u64,
     /// Lineage after the sample.
@@ -102,6 +111,21 @@ impl Note {
     }
 }
 
+/// The text of a program, from which the same program is read again.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct RetainedProgram {
+    /// Hash of the program.
+    pub hash: ProgramHash,
+    /// The name of its file, whose ending tells the language.
+    pub file: String,
+    /// Nanoseconds from one scan to the next.
+    pub period: u64,
+    /// The text of that file.
+    pub text: String,
+    /// Of a remote I/O: the inputs that operators write and that keep their values.
+    pub inputs: Vec<String>,
+}
+
 /// A state of a program with the steps since, as a station has kept them.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct RetainedRun {
@@ -109,6 +133,23 @@ pub struct RetainedRun {
     pub state: RetainedState,
     /// Steps from it, in their order.
     pub steps: Vec<RetainedStep>,
+    /// The program whose values the state has, where they were taken over from another one.
+    pub carried: Option<Carried>,
+}
+
+/// Where the values of a state are from that another program has left behind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Carried {
+    /// Hash of that program; the lineage and the cycle of the state are of it.
+    pub from: ProgramHash,
+    /// Whether each of its retentive values is in the state.
+    pub is_whole: bool,
+}
+
+impl From<RetainedState> for RetainedRun {
+    fn from(state: RetainedState) -> Self {
+        Self { state, steps: Vec::new(), carried: None }
+    }
 }
 
 impl RetainedRun {
@@ -122,7 +163,7 @@ impl RetainedRun {
         let mut runs: Vec<Self> = Vec::new();
         for record in records {
             match record {
-                Retained::State(state) => runs.push(Self { state, steps: Vec::new() }),
+                Retained::State(state) => runs.push(Self::from(state)),
                 Retained::Step(step) => {
                     if let Some(run) = runs.last_mut()
                         && run.leads_to(&step)
@@ -136,7 +177,8 @@ impl RetainedRun {
         runs
     }
 
-    fn lineage(&self) -> Lineage {
+    /// The lineage after the last step.
+    pub fn lineage(&self) -> Lineage {
         self.steps.last().map_or(self.state.lineage, |step| step.after)
     }
 
@@ -167,19 +209,7 @@ pub enum RetainedError {
 impl Retained {
     /// Appends its bytes to `bytes`; nothing where it is wider than a state may be.
     pub fn write(&self, bytes: &mut Vec<u8>) {
-        let start = bytes.len();
-        bytes.extend_from_slice(&[0; PREFIX_BYTES]);
-        bytes.push(VERSION);
-        let written = bincode::serde::encode_into_std_write(self, bytes, layout());
-        let length = bytes.len() - start - PREFIX_BYTES;
-        if written.is_err() || length > MAXIMUM_RECORD_BYTES {
-            bytes.truncate(start);
-            return;
-        }
-        let checksum = crc32fast::hash(&bytes[start + PREFIX_BYTES..]);
-        let length = u32::try_from(length).unwrap_or(u32::MAX);
-        bytes[start..start + 4].copy_from_slice(&length.to_le_bytes());
-        bytes[start + 4..start + PREFIX_BYTES].copy_from_slice(&checksum.to_le_bytes());
+        write_record(self, bytes);
     }
 
     /// The records of a file up to the first that cannot be read, and why the rest is not read.
@@ -187,7 +217,7 @@ impl Retained {
         let mut records = Vec::new();
         let mut at = 0;
         while at < bytes.len() {
-            match Self::read_one(&bytes[at..], at) {
+            match read_record(&bytes[at..], at) {
                 Ok((record, length)) => {
                     records.push(record);
                     at += length;
@@ -197,29 +227,68 @@ impl Retained {
         }
         (records, None)
     }
+}
 
-    fn read_one(bytes: &[u8], at: usize) -> Result<(Self, usize), RetainedError> {
-        let word = |place: usize| {
-            let word = bytes.get(place..place + 4).ok_or(RetainedError::Torn(at))?;
-            Ok(u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
-        };
-        let (length, checksum) = (word(0)? as usize, word(4)?);
-        if !(1..=MAXIMUM_RECORD_BYTES).contains(&length) {
-            return Err(RetainedError::Damaged(at));
+impl RetainedProgram {
+    /// Its bytes; none where its text is longer than [`MAXIMUM_KEPT_TEXT_BYTES`].
+    pub fn to_bytes(&self) -> Option<Vec<u8>> {
+        let mut bytes = Vec::new();
+        if self.text.len() <= MAXIMUM_KEPT_TEXT_BYTES {
+            write_record(self, &mut bytes);
         }
-        let content = bytes.get(PREFIX_BYTES..PREFIX_BYTES + length);
-        let content = content.ok_or(RetainedError::Torn(at))?;
-        if crc32fast::hash(content) != checksum {
-            return Err(RetainedError::Damaged(at));
+        (!bytes.is_empty()).then_some(bytes)
+    }
+
+    /// The program of a file.
+    ///
+    /// # Errors
+    /// [`RetainedError`].
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, RetainedError> {
+        match read_record(bytes, 0)? {
+            (program, length) if length == bytes.len() => Ok(program),
+            (_, length) => Err(RetainedError::Damaged(length)),
         }
-        if content[0] != VERSION {
-            return Err(RetainedError::Version { at, found: content[0] });
-        }
-        let decoded = bincode::serde::decode_from_slice::<Self, _>(&content[1..], layout());
-        match decoded {
-            Ok((record, read)) if read + 1 == length => Ok((record, PREFIX_BYTES + length)),
-            _ => Err(RetainedError::Damaged(at)),
-        }
+    }
+}
+
+fn write_record(record: &impl Serialize, bytes: &mut Vec<u8>) {
+    let start = bytes.len();
+    bytes.extend_from_slice(&[0; PREFIX_BYTES]);
+    bytes.push(VERSION);
+    let written = bincode::serde::encode_into_std_write(record, bytes, layout());
+    let length = bytes.len() - start - PREFIX_BYTES;
+    if written.is_err() || length > MAXIMUM_RECORD_BYTES {
+        bytes.truncate(start);
+        return;
+    }
+    let checksum = crc32fast::hash(&bytes[start + PREFIX_BYTES..]);
+    let length = u32::try_from(length).unwrap_or(u32::MAX);
+    bytes[start..start + 4].copy_from_slice(&length.to_le_bytes());
+    bytes[start + 4..start + PREFIX_BYTES].copy_from_slice(&checksum.to_le_bytes());
+}
+
+/// The record at the start of `bytes`, which is at byte `at` of its file, and its length.
+fn read_record<T: DeserializeOwned>(bytes: &[u8], at: usize) -> Result<(T, usize), RetainedError> {
+    let word = |place: usize| {
+        let word = bytes.get(place..place + 4).ok_or(RetainedError::Torn(at))?;
+        Ok(u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
+    };
+    let (length, checksum) = (word(0)? as usize, word(4)?);
+    if !(1..=MAXIMUM_RECORD_BYTES).contains(&length) {
+        return Err(RetainedError::Damaged(at));
+    }
+    let content = bytes.get(PREFIX_BYTES..PREFIX_BYTES + length);
+    let content = content.ok_or(RetainedError::Torn(at))?;
+    if crc32fast::hash(content) != checksum {
+        return Err(RetainedError::Damaged(at));
+    }
+    if content[0] != VERSION {
+        return Err(RetainedError::Version { at, found: content[0] });
+    }
+    let decoded = bincode::serde::decode_from_slice::<T, _>(&content[1..], layout());
+    match decoded {
+        Ok((record, read)) if read + 1 == length => Ok((record, PREFIX_BYTES + length)),
+        _ => Err(RetainedError::Damaged(at)),
     }
 }
 
@@ -240,6 +309,11 @@ mod tests {
             digest: Digest(8),
             state: Image::from_bits((0..width).map(|_| true)),
         })
+    }
+
+    fn program(text: String) -> RetainedProgram {
+        let inputs = vec!["level".to_owned()];
+        RetainedProgram { hash: ProgramHash(3), file: "a.st".into(), period: 10, text, inputs }
     }
 
     fn step(before: Lineage, cycle: u64) -> RetainedStep {
@@ -286,6 +360,38 @@ mod tests {
             let (read, error) = Retained::read(&damaged);
             assert!(error.is_some() && read.len() < 2, "{place}");
         }
+    }
+
+    /// The longest text too; a longer one is not kept in part.
+    #[test]
+    fn programs_come_back_up_to_the_longest_text() {
+        for length in [0, 1, 300, MAXIMUM_KEPT_TEXT_BYTES] {
+            let text = "x".repeat(length);
+            let program = program(text);
+            let mut bytes = program.to_bytes().expect("it is short enough");
+            assert_eq!(RetainedProgram::from_bytes(&bytes), Ok(program), "{length}");
+            bytes.push(0);
+            assert!(RetainedProgram::from_bytes(&bytes).is_err());
+            bytes.truncate(bytes.len() - 2);
+            assert_eq!(RetainedProgram::from_bytes(&bytes), Err(RetainedError::Torn(0)));
+        }
+        let text = "x".repeat(MAXIMUM_KEPT_TEXT_BYTES + 1);
+        let program = program(text);
+        assert_eq!(program.to_bytes(), None);
+    }
+
+    /// A file of a later release is not read as one of this.
+    #[test]
+    fn a_record_of_another_version_is_named() {
+        let mut bytes = Vec::new();
+        state(9).write(&mut bytes);
+        let first = bytes.len();
+        state(9).write(&mut bytes);
+        bytes[first + PREFIX_BYTES] = VERSION + 1;
+        let checksum = crc32fast::hash(&bytes[first + PREFIX_BYTES..]);
+        bytes[first + 4..first + PREFIX_BYTES].copy_from_slice(&checksum.to_le_bytes());
+        let error = RetainedError::Version { at: first, found: VERSION + 1 };
+        assert_eq!(Retained::read(&bytes), (vec![state(9)], Some(error)));
     }
 
     #[test]

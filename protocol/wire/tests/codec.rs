@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use smallvec::smallvec;
 use understudy_wire::{
     Actuation, Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Field, Frame,
-    FrameError, Header, Holding, Image, Join, Lineage, MAXIMUM_FRAME_BYTES, MAXIMUM_STATIONS,
+    FrameError, Header, Holding, Image, Join, Kept, Lineage, MAXIMUM_FRAME_BYTES, MAXIMUM_STATIONS,
     Member, Moment, Partial, ProgramHash, ProgramId, ProgramSet, Pulse, Recalled, Relayed, Sample,
     SamplesReceived, Segment, StationId, StationSet, Transfer, Turn, Word, WriteId, decode, encode,
 };
@@ -93,7 +93,7 @@ fn every_kind() -> Vec<(&'static str, Frame)> {
     let join = Join {
         wants: ProgramSet::from_bits(0b01),
         holdings: smallvec![holding(1)],
-        retained: smallvec![holding(0)],
+        retained: vec![Kept { holding: holding(0), of: ProgramHash(5), is_whole: true }],
         recalled: vec![recalled(0), recalled(1)],
         lacks: ProgramSet::from_bits(0b10),
         partial: vec![Partial {
@@ -246,7 +246,7 @@ fn a_frame_that_breaks_a_promise_never_leaves() {
     let twice = Join {
         wants: ProgramSet::EMPTY,
         holdings: smallvec![],
-        retained: smallvec![],
+        retained: vec![],
         recalled: vec![recalled(1), recalled(1)],
         lacks: ProgramSet::EMPTY,
         partial: Vec::new(),

@@ -13,7 +13,9 @@
 //!   covers it after a restart ──────────────────────────── the state is lost: see `StaleState`
 //! ```
 
-use understudy_wire::{Holding, Moment, OrderRefusal, StateChoice, StationId, StationSet, Time};
+use understudy_wire::{
+    Holding, Kept, Moment, OrderRefusal, StateChoice, StationId, StationSet, Time,
+};
 
 use super::knowledge::{Floor, Knowledge, Run};
 use super::{Authority, Question, RemoteIo};
@@ -26,7 +28,7 @@ use crate::trust::Trust;
 pub(super) enum Verdict {
     Cold,
     /// From a state that was kept over a power failure.
-    Warm(StationId, Holding),
+    Warm(StationId, Kept),
     Adopt(StationId, Holding),
     Disputed(StationSet),
     Stale(StationId, Holding),
@@ -173,7 +175,7 @@ impl RemoteIo {
             return;
         }
         self.question = Some(Question::StateLost);
-        let applied = self.newest_applied();
+        let applied = self.newest_applied().or_else(|| self.applied_of_another());
         let asks = self.settings.stale_state == StaleState::Operator
             || self.settings.restart == Some(Restart::Operator)
             || self.may_have_the_wrong_program();
@@ -187,11 +189,10 @@ impl RemoteIo {
     /// Applies the operator's choice.
     pub(super) fn choose(&mut self, choice: StateChoice) {
         let moment = self.moment();
-        let owned = |(from, newest): (StationId, &Holding)| (from, *newest);
-        let held = self.holders.newest().map(owned);
-        let retained = self.newest_retained().map(owned);
+        let held = self.holders.newest().map(|(from, newest)| (from, *newest));
+        let retained = self.newest_retained().map(|(from, kept)| (from, *kept));
         let retained = retained.filter(|_| held.is_none() && self.settings.restart.is_some());
-        let newest = held.or(retained);
+        let newest = held.or(retained.map(|(from, kept)| (from, kept.holding)));
         match (self.question, choice, newest) {
             (Some(Question::StateLost | Question::ConfigurationDisputed), StateChoice::Cold, _) => {
                 self.start_cold(moment, None)
@@ -199,9 +200,9 @@ impl RemoteIo {
             (Some(_), StateChoice::Newest { cycle }, Some((from, newest)))
                 if cycle.is_none_or(|cycle| cycle == newest.stepped.cycle) =>
             {
-                match held {
-                    Some(_) => self.start(moment, (from, newest)),
-                    None => self.start_warm(moment, (from, newest)),
+                match retained {
+                    Some(retained) => self.start_warm(moment, retained),
+                    None => self.start(moment, (from, newest)),
                 }
             }
             (question, ..) => {

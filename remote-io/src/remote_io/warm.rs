@@ -8,13 +8,16 @@
 //!     of the program were applied ─────────────── the state is lost
 //! ```
 //!
+//! A retained state may be of the program before this one, where stations have taken over its values. The note of that program tells then whether
+//! the state is behind what was applied; where values were dropped, the operator is asked in every case.
+//!
 //! The history of a warm start begins with a lineage that names the retained state, so a station that has this state follows
 //! it without being asked, and any other one takes a state over as always.
 
 use understudy_cycle::Output;
 use understudy_wire::{
-    Holding, Image, Lineage, Moment, Note, Recalled, Retained, SamplesReceived, StationId,
-    StationSet,
+    Image, Kept, Lineage, Moment, Note, ProgramHash, Recalled, Retained, SamplesReceived,
+    StationId, StationSet,
 };
 
 use super::recovery::Verdict;
@@ -63,7 +66,27 @@ impl RemoteIo {
 
     /// What it noted of this program before it was started.
     fn noted(&self) -> Option<&Note> {
-        self.noting.found.as_ref().filter(|note| note.hash == self.settings.hash)
+        self.noted_of(self.settings.hash)
+    }
+
+    fn noted_of(&self, program: ProgramHash) -> Option<&Note> {
+        self.noting.found.as_ref().filter(|note| note.hash == program)
+    }
+
+    /// The newest applied output of the program before this one, of an earlier life.
+    pub(super) fn applied_of_another(&self) -> Option<Moment> {
+        let found = self.noting.found.as_ref().filter(|note| note.hash != self.settings.hash);
+        found.map(Note::applied)
+    }
+
+    /// The newest applied output of a program, and the lineage after its sample.
+    fn newest_applied_of(&self, program: ProgramHash) -> Option<(Moment, Lineage)> {
+        match self.knowledge.floor() {
+            Some(floor) if program == self.settings.hash => Some((floor.moment, floor.lineage)),
+            // Outputs of this program were applied since those of any other one.
+            Some(_) => None,
+            None => self.noted_of(program).map(|note| (note.applied(), note.lineage)),
+        }
     }
 
     /// The cycle of the newest applied output, of an earlier life too.
@@ -95,6 +118,7 @@ impl RemoteIo {
             cluster: agreement.cluster,
             configuration: agreement.configuration,
             hash: self.settings.hash,
+            is_retentive: self.settings.restart.is_some(),
             number: self.noting.number,
             lineage: after,
             recalled: Recalled {
@@ -120,13 +144,14 @@ impl RemoteIo {
     }
 
     /// The newest retained state, but for those of stations that were excluded, with its station.
-    pub(super) fn newest_retained(&self) -> Option<(StationId, &Holding)> {
-        let epoch = self.newest_applied().map(|applied| applied.epoch);
+    pub(super) fn newest_retained(&self) -> Option<(StationId, &Kept)> {
+        let applied = self.newest_applied().or_else(|| self.applied_of_another());
+        let epoch = applied.map(|applied| applied.epoch);
         self.holders.newest_retained(self.noted_exclusions(), epoch)
     }
 
     fn noted_exclusions(&self) -> StationSet {
-        self.noted().map_or(StationSet::EMPTY, |note| note.recalled.excluded)
+        self.noting.found.as_ref().map_or(StationSet::EMPTY, |note| note.recalled.excluded)
     }
 
     /// What the retained states of the stations allow, where no living station holds a state.
@@ -136,34 +161,36 @@ impl RemoteIo {
         };
         let excluded = self.noted_exclusions();
         let retained = self.newest_retained();
+        // What this program or the one before it has left behind may be with a station that comes later.
+        let is_awaited = self.newest_applied().is_some()
+            || self.noting.found.as_ref().is_some_and(|note| note.is_retentive);
         match (restart, retained) {
             (Restart::Cold, _) => Verdict::Cold,
-            (_, None) if self.newest_applied().is_some() || self.noting.is_damaged => Verdict::Lost,
+            (_, None) if is_awaited || self.noting.is_damaged => Verdict::Lost,
             (_, None) => Verdict::Cold,
-            (Restart::Operator, Some((from, retained))) => Verdict::Stale(from, *retained),
-            (Restart::Warm, Some((from, retained))) => {
-                match self.holders.disputed_retained(excluded, retained) {
-                    _ if self.is_before_applied(retained) => Verdict::Stale(from, *retained),
-                    Some(stations) if !self.is_newest_applied(retained) => {
-                        Verdict::Disputed(stations)
-                    }
-                    _ => Verdict::Warm(from, *retained),
+            (Restart::Operator, Some((from, kept))) => Verdict::Stale(from, kept.holding),
+            (Restart::Warm, Some((from, kept))) => {
+                match self.holders.disputed_retained(excluded, kept) {
+                    _ if self.is_before_applied(kept) => Verdict::Stale(from, kept.holding),
+                    Some(stations) if !self.is_newest_applied(kept) => Verdict::Disputed(stations),
+                    _ => Verdict::Warm(from, *kept),
                 }
             }
         }
     }
 
     /// Whether a state is that after the newest applied sample.
-    fn is_newest_applied(&self, state: &Holding) -> bool {
-        let floor = self.knowledge.floor().map(|floor| floor.lineage);
-        floor.or(self.noted().map(|note| note.lineage)) == Some(state.lineage)
+    fn is_newest_applied(&self, kept: &Kept) -> bool {
+        let applied = self.newest_applied_of(kept.of);
+        applied.is_some_and(|(_, lineage)| lineage == kept.holding.lineage)
     }
 
-    /// Whether outputs of a newer state may have been applied. Moments of two epochs have no order here: the one that is founded after a power failure
-    /// is earlier where the wall clock was set back.
-    fn is_before_applied(&self, state: &Holding) -> bool {
-        // Without a note of this program, it is not known what was applied.
-        let Some(applied) = self.newest_applied() else {
+    /// Whether outputs of a newer state may have been applied, or values are not in it that were kept. Moments of two epochs have no order here: the
+    /// one that is founded after a power failure is earlier where the wall clock was set back.
+    fn is_before_applied(&self, kept: &Kept) -> bool {
+        let state = &kept.holding;
+        // Without a note of its program, it is not known what was applied.
+        let Some((applied, _)) = self.newest_applied_of(kept.of).filter(|_| kept.is_whole) else {
             return true;
         };
         if self.holders.newest_recalled().is_some_and(|recalled| recalled > state.stepped) {
@@ -172,16 +199,16 @@ impl RemoteIo {
         let (newest, stepped) = (applied.cycle, state.stepped.cycle);
         applied.epoch != state.stepped.epoch
             || stepped < newest
-            || stepped == newest && !self.is_newest_applied(state)
+            || stepped == newest && !self.is_newest_applied(kept)
     }
 
     /// Starts to sample from the initial state with the retentive values of a retained one.
-    pub(super) fn start_warm(&mut self, moment: Moment, (from, retained): (StationId, Holding)) {
+    pub(super) fn start_warm(&mut self, moment: Moment, (from, kept): (StationId, Kept)) {
         let awaits_release = self.settings.release == Release::Operator;
         self.authority = if awaits_release { Authority::Operator } else { Authority::Proof };
         self.last_true = None;
-        let applied = self.newest_applied();
-        let stepped = retained.stepped;
+        let applied = self.newest_applied_of(kept.of).map(|(applied, _)| applied);
+        let stepped = kept.holding.stepped;
         let lost = applied.filter(|applied| applied.epoch == stepped.epoch);
         let lost = lost.map(|applied| applied.cycle.0.saturating_sub(stepped.cycle.0));
         self.report(Event::StartedWarm {
@@ -191,9 +218,10 @@ impl RemoteIo {
             lost,
             awaits_release,
         });
-        let start = Lineage::warm(self.settings.hash, moment, retained.lineage);
+        let start = Lineage::warm(self.settings.hash, moment, kept.holding.lineage);
         let history = History::from(moment, start, self.settings.agreement.history);
-        let note = self.noted().cloned();
+        let width = self.settings.undriven.width();
+        let note = self.noting.found.clone().filter(|note| note.recalled.inputs.width() == width);
         self.sample_from(moment, history, None);
         if let Some(note) = note {
             self.writing.start_warm(&self.settings.operator_inputs, &note.recalled);

@@ -352,8 +352,10 @@ impl Writing {
     pub(super) fn start_warm(&mut self, inputs: &[OperatorInput], recalled: &Recalled) {
         *self = Self::new(inputs);
         for (input, written) in inputs.iter().zip(&mut self.values) {
-            if input.retains {
-                written.stored = input.place.get(&recalled.inputs);
+            let value = input.place.get(&recalled.inputs);
+            // The limits may have become narrower since.
+            if input.retains && input.admits(value) {
+                written.stored = value;
                 written.in_effect = written.stored;
             }
         }

@@ -78,6 +78,26 @@ pub enum HostEvent {
         /// Why.
         reason: String,
     },
+    /// It has taken over retentive values of the program before, which is another one.
+    RetainedCarried {
+        /// Its program.
+        program: String,
+        /// Values that are kept.
+        kept: usize,
+        /// Values of a type that is another one now.
+        converted: usize,
+        /// Values that the program before did not have.
+        new: usize,
+    },
+    /// Retentive values of the program before are not taken over.
+    RetainedDropped {
+        /// Its program.
+        program: String,
+        /// Their paths, the first of them.
+        paths: Vec<String>,
+        /// Paths that are not listed.
+        more: usize,
+    },
     /// Frames of two lives of a member arrive in turn: two processes run with its keys, for example one of an old disk image.
     DuplicateFound {
         /// Whose keys they have.

@@ -25,9 +25,12 @@ use crate::journal::{EventSink, JOURNAL_RECORDS, JOURNAL_VERSION, Journal, Noted
 use crate::link::LinkKind;
 use crate::network_reception::NetworkReception;
 use crate::orders::{Order, orders};
-use crate::retained::{FoundFile, Retainer, Retention};
+use crate::retained::{CarriedOver, FoundFile, Retainer, Retention};
 use crate::rights::{Rights, keep_times};
 use crate::watchdog::Watchdog;
+
+/// Dropped paths that a record lists.
+const LISTED_PATHS: usize = 20;
 
 /// What a process needs to know besides its member.
 pub struct MemberSettings {
@@ -105,7 +108,7 @@ where
     // The journal's thread starts before the rights are claimed, so that it inherits none.
     let (mut sink, journal) =
         Journal::start::<M::Event>(JOURNAL_RECORDS, clock, own.member, own.name.clone(), output)?;
-    let Retention { files, found, is_missing } = retention;
+    let Retention { files, found, carried, is_missing } = retention;
     let retainer = match files.is_empty() {
         true => None,
         false => Some(Retainer::start(files)?),
@@ -138,6 +141,16 @@ where
         if let Some(reason) = problem {
             let file = path.display().to_string();
             sink.record(clock.now(), Noted::Host(HostEvent::RetainedRefused { file, reason }));
+        }
+    }
+    for CarriedOver { program, kept, converted, new, mut dropped } in carried {
+        let more = dropped.len().saturating_sub(LISTED_PATHS);
+        dropped.truncate(LISTED_PATHS);
+        let carried = HostEvent::RetainedCarried { program: program.clone(), kept, converted, new };
+        sink.record(clock.now(), Noted::Host(carried));
+        if !dropped.is_empty() {
+            let dropped = HostEvent::RetainedDropped { program, paths: dropped, more };
+            sink.record(clock.now(), Noted::Host(dropped));
         }
     }
     let (control, orders) = orders()?;

@@ -8,15 +8,19 @@
 //! The cycle never waits for the disk: where the queue is full, or the disk is, records are left out, and that is reported. A file
 //! that is being written is never the only one: the other one has the state before.
 
+mod program;
+
 use std::fs::{File, OpenOptions, create_dir_all};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{Builder, JoinHandle};
 
-use understudy_wire::{ClusterHash, Moment, Note, ProgramHash, ProgramId, Retained, RetainedRun};
+use understudy_wire::{
+    ClusterHash, Moment, Note, ProgramId, Retained, RetainedProgram, RetainedRun,
+};
 
 use crate::error::BusError;
 
@@ -29,11 +33,12 @@ const NOTES_IN_A_FILE: u32 = 4096;
 /// Bytes of a file that are read, at most: a state, and the steps of an hour.
 const MAXIMUM_FILE_BYTES: u64 = 64 << 20;
 
-/// Two files that are written in turn.
+/// Two files that are written in turn, and the text of the program next to them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RetainedFiles {
     folder: PathBuf,
     name: String,
+    program: Option<RetainedProgram>,
 }
 
 /// What was found in one file.
@@ -45,6 +50,17 @@ pub struct FoundFile {
     pub problem: Option<String>,
 }
 
+/// What a remote I/O has noted.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FoundNotes {
+    /// The newest note, where no file lacks one that may be newer.
+    pub newest: Option<Note>,
+    /// Whether a file may lack a note.
+    pub is_damaged: bool,
+    /// The files.
+    pub files: Vec<FoundFile>,
+}
+
 /// What a member keeps for the time after a power failure.
 #[derive(Debug, Clone, Default)]
 pub struct Retention {
@@ -52,6 +68,8 @@ pub struct Retention {
     pub files: Vec<(Option<ProgramId>, RetainedFiles)>,
     /// What was found there at the start.
     pub found: Vec<FoundFile>,
+    /// What was taken over from the program before each one.
+    pub carried: Vec<CarriedOver>,
     /// Whether a program has retentive variables, and no folder was given.
     pub is_missing: bool,
 }
@@ -59,39 +77,42 @@ pub struct Retention {
 impl RetainedFiles {
     /// Those of `name` in `folder`: a remote I/O, or a station and a program of it.
     pub fn new(folder: &Path, name: String) -> Self {
-        Self { folder: folder.to_owned(), name }
+        Self { folder: folder.to_owned(), name, program: None }
+    }
+
+    /// Keeps the text of the program too, so that a changed program can take over its values.
+    #[must_use]
+    pub fn with_program(self, program: RetainedProgram) -> Self {
+        Self { program: Some(program), ..self }
     }
 
     fn paths(&self) -> [PathBuf; 2] {
         ["1", "2"].map(|which| self.folder.join(format!("{}.{which}.retained", self.name)))
     }
 
-    /// The states that a station has kept of a program.
-    pub fn runs(
-        &self,
-        cluster: ClusterHash,
-        hash: ProgramHash,
-    ) -> (Vec<RetainedRun>, Vec<FoundFile>) {
+    /// The states that a station has kept, of this program and of others before it; those of every cluster where none is given.
+    pub fn runs(&self, cluster: Option<ClusterHash>) -> (Vec<RetainedRun>, Vec<FoundFile>) {
         let of_file = |records| {
             let mut runs = RetainedRun::of_records(records);
             let all = runs.len();
-            runs.retain(|run| run.state.cluster == cluster && run.state.hash == hash);
-            let foreign = (runs.len() < all).then(|| "it is of another program".to_owned());
+            runs.retain(|run| cluster.is_none_or(|cluster| run.state.cluster == cluster));
+            let foreign = (runs.len() < all).then(|| "it is of another cluster".to_owned());
             let newest = runs.iter().map(RetainedRun::stepped).max();
             (runs, newest, foreign)
         };
         self.read(of_file)
     }
 
-    /// The notes that a remote I/O has made.
-    pub fn notes(&self, cluster: ClusterHash) -> (Vec<Note>, Vec<FoundFile>) {
+    /// The notes that a remote I/O has made; those of every cluster where none is given.
+    pub fn notes(&self, cluster: Option<ClusterHash>) -> FoundNotes {
         let of_file = |records: Vec<Retained>| {
             let notes = records.into_iter().filter_map(|record| match record {
                 Retained::Note(note) => Some(note),
                 Retained::State(_) | Retained::Step(_) => None,
             });
             let newest = notes.max_by_key(|note| note.number);
-            let foreign = newest.as_ref().is_some_and(|note| note.cluster != cluster);
+            let is_own = |note: &Note| cluster.is_none_or(|cluster| note.cluster == cluster);
+            let foreign = newest.as_ref().is_some_and(|note| !is_own(note));
             let newest = newest.filter(|_| !foreign);
             let applied = newest.as_ref().map(Note::applied);
             (
@@ -100,7 +121,10 @@ impl RetainedFiles {
                 foreign.then(|| "it is of another cluster".to_owned()),
             )
         };
-        self.read(of_file)
+        let (notes, files) = self.read(of_file);
+        let is_damaged = files.iter().any(|file| file.problem.is_some());
+        let newest = notes.into_iter().max_by_key(|note: &Note| note.number);
+        FoundNotes { newest: newest.filter(|_| !is_damaged), is_damaged, files }
     }
 
     fn read<T>(
@@ -137,21 +161,46 @@ fn read_bounded(path: &Path) -> io::Result<Vec<u8>> {
     std::fs::read(path)
 }
 
-/// The newest note, where no file lacks one that may be newer.
-pub fn newest_note(notes: Vec<Note>, found: &[FoundFile]) -> Option<Note> {
-    let is_whole = found.iter().all(|file| file.problem.is_none());
-    notes.into_iter().max_by_key(|note| note.number).filter(|_| is_whole)
+/// What was taken over of the values that the program before has left behind.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CarriedOver {
+    /// The program.
+    pub program: String,
+    /// Values that are kept.
+    pub kept: usize,
+    /// Values of a type that is another one now.
+    pub converted: usize,
+    /// Values that the program before did not have.
+    pub new: usize,
+    /// Paths whose values are not taken over.
+    pub dropped: Vec<String>,
 }
 
 /// Why the disk takes nothing, since when it does not; shared with the writer.
-type Failure = Arc<Mutex<Option<String>>>;
+type Failure = Arc<Failing>;
+
+#[derive(Debug, Default)]
+struct Failing {
+    reason: Mutex<Option<String>>,
+    /// Records that were left out because the queue was full.
+    left_out: AtomicU64,
+}
+
+impl Failing {
+    fn reason(&self) -> MutexGuard<'_, Option<String>> {
+        self.reason.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A record, and how many were left out before it.
+type Queued = (u64, Retained);
 
 /// What begins a file, and whether it is on the disk.
 type Begun = (File, Arc<AtomicBool>);
 
 /// Hands records of a member to the threads that write them.
 pub struct Retainer {
-    queue: Option<SyncSender<Retained>>,
+    queue: Option<SyncSender<Queued>>,
     failure: Failure,
     reported: bool,
     writer: Option<JoinHandle<()>>,
@@ -190,11 +239,14 @@ impl Retainer {
 
     /// Keeps a record, where the queue has room.
     pub(crate) fn keep(&self, record: Retained) {
-        if let Some(queue) = &self.queue
-            && let Err(TrySendError::Full(_)) = queue.try_send(record)
-        {
-            let mut failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
-            failure.get_or_insert_with(|| {
+        let Some(queue) = &self.queue else {
+            return;
+        };
+        let left_out = self.failure.left_out.load(Ordering::Acquire);
+        if let Err(TrySendError::Full(_)) = queue.try_send((left_out, record)) {
+            // First, or a state from before the gap could end the report.
+            self.failure.left_out.fetch_add(1, Ordering::AcqRel);
+            self.failure.reason().get_or_insert_with(|| {
                 format!("more than {WAITING_RECORDS} records wait for the disk")
             });
         }
@@ -202,7 +254,7 @@ impl Retainer {
 
     /// What has changed since it was asked last: the reason where the disk takes nothing any more, and `None` in it where it does again.
     pub(crate) fn take_change(&mut self) -> Option<Option<String>> {
-        let failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let failure = self.failure.reason().clone();
         let changed = failure.is_some() != self.reported;
         self.reported = failure.is_some();
         changed.then_some(failure)
@@ -229,6 +281,8 @@ struct Turn {
     current: Option<File>,
     /// Whether what begins the current file is on the disk: until then the other one is needed.
     is_synced: Arc<AtomicBool>,
+    /// Whether the text of the program is kept.
+    has_program: bool,
     notes: u32,
 }
 
@@ -243,13 +297,27 @@ impl Turn {
         let paths = files.paths();
         let damaged = paths.iter().filter(is_damaged).cloned().collect();
         let next = usize::from(newest(&paths[0]) > newest(&paths[1]));
-        Self { of, files, next, damaged, current: None, is_synced: Arc::default(), notes: 0 }
+        Self {
+            of,
+            files,
+            next,
+            damaged,
+            current: None,
+            is_synced: Arc::default(),
+            has_program: false,
+            notes: 0,
+        }
     }
 
     /// Begins the other file with a record; the one before stays as it is where that fails.
     fn begin(&mut self, bytes: &[u8]) -> io::Result<Begun> {
         let path = &self.files.paths()[self.next];
         create_dir_all(&self.files.folder)?;
+        if !self.has_program {
+            // A state is of no use for the next program without the text of its own.
+            self.files.keep_program()?;
+            self.has_program = true;
+        }
         let mut file = OpenOptions::new().create(true).write(true).truncate(true).open(path)?;
         file.write_all(bytes)?;
         let synced = file.try_clone()?;
@@ -278,18 +346,22 @@ struct Writer {
 }
 
 impl Writer {
-    fn run(mut self, records: &Receiver<Retained>) {
+    fn run(mut self, records: &Receiver<Queued>) {
         let mut bytes = Vec::new();
-        for record in records {
+        for (left_out, record) in records {
             bytes.clear();
             record.write(&mut bytes);
             let written = self.write(&record, &bytes);
-            let mut failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut reason = self.failure.reason();
             match written {
-                // A step behind a gap is not read: only a whole record shows that the disk takes states again.
-                Ok(true) => *failure = None,
-                Ok(false) => {}
-                Err((folder, error)) => *failure = Some(format!("{}: {error}", folder.display())),
+                // A step behind a gap is not read: only a whole record behind it shows that the disk takes states again.
+                Ok(true) if left_out == self.failure.left_out.load(Ordering::Acquire) => {
+                    *reason = None;
+                }
+                Ok(_) => {}
+                Err((folder, error)) => {
+                    *reason = Some(format!("{}: {error}", folder.display()));
+                }
             }
         }
     }

@@ -11,9 +11,11 @@ mod error;
 mod field;
 mod held;
 mod peers;
+mod retained;
 mod run;
 
 pub use error::MemberError;
 pub use held::tls_keys;
 pub use peers::{addressed_peers, find_member, listed_peers};
+pub use retained::{last_state, station_files};
 pub use run::{MemberOptions, link_kind, restart_for_zenoh, run_plant, run_remote_io, run_station};

@@ -9,21 +9,22 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::Serialize;
 use understudy_bus::{
-    Commands, Endpoints, FieldDriver, LinkKind, MemberSettings, NoField, Peer, RetainedFiles,
-    Retention, SimulatedField, ZENOH_RUNTIME, newest_note, run_member,
+    Commands, Endpoints, FieldDriver, LinkKind, MemberSettings, NoField, Peer, Retention,
+    SimulatedField, ZENOH_RUNTIME, run_member,
 };
 use understudy_cluster::{Cluster, Link};
 use understudy_cycle::Machine;
 use understudy_journal::Segments;
-use understudy_node::{Program, Station};
+use understudy_node::Station;
 use understudy_plant::PlantMachine;
 use understudy_remote_io::RemoteIo;
-use understudy_wire::{Epoch, Image, Member, ProgramId, RetainedRun, Time};
+use understudy_wire::{Epoch, Image, Member, ProgramId, Time};
 
 use crate::error::MemberError;
 use crate::field::Equipment;
 use crate::held::read_keys;
 use crate::peers::find_member;
+use crate::retained::{later_than_retained, retained_notes, retained_runs};
 
 /// What a member is told besides its cluster.
 #[derive(Debug, Clone)]
@@ -81,23 +82,14 @@ pub fn run_remote_io(cluster: &Cluster, options: &MemberOptions) -> Result<(), M
     let settings = cluster.remote_io_settings(program).ok_or_else(wrong)?;
     let field = field_of(options, cluster, program, settings.fail_safe.clone())?;
     let is_retentive = settings.restart.is_some();
-    let machine = RemoteIo::new(Time::default(), settings);
+    let machine = RemoteIo::new(Time::default(), settings.clone());
     let Some(folder) = &options.retain else {
         let retention = Retention { is_missing: is_retentive, ..Retention::default() };
         return run(cluster, options, member, machine, field, retention);
     };
-    let files = RetainedFiles::new(folder, format!("{}.{}", cluster.name(), options.name));
-    let (notes, found) = files.notes(cluster.agreement().cluster);
-    let is_damaged = found.iter().any(|file| file.problem.is_some());
-    let machine = machine.noting(newest_note(notes, &found), is_damaged);
-    run(
-        cluster,
-        options,
-        member,
-        machine,
-        field,
-        Retention { files: vec![(None, files)], found, is_missing: false },
-    )
+    let (notes, retention) = retained_notes(cluster, folder, &options.name, &settings);
+    let machine = machine.noting(notes.newest, notes.is_damaged);
+    run(cluster, options, member, machine, field, retention)
 }
 
 /// Runs a simulated plant until it is told to end.
@@ -206,44 +198,6 @@ pub fn restart_for_zenoh(link: LinkKind) {
         let error = Command::new(program).args(arguments).env(variable, value).exec();
         tracing::warn!(%error, "the program was not started again with fewer threads for Zenoh");
     }
-}
-
-/// What a station has kept of each program with retentive variables that it runs, and the files.
-fn retained_runs(
-    cluster: &Cluster,
-    options: &MemberOptions,
-    settings: &understudy_node::Settings,
-) -> (Vec<RetainedRun>, Retention) {
-    let (mut runs, mut retention) = (Vec::new(), Retention::default());
-    let is_retentive =
-        |program: &ProgramId| settings.programs[program.index()].executable.is_retentive();
-    let mut retentive = settings.runs().filter(is_retentive);
-    let Some(folder) = &options.retain else {
-        retention.is_missing = retentive.next().is_some();
-        return (runs, retention);
-    };
-    for program in retentive {
-        let Program { hash, .. } = &settings.programs[program.index()];
-        let controller = &cluster.controllers()[program.index()].name;
-        let name = format!("{}.{}.{controller}", cluster.name(), options.name);
-        let files = RetainedFiles::new(folder, name);
-        let (found_runs, found) = files.runs(cluster.agreement().cluster, *hash);
-        runs.extend(found_runs);
-        retention.found.extend(found);
-        retention.files.push((Some(program), files));
-    }
-    (runs, retention)
-}
-
-/// A station founds an epoch that is later than those of what it has kept, whatever its clock shows after the power failure.
-fn later_than_retained(
-    mut settings: understudy_node::Settings,
-    runs: &[RetainedRun],
-) -> understudy_node::Settings {
-    let newest = runs.iter().map(|run| run.stepped().epoch.0).max();
-    let after = newest.map_or(0, |newest| newest.saturating_add(1));
-    settings.epoch = Epoch(settings.epoch.0.max(after));
-    settings
 }
 
 /// Later than any epoch that the cluster has had.

@@ -101,5 +101,6 @@ pub(crate) fn parts(understudies: usize, turns: Turns) -> Parts {
         plants: plants.collect(),
         fed_by: vec![None; circuits.len()],
         follows: vec![Vec::new(); circuits.len()],
+        has_two_networks: false,
     }
 }

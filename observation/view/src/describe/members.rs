@@ -196,7 +196,7 @@ fn started_warm_text(
     };
     let release = if awaits_release { "; the operator has to release its outputs" } else { "" };
     format!(
-        "starts its program warm, with the retentive values of cycle {kept} that {from} has kept; {lost}{release}"
+        "starts its program warm, with the retentive values of cycle {kept} of the cluster that {from} has kept; {lost}{release}"
     )
 }
 

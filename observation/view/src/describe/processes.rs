@@ -62,6 +62,11 @@ descriptions! { host: HostEvent, members: Members;
         "what it keeps for the time after a power failure is written to its disk again";
     RetainedRefused { file, reason } => "retained-refused" Alarm
         format!("does not use, or not to its end, what it has kept in {file}: {reason}");
+    RetainedCarried { program, kept, converted, new } => "retained-carried" Notice format!(
+        "takes over the retentive values of the program before {program}: {kept} kept, {converted} converted, {new} new"
+    );
+    RetainedDropped { program, paths, more } => "retained-dropped" Alarm
+        format!("{program} does not take over the retentive values of {}", and_more(paths, *more));
     FieldLost { reason } => "field-lost" Alarm format!("its equipment cannot be read or written: {reason}");
     FieldRegained => "field-regained" Notice "its equipment is read and written again";
     FieldContested => "field-contested" Alarm "another master writes the outputs of its equipment";
@@ -88,6 +93,12 @@ fn times(quantiles: Quantiles) -> String {
 }
 
 /// An order that was refused, with the person and the names in it.
+/// Paths, and how many more there are.
+fn and_more(paths: &[String], more: usize) -> String {
+    let listed = paths.join(", ");
+    if more == 0 { listed } else { format!("{listed} and {more} more") }
+}
+
 fn refused_text(order: &RefusedOrder) -> String {
     let RefusedOrder { to, order, signal, owner, reason, why, more } = order;
     let signal = if signal.is_empty() { String::new() } else { format!(" of {signal}") };

@@ -255,6 +255,10 @@ impl Model {
             HostEvent::RetainedRefused { file, reason } => {
                 self.alarms.occurred(own("retained-refused"), cycle, format!("{file}: {reason}"));
             }
+            HostEvent::RetainedDropped { .. } => {
+                let text = describe(record, &self.members, &self.writes).text;
+                self.alarms.occurred(own("retained-dropped"), cycle, text);
+            }
             HostEvent::Ready { .. } | HostEvent::RetainRegained => {
                 self.alarms.over(&own("retain-failed"), cycle)
             }

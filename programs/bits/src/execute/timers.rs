@@ -81,6 +81,31 @@ impl Counted {
         self.scans
     }
 
+    /// Whether the timer keeps what is at an address.
+    pub(crate) fn keeps(&self, address: u64) -> bool {
+        self.kept(0, 0, 0).iter().any(|(at, _)| *at == address)
+    }
+
+    /// The count with which the timer keeps what `stored` has at each address; none where it keeps that with no count.
+    pub(crate) fn count(&self, stored: impl Fn(u64) -> u64, now: i64, period: i64) -> Option<u64> {
+        let runs = now.saturating_sub(stored(self.start()) as i64).checked_div(period).unwrap_or(0);
+        let runs = u64::try_from(runs).ok().filter(|runs| *runs <= self.scans);
+        // A timer that does not run has not started: its start and its elapsed time are of no meaning.
+        let counts = [Some(0), Some(self.scans), runs, runs.map(|runs| self.scans - runs)];
+        let variables = self.variables;
+        let is_kept = |count: &u64| {
+            let kept = self.kept(*count, now, period);
+            let runs = kept[0].1 > 0;
+            let idle = [variables.start, variables.elapsed].map(|slot| self.at(slot));
+            // The output is that of the last scan, which has a register of its own where the next one reads it.
+            let output = self.at(variables.output);
+            kept.iter().all(|(at, value)| {
+                *at == output || !runs && idle.contains(at) || stored(*at) == *value
+            })
+        };
+        counts.into_iter().flatten().find(is_kept)
+    }
+
     /// What the timer keeps where its count is `count`, so that every later scan is the same: values by address. `now` is the `TIME()` of the next
     /// scan.
     pub(crate) fn kept(&self, count: u64, now: i64, period: i64) -> [(u64, u64); 5] {

@@ -199,3 +199,25 @@ fn a_chart_has_no_signs_but_those_of_its_conditions() {
         assert_eq!(codes(&text), expected, "{text}");
     }
 }
+
+/// What is said of a loss of power is a boolean, and says one thing.
+#[test]
+fn attributes_of_a_loss_of_power_are_read_or_refused() {
+    let text = |attributes: &str| {
+        format!(
+            r#"<project xmlns="http://www.plcopen.org/xml/tc6_0201"><fileHeader companyName="" productName="" productVersion="1" creationDateTime="2026-01-01T00:00:00"/><contentHeader name="p"><coordinateInfo><fbd><scaling x="1" y="1"/></fbd><ld><scaling x="1" y="1"/></ld><sfc><scaling x="1" y="1"/></sfc></coordinateInfo></contentHeader><types><dataTypes/><pous><pou name="main" pouType="program"><interface><localVars {attributes}><variable name="n"><type><INT/></type></variable></localVars></interface><body><ST><xhtml:p xmlns:xhtml="http://www.w3.org/1999/xhtml">n := n + 1;</xhtml:p></ST></body></pou></pous></types><instances><configurations/></instances></project>"#
+        )
+    };
+    for right in ["", r#"retain="true""#, r#"nonretain="1" retain="false""#, r#"retain="0""#] {
+        assert!(!codes(&text(right)).contains(&"U1010"), "{right}: {:?}", codes(&text(right)));
+    }
+    for wrong in [
+        r#"retain="yes""#,
+        r#"persistent="TRUE""#,
+        r#"nonretain="no""#,
+        r#"retain="true" nonretain="true""#,
+        r#"persistent="1" nonretain="1""#,
+    ] {
+        assert!(codes(&text(wrong)).contains(&"U1010"), "{wrong}: {:?}", codes(&text(wrong)));
+    }
+}

@@ -3,9 +3,10 @@
 use std::time::Duration;
 
 use proptest::prelude::*;
+use understudy_bits::Registers;
 use understudy_ladder::{circuit, print};
 use understudy_testing::random::{Dice, random_program};
-use understudy_typed::{Interpreter, Program};
+use understudy_typed::{CarriedState, Interpreter, Program, Told};
 
 use crate::support::{PERIOD, program};
 use understudy_logic::{Scan, Scratch};
@@ -59,6 +60,67 @@ proptest! {
         let typed = ladder.typed(Duration::from_millis(milliseconds)).expect("a sound program");
         check(&typed, seed, &print(&ladder));
     }
+}
+
+/// Runs the circuit of a program for some scans, then starts the circuit and the interpreter of another one from its retentive values, which must
+/// agree. Answers whether the circuit has all of these values, and whether there are any.
+fn change(before: &Program, now: &Program, seed: u64, about: &str) -> (bool, bool) {
+    let [old, new] = [before, now].map(|typed| circuit(typed).expect("a sound program"));
+    let scan = Scan::new(&old.circuit);
+    let mut scratch = Scratch::default();
+    let mut dice = Dice::new(!seed);
+    let mut registers = scan.initial().to_vec();
+    let mut inputs = vec![0_u64; scan.input_count().div_ceil(64)];
+    let mut outputs = vec![0_u64; scan.output_count().div_ceil(64)];
+    for _ in 0..dice.below(60) {
+        let place = dice.below(scan.input_count());
+        inputs[place / 64] ^= 1 << (place % 64);
+        scan.step(&mut scratch, &mut registers, &inputs, &mut outputs);
+    }
+    let told = Told {
+        is_known: &|address| old.layout.holds(address),
+        is_read: &|address| new.layout.holds(address),
+    };
+    let CarriedState { mut state, .. } = now.carried(before, &old.layout.state(&registers), told);
+    let scan = Scan::new(&new.circuit);
+    let Registers { packed: mut registers, lost } =
+        new.layout.registers(now, &state, scan.initial());
+    let is_new = registers != scan.initial();
+    if !lost.is_empty() {
+        // The same program with the same period takes over everything.
+        assert!(!seed.is_multiple_of(6), "{lost:?} {state:?}\n{about}");
+        return (false, is_new);
+    }
+    let interpreter = Interpreter::new(now);
+    let mut inputs = vec![0_u64; scan.input_count().div_ceil(64)];
+    for number in 0..60 {
+        if dice.rarely(2) {
+            let place = dice.below(scan.input_count());
+            inputs[place / 64] ^= 1 << (place % 64);
+        }
+        let [mut wanted, mut found] = [0; 2].map(|_| vec![0_u64; scan.output_count().div_ceil(64)]);
+        interpreter.step(&mut state, &inputs, &mut wanted);
+        scan.step(&mut scratch, &mut registers, &inputs, &mut found);
+        assert_eq!(found, wanted, "scan {number}\n{about}");
+    }
+    (true, is_new)
+}
+
+#[test]
+fn changed_programs_go_on_from_what_the_circuit_before_has_left() {
+    let [mut whole, mut new] = [0; 2];
+    for seed in 0..300 {
+        let [before, now] =
+            [seed, seed + u64::from(seed % 3 > 0) * 7919].map(|seed| random_program(seed, 6));
+        let about = format!("{}\n{}", print(&before), print(&now));
+        let periods = [PERIOD, if seed % 2 == 0 { PERIOD } else { PERIOD * 3 }];
+        let [before, now] = [(&before, periods[0]), (&now, periods[1])]
+            .map(|(ladder, period)| ladder.typed(period).expect("a sound program"));
+        let (is_whole, is_new) = change(&before, &now, seed, &about);
+        whole += u32::from(is_whole && is_new);
+        new += u32::from(is_new);
+    }
+    assert!(whole > 30 && new > 35, "{whole} of {new}");
 }
 
 #[test]

@@ -4,7 +4,9 @@ use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::rc::Rc;
 
-use understudy_typed::{Initial, Root, Routine as Lowered, RoutineId, RoutineKind, Timer, Type};
+use understudy_typed::{
+    Initial, Root, Routine as Lowered, RoutineId, RoutineKind, Timer, Type, Variable as Shown,
+};
 
 use crate::syntax::{Class, Declaration, Name, Span, UnitKind};
 
@@ -143,6 +145,30 @@ impl<'a> Lowering<'a> {
         frame.symbols.insert(name.key(), symbol.unwrap_or(Symbol::Faulty));
     }
 
+    /// Gives a retentive variable of a routine a path, by which `check` lists it and a changed program takes it over.
+    fn name_static(&mut self, key: &Key, name: &Name, of: &Type, slot: u32) {
+        let unit = self.units[key.owner.unit].unit.name.as_str();
+        let method = key.owner.method.map(|_| self.unit_of(key.owner).name.as_str());
+        let parts: Vec<&str> =
+            [Some(unit), method, Some(name.as_str())].into_iter().flatten().collect();
+        let path = parts.join(".");
+        let is_taken = |path: &str| self.program.variables.iter().any(|known| known.name == path);
+        // A routine with open arrays has a body, and memory, for each of their types.
+        let mut unique = path.clone();
+        let mut number = 1;
+        while is_taken(&unique) {
+            number += 1;
+            unique = format!("{path}#{number}");
+        }
+        self.program.variables.push(Shown {
+            name: unique,
+            of: of.clone(),
+            slot,
+            address: None,
+            description: None,
+        });
+    }
+
     fn frame_symbol(
         &mut self,
         key: &Key,
@@ -187,6 +213,9 @@ impl<'a> Lowering<'a> {
             let slot = self.state(resolved.of.slots(), &name.span())?;
             self.program.initial.extend(initial(&resolved.image, slot));
             self.keep(declaration.retention, &resolved.of, slot);
+            if self.program.retains(slot) {
+                self.name_static(key, name, &resolved.of, slot);
+            }
             Root::Global(slot)
         } else {
             Root::Frame(self.take(frame, &resolved, &name.span())?)

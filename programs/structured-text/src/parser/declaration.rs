@@ -102,9 +102,7 @@ impl Parser<'_> {
         // A variable may be called so.
         while self.at_any(&QUALIFIERS) && !matches!(self.ahead(1), Lexeme::Sign(":" | ",")) {
             block.constant |= self.at_word("CONSTANT");
-            if let Some(retention) = self.retention() {
-                block.retention = retention;
-            }
+            self.take_retention(&mut block.retention);
             self.skip();
         }
         self.fields(block, into);
@@ -112,6 +110,18 @@ impl Parser<'_> {
             self.expected("`END_VAR`");
         }
         self.take_sign(";");
+    }
+
+    /// Takes note of what the qualifier that is here says of a loss of power, which may not contradict one before it.
+    pub(super) fn take_retention(&mut self, retention: &mut Retention) {
+        let Some(found) = self.retention() else {
+            return;
+        };
+        if *retention != Retention::Unstated && *retention != found {
+            let message = "variables are RETAIN or NON_RETAIN, not both".to_owned();
+            self.error("U1035", message, self.span());
+        }
+        *retention = found;
     }
 
     /// What the qualifier that is here says of a loss of power.

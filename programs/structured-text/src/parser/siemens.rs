@@ -73,10 +73,13 @@ impl Parser<'_> {
         self.skip();
         let name = self.name("the name of a data block");
         self.siemens_header();
-        let mut retention = Retention::Retained;
-        while let Some(found) = self.retention() {
-            retention = found;
+        let mut retention = Retention::Unstated;
+        while self.retention().is_some() {
+            self.take_retention(&mut retention);
             self.skip();
+        }
+        if retention == Retention::Unstated {
+            retention = Retention::Retained;
         }
         self.siemens_header();
         let of = if self.at_any(&["STRUCT", "ARRAY"]) {

@@ -63,6 +63,16 @@ impl Running {
         }
     }
 
+    pub(crate) fn state(&self) -> &[u64] {
+        &self.state
+    }
+
+    /// Goes on from a state.
+    pub(crate) fn go_on_from(&mut self, state: &[u64]) {
+        self.state = state.to_vec();
+        self.reference = state.to_vec();
+    }
+
     pub(crate) fn inputs(&self) -> Vec<Point> {
         let points = self.program.inputs.iter();
         points.filter(|point| point.slot != 0).cloned().collect()

@@ -4,25 +4,21 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_interchange::{Rungs, Source, SourceFile, Wanted, no_program, read_source};
-use understudy_ladder::Program as Ladder;
+use understudy_interchange::no_program;
 use understudy_logic::Circuit;
 use understudy_text::{Diagnostic, Report};
 
 use crate::code::Code;
 use crate::fields::Placed;
+use crate::source_text::{ReadSource, SourceText};
 
 /// Gives the text of a file by its name, or says why it cannot.
 type Open<'a> = &'a mut dyn FnMut(&str) -> Result<String, String>;
 
 /// A file and what it says.
 struct File {
-    name: String,
-    text: String,
-    source: Option<Source>,
-    /// The rungs that it is written in.
-    ladder: Option<Ladder>,
-    diagnostics: Vec<Diagnostic>,
+    source: Arc<SourceText>,
+    read: ReadSource,
 }
 
 pub(crate) struct Ladders<'a> {
@@ -56,23 +52,16 @@ impl<'a> Ladders<'a> {
                 return None;
             }
         };
-        let read = &mut self.read[place];
-        let Some(Source::Program(typed)) = &read.source else {
-            return None;
-        };
-        let typed = Arc::clone(typed);
-        let Some(ladder) = &read.ladder else {
-            return Some(Code::of_text(typed, Arc::from(read.text.as_str())));
-        };
+        let File { source, read } = &mut self.read[place];
+        let code = read.code(Arc::clone(source), name)?;
         // Several controllers may run one ladder.
-        for warning in ladder.preset_warnings(period) {
+        let warnings = read.ladder.as_ref().map(|ladder| ladder.preset_warnings(period));
+        for warning in warnings.into_iter().flatten() {
             if !read.diagnostics.contains(&warning) {
                 read.diagnostics.push(warning);
             }
         }
-        let mut ladder = ladder.clone();
-        ladder.name = name.into();
-        match Code::of_ladder(typed, ladder) {
+        match code {
             Ok(code) => Some(code),
             Err(error) => {
                 let message = format!("`{}`: {error}", file.value);
@@ -106,14 +95,12 @@ impl<'a> Ladders<'a> {
             return place.clone();
         }
         let place = (self.open)(file).map(|text| {
-            let wanted = Wanted { period: Some(period), program: None };
-            let SourceFile { source, rungs, mut diagnostics, .. } =
-                read_source(file, &text, wanted);
-            let ladder = rungs.and_then(Rungs::written);
-            if let Some(Source::Library(_)) = source {
-                diagnostics.push(no_program());
+            let source = SourceText { file: file.to_owned(), text: Arc::from(text), period };
+            let mut read = source.read();
+            if read.is_library {
+                read.diagnostics.push(no_program());
             }
-            self.read.push(File { name: file.to_owned(), text, source, ladder, diagnostics });
+            self.read.push(File { source: Arc::new(source), read });
             self.read.len() - 1
         });
         self.places.insert(file.to_owned(), place.clone());
@@ -122,9 +109,9 @@ impl<'a> Ladders<'a> {
 
     pub(crate) fn into_reports(self) -> impl Iterator<Item = Report> {
         self.read.into_iter().map(|file| Report {
-            name: file.name,
-            text: file.text,
-            diagnostics: file.diagnostics,
+            name: file.source.file.clone(),
+            text: file.source.text.to_string(),
+            diagnostics: file.read.diagnostics,
         })
     }
 }

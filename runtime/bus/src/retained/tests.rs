@@ -55,6 +55,7 @@ fn note(cycle: u64) -> Retained {
         cluster: CLUSTER,
         configuration: understudy_wire::ConfigurationHash(3),
         hash: HASH,
+        is_retentive: true,
         number: cycle,
         lineage: lineage(cycle),
         recalled: Recalled {
@@ -82,7 +83,7 @@ fn keep(files: &RetainedFiles, first: u64, last: u64) {
 
 /// The newest cycle that is read.
 fn newest(files: &RetainedFiles) -> Option<u64> {
-    let (runs, _) = files.runs(CLUSTER, HASH);
+    let (runs, _) = files.runs(Some(CLUSTER));
     runs.iter().map(|run| run.stepped().cycle.0).max()
 }
 
@@ -97,13 +98,12 @@ fn the_newest_cycle_comes_back_over_several_lives() {
         last += life;
         assert_eq!(newest(&files), Some(last));
     }
-    let (_, found) = files.runs(CLUSTER, HASH);
+    let (_, found) = files.runs(Some(CLUSTER));
     assert!(found.iter().all(|file| file.problem.is_none()), "{found:?}");
 }
 
 fn newest_of(files: &RetainedFiles) -> Option<Moment> {
-    let (notes, found) = files.notes(CLUSTER);
-    newest_note(notes, &found).map(|note| note.applied())
+    files.notes(Some(CLUSTER)).newest.map(|note| note.applied())
 }
 
 /// A note that may not be the newest proves nothing: a file that is damaged, cut or emptied leaves none.
@@ -161,11 +161,11 @@ fn the_newest_note_comes_back() {
         }
     }
     retainer.finish();
-    let (notes, found) = files.notes(CLUSTER);
-    assert_eq!(newest_note(notes, &found).map(|note| note.applied()), Some(moment(cycle)));
-    assert!(found.iter().all(|file| file.problem.is_none()), "{found:?}");
-    let (foreign, found) = files.notes(ClusterHash(9));
-    assert!(foreign.is_empty() && found.iter().all(|file| file.problem.is_some()), "{found:?}");
+    let found = files.notes(Some(CLUSTER));
+    assert_eq!(found.newest.map(|note| note.applied()), Some(moment(cycle)));
+    assert!(!found.is_damaged, "{:?}", found.files);
+    let foreign = files.notes(Some(ClusterHash(9)));
+    assert!(foreign.newest.is_none() && foreign.is_damaged, "{:?}", foreign.files);
 }
 
 /// A folder that cannot be written is reported, and so is that it can be again; nothing ends.
@@ -205,7 +205,7 @@ enum Damage {
     Torn(f64),
     /// A bit flips at this share of its bytes.
     Flipped(f64),
-    /// It is of another program.
+    /// It is of another cluster.
     Foreign,
 }
 
@@ -259,7 +259,7 @@ fn damage(path: &Path, damage: &Damage) -> Option<u64> {
         Damage::Foreign => {
             let mut foreign = Vec::new();
             if let Retained::State(of) = state(1) {
-                Retained::State(RetainedState { hash: understudy_wire::ProgramHash(99), ..of })
+                Retained::State(RetainedState { cluster: ClusterHash(99), ..of })
                     .write(&mut foreign);
             }
             fs::write(path, &foreign).expect("written");
@@ -278,7 +278,7 @@ proptest! {
         let files = RetainedFiles::new(&folder, "robot.robot".to_owned());
         keep(&files, 1, last);
         let intact = files.paths().iter().zip(&both).filter_map(|(path, of)| damage(path, of)).max();
-        let (runs, found) = files.runs(CLUSTER, HASH);
+        let (runs, found) = files.runs(Some(CLUSTER));
         for run in &runs {
             let cycle = run.stepped().cycle.0;
             prop_assert_eq!(run.steps.last().map_or(run.state.lineage, |step| step.after), lineage(cycle));
@@ -298,4 +298,145 @@ proptest! {
         keep(&files, last + 1, last + 3);
         prop_assert_eq!(newest(&files), Some(last + 3));
     }
+}
+
+/// Waits until something is so.
+fn wait_until(mut is_so: impl FnMut() -> bool) {
+    let patience = Instant::now() + Duration::from_secs(60);
+    while !is_so() {
+        assert!(Instant::now() < patience, "it is not so");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// Keeps states until something changes: the reason why the disk takes nothing, or none where it does.
+fn changed(retainer: &mut Retainer, cycle: u64) -> Option<String> {
+    let mut change = None;
+    wait_until(|| {
+        retainer.keep(state(cycle));
+        change = retainer.take_change();
+        change.is_some()
+    });
+    change.flatten()
+}
+
+/// A disk that is full: every write fails, and nothing ends.
+#[test]
+fn a_full_disk_is_reported_until_it_has_room() {
+    let folder = Folder::new("retained-no-room");
+    let files = RetainedFiles::new(&folder, "robot.robot".to_owned());
+    let mut retainer = Retainer::start(vec![(Some(PROGRAM), files.clone())]).expect("threads");
+    retainer.keep(state(1));
+    wait_until(|| newest(&files) == Some(1));
+    let full = || {
+        for path in files.paths() {
+            let _ = fs::remove_file(&path);
+            std::os::unix::fs::symlink("/dev/full", path).expect("a link");
+        }
+    };
+    full();
+    let reason = changed(&mut retainer, 2).expect("a reason");
+    assert!(reason.contains("No space left"), "{reason}");
+    for path in files.paths() {
+        fs::remove_file(path).expect("removed");
+    }
+    assert_eq!(changed(&mut retainer, 3), None);
+    retainer.finish();
+    assert_eq!(newest(&files), Some(3));
+}
+
+/// A disk that takes nothing for a while: the cycle goes on, what has no room is left out, and that is reported. The steps behind the gap are not used.
+#[test]
+fn a_slow_disk_leaves_records_out_and_says_so() {
+    let folder = Folder::new("retained-slow");
+    let files = RetainedFiles::new(&folder, "robot.robot".to_owned());
+    let failure = Failure::default();
+    let (queue, records) = sync_channel(WAITING_RECORDS);
+    let mut retainer = Retainer {
+        queue: Some(queue),
+        failure: Arc::clone(&failure),
+        reported: false,
+        writer: None,
+    };
+    let room = WAITING_RECORDS as u64;
+    retainer.keep(state(1));
+    (2..=room + 50).for_each(|cycle| retainer.keep(step(cycle)));
+    let reason = retainer.take_change().flatten().expect("a reason");
+    assert!(reason.contains("wait for the disk"), "{reason}");
+    // The disk is back.
+    let (sync, _) = sync_channel(1);
+    let turns = vec![Turn::new(Some(PROGRAM), files.clone())];
+    let writer = std::thread::spawn(move || Writer { turns, sync, failure }.run(&records));
+    wait_until(|| newest(&files) == Some(room));
+    assert_eq!(retainer.take_change(), None);
+    retainer.keep(step(room + 51));
+    assert_eq!(changed(&mut retainer, room + 60), None);
+    retainer.finish();
+    writer.join().expect("it ends");
+    let (runs, _) = files.runs(Some(CLUSTER));
+    let cycles = runs.iter().flat_map(|run| run.steps.iter().map(|step| step.stepped.cycle.0));
+    assert_eq!(cycles.max(), Some(room));
+    assert_eq!(newest(&files), Some(room + 60));
+}
+
+fn program(hash: u64) -> RetainedProgram {
+    RetainedProgram {
+        hash: understudy_wire::ProgramHash(hash),
+        file: "robot.st".to_owned(),
+        period: 10_000_000,
+        text: format!("PROGRAM p{hash} END_PROGRAM"),
+        inputs: Vec::new(),
+    }
+}
+
+/// The values of the program before cannot come back once the next one has kept its own: not by what still waited for the disk, and not by its text.
+#[test]
+fn what_the_program_before_has_left_does_not_come_back() {
+    let folder = Folder::new("retained-changed");
+    let of = |hash: u64| {
+        RetainedFiles::new(&folder, "robot.robot".to_owned()).with_program(program(hash))
+    };
+    let state_of = |hash: u64, cycle: u64| match state(cycle) {
+        Retained::State(state) => {
+            Retained::State(RetainedState { hash: understudy_wire::ProgramHash(hash), ..state })
+        }
+        _ => unreachable!("a state"),
+    };
+    let run = |hash: u64, cycles: std::ops::Range<u64>| {
+        let retainer = Retainer::start(vec![(Some(PROGRAM), of(hash))]).expect("threads");
+        for cycle in cycles {
+            retainer.keep(state_of(hash, cycle));
+            retainer.keep(step(cycle + 1));
+        }
+        retainer.finish();
+    };
+    let hashes = || {
+        let (runs, _) = of(0).runs(Some(CLUSTER));
+        let newest = runs.iter().max_by_key(|run| run.state.number).map(|run| run.state.hash.0);
+        (newest, [8, 9].map(|hash| of(0).program(understudy_wire::ProgramHash(hash)).is_ok()))
+    };
+    run(8, 1..20);
+    assert_eq!(hashes(), (Some(8), [true, false]));
+    assert_eq!(of(0).program(program(8).hash), Ok(program(8)));
+    run(9, 20..21);
+    // The other file is still of the program before, and older.
+    assert_eq!(hashes(), (Some(9), [true, true]));
+    run(9, 21..40);
+    run(9, 40..41);
+    assert_eq!(hashes(), (Some(9), [false, true]));
+    let (runs, _) = of(0).runs(Some(CLUSTER));
+    assert!(runs.iter().all(|run| run.state.hash.0 == 9));
+}
+
+/// A text that is longer than one that is kept is reported; the member runs.
+#[test]
+fn a_program_that_is_too_long_is_reported() {
+    let folder = Folder::new("retained-long");
+    let text = "x".repeat(understudy_wire::MAXIMUM_KEPT_TEXT_BYTES + 1);
+    let long = RetainedProgram { text, ..program(8) };
+    let files = RetainedFiles::new(&folder, "robot.robot".to_owned()).with_program(long);
+    let mut retainer = Retainer::start(vec![(Some(PROGRAM), files)]).expect("threads");
+    let reason = changed(&mut retainer, 1).expect("a reason");
+    assert!(reason.contains("the text of the program has"), "{reason}");
+    retainer.finish();
 }

@@ -48,6 +48,7 @@ impl Typed {
         class: Class,
         into: &mut Vec<Declaration>,
     ) {
+        let retention = self.retention(list);
         for node in children(list, "variable") {
             let Some(written) = self.needed(node, "name") else {
                 continue;
@@ -64,7 +65,7 @@ impl Typed {
                 name: name(&written),
                 class,
                 constant: is(list, "constant"),
-                retention: retention(list),
+                retention,
                 edge: None,
                 address: address
                     .map(|address| Name::new(address.to_ascii_uppercase(), address.span())),
@@ -296,13 +297,29 @@ fn is(of: Node<'_, '_>, name: &str) -> bool {
     attribute(of, name).is_some_and(|value| matches!(value.as_str(), "true" | "1"))
 }
 
-/// What the attributes of a list of variables say of a loss of power.
-fn retention(list: Node<'_, '_>) -> Retention {
-    if is(list, "retain") || is(list, "persistent") {
-        return Retention::Retained;
-    }
-    match is(list, "nonretain") {
-        true => Retention::NotRetained,
-        false => Retention::Unstated,
+impl Typed {
+    /// What the attributes of a list of variables say of a loss of power.
+    fn retention(&mut self, list: Node<'_, '_>) -> Retention {
+        for name in ["retain", "persistent", "nonretain"] {
+            let Some(value) = attribute(list, name) else {
+                continue;
+            };
+            if !matches!(value.as_str(), "true" | "1" | "false" | "0" | "") {
+                let message =
+                    format!("`{value}` is not a value of `{name}`: write `true` or `false`");
+                self.error("U1010", message, value.span());
+            }
+        }
+        let kept = is(list, "retain") || is(list, "persistent");
+        let not_kept = is(list, "nonretain");
+        if kept && not_kept {
+            let message = "variables are retentive or not: both are stated".to_owned();
+            self.error("U1010", message, start_tag(list));
+        }
+        match (kept, not_kept) {
+            (true, _) => Retention::Retained,
+            (false, true) => Retention::NotRetained,
+            (false, false) => Retention::Unstated,
+        }
     }
 }

@@ -1,0 +1,329 @@
+//! What a changed program takes over: the retentive values of the program before it, by full path and type.
+//!
+//! ```text
+//!   retentive in both, of one type                         kept
+//!   the same, and the type has become wider                converted: INT to DINT or REAL, WORD to DWORD, the values of an enumeration by their names
+//!   retentive in the new program only                      new: it has its initial value
+//!   retentive in the old program only, or of a type that
+//!   does not have all values of the old one                dropped
+//! ```
+//!
+//! A path is that of a variable, of a member of a structure or of a function block, or of elements of an array. What has become of a path depends
+//! on the declarations, except where a value has no name in its enumeration or is outside of a declared subrange: that one is dropped. References
+//! are bound anew by the calls. The scans since the cold start become those of the same time, rounded up, so that no moment that a retentive variable
+//! holds is one of the future.
+//!
+//! All stations compute the same state, since it is a function of the two programs and of the old state.
+
+mod arrays;
+mod types;
+
+use std::collections::HashMap;
+
+use self::types::{Conversion, conversion};
+use crate::form::Program;
+use crate::image::{Declared, Points};
+use crate::scan::SCANS;
+use crate::types::Type;
+
+/// A state of the new program, and what has become of each retentive path.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CarriedState {
+    /// The initial state with the values that are taken over.
+    pub state: Vec<u64>,
+    /// The retentive paths of both programs, each once; a path stands for all its parts.
+    pub paths: Vec<CarriedPath>,
+}
+
+/// What a state of the old program tells, and what of it the new program can read: addresses of the two states.
+#[derive(Clone, Copy)]
+pub struct Told<'a> {
+    /// Whether the old state has the value at an address.
+    pub is_known: &'a dyn Fn(u64) -> bool,
+    /// Whether a scan of the new program may read the value at an address before it writes it.
+    pub is_read: &'a dyn Fn(u64) -> bool,
+}
+
+impl Told<'_> {
+    /// Everything.
+    pub const ALL: Self = Self { is_known: &|_| true, is_read: &|_| true };
+}
+
+/// What has become of a retentive path.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CarriedPath {
+    /// The path, such as `pump.hours` or `table[0..4]`.
+    pub path: String,
+    /// What has become of it.
+    pub fate: Fate,
+    /// Its type in the old program, where it is retentive there.
+    pub before: Option<String>,
+    /// Its type in the new program, where it is retentive there.
+    pub now: Option<String>,
+}
+
+/// What becomes of a retentive value where the program changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Fate {
+    /// The new program has the value.
+    Kept,
+    /// The new program has the value, in another type.
+    Converted,
+    /// The new program has its initial value.
+    New,
+    /// The new program does not have the value.
+    Dropped,
+}
+
+impl Fate {
+    /// The word for it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Kept => "kept",
+            Self::Converted => "converted",
+            Self::New => "new",
+            Self::Dropped => "dropped",
+        }
+    }
+}
+
+impl CarriedState {
+    /// The paths whose values the new program does not have.
+    pub fn dropped(&self) -> impl Iterator<Item = &CarriedPath> {
+        self.paths.iter().filter(|path| path.fate == Fate::Dropped)
+    }
+}
+
+impl Program {
+    /// The state with which this program starts warm from a state of the program before it. What that state does not
+    /// tell is dropped, where the new program reads it.
+    ///
+    /// # Panics
+    /// If `state` is shorter than a state of `before`.
+    pub fn carried(&self, before: &Self, state: &[u64], told: Told<'_>) -> CarriedState {
+        let points = self.inputs.iter().chain(&self.outputs).filter(|point| point.range.is_some());
+        let mut walk = Walk {
+            old: before,
+            new: self,
+            kept: state,
+            told,
+            state: self.initial_state(),
+            declared: points.map(|point| (point.slot, point.declared())).collect(),
+        };
+        let paths = walk.variables();
+        if self.is_retentive() && before.is_retentive() {
+            let time = i128::from(before.period.max(1)) * i128::from(state[SCANS]);
+            let period = i128::from(self.period.max(1));
+            let scans = (time + period - 1) / period;
+            walk.state[SCANS] = u64::try_from(scans).unwrap_or(u64::MAX);
+        }
+        CarriedState { state: walk.state, paths }
+    }
+}
+
+impl Points {
+    /// Puts the values of points before into an image of these, by name and type: of those in `names`, and not where the type or the subrange of the
+    /// point does not have the value.
+    ///
+    /// # Panics
+    /// If an image is narrower than its points.
+    pub fn carry(&self, image: &mut [u64], before: (&Self, &[u64]), names: &[String]) {
+        let (points, values) = before;
+        for point in self.iter().filter(|point| names.contains(&point.name)) {
+            let value = points.find(&point.name).and_then(|old| {
+                let value = types::converted(old.of, point.of, old.get(values))?;
+                Some(value).filter(|value| point.declared().contains(*value))
+            });
+            if let Some(value) = value {
+                point.set(image, value);
+            }
+        }
+    }
+}
+
+/// A variable, or a part of one, in the state of its program.
+#[derive(Debug, Clone, Copy)]
+struct Spot<'p> {
+    of: &'p Type,
+    slot: u32,
+}
+
+struct Walk<'p> {
+    old: &'p Program,
+    new: &'p Program,
+    kept: &'p [u64],
+    told: Told<'p>,
+    state: Vec<u64>,
+    /// Points of the new program with a subrange, by their slots.
+    declared: HashMap<u32, Declared>,
+}
+
+impl<'p> Walk<'p> {
+    fn variables(&mut self) -> Vec<CarriedPath> {
+        let (old, new) = (self.old, self.new);
+        let spot = |of: &'p crate::form::Variable| Spot { of: &of.of, slot: of.slot };
+        let mut known: HashMap<&str, Spot<'_>> =
+            old.variables.iter().map(|variable| (variable.name.as_str(), spot(variable))).collect();
+        // The names of a ladder may differ in their case alone, those of all other languages do not.
+        let mut folded: HashMap<String, &str> = HashMap::new();
+        for variable in &old.variables {
+            folded.insert(variable.name.to_ascii_lowercase(), &variable.name);
+        }
+        let mut paths = Vec::new();
+        let exact: Vec<bool> = new
+            .variables
+            .iter()
+            .map(|variable| known.contains_key(variable.name.as_str()))
+            .collect();
+        let mut partners: Vec<Option<Spot<'_>>> = Vec::new();
+        for (variable, exact) in new.variables.iter().zip(&exact) {
+            partners.push(exact.then(|| known.remove(variable.name.as_str())).flatten());
+        }
+        for (variable, partner) in new.variables.iter().zip(partners) {
+            let in_other_case = || {
+                let name = folded.get(&variable.name.to_ascii_lowercase())?;
+                known.remove(name)
+            };
+            let partner = partner.or_else(in_other_case);
+            paths.extend(self.part(&variable.name, partner, Some(spot(variable))));
+        }
+        if old.has_unnamed_retentive() {
+            let path = "memory without a name".to_owned();
+            paths.push(CarriedPath { path, fate: Fate::Dropped, before: None, now: None });
+        }
+        for variable in &old.variables {
+            if let Some(spot) = known.remove(variable.name.as_str()) {
+                paths.extend(self.part(&variable.name, Some(spot), None));
+            }
+        }
+        paths
+    }
+
+    /// Takes over what has a path, or the parts of it; one entry where all parts have the same fate.
+    fn part(
+        &mut self,
+        path: &str,
+        old: Option<Spot<'p>>,
+        new: Option<Spot<'p>>,
+    ) -> Vec<CarriedPath> {
+        let is_kept = |program: &Program, spot: &Spot<'_>| {
+            let end = spot.slot.saturating_add(spot.of.slots() as u32);
+            program.retains_any(spot.slot..end)
+        };
+        let old = old.filter(|spot| is_kept(self.old, spot));
+        let new = new.filter(|spot| is_kept(self.new, spot));
+        let (Some(from), Some(to)) = (old, new) else {
+            let fate = match (old, new) {
+                (None, None) => return Vec::new(),
+                (_, None) => Fate::Dropped,
+                (None, _) => Fate::New,
+                (Some(_), Some(_)) => unreachable!("both were there"),
+            };
+            return vec![self.entry(path, fate, old, new)];
+        };
+        match (from.of, to.of) {
+            (Type::Structure(one, _), Type::Structure(other, _)) => {
+                let (old_type, new_type) =
+                    (&self.old.structures[one.0 as usize], &self.new.structures[other.0 as usize]);
+                if !old_type.name.eq_ignore_ascii_case(&new_type.name) {
+                    return vec![self.entry(path, Fate::Dropped, old, new)];
+                }
+                let mut parts = Vec::new();
+                let spot = |first: u32, field: &'p crate::types::Field| Spot {
+                    of: &field.of,
+                    slot: first + field.slot,
+                };
+                for field in new_type.fields.iter().filter(|field| !field.is_reference) {
+                    let mut fields = old_type.fields.iter();
+                    let same = fields.find(|known| {
+                        !known.is_reference && known.name.eq_ignore_ascii_case(&field.name)
+                    });
+                    let before = same.map(|same| spot(from.slot, same));
+                    let path = format!("{path}.{}", field.name);
+                    parts.extend(self.part(&path, before, Some(spot(to.slot, field))));
+                }
+                for field in old_type.fields.iter().filter(|field| !field.is_reference) {
+                    let is_same = |known: &crate::types::Field| {
+                        !known.is_reference && known.name.eq_ignore_ascii_case(&field.name)
+                    };
+                    if !new_type.fields.iter().any(is_same) {
+                        let path = format!("{path}.{}", field.name);
+                        parts.extend(self.part(&path, Some(spot(from.slot, field)), None));
+                    }
+                }
+                self.together(path, parts, (from, to))
+            }
+            (Type::Array(_), Type::Array(_)) => self.array(path, from, to),
+            _ => {
+                let fate = self.value(from, to);
+                vec![self.entry(path, fate, old, new)]
+            }
+        }
+    }
+
+    /// Takes over a value without parts.
+    fn value(&mut self, from: Spot<'_>, to: Spot<'_>) -> Fate {
+        let (first, second) = (from.slot as usize, to.slot as usize);
+        if !(self.told.is_known)(64 * u64::from(from.slot)) {
+            return if (self.told.is_read)(64 * u64::from(to.slot)) {
+                Fate::Dropped
+            } else {
+                Fate::Kept
+            };
+        }
+        if let (Type::Text(before), Type::Text(now)) = (from.of, to.of) {
+            if before > now {
+                return Fate::Dropped;
+            }
+            let slots = from.of.slots() as usize;
+            self.state[second..second + to.of.slots() as usize].fill(0);
+            self.state[second..second + slots].copy_from_slice(&self.kept[first..first + slots]);
+            return if before == now { Fate::Kept } else { Fate::Converted };
+        }
+        let Some(conversion) = conversion((self.old, from.of), (self.new, to.of)) else {
+            return Fate::Dropped;
+        };
+        let value = conversion.of(self.kept[first]);
+        let declared = self.declared.get(&to.slot);
+        let value = value.filter(|value| declared.is_none_or(|range| range.contains(*value)));
+        let Some(value) = value else {
+            return Fate::Dropped;
+        };
+        self.state[second] = value;
+        match conversion {
+            Conversion::Same => Fate::Kept,
+            _ => Fate::Converted,
+        }
+    }
+
+    /// The parts of a path, or the path alone where all of it has the same fate.
+    fn together(
+        &self,
+        path: &str,
+        parts: Vec<CarriedPath>,
+        (from, to): (Spot<'_>, Spot<'_>),
+    ) -> Vec<CarriedPath> {
+        match parts.first().map(|part| part.fate) {
+            Some(fate) if fate != Fate::New && parts.iter().all(|part| part.fate == fate) => {
+                vec![self.entry(path, fate, Some(from), Some(to))]
+            }
+            _ => parts,
+        }
+    }
+
+    fn entry(
+        &self,
+        path: &str,
+        fate: Fate,
+        old: Option<Spot<'_>>,
+        new: Option<Spot<'_>>,
+    ) -> CarriedPath {
+        let name = |program: &Program, spot: Spot<'_>| program.type_name(spot.of);
+        CarriedPath {
+            path: path.to_owned(),
+            fate,
+            before: old.map(|spot| name(self.old, spot)),
+            now: new.map(|spot| name(self.new, spot)),
+        }
+    }
+}

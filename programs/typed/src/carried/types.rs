@@ -1,0 +1,90 @@
+//! Which values of one type are values of another one.
+
+use crate::form::Program;
+use crate::types::{Elementary, Type};
+
+/// How a value of one type becomes one of another type that has all its values.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Conversion {
+    /// The types are equal.
+    Same,
+    /// To a type that has all values of the first.
+    Wider(Elementary, Elementary),
+    /// From the number of a name in one enumeration to its number in another one.
+    ByName(Vec<(u64, u64)>),
+}
+
+impl Conversion {
+    /// The value as the new type stores it; none for a number without a name.
+    pub(super) fn of(&self, stored: u64) -> Option<u64> {
+        match self {
+            Self::Same => Some(stored),
+            Self::Wider(from, to) => Some(widened(*from, *to, stored)),
+            Self::ByName(numbers) => {
+                let mut numbers = numbers.iter();
+                numbers.find(|(before, _)| *before == stored).map(|(_, now)| *now)
+            }
+        }
+    }
+}
+
+/// The conversion between two types without parts, where the second one has all values of the first.
+pub(super) fn conversion(
+    (old, from): (&Program, &Type),
+    (new, to): (&Program, &Type),
+) -> Option<Conversion> {
+    match (from, to) {
+        (Type::Elementary(from), Type::Elementary(to)) if from == to => Some(Conversion::Same),
+        (Type::Elementary(from), Type::Elementary(to)) => {
+            is_wider(*from, *to).then_some(Conversion::Wider(*from, *to))
+        }
+        (Type::Enumeration(one, from), Type::Enumeration(other, to)) => {
+            let before = &old.enumerations[one.0 as usize].values;
+            let now = &new.enumerations[other.0 as usize].values;
+            if from == to && before == now {
+                return Some(Conversion::Same);
+            }
+            let numbers = before.iter().filter_map(|(name, number)| {
+                let (_, same) = now.iter().find(|(known, _)| known.eq_ignore_ascii_case(name))?;
+                Some((*number as u64 & from.mask(), *same as u64 & to.mask()))
+            });
+            Some(Conversion::ByName(numbers.collect()))
+        }
+        _ => None,
+    }
+}
+
+/// A value of one type as one of a type that has all its values.
+pub(super) fn converted(from: Elementary, to: Elementary, stored: u64) -> Option<u64> {
+    (from == to).then_some(stored).or_else(|| is_wider(from, to).then(|| widened(from, to, stored)))
+}
+
+/// Whether a type has all values of another one, and means the same by them.
+fn is_wider(from: Elementary, to: Elementary) -> bool {
+    let wider_bits = from.bits() < to.bits();
+    if from.is_integer() && to.is_integer() {
+        let ((low, high), (least, most)) = (from.limits(), to.limits());
+        return least <= low && high <= most;
+    }
+    match to {
+        // 24 and 53 bits of a whole number are exact.
+        Elementary::Real => from.is_integer() && from.bits() <= 16,
+        Elementary::Lreal => from == Elementary::Real || from.is_integer() && from.bits() <= 32,
+        _ => {
+            let are_strings = from.is_bit_string() && to.is_bit_string();
+            are_strings && wider_bits && from != Elementary::Bool
+        }
+    }
+}
+
+fn widened(from: Elementary, to: Elementary, stored: u64) -> u64 {
+    let number = from.signed(stored);
+    match to {
+        Elementary::Real => u64::from((number as f32).to_bits()),
+        Elementary::Lreal if from == Elementary::Real => {
+            f64::from(f32::from_bits(stored as u32)).to_bits()
+        }
+        Elementary::Lreal => (number as f64).to_bits(),
+        _ => number as u64 & to.mask(),
+    }
+}

@@ -1,0 +1,85 @@
+//! The text of a program, from which the same program is read again.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use understudy_interchange::{Rungs, Source, SourceFile, Wanted, read_source};
+use understudy_ladder::{LowerError, Program as Ladder};
+use understudy_text::Diagnostic;
+use understudy_typed::Program as Typed;
+use understudy_wire::{ProgramHash, RetainedProgram};
+
+use crate::code::Code;
+
+/// The file of a program, as it was read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SourceText {
+    /// Its name, whose ending tells the language.
+    pub file: String,
+    /// Its text.
+    pub text: Arc<str>,
+    /// The period of the cluster.
+    pub period: Duration,
+}
+
+/// What a file says.
+pub(crate) struct ReadSource {
+    pub(crate) program: Option<Arc<Typed>>,
+    /// The rungs that it is written in.
+    pub(crate) ladder: Option<Ladder>,
+    /// Whether it is a library: it has parts of programs, and none of its own.
+    pub(crate) is_library: bool,
+    pub(crate) diagnostics: Vec<Diagnostic>,
+}
+
+impl SourceText {
+    pub(crate) fn read(&self) -> ReadSource {
+        let wanted = Wanted { period: Some(self.period), program: None };
+        let SourceFile { source, rungs, diagnostics, .. } =
+            read_source(&self.file, &self.text, wanted);
+        let (program, is_library) = match source {
+            Some(Source::Program(program)) => (Some(program), false),
+            Some(Source::Library(_)) => (None, true),
+            None => (None, false),
+        };
+        ReadSource { program, ladder: rungs.and_then(Rungs::written), is_library, diagnostics }
+    }
+
+    /// What a station keeps of the program of this text.
+    pub fn kept(&self, hash: ProgramHash) -> RetainedProgram {
+        RetainedProgram {
+            hash,
+            file: self.file.clone(),
+            period: u64::try_from(self.period.as_nanos()).unwrap_or(u64::MAX),
+            text: self.text.to_string(),
+            inputs: Vec::new(),
+        }
+    }
+}
+
+impl ReadSource {
+    pub(crate) fn code(
+        &self,
+        source: Arc<SourceText>,
+        name: &str,
+    ) -> Option<Result<Code, LowerError>> {
+        let typed = Arc::clone(self.program.as_ref()?);
+        let Some(ladder) = &self.ladder else {
+            return Some(Ok(Code::of_text(typed, source)));
+        };
+        let mut ladder = ladder.clone();
+        ladder.name = name.into();
+        Some(Code::of_ladder(typed, ladder, source))
+    }
+}
+
+/// The program that a member has kept: none where this release reads another one from its text.
+pub fn read_kept(kept: &RetainedProgram) -> Option<Code> {
+    let source = Arc::new(SourceText {
+        file: kept.file.clone(),
+        text: Arc::from(kept.text.as_str()),
+        period: Duration::from_nanos(kept.period),
+    });
+    let code = source.read().code(Arc::clone(&source), "")?.ok()?;
+    (code.hash() == kept.hash).then_some(code)
+}

@@ -1,0 +1,202 @@
+//! What a member has kept before the power failed, of its own program or of the one before it.
+
+use std::path::Path;
+
+use understudy_bus::{CarriedOver, FoundFile, FoundNotes, RetainedFiles, Retention};
+use understudy_cluster::{Cluster, Code, read_kept};
+use understudy_executable::Scratch;
+use understudy_node::Settings;
+use understudy_typed::{CarriedState, Fate};
+use understudy_wire::{
+    Carried, Digest, Epoch, Image, ProgramHash, ProgramId, RetainedProgram, RetainedRun,
+    RetainedState,
+};
+
+use crate::run::MemberOptions;
+
+/// What a station has kept of each program with retentive variables that it runs, and the files.
+pub(crate) fn retained_runs(
+    cluster: &Cluster,
+    options: &MemberOptions,
+    settings: &Settings,
+) -> (Vec<RetainedRun>, Retention) {
+    let (mut runs, mut retention) = (Vec::new(), Retention::default());
+    let is_retentive =
+        |program: &ProgramId| settings.programs[program.index()].executable.is_retentive();
+    let mut retentive = settings.runs().filter(is_retentive);
+    let Some(folder) = &options.retain else {
+        retention.is_missing = retentive.next().is_some();
+        return (runs, retention);
+    };
+    for program in retentive {
+        let files = station_files(cluster, folder, &options.name, program);
+        let (mut of_program, found) = files.runs(Some(cluster.agreement().cluster));
+        for run in &mut of_program {
+            // The files have the name of its controller: with other controllers before it, it had another number.
+            run.state.program = program;
+        }
+        retention.found.extend(found);
+        let newest = of_program.iter().max_by_key(|run| run.state.number);
+        let hash = settings.programs[program.index()].hash;
+        if let Some(newest) = newest.filter(|newest| newest.state.hash != hash) {
+            let controller = &cluster.controllers()[program.index()];
+            match carried_run(&controller.code, hash, &files, newest) {
+                Ok((run, state)) => {
+                    retention.carried.push(carried_over(&controller.name, &state));
+                    runs.push(run);
+                }
+                Err(FoundFile { path, problem }) => {
+                    retention.found.push(FoundFile { path, problem })
+                }
+            }
+        }
+        runs.extend(of_program);
+        retention.files.push((Some(program), files));
+    }
+    (runs, retention)
+}
+
+/// The files of a station for one of its programs.
+pub fn station_files(
+    cluster: &Cluster,
+    folder: &Path,
+    station: &str,
+    program: ProgramId,
+) -> RetainedFiles {
+    let controller = &cluster.controllers()[program.index()];
+    let hash = cluster.programs()[program.index()].hash;
+    let name = format!("{}.{station}.{}", cluster.name(), controller.name);
+    RetainedFiles::new(folder, name).with_program(controller.code.source().kept(hash))
+}
+
+/// What a remote I/O has noted, with the inputs in the image of its program, and the files.
+pub(crate) fn retained_notes(
+    cluster: &Cluster,
+    folder: &Path,
+    name: &str,
+    settings: &understudy_remote_io::Settings,
+) -> (FoundNotes, Retention) {
+    let program = settings.program;
+    let code = &cluster.controllers()[program.index()].code;
+    let hash = settings.hash;
+    let inputs = code.interface().inputs;
+    let input_at = |bit: u16| inputs.iter().find(|point| point.bit == u32::from(bit));
+    let retained = settings.operator_inputs.iter().filter(|input| input.retains);
+    let retained = retained.filter_map(|input| Some(input_at(input.place.bit)?.name.clone()));
+    let kept = RetainedProgram { inputs: retained.collect(), ..code.source().kept(hash) };
+    let files = RetainedFiles::new(folder, format!("{}.{name}", cluster.name())).with_program(kept);
+    let mut notes = files.notes(Some(cluster.agreement().cluster));
+    if let Some(note) = &mut notes.newest {
+        // The file has the name of this remote I/O: with other controllers before it, its program had another number.
+        note.recalled.program = program;
+    }
+    if let Some(note) = notes.newest.as_mut().filter(|note| note.hash != hash) {
+        match files.program(note.hash).and_then(of_this_release) {
+            Ok((kept, before)) => {
+                let old = before.interface().inputs;
+                let mut image = settings.undriven.clone();
+                for input in &settings.operator_inputs {
+                    if let Some(point) = input_at(input.place.bit) {
+                        point.set(image.words_mut(), input.initial);
+                    }
+                }
+                let noted = &note.recalled.inputs;
+                if noted.width() == old.width() {
+                    inputs.carry(image.words_mut(), (&old, noted.words()), &kept.inputs);
+                }
+                note.recalled.inputs = image;
+            }
+            Err(problem) => {
+                // Nothing tells what its bits are.
+                note.recalled.inputs = Image::zero(0);
+                let problem = problem_of(&files, note.hash, problem);
+                notes.files.push(problem);
+            }
+        }
+    }
+    let found = std::mem::take(&mut notes.files);
+    let retention = Retention { files: vec![(None, files)], found, ..Retention::default() };
+    (notes, retention)
+}
+
+/// The state of another program as this one starts from it.
+fn carried_run(
+    code: &Code,
+    hash: ProgramHash,
+    files: &RetainedFiles,
+    run: &RetainedRun,
+) -> Result<(RetainedRun, CarriedState), FoundFile> {
+    let refused = |problem: String| problem_of(files, run.state.hash, problem);
+    let kept = files.program(run.state.hash).map_err(refused)?;
+    let (_, before) = of_this_release(kept).map_err(refused)?;
+    let last = last_state(&before, run)
+        .ok_or_else(|| refused("its program has another state".to_owned()))?;
+    let carried = code.carried(&before, last.words());
+    let executable = code.executable();
+    let restarted = executable.restarted(&carried.state);
+    let state = Image::from_words(executable.state_count(), &restarted);
+    let state = state.map_err(|_| refused("its program has another state".to_owned()))?;
+    let is_whole = carried.dropped().next().is_none();
+    let run = RetainedRun {
+        state: RetainedState {
+            hash,
+            lineage: run.lineage(),
+            stepped: run.stepped(),
+            digest: Digest::default(),
+            state,
+            ..run.state.clone()
+        },
+        steps: Vec::new(),
+        carried: Some(Carried { from: run.state.hash, is_whole }),
+    };
+    Ok((run, carried))
+}
+
+/// The state after the last step; none where the run does not fit the program.
+pub fn last_state(code: &Code, run: &RetainedRun) -> Option<Image> {
+    let executable = code.executable();
+    let inputs = executable.input_count();
+    let fits = run.state.state.width() == executable.state_count()
+        && run.steps.iter().all(|step| step.inputs.width() == inputs);
+    if !fits {
+        return None;
+    }
+    let mut state = run.state.state.clone();
+    let mut outputs = Image::zero(executable.output_count());
+    let mut scratch = Scratch::default();
+    for step in &run.steps {
+        let (state, outputs) = (state.words_mut(), outputs.words_mut());
+        executable.step(&mut scratch, state, step.inputs.words(), outputs);
+    }
+    Some(state)
+}
+
+/// What is kept of a program, and that program.
+fn of_this_release(kept: RetainedProgram) -> Result<(RetainedProgram, Code), String> {
+    let code = read_kept(&kept);
+    let code = code.ok_or_else(|| "this release reads another program from its text".to_owned())?;
+    Ok((kept, code))
+}
+
+fn problem_of(files: &RetainedFiles, hash: ProgramHash, problem: String) -> FoundFile {
+    FoundFile { path: files.program_path(hash), problem: Some(problem) }
+}
+
+fn carried_over(program: &str, state: &CarriedState) -> CarriedOver {
+    let count = |fate| state.paths.iter().filter(|path| path.fate == fate).count();
+    CarriedOver {
+        program: program.to_owned(),
+        kept: count(Fate::Kept),
+        converted: count(Fate::Converted),
+        new: count(Fate::New),
+        dropped: state.dropped().map(|path| path.path.clone()).collect(),
+    }
+}
+
+/// A station founds an epoch that is later than those of what it has kept, whatever its clock shows after the power failure.
+pub(crate) fn later_than_retained(mut settings: Settings, runs: &[RetainedRun]) -> Settings {
+    let newest = runs.iter().map(|run| run.stepped().epoch.0).max();
+    let after = newest.map_or(0, |newest| newest.saturating_add(1));
+    settings.epoch = Epoch(settings.epoch.0.max(after));
+    settings
+}
