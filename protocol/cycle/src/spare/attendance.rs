@@ -16,6 +16,9 @@ pub const REPORTED_EVERY: Duration = Duration::from_secs(1);
 /// Deadlines for which a station that is missed causes reports at once; after that all spares know of it.
 const AT_ONCE: u32 = 1_000;
 
+/// The same for the slot of a spare: until every other spare takes it for empty.
+const SLOT_AT_ONCE: u32 = 100;
+
 /// The stations that a remote I/O misses.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AttendanceReport {
@@ -69,7 +72,8 @@ impl AttendanceCount {
             let is_present = heard.contains(station);
             *silent = if is_present { 0 } else { silent.saturating_add(1) };
             *longest = (*longest).max(*silent);
-            let is_missed = self.expected.contains(station) && (1..=AT_ONCE).contains(silent);
+            let limit = if self.expected.contains(station) { AT_ONCE } else { SLOT_AT_ONCE };
+            let is_missed = (1..=limit).contains(silent);
             // The station of a slot begins, or ends.
             let is_changed = is_present != (before == 0);
             self.is_urgent |= is_missed || is_changed;
@@ -109,20 +113,22 @@ mod tests {
     #[test]
     fn a_report_is_due_once_a_second_and_at_once_while_a_station_is_missed() {
         let mut count = count();
-        count.deadline(set(&[0, 1]));
-        assert!(count.take().is_some(), "the first one");
+        for _ in 0..SLOT_AT_ONCE {
+            count.deadline(set(&[0, 1]));
+            assert!(count.take().is_some(), "the slot is empty since a moment ago");
+        }
         for _ in 0..99 {
             count.deadline(set(&[0, 1]));
             assert_eq!(count.take(), None);
         }
         count.deadline(set(&[0, 1]));
-        assert_eq!(count.take().expect("due").deadlines, 101);
+        assert_eq!(count.take().expect("due").deadlines, 200);
         count.deadline(set(&[0]));
-        assert_eq!(count.take().expect("one is missed").silent, [0, 1, 102]);
+        assert_eq!(count.take().expect("one is missed").silent, [0, 1, 201]);
         count.deadline(set(&[0]));
         count.deadline(set(&[0, 1]));
         let back = count.take().expect("it is back");
-        assert_eq!((back.silent, back.longest), (vec![0, 0, 104], vec![0, 2, 104]));
+        assert_eq!((back.silent, back.longest), (vec![0, 0, 203], vec![0, 2, 203]));
         assert_eq!(count.take(), None);
         count.deadline(set(&[0, 1, 2]));
         assert_eq!(count.take().expect("the spare is awake").silent, [0, 0, 0]);
