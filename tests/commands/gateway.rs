@@ -352,7 +352,14 @@ fn the_dashboard_and_the_page_name_metrics_that_there_are() {
     for name in metric_names(&dashboard) {
         assert!(exposed.contains(name.as_str()), "{name} is not exposed");
     }
+    // Those of a plant file need its groups: the gateway registers them.
+    let of_plant = read("observation/gateway/src/plant.rs");
     for name in metric_names(&read("docs/how-to/monitoring.md")) {
+        let registered =
+            name.strip_prefix("understudy_plant_").map(|name| format!("register(\"{name}\""));
+        if registered.is_some_and(|registered| of_plant.contains(&registered)) {
+            continue;
+        }
         let is_there = exposed.contains(name.as_str())
             || exposed.contains(format!("{name}_count").as_str())
             || at_times.contains(&format!("\n{name}{{"));
