@@ -1,4 +1,4 @@
-//! `understudy-bench timing`: exchange, and sample to output, of whole clusters on processes of this machine, beside its own wake-ups.
+//! `understudy-bench timing`: exchange, and sample to output, of whole clusters on processes of this machine, with its own wake-ups.
 //!
 //! The *exchange* is measured at the understudy, which receives every turn: from the first frame of a cycle to the last turn, its own included.
 //! *Sample to output* is measured at each remote I/O, from the sample to the outputs that are proved for it; it has the deadline in it, at

@@ -45,7 +45,7 @@ fn hops(controllers: usize, turns: Turns) -> u128 {
             }
             _ => {}
         })
-        .expect("it comes into step");
+        .expect("the cluster is synchronised");
     assert_eq!(simulation.violations(), []);
     longest.as_nanos() / HOP.as_nanos()
 }
@@ -68,7 +68,7 @@ fn flagged(controllers: usize, turns: Turns, rank: u8) -> (BTreeSet<StationId>, 
             }
             _ => {}
         })
-        .expect("it comes into step");
+        .expect("the cluster is synchronised");
     assert_eq!(simulation.violations(), []);
     assert!(simulation.synchronised());
     (flagged, simulation.tallies().iter().map(|tally| tally.held + tally.fail_safe).sum())
@@ -84,9 +84,9 @@ fn the_exchange_grows_with_the_token_and_does_not_with_turns_in_parallel() {
 }
 
 /// Most turns of other controllers come to a controller through the understudy only. Without one it learns from the chain who is before it, and flags
-/// nobody of them who lives: it counts on them to start the cycles.
+/// none of them that lives: it counts on them to start the cycles.
 #[test]
-fn nobody_is_flagged_who_lives() {
+fn no_living_station_is_flagged() {
     const CONTROLLERS: usize = 8;
     for turns in [Turns::Token, Turns::Parallel] {
         for rank in 0..=CONTROLLERS as u8 {

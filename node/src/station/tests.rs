@@ -309,7 +309,7 @@ fn an_understudy_publishes_last() {
 /// With turns in parallel a controller publishes with its sample, once an understudy was received: in the cycle after one without an understudy it
 /// waits for its predecessor.
 #[test]
-fn a_controller_waits_for_nobody_where_turns_are_parallel() {
+fn controllers_do_not_wait_where_turns_are_parallel() {
     let mut script = Vec::new();
     for cycle in 1..=4 {
         script.extend([(cycle, 0, Sync(0)), (cycle, 100, Sample(1, 1)), (cycle, 900, Turn(0))]);

@@ -153,7 +153,7 @@ struct Timing {
     slowest: Option<Slowest>,
 }
 
-/// The remote I/O that takes longest from its samples to its outputs, beside how late it is woken.
+/// The remote I/O that takes longest from its samples to its outputs, and how late it is woken.
 #[derive(Debug, Serialize)]
 struct Slowest {
     name: String,

@@ -23,7 +23,7 @@ pub enum Turns {
     /// exchange of a cycle is a chain of N + S turns.
     #[default]
     Token,
-    /// A controller waits for nobody, an understudy for the controllers: the exchange of a cycle has four hops for any
+    /// A controller does not wait for others, an understudy waits for the controllers: the exchange of a cycle has four hops for any
     /// number of controllers. A controller that received no understudy in the last cycle waits as with the token, because it
     /// learns from the understudies, or else from the chain, who published.
     Parallel,

@@ -13,7 +13,7 @@
 //!
 //! * A controller waits for its predecessor's turn, and for the one before where the predecessor is flagged; where both are flagged it publishes
 //!   in its own slot. Which other stations published it learns from the understudies' turns, and from those of its predecessors.
-//! * With turns in parallel it waits for nobody while it receives an understudy, whose turn says who published.
+//! * With turns in parallel it does not wait while it receives an understudy, whose turn says who published.
 //! * The next controller has a sample that the understudy and controller i both lack, and relays it to all.
 
 use crate::frame::{Body, Frame};

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// Ranges in each doubling.
 const FINE: u64 = 64;
 const FINE_BITS: u32 = FINE.ilog2();
-/// Longer times, from 18 minutes, count as this one in a range; the longest is kept beside.
+/// Longer times, from 18 minutes, count as this one in a range; the longest is kept too.
 const LONGEST_NS: u64 = (1 << 40) - 1;
 const RANGES: usize = range_of(LONGEST_NS) + 1;
 

@@ -1,4 +1,4 @@
-//! How long a remote I/O takes from its samples to its outputs, beside how late it is woken: the one is not read without the other.
+//! How long a remote I/O takes from its samples to its outputs, and how late it is woken: the one is not read without the other.
 
 use std::time::Duration;
 
@@ -31,7 +31,7 @@ impl Timing {
         self.sample_to_output.note(now.since(sampled));
     }
 
-    /// What is to be said at `now`, where that is new: each ten seconds, or at once where it is the last time.
+    /// What is to be said at `now`, where that is new: every ten seconds, and the last time.
     pub(crate) fn record(&mut self, now: Time, is_last: bool) -> Option<HostEvent> {
         let is_due = is_last || now.since(self.reported) >= REPORTED_EVERY;
         let count = self.sample_to_output.count();
