@@ -113,7 +113,7 @@ fn run(
     member: fn(&Cluster, &MemberOptions) -> Result<(), MemberError>,
 ) -> Result<Answer, Answer> {
     let (cluster, _) = files::cluster(&arguments.cluster, arguments.overrides.overrides())?;
-    restart_for_zenoh(link_kind(&cluster));
+    restart_for_zenoh(link_kind(&cluster), cluster.has_two_networks());
     if !is_wanted(find(&cluster, &arguments.name)?) {
         return Err(failed(&MemberError::WrongKind {
             name: arguments.name.clone(),

@@ -50,7 +50,8 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
-    restart_for_zenoh(understudy_bus::LinkKind::Zenoh);
+    // It does not know its groups yet, of which one may have two networks.
+    restart_for_zenoh(understudy_bus::LinkKind::Zenoh, true);
     let (plant, _) = plants::valid(&arguments.plant)?;
     let Some(spare) = plant.spares.iter().find(|spare| spare.name == arguments.name) else {
         let known: Vec<&str> = plant.spares.iter().map(|spare| spare.name.as_str()).collect();

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use tokio::process::Command;
 use tokio::sync::mpsc::Receiver;
-use understudy_bus::{Cuts, HostEvent, ZENOH_RUNTIME, log_environment};
+use understudy_bus::{Cuts, HostEvent, log_environment, zenoh_runtime};
 use understudy_journal::{Happening, Record, RunEvent, check_version};
 use understudy_scenarios::action_word;
 use understudy_simulator::{Action, Fault};
@@ -24,6 +24,7 @@ impl Laboratory<'_> {
         let name = self.name(member);
         let multicast = self.site.multicast();
         let multicast = multicast.map_or("none".to_owned(), |first| first.to_string());
+        let zenoh = zenoh_runtime(self.site.has_two_networks());
         let mut command = Command::new(&self.settings.program);
         command
             .arg(match member {
@@ -41,7 +42,7 @@ impl Laboratory<'_> {
             .arg("--in-laboratory")
             .args(self.keys.arguments(&name))
             .args(&self.settings.arguments)
-            .env(ZENOH_RUNTIME.0, ZENOH_RUNTIME.1)
+            .env(zenoh.0, zenoh.1)
             .envs(log_environment().iter().map(|(name, value)| (name, value)));
         let life = self.lives.entry(member).and_modify(|life| *life += 1).or_insert(1);
         let start = || Process::start(member, *life, command, self.sender.clone());

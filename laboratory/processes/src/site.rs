@@ -68,6 +68,7 @@ pub(super) struct Site {
     impairment: Impairment,
     /// Of two networks the one that is impaired; both where absent.
     impaired: Option<Via>,
+    has_two_networks: bool,
     /// The first multicast group of the frames.
     multicast: Option<SocketAddrV4>,
 }
@@ -124,6 +125,7 @@ impl Site {
             stand_ins: Vec::new(),
             impairment,
             impaired,
+            has_two_networks: cluster.has_two_networks(),
             multicast: None,
         };
         let only_loss = impairment == Impairment { loss: impairment.loss, ..Impairment::default() };
@@ -179,6 +181,11 @@ impl Site {
             }
             _ => Ok(false),
         }
+    }
+
+    /// Whether each frame is sent over two networks.
+    pub(super) fn has_two_networks(&self) -> bool {
+        self.has_two_networks
     }
 
     /// Pulls the cable between a member's host and a network, or plugs it in again. False where the member has to do it by itself.

@@ -70,7 +70,7 @@ impl Authority {
         let pair = certificate::authority(&Subject {
             cluster: cluster.name(),
             common_name: &name,
-            address: None,
+            addresses: Vec::new(),
             issued: now,
             expires: now.plus_days(AUTHORITY_DAYS),
         })?;
@@ -159,16 +159,20 @@ impl Authority {
         self.check(cluster, names, people)?;
         let address = |name: &String| {
             let member = cluster.member(name);
-            let address = member.and_then(|member| cluster.address(member));
-            address.map(|address| address.ip())
+            let addresses = member.map(|member| cluster.addresses(member)).unwrap_or_default();
+            let both = [addresses.first, addresses.second].into_iter().flatten();
+            both.map(|address| address.ip()).collect::<Vec<IpAddr>>()
         };
         let all = names.iter().map(|name| (name, Role::Member, address(name)));
         let persons = people.holders.iter();
-        let all = all.chain(persons.map(|(name, role)| (name, Role::from(*role), people.address)));
+        let all =
+            all.chain(persons.map(|(name, role)| {
+                (name, Role::from(*role), people.address.into_iter().collect())
+            }));
         let mut renewed = BTreeSet::new();
-        for (name, role, address) in all {
+        for (name, role, addresses) in all {
             if renewed.insert(name.clone()) {
-                self.renew(name, role, address, now, now.plus_days(days))
+                self.renew(name, role, addresses, now, now.plus_days(days))
                     .map_err(|error| vec![error])?;
             }
         }
@@ -259,7 +263,7 @@ impl Authority {
         &mut self,
         name: &str,
         role: Role,
-        address: Option<IpAddr>,
+        addresses: Vec<IpAddr>,
         now: Date,
         expires: Date,
     ) -> Result<(), KeysError> {
@@ -269,7 +273,7 @@ impl Authority {
             &Subject {
                 cluster: &self.register.cluster,
                 common_name: &common_name(name, generation),
-                address,
+                addresses,
                 issued: now,
                 expires,
             },

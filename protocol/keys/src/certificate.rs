@@ -29,8 +29,8 @@ pub(crate) struct Pair {
 pub(crate) struct Subject<'a> {
     pub(crate) cluster: &'a str,
     pub(crate) common_name: &'a str,
-    /// Where the holder listens.
-    pub(crate) address: Option<IpAddr>,
+    /// Where the holder listens, on each network.
+    pub(crate) addresses: Vec<IpAddr>,
     pub(crate) issued: Date,
     pub(crate) expires: Date,
 }
@@ -72,9 +72,12 @@ pub(crate) fn holder(
     parameters.extended_key_usages =
         vec![ExtendedKeyUsagePurpose::ServerAuth, ExtendedKeyUsagePurpose::ClientAuth];
     // A laboratory's members are all at home.
-    let address = subject.address.filter(|address| !address.is_unspecified());
-    let address = address.unwrap_or(IpAddr::from([127, 0, 0, 1]));
-    parameters.subject_alt_names = vec![SanType::IpAddress(address)];
+    let addresses = subject.addresses.iter().copied().filter(|address| !address.is_unspecified());
+    let mut names: Vec<SanType> = addresses.map(SanType::IpAddress).collect();
+    if names.is_empty() {
+        names.push(SanType::IpAddress(IpAddr::from([127, 0, 0, 1])));
+    }
+    parameters.subject_alt_names = names;
     let key = key(subject)?;
     let certificate = parameters.signed_by(&key, issuer);
     let certificate = certificate.map_err(|error| failed(subject.common_name)(error))?;

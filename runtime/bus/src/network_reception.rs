@@ -8,6 +8,9 @@
 //! | carried no frame that came over the other one, or each too late | lost |
 //! | carried less than [`WELL_PERCENT`] of them in time | impaired |
 //! | carried more, for [`WELL_AGAIN`] such times after it was lost or impaired | in order |
+//!
+//! A peer of which nothing arrives over either network is down as long as other peers are received: nothing is said of the networks to it.
+//! Where no peer is received any more, both networks are lost.
 
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hasher};
@@ -27,6 +30,8 @@ const WELL_PERCENT: u32 = 90;
 const WELL_AGAIN: u8 = 4;
 /// Times in a row without a frame of a peer over any network after which nothing is said of the networks to it: the peer is down.
 const SILENT_FOR: u8 = 4;
+/// Times in a row without a frame of any peer after which both networks are lost.
+const DEAF_AFTER: u8 = 2;
 /// Datagrams that are remembered: those of five cycles of 64 programs, and more.
 const REMEMBERED: usize = 4096;
 
@@ -78,6 +83,8 @@ pub struct NetworkReception {
     patience: Duration,
     peers: BTreeMap<Member, Received>,
     judged: Time,
+    /// Times in a row without a frame of any peer.
+    silent: u8,
     /// What was reported, by network: the peers of which it is lost, and of which it is impaired.
     reported: [[Vec<Member>; 2]; 2],
 }
@@ -90,6 +97,7 @@ impl NetworkReception {
             patience,
             peers: BTreeMap::new(),
             judged: now,
+            silent: 0,
             reported: Default::default(),
         }
     }
@@ -135,7 +143,16 @@ impl NetworkReception {
             return Vec::new();
         }
         self.judged = now;
-        self.peers.values_mut().for_each(Received::judge);
+        let none = self.peers.values().all(|received| received.frames == 0);
+        self.silent = if none { self.silent.saturating_add(1) } else { 0 };
+        let is_deaf = self.silent >= DEAF_AFTER;
+        for received in self.peers.values_mut() {
+            match (none, is_deaf) {
+                (false, _) => received.judge(),
+                (true, true) => received.state = [State::Lost; 2],
+                (true, false) => {}
+            }
+        }
         let mut changes = Vec::new();
         for via in Via::BOTH {
             let of = |state| {
@@ -286,11 +303,61 @@ mod tests {
                 let arrival = reception.note(now, Via::First, u64::from(period) + 1);
                 reception.count(PRESS, Via::First, arrival);
             }
+            for via in Via::BOTH {
+                let arrival = reception.note(now, via, u64::from(period) + 10_000);
+                reception.count(Member::Station(StationId(2)), via, arrival);
+            }
             found.extend(reception.judge(now));
         }
         let lost =
             |lost| HostEvent::NetworkReception { network: Via::Second, lost, impaired: Vec::new() };
         assert_eq!(found, [lost(vec![PRESS]), lost(Vec::new())]);
+    }
+
+    /// Where both networks fail one after the other, or at once, both are lost, and neither is in order before it carries frames.
+    #[test]
+    fn both_networks_can_be_lost() {
+        let check = |first: std::ops::Range<u32>, second: std::ops::Range<u32>| {
+            let late = |period: u32, via| {
+                let lost = if via == Via::First { &first } else { &second };
+                (!lost.contains(&period)).then_some(Duration::ZERO)
+            };
+            let mut reception = NetworkReception::new(Time(0), PERIOD);
+            let mut found = Vec::new();
+            for period in 0..2000_u32 {
+                let now = Time(0) + PERIOD * period;
+                for via in Via::BOTH.into_iter().filter(|via| late(period, *via).is_some()) {
+                    let arrival = reception.note(now, via, u64::from(period) + 1);
+                    reception.count(PRESS, via, arrival);
+                }
+                for event in reception.judge(now) {
+                    let HostEvent::NetworkReception { network, lost, impaired } = event else {
+                        panic!("{event:?}");
+                    };
+                    found.push((period, u8::from(network), lost.len() + impaired.len()));
+                }
+            }
+            found
+        };
+        let is_reported = |found: &[(u32, u8, usize)], period: u32, network: u8| {
+            let last = found.iter().rfind(|(at, of, _)| *at <= period && *of == network);
+            last.is_some_and(|(.., peers)| *peers > 0)
+        };
+        let at_once = check(320..1000, 320..1000);
+        let apart = check(320..1000, 520..1200);
+        for period in [500, 700, 999] {
+            assert!(
+                is_reported(&at_once, period, 1) && is_reported(&at_once, period, 2),
+                "{at_once:?}"
+            );
+        }
+        for period in [700, 999] {
+            assert!(is_reported(&apart, period, 1) && is_reported(&apart, period, 2), "{apart:?}");
+        }
+        assert!(is_reported(&apart, 1150, 2), "{apart:?}");
+        for network in [1, 2] {
+            assert!(!is_reported(&at_once, 1999, network) && !is_reported(&apart, 1999, network));
+        }
     }
 
     #[test]

@@ -50,11 +50,19 @@ const QUEUE_FRAMES: usize = 1024;
 const PULSE: Duration = Duration::from_millis(250);
 
 /// How Zenoh's own threads are to be set up, as a variable of the environment of every process that opens a Zenoh link. Zenoh
-/// reads it once, when its first session opens, and takes nothing else; without it there are six threads where two do.
-pub const ZENOH_RUNTIME: (&str, &str) = (
-    "ZENOH_RUNTIME",
-    "(rx: (worker_threads: 1), tx: (handover: rx), acc: (handover: rx), app: (handover: net), net: (worker_threads: 1))",
-);
+/// reads it once, when its first session opens, and takes nothing else; without it there are six threads where two do. Over two networks there are
+/// two of each, so that what waits in the session of a network that has failed does not hold up the other one.
+pub fn zenoh_runtime(has_two_networks: bool) -> (&'static str, &'static str) {
+    let threads = match has_two_networks {
+        false => {
+            "(rx: (worker_threads: 1), tx: (handover: rx), acc: (handover: rx), app: (handover: net), net: (worker_threads: 1))"
+        }
+        true => {
+            "(rx: (worker_threads: 2), tx: (handover: rx), acc: (handover: rx), app: (handover: net), net: (worker_threads: 2))"
+        }
+    };
+    ("ZENOH_RUNTIME", threads)
+}
 
 /// A session that closes is waited for so long, at most.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(1);

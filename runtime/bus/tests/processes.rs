@@ -22,7 +22,7 @@ use nix::unistd::Pid;
 use serde::{Deserialize, Serialize};
 use understudy_bus::{
     Commands, FieldDriver, Guard, HostEvent, LinkKind, MemberSettings, NoField, Noted, Peer,
-    Record, SimulatedField, ZENOH_RUNTIME, run_member,
+    Record, SimulatedField, run_member, zenoh_runtime,
 };
 use understudy_wire::Member;
 
@@ -106,7 +106,7 @@ impl Process {
     fn start(part: &Part, reports: &Sender<Reports>) -> Self {
         let mut child = Command::new(std::env::current_exe().expect("this program"))
             .args([PART, &serde_json::to_string(part).expect("plain data")])
-            .env(ZENOH_RUNTIME.0, ZENOH_RUNTIME.1)
+            .env(zenoh_runtime(false).0, zenoh_runtime(false).1)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()

@@ -14,7 +14,7 @@ use serde_json::json;
 use understudy::{Answer, Status};
 use understudy_bus::{
     BusError, Clock, Commands, Endpoints, EventSink as _, Journal, LinkKind, MemberSettings,
-    NoField, Noted, Peer, Record, ZENOH_RUNTIME, free_addresses, keep_times,
+    NoField, Noted, Peer, Record, free_addresses, keep_times, zenoh_runtime,
 };
 use understudy_wire::{ClusterHash, Member, ProgramId, Roster, StationId};
 
@@ -80,8 +80,8 @@ pub(super) fn measure(carrier: Carrier, settings: Settings) -> Result<Exchange, 
         let mut command = Command::new(&program);
         command.arg("member");
         command.arg(serde_json::to_string(&part).unwrap_or_default());
-        if std::env::var_os(ZENOH_RUNTIME.0).is_none() {
-            command.env(ZENOH_RUNTIME.0, ZENOH_RUNTIME.1);
+        if std::env::var_os(zenoh_runtime(false).0).is_none() {
+            command.env(zenoh_runtime(false).0, zenoh_runtime(false).1);
         }
         let child = command
             .stdin(Stdio::piped())

@@ -79,11 +79,14 @@ impl Model {
         networks.collect()
     }
 
+    /// The text of the other network may change with this one.
     fn network_changed(&mut self, via: Via, cycle: i64) {
-        let subject = (network_name(via), NETWORK_FAULT);
-        match self.network_text(via) {
-            None => self.alarms.over(&subject, cycle),
-            Some(text) => self.alarms.raise_or_retell(subject, cycle, text),
+        for via in [via, via.other()] {
+            let subject = (network_name(via), NETWORK_FAULT);
+            match self.network_text(via) {
+                None => self.alarms.over(&subject, cycle),
+                Some(text) => self.alarms.raise_or_retell(subject, cycle, text),
+            }
         }
     }
 
@@ -120,7 +123,12 @@ impl Model {
                 false => format!("between {}", listed(&names)),
             }
         };
-        let left = via.other();
-        Some(format!("all depends on network {left}: over network {via} {what} {whom}"))
+        let is_left = self.networks.faults[via.other().index()].is_empty();
+        Some(match is_left {
+            true => {
+                format!("all depends on network {}: over network {via} {what} {whom}", via.other())
+            }
+            false => format!("neither network is in order: over network {via} {what} {whom}"),
+        })
     }
 }

@@ -74,6 +74,9 @@ pub(super) fn settings(endpoints: &Endpoints) -> zenoh::Result<zenoh::Config> {
         ("transport/link/tx/lease", LEASE_MS.to_string()),
         ("transport/link/tx/keep_alive", "4".into()),
         ("transport/link/tx/queue/congestion_control/drop/wait_before_drop", "0".into()),
+        // Declarations and farewells wait for so long, in microseconds, on the thread that carries all connections of this process: five
+        // seconds for each peer behind a network that has failed, if it were for Zenoh.
+        ("transport/link/tx/queue/congestion_control/block/wait_before_close", "20000".into()),
     ] {
         config
             .insert_json5(setting, &value)
