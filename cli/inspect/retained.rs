@@ -14,7 +14,7 @@ use understudy_wire::{Member, ProgramId, RetainedRun};
 use crate::answer::{Answer, Status};
 use crate::files;
 
-/// Show what stations and remote I/Os have kept for the time after a power failure
+/// Show what members have kept for the time after a power failure
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:

@@ -301,7 +301,7 @@ fn exposed_while_a_state_is_lost(folder: &Path) -> String {
 }
 
 /// Metrics of an example.
-fn exposed_by(folder: &Path, example: &str, scenario: &str) -> String {
+pub(crate) fn exposed_by(folder: &Path, example: &str, scenario: &str) -> String {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(example);
     let path = |file: &str| root.join(file).display().to_string();
     let (cluster, scenario) = (path("cluster.toml"), path(scenario));
