@@ -144,8 +144,8 @@ fn times(quantiles: &Quantiles) -> String {
 }
 
 const HEADING: &str = "\
-                      |      exchange, us      |  sample to output, us  |     missed    |      wake-ups, us      | proces-
-period    N schedule       p50   p99.9     max      p50   p99.9     max    of deadlines     p50   p99.9     max   sors";
+                      |      exchange, us      |  sample to output, us  |     missed    |      wake-ups, us      |   CPUs
+period    N schedule       p50   p99.9     max      p50   p99.9     max    of deadlines     p50   p99.9     max   in use";
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     let began = Instant::now();
