@@ -68,7 +68,8 @@ pub(crate) struct ClusterSection {
     /// Index into [`crate::format::LINKS`].
     pub(crate) link: usize,
     pub(crate) multicast: Option<SocketAddrV4>,
-    pub(crate) networks: u32,
+    /// Nothing where the number is an error.
+    pub(crate) networks: Option<u32>,
     /// Index into [`crate::format::SECURITIES`].
     pub(crate) security: usize,
 }
@@ -262,6 +263,9 @@ fn cluster(root: &DeTable<'_>, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
     };
     let table = Value::new(CLUSTER.name, value, &CODES).table("a table, [cluster]", diagnostics)?;
     let fields = Fields::new(&CLUSTER, table, diagnostics);
+    let known = diagnostics.len();
+    let networks = fields.count("networks", diagnostics);
+    let networks = Some(networks).filter(|_| diagnostics.len() == known);
     Some(ClusterSection {
         span: fields.span.clone(),
         name: fields.name("name", diagnostics),
@@ -276,7 +280,7 @@ fn cluster(root: &DeTable<'_>, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
         retain_every: fields.time("retain_every", diagnostics),
         link: fields.word("link", diagnostics),
         multicast: fields.multicast("multicast", diagnostics),
-        networks: fields.count("networks", diagnostics),
+        networks,
         security: fields.word("security", diagnostics),
     })
 }

@@ -158,8 +158,8 @@ fn build(
     }
     file.controllers.truncate(MAXIMUM_PROGRAMS);
     let link = overrides.link.unwrap_or([Link::Udp, Link::Zenoh][cluster.link]);
-    let has_two_networks = cluster.networks == 2;
-    let mut names = Names::new(link, cluster.multicast.is_some(), has_two_networks);
+    let has_two_networks = cluster.networks == Some(2);
+    let mut names = Names::new(link, cluster.multicast.is_some(), cluster.networks);
     let members = members(file.controllers, period, ladders, &mut names, diagnostics);
     let understudies = understudies(file.understudies, &mut names, diagnostics);
     let remote_ios =

@@ -19,20 +19,21 @@ pub(crate) struct Names {
     addresses: BTreeMap<SocketAddr, Range<usize>>,
     link: Link,
     has_multicast: bool,
-    has_two_networks: bool,
+    /// Nothing where their number is an error, which was reported.
+    networks: Option<u32>,
     /// By host, which network it is on and where that stands; hosts of loopback are on both.
     hosts: BTreeMap<IpAddr, (bool, Range<usize>)>,
 }
 
 impl Names {
     /// None, in a cluster with this link.
-    pub(crate) fn new(link: Link, has_multicast: bool, has_two_networks: bool) -> Self {
+    pub(crate) fn new(link: Link, has_multicast: bool, networks: Option<u32>) -> Self {
         Self {
             members: BTreeMap::new(),
             addresses: BTreeMap::new(),
             link,
             has_multicast,
-            has_two_networks,
+            networks,
             hosts: BTreeMap::new(),
         }
     }
@@ -67,12 +68,12 @@ impl Names {
             diagnostics.push(Diagnostic::error("U0240", message, span).with_help(help));
         };
         match (&addresses.first, &addresses.second) {
-            (_, Some(second)) if !self.has_two_networks => report(
+            (_, Some(second)) if self.networks == Some(1) => report(
                 "a `second_address` in a cluster with one network".to_owned(),
                 second,
                 "add `networks = 2` to `[cluster]`, and a `second_address` to every member",
             ),
-            (Some(first), None) if self.has_two_networks => report(
+            (Some(first), None) if self.networks == Some(2) => report(
                 format!("the member at {} has no `second_address`", first.value),
                 first,
                 "with `networks = 2` every member has an address on each network",
@@ -100,7 +101,7 @@ impl Names {
         diagnostics: &mut Vec<Diagnostic>,
     ) {
         let host = value.ip().to_canonical();
-        if !self.has_two_networks || host.is_loopback() {
+        if self.networks != Some(2) || host.is_loopback() {
             return;
         }
         let (known, first) = self.hosts.entry(host).or_insert_with(|| (is_second, span.clone()));
