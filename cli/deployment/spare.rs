@@ -44,6 +44,9 @@ pub(crate) struct Arguments {
     /// Folder for what its stations keep for the time after a power failure
     #[arg(long, value_name = "DIR")]
     retain: Option<PathBuf>,
+    /// End with the process that started it
+    #[arg(long)]
+    ends_with_parent: bool,
     /// Do not request real-time scheduling and locked memory
     #[arg(long)]
     no_real_time: bool,
@@ -52,6 +55,10 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
     // It does not know its groups yet, of which one may have two networks.
     restart_for_zenoh(understudy_bus::LinkKind::Zenoh, true);
+    if arguments.ends_with_parent {
+        understudy_bus::end_with_parent()
+            .map_err(|error| Answer::failed(Status::Failed, error.code(), error))?;
+    }
     let (plant, _) = plants::valid(&arguments.plant)?;
     let Some(spare) = plant.spares.iter().find(|spare| spare.name == arguments.name) else {
         let known: Vec<&str> = plant.spares.iter().map(|spare| spare.name.as_str()).collect();

@@ -280,6 +280,7 @@ impl Spare {
         }
         let mut command = Command::new(program);
         command.arg("spare").arg(&file).args(["--name", "spare-1", "--keys"]).arg(&keys);
+        command.arg("--ends-with-parent");
         if arguments.no_real_time {
             command.arg("--no-real-time");
         }

@@ -72,7 +72,7 @@ pub use journal::{
 };
 pub use link::{Link, LinkCounters, LinkKind, NoSuchLink, Reopening};
 pub use log::{Line, Log, LogFilter, LogFormat, LogSettings, log_environment};
-pub use member::{MemberSettings, run_member};
+pub use member::{MemberSettings, end_with_parent, run_member};
 pub use multicast::loopback_groups;
 pub use network_reception::NetworkReception;
 pub use operator::{Call, Request, Told};

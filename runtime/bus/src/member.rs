@@ -88,8 +88,7 @@ where
         real_time,
     } = settings;
     if ends_with_parent {
-        set_pdeathsig(Signal::SIGKILL)
-            .map_err(BusError::system("to end with the process that started this one"))?;
+        end_with_parent()?;
     }
     let signals = ending_signals()?;
     let finished = EventFd::from_flags(EfdFlags::EFD_CLOEXEC)
@@ -204,6 +203,15 @@ where
         tracing::error!(unwritten, "records are missing in the journal");
     }
     summary
+}
+
+/// The system kills this process when the thread that started it ends.
+///
+/// # Errors
+/// [`BusError::System`] where the system refuses it.
+pub fn end_with_parent() -> Result<(), BusError> {
+    set_pdeathsig(Signal::SIGKILL)
+        .map_err(BusError::system("to end with the process that started this one"))
 }
 
 /// Tells the main thread that the cycle has ended, also where it ends by a panic.
