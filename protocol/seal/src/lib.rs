@@ -41,4 +41,4 @@ pub use key::{ClusterSecret, FrameKey, KEY_BYTES, Title, TransferKey};
 pub use opener::{Opener, Refusal};
 pub use revocations::Revocations;
 pub use seal::{Seal, SealError};
-pub use window::WINDOW_FRAMES;
+pub use window::{ON_THEIR_WAY, WINDOW_FRAMES};

@@ -5,7 +5,7 @@
 pub const WINDOW_FRAMES: u64 = 1024;
 
 /// Frames of a life that ends that are still on their way, at most.
-const ON_THEIR_WAY: u64 = 64;
+pub const ON_THEIR_WAY: u64 = 64;
 
 const WORDS: usize = (WINDOW_FRAMES / 64) as usize;
 

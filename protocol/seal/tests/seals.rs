@@ -5,13 +5,13 @@ use std::sync::Arc;
 use proptest::prelude::*;
 use smallvec::smallvec;
 use understudy_seal::{
-    ClusterSecret, FrameKey, OVERHEAD_BYTES, Opener, Refusal, Revocations, Seal, SealError, Title,
-    TransferKey, WINDOW_FRAMES,
+    ClusterSecret, FrameKey, ON_THEIR_WAY, OVERHEAD_BYTES, Opener, Refusal, Revocations, Seal,
+    SealError, Title, TransferKey, WINDOW_FRAMES,
 };
 use understudy_wire::{
     Actuation, Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Field, Frame,
     FrameError, Header, Image, Lineage, MAXIMUM_IMAGE_BITS, Member, Moment, ProgramHash, ProgramId,
-    Segment, StationId, Transfer, encode,
+    Segment, StationId, Transfer, Via, encode,
 };
 
 const ROBOT: Member = Member::Station(StationId(0));
@@ -209,9 +209,9 @@ fn two_lives_at_once_are_told_from_late_frames() {
     let (mut earlier, mut later) = (seal(ROBOT, 1), seal(ROBOT, 2));
     assert!(open(&mut opener, &sealed(&mut earlier, &frame(ROBOT, 1))).is_ok());
     assert!(open(&mut opener, &sealed(&mut later, &frame(ROBOT, 2))).is_ok());
-    for number in 1..=2 * WINDOW_FRAMES {
+    for number in 1..=2 * ON_THEIR_WAY {
         let refused = open(&mut opener, &sealed(&mut earlier, &frame(ROBOT, number)));
-        let expected = if number <= WINDOW_FRAMES {
+        let expected = if number <= ON_THEIR_WAY {
             Refusal::Replayed { sender: ROBOT }
         } else {
             Refusal::OfAnotherLife { sender: ROBOT }
@@ -359,5 +359,27 @@ proptest! {
             }
         }
         prop_assert!(taken.iter().all(|&times| times <= 1));
+    }
+}
+
+/// The copy over the other network is told from a replay over one of them.
+#[test]
+fn a_second_copy_is_no_replay() {
+    let (mut seal, mut opener) = (seal(ROBOT, 1), listener());
+    let said: Vec<Vec<u8>> =
+        (0..WINDOW_FRAMES).map(|cycle| sealed(&mut seal, &frame(ROBOT, cycle))).collect();
+    for datagram in &said {
+        assert!(opener.open_over(Via::Second, &mut datagram.clone()).is_ok());
+    }
+    // The first network is far behind, and each of its copies comes once.
+    for datagram in &said {
+        let copy = opener.open_over(Via::First, &mut datagram.clone());
+        assert_eq!(copy, Err(Refusal::SecondCopy { sender: ROBOT }));
+    }
+    for via in Via::BOTH {
+        for datagram in &said {
+            let again = opener.open_over(via, &mut datagram.clone());
+            assert_eq!(again, Err(Refusal::Replayed { sender: ROBOT }));
+        }
     }
 }
