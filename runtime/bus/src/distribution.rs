@@ -1,26 +1,23 @@
-//! How often each duration was measured, in bounded memory: counts in ranges that are wider for longer times, as HDR histograms have them.
+//! How often each duration was measured, in bounded memory: an HDR histogram, and the longest duration as it was.
 //!
-//! A time below 64 ns has a range of its own; each longer one a range of at most a 64th of it, so a quantile is at most 1.6 % above a time that
-//! was measured. Nothing is allocated after the start.
+//! A quantile is at most 1 % above a time that was measured. Nothing is allocated after the start.
 
 use std::time::Duration;
 
+use hdrhistogram::Histogram;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Ranges in each doubling.
-const FINE: u64 = 64;
-const FINE_BITS: u32 = FINE.ilog2();
-/// Longer times, from 18 minutes, count as this one in a range; the longest is kept too.
+/// Longer times, from 18 minutes, count as this one; the longest is kept too.
 const LONGEST_NS: u64 = (1 << 40) - 1;
-const RANGES: usize = range_of(LONGEST_NS) + 1;
+/// Significant decimal digits of a time.
+const DIGITS: u8 = 2;
 
 /// Counts of durations.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(from = "Sparse", into = "Sparse")]
 pub struct Distribution {
-    counts: Box<[u64]>,
-    count: u64,
+    counts: Histogram<u64>,
     longest_ns: u64,
 }
 
@@ -39,9 +36,14 @@ pub struct Quantiles {
     pub maximum_ns: u64,
 }
 
+// Counts and bounds are whole numbers.
+impl Eq for Distribution {}
+
 impl Default for Distribution {
+    #[allow(clippy::expect_used, reason = "the bounds are constants, and tests make one")]
     fn default() -> Self {
-        Self { counts: vec![0; RANGES].into(), count: 0, longest_ns: 0 }
+        let counts = Histogram::new_with_bounds(1, LONGEST_NS, DIGITS);
+        Self { counts: counts.expect("bounds of a histogram"), longest_ns: 0 }
     }
 }
 
@@ -49,42 +51,35 @@ impl Distribution {
     /// Counts a duration.
     pub fn note(&mut self, duration: Duration) {
         let ns = u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
-        self.counts[range_of(ns.min(LONGEST_NS))] += 1;
-        self.count += 1;
+        self.counts.saturating_record(ns);
         self.longest_ns = self.longest_ns.max(ns);
     }
 
     /// Counts what another one counted.
     pub fn add(&mut self, other: &Self) {
-        for (count, more) in self.counts.iter_mut().zip(&other.counts) {
-            *count += more;
-        }
-        self.count += other.count;
+        // Both have the same bounds.
+        let _ = self.counts.add(&other.counts);
         self.longest_ns = self.longest_ns.max(other.longest_ns);
     }
 
     /// Number of durations.
     pub fn count(&self) -> u64 {
-        self.count
+        self.counts.len()
     }
 
     /// `per_mille` of 1000 durations were at most so long; zero where none was measured.
     pub fn quantile(&self, per_mille: u32) -> Duration {
-        let wanted = self.count.saturating_mul(u64::from(per_mille)).div_ceil(1000);
-        let mut passed = 0;
-        let range = self.counts.iter().position(|count| {
-            passed += count;
-            passed >= wanted
-        });
-        let ns = range.map_or(self.longest_ns, |range| last_of(range).min(self.longest_ns));
-        Duration::from_nanos(if range == Some(RANGES - 1) { self.longest_ns } else { ns })
+        let ns = self.counts.value_at_quantile(f64::from(per_mille) / 1000.0);
+        // The longest is known better than its range.
+        let ns = if ns < self.counts.max() { ns } else { self.longest_ns };
+        Duration::from_nanos(ns)
     }
 
     /// The quantiles that are published.
     pub fn quantiles(&self) -> Quantiles {
         let at = |per_mille| self.quantile(per_mille).as_nanos() as u64;
         Quantiles {
-            count: self.count,
+            count: self.count(),
             p50_ns: at(500),
             p99_ns: at(990),
             p999_ns: at(999),
@@ -93,47 +88,26 @@ impl Distribution {
     }
 }
 
-/// The range of a time.
-const fn range_of(ns: u64) -> usize {
-    if ns < FINE {
-        return ns as usize;
-    }
-    let doublings = ns.ilog2() - FINE_BITS;
-    (doublings as u64 * FINE + (ns >> doublings)) as usize
-}
-
-/// The longest time of a range.
-const fn last_of(range: usize) -> u64 {
-    let range = range as u64;
-    if range < FINE {
-        return range;
-    }
-    let doublings = range / FINE - 1;
-    ((range - doublings * FINE + 1) << doublings) - 1
-}
-
-/// The ranges that have counts, and the longest time.
+/// The times that were counted, and the longest one.
 #[derive(Serialize, Deserialize)]
 struct Sparse {
-    counts: Vec<(usize, u64)>,
+    counts: Vec<(u64, u64)>,
     longest_ns: u64,
 }
 
 impl From<Distribution> for Sparse {
     fn from(all: Distribution) -> Self {
-        let counted = all.counts.iter().copied().enumerate().filter(|(_, count)| *count > 0);
-        Self { counts: counted.collect(), longest_ns: all.longest_ns }
+        let counted = all.counts.iter_recorded();
+        let counts = counted.map(|of| (of.value_iterated_to(), of.count_at_value())).collect();
+        Self { counts, longest_ns: all.longest_ns }
     }
 }
 
 impl From<Sparse> for Distribution {
     fn from(sparse: Sparse) -> Self {
         let mut all = Self { longest_ns: sparse.longest_ns, ..Self::default() };
-        for (range, count) in sparse.counts {
-            if let Some(place) = all.counts.get_mut(range) {
-                *place += count;
-                all.count += count;
-            }
+        for (ns, count) in sparse.counts {
+            all.counts.saturating_record_n(ns, count);
         }
         all
     }
@@ -142,18 +116,6 @@ impl From<Sparse> for Distribution {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn ranges_follow_each_other_and_are_narrow() {
-        let mut first = 0;
-        for range in 0..RANGES {
-            let last = last_of(range);
-            assert_eq!((range_of(first), range_of(last)), (range, range));
-            assert!(last - first <= first / FINE);
-            first = last + 1;
-        }
-        assert_eq!(first, LONGEST_NS + 1);
-    }
 
     /// Against the sorted list.
     #[test]
@@ -169,10 +131,7 @@ mod tests {
         for per_mille in [1, 500, 990, 999, 1000] {
             let exact = times[(5000 * per_mille as usize).div_ceil(1000) - 1];
             let found = left.quantile(per_mille).as_nanos() as u64;
-            assert!(
-                found >= exact && found <= exact + exact / FINE,
-                "{per_mille}: {exact} {found}"
-            );
+            assert!(found >= exact && found <= exact + exact / 64, "{per_mille}: {exact} {found}");
         }
         assert_eq!(left.quantiles().maximum_ns, times[4999]);
         assert_eq!(left.count(), 5000);
