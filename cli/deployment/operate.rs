@@ -352,9 +352,6 @@ fn write_elsewhere(
     Ok(Answer::done(text, result))
 }
 
-/// How long a member is given to take a call at one of its addresses on two networks.
-const REACH: Duration = Duration::from_millis(1500);
-
 /// Sends the command to a remote member. The member records one that is refused here, or to which this certificate is not admitted, too.
 fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
     let (cluster, _) = files::cluster(&arguments.target, Overrides::default())?;
@@ -371,8 +368,7 @@ fn elsewhere(arguments: &Arguments, keys: &Path) -> Result<Answer, Answer> {
     let tls = tls_keys(&keys.tls);
     let configuration = cluster.agreement().configuration;
     let call = || {
-        let address = second.and_then(|_| peer.reachable(REACH).ok()).unwrap_or(address);
-        let call = Call::to(address, hash, &arguments.name, &tls)?;
+        let call = Call::to(peer.call_address(), hash, &arguments.name, &tls)?;
         Ok(call.with_configuration(configuration))
     };
     let record = |answer: &Answer| {

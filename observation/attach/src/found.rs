@@ -10,9 +10,6 @@ use understudy_wire::{ClusterHash, ConfigurationHash};
 
 use crate::error::{AttachError, Unheard};
 
-/// Time limit for the answer of a machine.
-const REACH: Duration = Duration::from_millis(1500);
-
 /// Members that are called at once, at most.
 const AT_ONCE: usize = 16;
 
@@ -126,7 +123,7 @@ impl Line {
     /// Calls one member, and hears whether it runs the same.
     pub(crate) fn call(&self, peer: &Peer) -> Result<Call, Vain> {
         // Asked of the system first: Zenoh says the same of a machine that is not there and of a key that is not believed.
-        let address = peer.reachable(REACH).map_err(|error| Vain::Nobody(words_of(&error)))?;
+        let address = peer.reachable().map_err(|error| Vain::Nobody(words_of(&error)))?;
         let not_admitted = |error: BusError| {
             Vain::NotAdmitted(match error {
                 BusError::Uncalled { reason, .. } => reason,

@@ -25,14 +25,20 @@ pub struct Peer {
 }
 
 impl Peer {
-    /// The first of its addresses that takes a call within `patience`.
+    /// Where to call it: of two addresses the first that takes a call, which is asked only where there are two.
+    pub fn call_address(&self) -> SocketAddr {
+        let asked = self.second.and_then(|_| self.reachable().ok());
+        asked.unwrap_or(self.address)
+    }
+
+    /// The first of its addresses that takes a call.
     ///
     /// # Errors
     /// What the system says of the last one.
-    pub fn reachable(&self, patience: Duration) -> io::Result<SocketAddr> {
+    pub fn reachable(&self) -> io::Result<SocketAddr> {
         let mut failure = io::ErrorKind::NotFound.into();
         for address in self.addresses() {
-            match TcpStream::connect_timeout(&address, patience) {
+            match TcpStream::connect_timeout(&address, REACH) {
                 Ok(_) => return Ok(address),
                 Err(error) => failure = error,
             }
@@ -45,6 +51,9 @@ impl Peer {
         [self.address].into_iter().chain(self.second)
     }
 }
+
+/// How long a member is given to take a call at one of its addresses.
+const REACH: Duration = Duration::from_millis(1500);
 
 /// What one member knows of all.
 #[derive(Debug, Clone, PartialEq, Eq)]

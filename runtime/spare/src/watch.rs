@@ -24,9 +24,6 @@ pub(crate) enum Seen {
     Lost(String),
 }
 
-/// How long a remote I/O is given to take a call at one of its addresses.
-const REACH: Duration = Duration::from_millis(1500);
-
 /// Where a spare is awake, for the reports of all its witnesses.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Whereabouts(Arc<Mutex<Option<String>>>);
@@ -59,8 +56,7 @@ impl Watch {
     /// Follows until the spare ends; its end of the channel is gone then.
     pub(crate) fn run(self, group: usize, witness: usize, seen: &Sender<(usize, usize, Seen)>) {
         for peer in self.peers.iter().cycle() {
-            let address = peer.reachable(REACH).unwrap_or(peer.address);
-            let lost = match Call::to(address, self.cluster, &peer.name, &self.keys) {
+            let lost = match Call::to(peer.call_address(), self.cluster, &peer.name, &self.keys) {
                 Ok(call) => self.follow(&call, |report| {
                     seen.send((group, witness, Seen::Report(report))).is_ok()
                 }),
