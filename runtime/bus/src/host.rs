@@ -159,8 +159,11 @@ impl<M: Machine> Host<'_, M> {
             if self.obey(&mut round) || self.machine.outvoted().is_some() {
                 break;
             }
-            for via in Via::BOTH {
-                self.link.plug(via, !self.orders.is_unplugged(via));
+            if self.networks.is_some() {
+                let unplugged = self.orders.unplugged();
+                for via in Via::BOTH {
+                    self.link.plug(via, !unplugged[via.index()]);
+                }
             }
             self.look(&mut round);
             let heard = self.listen(&mut round);

@@ -210,9 +210,9 @@ impl Orders {
         self.standing.cuts().contains(member)
     }
 
-    /// Whether the cable to a network is pulled.
-    pub(crate) fn is_unplugged(&self, via: Via) -> bool {
-        self.standing.cuts().unplugged[via.index()]
+    /// By network, whether the cable to it is pulled.
+    pub(crate) fn unplugged(&self) -> [bool; 2] {
+        self.standing.cuts().unplugged
     }
 
     pub(crate) fn readiness(&self) -> BorrowedFd<'_> {

@@ -63,12 +63,11 @@ impl Model {
         if !self.cluster.has_two_networks() {
             return Vec::new();
         }
-        let faults: Vec<Alarm> = self.alarms.iter().filter_map(|alarm| alarm.at(cycle)).collect();
+        let faults = self.alarms.iter().filter(|alarm| alarm.alarm == NETWORK_FAULT);
+        let faults: Vec<Alarm> = faults.filter_map(|alarm| alarm.at(cycle)).collect();
         let networks = Via::BOTH.into_iter().map(|via| {
             let name = network_name(via);
-            let lasts = |alarm: &&Alarm| {
-                alarm.alarm == NETWORK_FAULT && alarm.name == name && alarm.over.is_none()
-            };
+            let lasts = |alarm: &&Alarm| alarm.name == name && alarm.over.is_none();
             let fault = faults.iter().find(lasts);
             NetworkSnapshot {
                 network: via.into(),
