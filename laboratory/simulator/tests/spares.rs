@@ -3,34 +3,12 @@
 use understudy_cycle::Mode;
 use understudy_remote_io::Event;
 use understudy_simulator::{Action, Fault, Network, Record, Simulation, SpareTimes, parts};
+use understudy_testing::CELL_WITH_SPARE;
 use understudy_wire::{Member, ProgramId, StationId};
 
 const CONTROLLER: Member = Member::Station(StationId(0));
 const UNDERSTUDY: Member = Member::Station(StationId(2));
 const SPARE: Member = Member::Station(StationId(3));
-
-/// Two controllers, an understudy and the slot of a spare.
-const CELL: &str = r#"
-[cluster]
-name = "cell"
-[[controller]]
-name = "robot"
-ladder = "robot.ladder"
-[[controller]]
-name = "press"
-ladder = "press.ladder"
-[[understudy]]
-name = "understudy"
-[[understudy]]
-name = "spare"
-spare = true
-[[plant]]
-controller = "robot"
-model = "robot"
-[[plant]]
-controller = "press"
-model = "press"
-"#;
 
 /// What the remote I/O of the robot reported.
 #[derive(Debug, Default, PartialEq, Eq)]
@@ -42,7 +20,7 @@ struct Outcome {
 }
 
 fn check(steps: &[(u64, Member, Action)], cycles: u64) -> Outcome {
-    let cluster = understudy_testing::cluster(CELL, Mode::Full);
+    let cluster = understudy_testing::cluster(CELL_WITH_SPARE, Mode::Full);
     let mut simulation = Simulation::new(parts(&cluster), Network::default(), 1);
     for &(at_cycle, member, action) in steps {
         simulation.schedule(Fault { at_cycle, phase: 0.3, member, action });
@@ -122,7 +100,7 @@ fn protection_returns_within_twenty_cycles_and_stays_when_the_spare_retires() {
 
 /// What happens to the slot when the spare follows its rule: the cycle, and whether it starts.
 fn by_its_rule(steps: &[(u64, Member, Action)], cycles: u64) -> (Vec<(u64, bool)>, u64) {
-    let cluster = understudy_testing::cluster(CELL, Mode::Full);
+    let cluster = understudy_testing::cluster(CELL_WITH_SPARE, Mode::Full);
     let mut simulation = Simulation::new(parts(&cluster), Network::default(), 1);
     simulation.with_spares(SpareTimes { spare_after: 20, retire_after: 30 });
     for &(at_cycle, member, action) in steps {

@@ -57,3 +57,26 @@ PROGRAM counter
   total := total + 1;
   since := since + 1;
 END_PROGRAM";
+
+/// The press cell with two controllers, an understudy and the slot of a spare, as the text of a cluster.
+pub const CELL_WITH_SPARE: &str = r#"
+[cluster]
+name = "cell"
+[[controller]]
+name = "robot"
+ladder = "robot.ladder"
+[[controller]]
+name = "press"
+ladder = "press.ladder"
+[[understudy]]
+name = "understudy"
+[[understudy]]
+name = "spare"
+spare = true
+[[plant]]
+controller = "robot"
+model = "robot"
+[[plant]]
+controller = "press"
+model = "press"
+"#;

@@ -12,7 +12,7 @@ use std::fs::OpenOptions;
 use std::io::{self, Write as _};
 use std::thread;
 
-pub use cells::{COUNTER, cluster, line, press_cell};
+pub use cells::{CELL_WITH_SPARE, COUNTER, cluster, line, press_cell};
 
 /// Where [`skip`] writes a line for each test, for whoever counts them.
 pub const LIST: &str = "UNDERSTUDY_SKIPPED";

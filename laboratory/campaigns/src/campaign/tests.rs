@@ -180,32 +180,10 @@ fn a_deadline_beside_a_stall_of_the_host_says_nothing_of_the_masking() {
     check(&[(1, Seen::Missed), (30, Seen::Stalled)], 1, 1, 0);
 }
 
-const SHARED: &str = r#"
-[cluster]
-name = "cell"
-[[controller]]
-name = "robot"
-ladder = "robot.ladder"
-[[controller]]
-name = "press"
-ladder = "press.ladder"
-[[understudy]]
-name = "understudy"
-[[understudy]]
-name = "spare"
-spare = true
-[[plant]]
-controller = "robot"
-model = "robot"
-[[plant]]
-controller = "press"
-model = "press"
-"#;
-
 /// Two groups share a spare: the measured MTTF agrees with the model of shared spares, and is well above that without them.
 #[test]
 fn groups_that_share_a_spare_live_as_long_as_the_model_says() {
-    let cell = understudy_testing::cluster(SHARED, Mode::Full);
+    let cell = understudy_testing::cluster(understudy_testing::CELL_WITH_SPARE, Mode::Full);
     let question = Question {
         mtbf: hours(1500.0),
         mttr: hours(300.0),

@@ -11,13 +11,29 @@ use understudy_typed::{CarriedState, Interpreter, Program, Told};
 use crate::support::{PERIOD, program};
 use understudy_logic::{Scan, Scratch};
 
+fn flip(inputs: &mut [u64], place: usize) {
+    inputs[place / 64] ^= 1 << (place % 64);
+}
+
+/// One scan of a program and of its circuit, which have the same outputs.
+fn both_step(
+    (interpreter, state): (&Interpreter, &mut Vec<u64>),
+    (scan, registers): (&Scan, &mut Vec<u64>),
+    inputs: &[u64],
+    about: &str,
+) {
+    let [mut wanted, mut found] = [0; 2].map(|_| vec![0_u64; scan.output_count().div_ceil(64)]);
+    interpreter.step(state, inputs, &mut wanted);
+    scan.step(&mut Scratch::default(), registers, inputs, &mut found);
+    assert_eq!(found, wanted, "{about}");
+}
+
 /// Runs the circuit of a program and its interpreter, and restarts both warm in about one of eight scans.
 fn check(typed: &Program, seed: u64, about: &str) -> usize {
     let exact = circuit(typed).expect("a sound program");
     let mask = exact.layout.retentive_mask(typed);
     let scan = Scan::new(&exact.circuit);
     let interpreter = Interpreter::new(typed);
-    let mut scratch = Scratch::default();
     let mut registers = scan.initial().to_vec();
     let mut state = interpreter.initial().to_vec();
     let mut dice = Dice::new(!seed);
@@ -34,19 +50,15 @@ fn check(typed: &Program, seed: u64, about: &str) -> usize {
         }
         // Inputs that stay for a while let timers end.
         if dice.rarely(2) {
-            let place = dice.below(scan.input_count());
-            inputs[place / 64] ^= 1 << (place % 64);
+            flip(&mut inputs, dice.below(scan.input_count()));
         }
-        let [mut wanted, mut found] = [0; 2].map(|_| vec![0_u64; scan.output_count().div_ceil(64)]);
-        interpreter.step(&mut state, &inputs, &mut wanted);
-        scan.step(&mut scratch, &mut registers, &inputs, &mut found);
-        assert_eq!(found, wanted, "scan {number}\n{about}");
+        let about_scan = format!("scan {number}\n{about}");
+        both_step((&interpreter, &mut state), (&scan, &mut registers), &inputs, &about_scan);
         // The state that views show is the same program's, too.
         let mut shown = exact.layout.state(&registers);
         let mut go_on = registers.clone();
-        interpreter.step(&mut shown, &inputs, &mut wanted);
-        scan.step(&mut scratch, &mut go_on, &inputs, &mut found);
-        assert_eq!(found, wanted, "after the state of scan {number}\n{about}");
+        let about_scan = format!("after the state of scan {number}\n{about}");
+        both_step((&interpreter, &mut shown), (&scan, &mut go_on), &inputs, &about_scan);
     }
     kept
 }
@@ -73,8 +85,7 @@ fn change(before: &Program, now: &Program, seed: u64, about: &str) -> (bool, boo
     let mut inputs = vec![0_u64; scan.input_count().div_ceil(64)];
     let mut outputs = vec![0_u64; scan.output_count().div_ceil(64)];
     for _ in 0..dice.below(60) {
-        let place = dice.below(scan.input_count());
-        inputs[place / 64] ^= 1 << (place % 64);
+        flip(&mut inputs, dice.below(scan.input_count()));
         scan.step(&mut scratch, &mut registers, &inputs, &mut outputs);
     }
     let told = Told {
@@ -95,13 +106,10 @@ fn change(before: &Program, now: &Program, seed: u64, about: &str) -> (bool, boo
     let mut inputs = vec![0_u64; scan.input_count().div_ceil(64)];
     for number in 0..60 {
         if dice.rarely(2) {
-            let place = dice.below(scan.input_count());
-            inputs[place / 64] ^= 1 << (place % 64);
+            flip(&mut inputs, dice.below(scan.input_count()));
         }
-        let [mut wanted, mut found] = [0; 2].map(|_| vec![0_u64; scan.output_count().div_ceil(64)]);
-        interpreter.step(&mut state, &inputs, &mut wanted);
-        scan.step(&mut scratch, &mut registers, &inputs, &mut found);
-        assert_eq!(found, wanted, "scan {number}\n{about}");
+        let about_scan = format!("scan {number}\n{about}");
+        both_step((&interpreter, &mut state), (&scan, &mut registers), &inputs, &about_scan);
     }
     (true, is_new)
 }
