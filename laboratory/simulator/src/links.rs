@@ -95,7 +95,7 @@ impl Flips {
 }
 
 impl Links {
-    /// Links of so many stations and remote I/Os, over two networks where they have them.
+    /// Links of stations and remote I/Os, by their numbers, over two networks where they have them.
     pub(crate) fn new(
         (stations, remote_ios): (usize, usize),
         (roster, has_two_networks): (Roster, bool),

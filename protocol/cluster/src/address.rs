@@ -5,9 +5,9 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr, SocketAddrV4};
 /// Where a member listens, as far as that is known: on the network that every cluster has, and on the second one of a cluster with two.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Addresses<A = SocketAddr> {
-    /// On the first network.
+    /// Address on the first network.
     pub first: Option<A>,
-    /// On the second network.
+    /// Address on the second network.
     pub second: Option<A>,
 }
 

@@ -46,7 +46,7 @@ impl std::fmt::Debug for Keys {
 pub(crate) enum Opened {
     /// A frame for this member.
     Frame(Arc<Frame>),
-    /// For another station.
+    /// A transfer for another station.
     ForAnother,
     /// A frame of this member that came over the other network before.
     SecondCopy(Member),

@@ -24,7 +24,7 @@ use crate::host_event::HostEvent;
 const JUDGED_EVERY: Duration = Duration::from_millis(500);
 /// Frames of a peer on which it is judged, at least.
 const FEWEST_FRAMES: u32 = 8;
-/// A network carries so many of a hundred frames, or is impaired.
+/// Percentage of frames below which a network is impaired.
 const WELL_PERCENT: u32 = 90;
 /// Times in a row that a network is in order before that is reported.
 const WELL_AGAIN: u8 = 4;
@@ -45,7 +45,7 @@ pub(crate) enum Arrival {
         /// Whether it came within the time that a frame is of use.
         in_time: bool,
     },
-    /// It came over this network before: the sender, or somebody else, has sent it again.
+    /// It came over this network before: the sender or another device has sent it again.
     Again,
 }
 

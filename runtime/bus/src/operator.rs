@@ -47,7 +47,7 @@ pub enum Request {
     Write(Write),
     /// To record an order that was refused before it was sent.
     Refused(RefusedOrder),
-    /// To record where a spare is.
+    /// Records where a spare is.
     Spare(SpareReport),
     /// To end.
     Stop,

@@ -7,7 +7,7 @@ use understudy_wire::Time;
 use crate::distribution::Distribution;
 use crate::host_event::HostEvent;
 
-/// From one record to the next.
+/// Time from one record to the next.
 const REPORTED_EVERY: Duration = Duration::from_secs(10);
 
 /// Since the start of the process, in memory that does not grow.

@@ -53,10 +53,10 @@ pub(crate) struct Measured {
 pub(super) struct Observed<M> {
     machine: M,
     window: Window,
-    /// At the understudy.
+    /// Exchange of each cycle at the understudy.
     meter: Option<(Member, Meter)>,
     measured: Measured,
-    /// Of the first input.
+    /// Time of the first input.
     started: Option<Time>,
     begins: Option<Time>,
     /// The last input: when it came on the clock of the member, and on that of this process.

@@ -32,7 +32,7 @@ use super::replica::{PATIENCE_CYCLES, carry_out, look};
 use super::seen::{Deadlines, Seen};
 use super::{CampaignError, CampaignPlan, HOUR_NS, replicas};
 
-/// Of the interval.
+/// Confidence of the interval.
 const CONFIDENCE: f64 = 0.95;
 
 /// A measurement of groups that share spares, compared with the model.
