@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 use understudy_cycle::{Notice, Outvoted, Refusal};
 use understudy_wire::{
-    ConfigurationHash, Image, Lineage, Member, Moment, ProgramId, ProgramSet, StationId, Word,
+    ConfigurationHash, Configurations, Image, Lineage, Member, Moment, ProgramHash, ProgramId,
+    ProgramSet, StationId, Word,
 };
 
 /// Event of a station.
@@ -27,6 +28,9 @@ pub enum Event {
         moment: Moment,
         /// Program of the state.
         program: ProgramId,
+        /// Hash of that program: another one than that of its cluster file after an online change.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        changed: Option<ProgramHash>,
         /// Lineage of the state.
         lineage: Lineage,
         /// x(t+1).
@@ -138,6 +142,17 @@ pub enum Event {
         /// Stations with the other one.
         others: u32,
     },
+    /// The configuration that it runs, and the one that it has loaded beside it, after a step of an online change.
+    Configured(Configurations),
+    /// The history of a program changes to a program that this station has not loaded: it does not compute it from here on.
+    NotPrepared {
+        /// Current cycle.
+        moment: Moment,
+        /// Program that changes.
+        program: ProgramId,
+        /// Hash of the program that is missing.
+        missing: ProgramHash,
+    },
     /// The host woke this station too late to keep its times.
     Stalled {
         /// Current cycle.
@@ -164,6 +179,7 @@ impl From<Notice> for Event {
             Notice::Outvoted(Outvoted { theirs, stations, others, .. }) => {
                 Self::Outvoted { theirs, stations, others }
             }
+            Notice::Configured(configurations) => Self::Configured(configurations),
             Notice::Stalled { moment, late } => Self::Stalled { moment, late },
         }
     }

@@ -12,7 +12,7 @@
 use understudy_executable::{Executable, Scratch};
 use understudy_wire::Image;
 
-use crate::replica::Step;
+use crate::replica::Stepped;
 
 /// y(N+1) of one cycle, where `steps` are the last steps of all replicas in the order of programs.
 ///
@@ -20,7 +20,7 @@ use crate::replica::Step;
 pub(crate) fn outputs<'a>(
     generated: &Executable,
     scratch: &mut Scratch,
-    steps: impl Iterator<Item = &'a Step>,
+    steps: impl Iterator<Item = &'a Stepped>,
 ) -> Option<Image> {
     let (mut state, mut inputs) = (Packed::default(), Packed::default());
     for step in steps {

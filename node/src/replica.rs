@@ -13,10 +13,11 @@ mod transfer;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
+use understudy_cycle::{Program, Versions};
 use understudy_executable::Scratch;
 use understudy_wire::{
-    Body, Digest, Frame, Holding, Image, Lineage, Moment, ProgramId, Sample, Segment, StationId,
-    StationSet,
+    Body, Digest, Frame, Holding, Image, Lineage, Moment, ProgramHash, ProgramId, Sample, Segment,
+    StationId, StationSet, Step,
 };
 
 use self::log::Log;
@@ -25,7 +26,6 @@ use self::retaining::Retaining;
 pub(crate) use self::transfer::SEGMENTS_A_CYCLE;
 use self::transfer::{Joining, Snapshot};
 
-use crate::settings::Program;
 
 /// Whether the outputs of a replica may be published.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -50,7 +50,7 @@ pub(crate) struct Replica {
     /// States before the last steps, oldest first; at most as many as a sample's history.
     past: VecDeque<State>,
     /// The last step: a state that was transferred has no outputs until it is stepped.
-    step: Step,
+    step: Stepped,
     /// While it is lost.
     joining: Joining,
     /// For other stations, of a state of several segments.
@@ -67,6 +67,8 @@ pub(crate) struct Replica {
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 struct State {
     bits: Image,
+    /// The program whose state it is.
+    program: ProgramHash,
     lineage: Lineage,
     stepped: Moment,
     /// Of the state before the last step.
@@ -75,7 +77,9 @@ struct State {
 
 /// One step of a program: x(i)(t) and u(i)(t), from which y(i)(t) was computed.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(crate) struct Step {
+pub(crate) struct Stepped {
+    /// The program that took it.
+    pub(crate) program: ProgramHash,
     /// x(i)(t).
     pub(crate) state: Image,
     /// u(i)(t).
@@ -112,6 +116,8 @@ pub(crate) enum Followed {
     Lost,
     /// The history does not lead to the lineage in the sample: the sample was changed on its way, and counts as lost.
     Changed,
+    /// The history changes to a program that is not loaded here.
+    NotPrepared(ProgramHash),
 }
 
 impl Replica {
@@ -121,7 +127,8 @@ impl Replica {
             standing: Standing::Lost,
             held: None,
             past: VecDeque::with_capacity(history),
-            step: Step {
+            step: Stepped {
+                program: program.hash,
                 state: Image::zero(program.executable.state_count()),
                 inputs: Image::zero(program.executable.input_count()),
                 outputs: Image::zero(program.executable.output_count()),
@@ -154,6 +161,12 @@ impl Replica {
             && self.held.as_ref().is_some_and(knows)
     }
 
+    /// Whether its state and all that it can go back to are states of the program with this hash.
+    pub(crate) fn is_of(&self, program: ProgramHash) -> bool {
+        let held = self.held.as_ref().map(|held| &held.state);
+        held.into_iter().chain(&self.past).all(|state| state.program == program)
+    }
+
     /// Whether its outputs of `moment` may be published.
     pub(crate) fn may_publish(&self, moment: Moment) -> bool {
         self.standing == Standing::Proven && self.is_current(moment)
@@ -165,7 +178,7 @@ impl Replica {
     }
 
     /// The last step.
-    pub(crate) fn last_step(&self) -> &Step {
+    pub(crate) fn last_step(&self) -> &Stepped {
         &self.step
     }
 
@@ -187,7 +200,7 @@ impl Replica {
     /// Follows the sample of `moment`, a frame whose body is `sample`.
     pub(crate) fn follow(
         &mut self,
-        program: &Program,
+        versions: Versions<'_>,
         scratch: &mut Scratch,
         frame: &Arc<Frame>,
         shadow_cycles: u32,
@@ -197,7 +210,7 @@ impl Replica {
         };
         let moment = frame.header.moment;
         if sample.history.len() > self.history
-            || sample.history[0].width() != program.executable.input_count()
+            || sample.history[0].inputs.width() != versions.input_count()
         {
             return Followed::Lost;
         }
@@ -208,37 +221,39 @@ impl Replica {
             return Followed::Synchronised;
         }
         let newest = &sample.history[sample.history.len() - 1];
-        if sample.before.after(newest) != sample.after {
+        if !sample.is_intact() {
             return Followed::Changed;
         }
         if self.held.as_ref().is_some_and(|held| held.state.lineage == sample.before) {
-            self.step(program, scratch, newest, moment);
-            return self.synchronised(shadow_cycles);
+            return match self.step(versions, scratch, newest, moment) {
+                Ok(()) => self.synchronised(shadow_cycles),
+                Err(missing) => self.cannot_follow(missing),
+            };
         }
         let lineages = lineages_of(sample);
         if lineages.last() != Some(&sample.after) {
             return Followed::Changed;
         }
-        if let Some(place) = self.find(&lineages) {
-            self.replay(program, scratch, sample, place, moment);
-            return self.synchronised(shadow_cycles);
+        if let Some(place) = self.find(&lineages).or_else(|| self.take_up_retained(&lineages)) {
+            return match self.replay(versions, scratch, sample, place, moment) {
+                Ok(()) => self.synchronised(shadow_cycles),
+                Err(missing) => self.cannot_follow(missing),
+            };
         }
-        if let Some(place) = self.take_up_retained(&lineages) {
-            self.replay(program, scratch, sample, place, moment);
-            return self.synchronised(shadow_cycles);
-        }
-        if let Some((place, start)) = self.start_in(program, sample, &lineages) {
+        if let Some((place, start)) = self.start_in(versions, sample, &lineages) {
             let genesis = start.lineage;
             self.past.clear();
             self.held = Some(Held { born: sample.born, state: start });
-            self.replay(program, scratch, sample, place, moment);
+            if let Err(missing) = self.replay(versions, scratch, sample, place, moment) {
+                return self.cannot_follow(missing);
+            }
             self.standing = Standing::Proven;
             self.joining = Joining::default();
             return Followed::FromGenesis(self.lineage().unwrap_or(genesis));
         }
         self.standing = Standing::Lost;
-        self.keep(program, sample, moment);
-        let caught_up = self.catch_up(program, scratch, shadow_cycles);
+        self.keep(versions, sample, moment);
+        let caught_up = self.catch_up(versions, scratch, shadow_cycles);
         caught_up.map_or(Followed::Lost, Followed::CaughtUp)
     }
 
@@ -291,8 +306,10 @@ impl Replica {
     }
 
     /// Keeps a sample that cannot be followed: for a state of one segment, which comes at once, the newest is enough.
-    fn keep(&mut self, program: &Program, sample: &Sample, moment: Moment) {
-        let is_whole = Segment::count(program.executable.state_count()) == 1;
+    fn keep(&mut self, versions: Versions<'_>, sample: &Sample, moment: Moment) {
+        let one_segment =
+            |program: &Program| Segment::count(program.executable.state_count()) == 1;
+        let is_whole = versions.all().all(one_segment);
         match &mut self.joining.log {
             Some(log) if !is_whole => log.extend(sample, moment),
             log => *log = Some(Log::of(sample, moment)),
@@ -305,6 +322,12 @@ impl Replica {
         }
         self.joining = Joining::default();
         Followed::Synchronised
+    }
+
+    /// It keeps its last state, and is silent until the program is loaded or another station transfers a state.
+    fn cannot_follow(&mut self, missing: ProgramHash) -> Followed {
+        self.standing = Standing::Lost;
+        Followed::NotPrepared(missing)
     }
 
     /// The place of the state in the history, or of the newest earlier state that is in it, to which the replica then
@@ -328,25 +351,43 @@ impl Replica {
 
     /// Steps through the history from `place` on. A place past its end means that the replica has this sample already:
     /// void samples may be sent again unchanged.
+    ///
+    /// # Errors
+    /// The program that a step changes to is not loaded: the state is the one before that step.
     fn replay(
         &mut self,
-        program: &Program,
+        versions: Versions<'_>,
         scratch: &mut Scratch,
         sample: &Sample,
         place: usize,
         moment: Moment,
-    ) {
-        for inputs in &sample.history[place.min(sample.history.len())..] {
-            self.step(program, scratch, inputs, moment);
+    ) -> Result<(), ProgramHash> {
+        for step in &sample.history[place.min(sample.history.len())..] {
+            self.step(versions, scratch, step, moment)?;
         }
         if let Some(held) = &mut self.held {
             held.state.stepped = moment;
         }
+        Ok(())
     }
 
-    fn step(&mut self, program: &Program, scratch: &mut Scratch, inputs: &Image, moment: Moment) {
+    /// # Errors
+    /// As [`Self::replay`].
+    fn step(
+        &mut self,
+        versions: Versions<'_>,
+        scratch: &mut Scratch,
+        step: &Step,
+        moment: Moment,
+    ) -> Result<(), ProgramHash> {
         let Some(held) = self.held.as_mut() else {
-            return;
+            return Ok(());
+        };
+        let target = step.change.unwrap_or(held.state.program);
+        let program = versions.of(target).ok_or(target)?;
+        let converted = match target == held.state.program {
+            true => None,
+            false => Some(converted(versions, &held.state, program).ok_or(target)?),
         };
         let oldest = match self.past.len() < self.history {
             true => None,
@@ -360,28 +401,40 @@ impl Replica {
             None => held.state.clone(),
         };
         self.past.push_back(before);
+        if let Some(bits) = converted {
+            held.state.bits = bits;
+            held.state.program = target;
+        }
         held.state.digest = Digest::of(&held.state.bits);
+        self.step.program = target;
         self.step.state.clone_from(&held.state.bits);
-        self.step.inputs.clone_from(inputs);
+        self.step.inputs.clone_from(&step.inputs);
         program.executable.step(
             scratch,
             held.state.bits.words_mut(),
-            inputs.words(),
+            step.inputs.words(),
             self.step.outputs.words_mut(),
         );
-        held.state.lineage = held.state.lineage.after(inputs);
+        held.state.lineage = held.state.lineage.after_step(step);
         held.state.stepped = moment;
         self.step.after = Some(held.state.lineage);
-        self.retaining.stepped(self.id, program, held, inputs);
+        self.retaining.stepped(self.id, held, &step.inputs);
+        Ok(())
     }
+}
+
+/// The first state of `program` for a state of another program.
+fn converted(versions: Versions<'_>, state: &State, program: &Program) -> Option<Image> {
+    let words = versions.convert(state.program, program.hash, state.bits.words())?;
+    Image::from_words(program.executable.state_count(), &words).ok()
 }
 
 /// The lineage before each sample of the history, and last the one after all of them.
 fn lineages_of(sample: &Sample) -> smallvec::SmallVec<[Lineage; 16]> {
     let mut lineage = sample.base;
     let mut lineages = smallvec::smallvec![lineage];
-    for inputs in &sample.history {
-        lineage = lineage.after(inputs);
+    for step in &sample.history {
+        lineage = lineage.after_step(step);
         lineages.push(lineage);
     }
     lineages

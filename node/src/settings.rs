@@ -2,18 +2,11 @@
 
 use std::sync::Arc;
 
-use understudy_cycle::Agreement;
+use understudy_cycle::{Agreement, OnlineChange, Participant, Program, Versions};
 use understudy_executable::Executable;
-use understudy_wire::{Epoch, ProgramHash, ProgramId, StationId};
+use understudy_wire::{ConfigurationHash, Epoch, ProgramId, StationId};
 
-/// Compiled program of the cluster.
-#[derive(Debug, Clone)]
-pub struct Program {
-    /// Hash of its canonical text.
-    pub hash: ProgramHash,
-    /// Its f and h, (1) and (2).
-    pub executable: Executable,
-}
+use crate::event::Event;
 
 /// Configuration of one station.
 #[derive(Debug, Clone)]
@@ -33,6 +26,29 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// What can be executed in the place of a program, with the change that a member has loaded.
+    pub(crate) fn versions<'a>(
+        &'a self,
+        member: &'a Participant<Event>,
+        program: ProgramId,
+    ) -> Versions<'a> {
+        let first = &self.programs[program.index()];
+        Versions::new(first, member.changing().change(), program)
+    }
+
+    /// Takes the programs of one of the configurations of a change for its own.
+    pub(crate) fn adopt(&mut self, change: &OnlineChange, own: ConfigurationHash) {
+        let mut programs = self.programs.to_vec();
+        for of in &change.programs {
+            if let Some(program) = programs.get_mut(of.program.index()) {
+                *program = if own == change.after { &of.after } else { &of.before }.clone();
+            }
+        }
+        // It was generated from the programs before.
+        self.generated = self.generated.take().filter(|_| own == change.before);
+        self.programs = programs.into();
+    }
+
     /// The programs that this station runs.
     pub fn runs(&self) -> impl Iterator<Item = ProgramId> + use<> {
         let own = self.station.0;

@@ -23,11 +23,11 @@ use std::sync::Arc;
 pub use turn::STATES_EVERY;
 
 use smallvec::SmallVec;
-use understudy_cycle::{Arrival, Input, Machine, Output, Outvoted, Participant};
+use understudy_cycle::{Arrival, ChangeOrder, Input, Machine, OnlineChange, Output, Outvoted, Participant};
 use understudy_executable::Scratch;
 use understudy_wire::{
-    Body, ConfigurationHash, Digest, Frame, Holding, Image, Lineage, Member, Moment, ProgramId,
-    ProgramSet, Recalled, RetainedRun, Sample, SamplesReceived, StationId, StationSet, Time,
+    Body, Configurations, Digest, Frame, Holding, Image, Lineage, Member, Moment, ProgramHash,
+    ProgramId, ProgramSet, Recalled, RetainedRun, Sample, SamplesReceived, StationId, StationSet, Time,
 };
 
 use crate::event::Event;
@@ -62,6 +62,8 @@ pub struct Station {
     unsampled: SmallVec<[u32; 2]>,
     /// When the last cycle began that was looked at for samples.
     looked_at: Time,
+    /// Programs that histories have changed to, and that are not loaded; reported once each, and without effect on the cycle.
+    lacks_program: SmallVec<[(ProgramId, ProgramHash); 1]>,
 }
 
 /// Who starts the cycles.
@@ -180,6 +182,7 @@ impl Station {
             awaited: ProgramSet::EMPTY,
             unsampled: settings.runs().map(|_| 0).collect(),
             looked_at: now,
+            lacks_program: SmallVec::new(),
             settings,
         };
         station.member.wake_at(station.next_wakeup());
@@ -193,8 +196,9 @@ impl Station {
     pub fn retaining(mut self, every: u32, runs: &[RetainedRun]) -> Self {
         let cluster = self.settings.agreement.cluster;
         for replica in &mut self.replicas {
-            let program = &self.settings.programs[replica.id().index()];
-            if !program.executable.is_retentive() {
+            let id = replica.id();
+            let versions = self.settings.versions(&self.member, id);
+            if !versions.all().any(|program| program.executable.is_retentive()) {
                 continue;
             }
             replica.retain(cluster, every);
@@ -204,7 +208,7 @@ impl Station {
             let mut own: Vec<_> = runs.iter().filter(own).collect();
             own.sort_by_key(|run| run.state.number);
             for run in own {
-                replica.find_retained(program, &mut self.scratch, run);
+                replica.find_retained(versions, &mut self.scratch, run);
             }
         }
         self
@@ -217,9 +221,20 @@ impl Station {
         }
     }
 
-    /// The configuration that it runs; it refuses members with another one.
-    pub fn configuration(&self) -> ConfigurationHash {
-        self.settings.agreement.configuration
+    /// It had loaded a change before it was started, with these configurations; before [`Self::retaining`]. Without effect where the change is none of
+    /// its configuration.
+    #[must_use]
+    pub fn changed(mut self, change: &Arc<OnlineChange>, configurations: Configurations) -> Self {
+        let restored = self.member.restore_change(Arc::clone(change), configurations);
+        if restored.is_ok() && configurations.prepared.is_none() {
+            self.settings.adopt(change, configurations.own);
+        }
+        self
+    }
+
+    /// The configuration that it runs, and the one that it has loaded beside it; it refuses members with none of them.
+    pub fn configurations(&self) -> Configurations {
+        self.member.changing().configurations()
     }
 
     /// State of a program that it holds, with its lineage; it may be older than the newest sample.
@@ -291,7 +306,8 @@ impl Station {
             true => SamplesReceived::Later,
             false => SamplesReceived::First,
         };
-        replica.remember(&self.settings.programs[program.index()], moment, sample, received);
+        let versions = self.settings.versions(&self.member, program);
+        replica.remember(versions, moment, sample, received);
         if replica.set_excluded(excluded) {
             self.member.report(if excluded {
                 Event::Excluded { moment, program }
@@ -299,8 +315,9 @@ impl Station {
                 Event::Readmitted { moment, program }
             });
         }
+        let versions = self.settings.versions(&self.member, program);
         let followed = replica.follow(
-            &self.settings.programs[program.index()],
+            versions,
             &mut self.scratch,
             frame,
             self.settings.agreement.shadow_cycles,
@@ -309,10 +326,40 @@ impl Station {
         let adopted = match followed {
             Followed::FromGenesis(lineage) => Some((lineage, None)),
             Followed::CaughtUp(from) => Some((sample.after, Some(from))),
+            Followed::NotPrepared(missing) => {
+                self.miss_program(moment, program, missing);
+                None
+            }
             Followed::Synchronised | Followed::Lost | Followed::Changed => None,
         };
         if let Some((lineage, from)) = adopted {
             self.report(Event::Adopted { moment, program, lineage, from });
+        }
+    }
+
+    /// Reports once that a program is not loaded that a history changes to.
+    fn miss_program(&mut self, moment: Moment, program: ProgramId, missing: ProgramHash) {
+        let lack = (program, missing);
+        if !self.lacks_program.contains(&lack) {
+            self.lacks_program.retain(|(known, _)| *known != program);
+            self.lacks_program.push(lack);
+            self.report(Event::NotPrepared { moment, program, missing });
+        }
+    }
+
+    /// Moves an online change on. What this station computes is decided by the histories alone: it forgets a program when none of its replicas needs it.
+    fn take_change(&mut self, now: Time, order: &ChangeOrder) {
+        let changing = self.member.changing();
+        let own = |replica: &Replica| {
+            let id = replica.id();
+            changing.hash_of(id, self.settings.programs[id.index()].hash)
+        };
+        let may_forget = self.replicas.iter().all(|replica| replica.is_of(own(replica)));
+        let before = changing.change().cloned();
+        self.member.take_change(now, order, may_forget);
+        let changing = self.member.changing();
+        if let (Some(change), None) = (before, changing.change()) {
+            self.settings.adopt(&change, changing.configurations().own);
         }
     }
 
@@ -338,7 +385,7 @@ impl Station {
     fn take_recalled(&mut self, recalled: &[Recalled]) {
         for one in recalled {
             if let Some(replica) = replica_mut(&mut self.replicas, one.program) {
-                replica.take_recalled(&self.settings.programs[one.program.index()], one);
+                replica.take_recalled(self.settings.versions(&self.member, one.program), one);
             }
         }
     }
@@ -409,6 +456,7 @@ impl Hash for Station {
             // Only reported.
             unsampled: _,
             looked_at: _,
+            lacks_program: _,
         } = self;
         (member, replicas).hash(hasher);
         (cycle, closed, company, started, role, wanted).hash(hasher);
@@ -424,6 +472,7 @@ impl Machine for Station {
         match input {
             Input::Wakeup => self.wake(now),
             Input::Frame(frame) => self.receive(now, frame),
+            Input::Change(order) => self.take_change(now, order),
             Input::RemoteIo(_) => {}
         }
         self.member.wake_at(self.next_wakeup());

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 use understudy_cycle::{Notice, Outvoted, Refusal};
 use understudy_wire::{
-    ConfigurationHash, Force, Image, Lineage, Member, Moment, OrderRefusal, ProgramId, SignalPlace,
-    Source, StationId, StationSet, Write, WriteId, WriteRefusal,
+    ConfigurationHash, Configurations, Force, Image, Lineage, Member, Moment, OrderRefusal,
+    ProgramHash, ProgramId, SignalPlace, Source, StationId, StationSet, Write, WriteId, WriteRefusal,
 };
 
 use crate::settings::ValueFault;
@@ -27,7 +27,21 @@ pub enum Event {
         born: Moment,
         /// The lineage that this sample extends, L(i)(t).
         before: Lineage,
+        /// The program that takes this sample and all after it, where that changes.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        change: Option<ProgramHash>,
     },
+    /// The program of an online change takes this sample and all after it; outputs of this cycle are those of the new program.
+    ProgramChanged {
+        /// Cycle of the sample.
+        moment: Moment,
+        /// Hash of the program before; none where it is not known, since this remote I/O has taken over its state.
+        from: Option<ProgramHash>,
+        /// Hash of the program after.
+        to: ProgramHash,
+    },
+    /// The configuration that it runs, and the one that it has loaded beside it, after a step of an online change.
+    Configured(Configurations),
     /// A deadline: the sample of this cycle, and the outputs that are driven from now on.
     Applied {
         /// Cycle of the deadline.
@@ -420,6 +434,7 @@ impl From<Notice> for Event {
             Notice::Outvoted(Outvoted { theirs, stations, others, .. }) => {
                 Self::Outvoted { theirs, stations, others }
             }
+            Notice::Configured(configurations) => Self::Configured(configurations),
             Notice::Stalled { moment, late } => Self::Stalled { moment, late },
         }
     }

@@ -17,14 +17,16 @@
 use std::collections::VecDeque;
 
 use smallvec::SmallVec;
-use understudy_wire::{Image, Lineage, Moment, ProgramHash};
+use understudy_wire::{Image, Lineage, Moment, ProgramHash, Step};
 
 /// The last samples of a program and their lineages.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) struct History {
     born: Moment,
     base: Lineage,
-    samples: VecDeque<(Image, Lineage)>,
+    /// The program of the state at the base; none where that was adopted from a station and not changed since.
+    program: Option<ProgramHash>,
+    samples: VecDeque<(Step, Lineage)>,
     /// Samples from the base up to the newest lineage that any station has reported to hold.
     confirmed: usize,
     capacity: usize,
@@ -33,12 +35,27 @@ pub(crate) struct History {
 impl History {
     /// A program that starts from its initial state at `born`.
     pub(crate) fn genesis(program: ProgramHash, born: Moment, capacity: usize) -> Self {
-        Self::from(born, Lineage::genesis(program, born), capacity)
+        Self::from(born, (Some(program), Lineage::genesis(program, born)), capacity)
     }
 
-    /// A program that goes on from a lineage that a station holds.
-    pub(crate) fn from(born: Moment, base: Lineage, capacity: usize) -> Self {
-        Self { born, base, samples: VecDeque::with_capacity(capacity), confirmed: 0, capacity }
+    /// A program that goes on from a lineage, of a state of that program where it is known.
+    pub(crate) fn from(
+        born: Moment,
+        (program, base): (Option<ProgramHash>, Lineage),
+        capacity: usize,
+    ) -> Self {
+        let samples = VecDeque::with_capacity(capacity);
+        Self { born, base, program, samples, confirmed: 0, capacity }
+    }
+
+    /// The program that takes the next sample, unless that changes it; none where it is not known.
+    pub(crate) fn program(&self) -> Option<ProgramHash> {
+        self.samples.iter().rev().find_map(|(step, _)| step.change).or(self.program)
+    }
+
+    /// Whether all its states are of this program.
+    pub(crate) fn is_of(&self, program: ProgramHash) -> bool {
+        self.program == Some(program) && self.samples.iter().all(|(step, _)| step.change.is_none())
     }
 
     pub(crate) fn born(&self) -> Moment {
@@ -62,11 +79,11 @@ impl History {
 
     /// u(i)(t).
     pub(crate) fn newest(&self) -> Option<&Image> {
-        self.samples.back().map(|(inputs, _)| inputs)
+        self.samples.back().map(|(step, _)| &step.inputs)
     }
 
-    pub(crate) fn samples(&self) -> SmallVec<[Image; 2]> {
-        self.samples.iter().map(|(inputs, _)| inputs.clone()).collect()
+    pub(crate) fn samples(&self) -> SmallVec<[Step; 2]> {
+        self.samples.iter().map(|(step, _)| step.clone()).collect()
     }
 
     /// How many samples from the base lead to `lineage`; none where it is not of this history.
@@ -111,15 +128,16 @@ impl History {
     }
 
     /// Appends this cycle's sample. Where the window is full the oldest one leaves it.
-    pub(crate) fn push(&mut self, inputs: &Image) {
+    pub(crate) fn push(&mut self, step: Step) {
         if self.samples.len() == self.capacity
-            && let Some((_, after)) = self.samples.pop_front()
+            && let Some((oldest, after)) = self.samples.pop_front()
         {
+            self.program = oldest.change.or(self.program);
             self.base = after;
             self.confirmed = self.confirmed.saturating_sub(1);
         }
-        let after = self.head().after(inputs);
-        self.samples.push_back((inputs.clone(), after));
+        let after = self.head().after_step(&step);
+        self.samples.push_back((step, after));
     }
 
     fn lineage_after(&self, samples: usize) -> Lineage {
@@ -150,7 +168,7 @@ mod tests {
         floor: Option<Lineage>,
     ) -> usize {
         let void = history.make_room(living, floor);
-        history.push(inputs);
+        history.push(Step::of(inputs.clone()));
         void
     }
 

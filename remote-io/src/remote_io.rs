@@ -22,6 +22,7 @@
 //!
 //! Invariant *Never back*: the history continues from a state before the floor only if the operator chooses it.
 
+mod changing;
 mod deadline;
 mod forcing;
 mod knowledge;
@@ -38,10 +39,10 @@ use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_cycle::{Arrival, Input, Machine, Output, Outvoted, Participant, RemoteIoInput};
+use understudy_cycle::{Arrival, Input, Machine, OnlineChange, Output, Outvoted, Participant, RemoteIoInput};
 use understudy_wire::{
-    Body, ConfigurationHash, Frame, Holding, Image, Join, Kept, Member, Moment, OrderRefusal,
-    ProgramId, Recalled, Source, StateChoice, StationId, StationSet, Time,
+    Body, Configurations, Frame, Holding, Image, Join, Kept, Member, Moment, OrderRefusal,
+    ProgramHash, ProgramId, Recalled, Source, StateChoice, StationId, StationSet, Time,
 };
 
 use crate::diagnosis::Diagnosing;
@@ -100,6 +101,10 @@ pub struct RemoteIo {
     trust: Trust,
     /// Words and states that differed at the last deadline, with those who can be wrong.
     differed: Vec<(Option<ProgramId>, StationSet)>,
+    /// The program that an online change wants; a change mark that becomes void is made again.
+    wanted: Option<ProgramHash>,
+    /// Stations that have loaded the online change, as their newest frames say.
+    prepared: StationSet,
 }
 
 /// Who authorises the outputs that are proven.
@@ -203,15 +208,28 @@ impl RemoteIo {
             program: Execution::Running,
             trust: Trust::default(),
             differed: Vec::new(),
+            wanted: None,
+            prepared: StationSet::EMPTY,
             settings,
         };
         remote_io.member.wake_at(remote_io.next_wakeup());
         remote_io
     }
 
-    /// The configuration that it runs; it refuses members with another one.
-    pub fn configuration(&self) -> ConfigurationHash {
-        self.settings.agreement.configuration
+    /// It had loaded a change before it was started, with these configurations; before [`Self::noting`]. Without effect where the change is none of
+    /// its configuration.
+    #[must_use]
+    pub fn changed(mut self, change: &Arc<OnlineChange>, configurations: Configurations) -> Self {
+        let restored = self.member.restore_change(Arc::clone(change), configurations);
+        if restored.is_ok() && configurations.prepared.is_none() {
+            self.adopt(change, configurations.own);
+        }
+        self
+    }
+
+    /// The configuration that it runs, and the one that it has loaded beside it; it refuses members with none of them.
+    pub fn configurations(&self) -> Configurations {
+        self.member.changing().configurations()
     }
 
     /// Whether the operator has to choose the state that the program continues from.
@@ -257,6 +275,7 @@ impl RemoteIo {
             Arrival::Begins(anchor) => self.begin_cycle(now, frame.header.moment, anchor),
         }
         self.holders.hear(station, None);
+        self.note_prepared(station, &frame.header);
         match &frame.body {
             Body::Turn(turn) if self.member.attendance.receive_turn(station) => {
                 self.note(station, &turn.holdings, &[], &turn.recalled, frame.header.alone);
@@ -449,12 +468,15 @@ impl Hash for RemoteIo {
             program,
             trust,
             differed,
+            wanted,
+            prepared,
         } = self;
         (member, holders, knowledge, question, authority).hash(hasher);
         (sensors, field, diagnosing, diagnosed, forcing).hash(hasher);
         (writing, signals, noting).hash(hasher);
         (looked, resumed, protection, turns, deadline, missed, applied).hash(hasher);
         (last_true, descent, program, trust, differed).hash(hasher);
+        (wanted, prepared).hash(hasher);
     }
 }
 
@@ -469,6 +491,7 @@ impl Machine for RemoteIo {
             Input::Wakeup => self.wake(now),
             Input::Frame(frame) => self.receive(now, frame),
             Input::RemoteIo(input) => self.take(now, input),
+            Input::Change(order) => self.take_change(now, order),
         }
         self.member.wake_at(self.next_wakeup());
     }

@@ -253,6 +253,7 @@ mod tests {
             header: Header {
                 cluster: ClusterHash(1),
                 configuration: ConfigurationHash(1),
+                prepared: None,
                 moment: Moment::default(),
                 sender: Member::Station(StationId(rank as u8)),
                 alone: false,

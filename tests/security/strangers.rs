@@ -37,6 +37,7 @@ fn offers(heard: &[u8], kept: &[Vec<u8>]) -> Vec<Vec<u8>> {
         header: Header {
             cluster: ClusterHash::of(b"press-cell"),
             configuration: ConfigurationHash(1),
+            prepared: None,
             moment: Moment { epoch: Epoch(u64::MAX), cycle: Cycle(1) },
             sender,
             alone: false,

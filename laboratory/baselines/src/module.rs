@@ -7,7 +7,7 @@ use smallvec::smallvec;
 use understudy_cycle::{Agreement, Copies, Input, Machine, Output, RemoteIoInput};
 use understudy_wire::{
     Body, Cycle, Epoch, Frame, Header, Image, Lineage, Member, Moment, ProgramHash, ProgramId,
-    Sample, StationSet, Time,
+    Sample, StationSet, Step, Time,
 };
 
 /// A deadline.
@@ -69,6 +69,7 @@ impl Module {
             header: Header {
                 cluster: self.agreement.cluster,
                 configuration: self.agreement.configuration,
+                prepared: None,
                 moment,
                 sender: Member::RemoteIo(self.program),
                 alone: false,
@@ -78,7 +79,7 @@ impl Module {
                 base: lineage,
                 before: lineage,
                 after: lineage.after(&self.field),
-                history: smallvec![self.field.clone()],
+                history: smallvec![Step::of(self.field.clone())],
                 applied: None,
                 excluded: StationSet::EMPTY,
                 gone: StationSet::EMPTY,

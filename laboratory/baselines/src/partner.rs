@@ -206,6 +206,7 @@ impl Partner {
             header: Header {
                 cluster: agreement.cluster,
                 configuration: agreement.configuration,
+                prepared: None,
                 moment: self.moment(self.cycle),
                 sender: Member::Station(StationId(self.settings.rank)),
                 alone: false,
@@ -225,7 +226,9 @@ impl Partner {
             self.begin(now, cycle);
         }
         match &frame.body {
-            Body::Sample(sample) => self.sample = sample.history.last().cloned(),
+            Body::Sample(sample) => {
+                self.sample = sample.history.last().map(|step| step.inputs.clone());
+            }
             Body::Transfer(transfer) => self.hear(frame.header.moment.epoch.0, transfer),
             _ => {}
         }

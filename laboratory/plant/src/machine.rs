@@ -210,6 +210,7 @@ impl Machine for PlantMachine {
         match input {
             Input::Wakeup => self.wake(now),
             Input::Frame(frame) => self.hear(now, frame),
+            Input::Change(order) => self.endpoint.take_change(now, order, true),
             Input::RemoteIo(_) => {}
         }
     }

@@ -113,6 +113,7 @@ fn frame(epoch: u64, cycle: u64, sender: Member, body: Body) -> Arc<Frame> {
     let header = Header {
         cluster: ClusterHash(1),
         configuration: ConfigurationHash(2),
+        prepared: None,
         moment: Moment { epoch: Epoch(epoch), cycle: Cycle(cycle) },
         sender,
         alone: false,

@@ -65,6 +65,7 @@ fn frame(moment: Moment, sender: Member, body: Body) -> Arc<Frame> {
     let header = Header {
         cluster: ClusterHash(1),
         configuration: ConfigurationHash(2),
+        prepared: None,
         moment,
         sender,
         alone: false,

@@ -1,9 +1,13 @@
 //! What the members keep on their disks.
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use understudy_cycle::OnlineChange;
 use understudy_node::{Settings, Station};
 use understudy_remote_io::RemoteIo;
 use understudy_wire::{
-    Member, Note, ProgramId, ProgramSet, Retained, RetainedRun, StationId, Time,
+    Configurations, Member, Note, ProgramId, ProgramSet, Retained, RetainedRun, StationId, Time,
 };
 
 /// Steps after which a station keeps the whole state again.
@@ -16,6 +20,8 @@ pub(crate) struct Disks {
     remote_ios: Vec<Option<Note>>,
     /// Remote I/Os whose notes cannot be read.
     damaged: ProgramSet,
+    /// The configurations of members that have loaded an online change.
+    changed: BTreeMap<Member, Configurations>,
 }
 
 impl Disks {
@@ -24,13 +30,36 @@ impl Disks {
             stations: vec![Vec::new(); stations],
             remote_ios: vec![None; remote_ios],
             damaged: ProgramSet::EMPTY,
+            changed: BTreeMap::new(),
         }
     }
 
     /// A station that starts with what its disk has.
-    pub(crate) fn station(&self, now: Time, settings: Settings) -> Station {
-        let runs = &self.stations[settings.station.index()];
-        Station::new(now, settings).retaining(RETAIN_EVERY, runs)
+    pub(crate) fn station(
+        &self,
+        now: Time,
+        settings: Settings,
+        change: Option<&Arc<OnlineChange>>,
+    ) -> Station {
+        let station = settings.station;
+        let mut machine = Station::new(now, settings);
+        if let Some((change, configurations)) = self.changed_of(Member::Station(station), change) {
+            machine = machine.changed(change, configurations);
+        }
+        machine.retaining(RETAIN_EVERY, &self.stations[station.index()])
+    }
+
+    fn changed_of<'c>(
+        &self,
+        member: Member,
+        change: Option<&'c Arc<OnlineChange>>,
+    ) -> Option<(&'c Arc<OnlineChange>, Configurations)> {
+        Some((change?, *self.changed.get(&member)?))
+    }
+
+    /// A member keeps what it knows of an online change.
+    pub(crate) fn configure(&mut self, member: Member, configurations: Configurations) {
+        self.changed.insert(member, configurations);
     }
 
     /// A remote I/O that starts with what its disk has.
@@ -38,10 +67,15 @@ impl Disks {
         &self,
         now: Time,
         settings: understudy_remote_io::Settings,
+        change: Option<&Arc<OnlineChange>>,
     ) -> RemoteIo {
         let program = settings.program;
         let note = self.remote_ios[program.index()].clone();
-        RemoteIo::new(now, settings).noting(note, self.damaged.contains(program))
+        let mut machine = RemoteIo::new(now, settings);
+        if let Some((change, configurations)) = self.changed_of(Member::RemoteIo(program), change) {
+            machine = machine.changed(change, configurations);
+        }
+        machine.noting(note, self.damaged.contains(program))
     }
 
     /// A member keeps a record.

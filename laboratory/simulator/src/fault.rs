@@ -21,6 +21,24 @@ pub struct Fault {
     pub action: Action,
 }
 
+/// A step of an online change, at one member.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ChangeStep {
+    /// It loads the other programs.
+    Prepare,
+    /// The program of this remote I/O becomes the new one.
+    Switch,
+    /// The program of this remote I/O becomes the old one again.
+    SwitchBack,
+    /// The new configuration is its own.
+    Accept,
+    /// The old configuration is its own again.
+    TakeBack,
+    /// It forgets the configuration that is not its own.
+    Forget,
+}
+
 /// What can be done to a member. What does not concern a member (a state that it does not hold) does nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -51,6 +69,11 @@ pub enum Action {
     /// The operator releases the outputs of a remote I/O after a cold start or a value fault, and the stations that it
     /// has excluded.
     Release,
+    /// An engineer takes a step of the online change of the cluster; nothing where there is none.
+    Change {
+        /// Which.
+        step: ChangeStep,
+    },
     /// The operator chooses the state that the program of a remote I/O continues from, where it is lost.
     Choose {
         /// Which.
@@ -183,6 +206,7 @@ impl Action {
             Self::Continue => "continue",
             Self::Slow { .. } => "slow",
             Self::Release | Self::Unset { .. } => "release",
+            Self::Change { .. } => "change",
             Self::Choose { choice: StateChoice::Cold } => "cold-start",
             Self::Choose { .. } => "accept-state",
             Self::Write { .. } => "write",

@@ -21,7 +21,7 @@ mod stranger;
 mod tally;
 mod wakeups;
 
-pub use fault::{Action, Fault};
+pub use fault::{Action, ChangeStep, Fault};
 pub use links::Metered;
 pub use network::{Disturbance, Network};
 pub use parts::{Parts, parts};

@@ -431,7 +431,7 @@ impl Hash for Links {
 fn flipped(frame: &Frame, flips: &mut Flips) -> Arc<Frame> {
     let mut changed = frame.clone();
     let image = match &mut changed.body {
-        Body::Sample(sample) => sample.history.last_mut(),
+        Body::Sample(sample) => sample.history.last_mut().map(|step| &mut step.inputs),
         Body::Turn(turn) => turn.words.first_mut().map(|word| &mut word.sum),
         _ => None,
     };

@@ -1,8 +1,11 @@
 //! What a cluster consists of, ready to be started again and again.
 
+use std::sync::Arc;
+
 use understudy_cluster::Cluster;
+use understudy_cycle::OnlineChange;
 use understudy_plant::{Followed, Plant};
-use understudy_wire::{Epoch, Member, ProgramId, Roster, StationId};
+use understudy_wire::{Configurations, Epoch, Member, ProgramId, Roster, StationId};
 
 /// The settings of every member. Remote I/Os and plants are indexed by program.
 #[derive(Debug, Clone)]
@@ -19,9 +22,19 @@ pub struct Parts {
     pub follows: Vec<Vec<Followed>>,
     /// Whether each frame is sent over two networks.
     pub has_two_networks: bool,
+    /// The online change that an engineer may make in a run.
+    pub change: Option<Arc<OnlineChange>>,
 }
 
 impl Parts {
+    /// Whether a member with these configurations takes part with the others: one of them is that of the cluster, or what its online change leads to.
+    pub(crate) fn are_right(&self, configurations: Configurations) -> bool {
+        let before = self.stations[0].agreement.configuration;
+        let after = self.change.as_ref().map_or(before, |change| change.after);
+        let Configurations { own, prepared } = configurations;
+        [Some(own), prepared].iter().flatten().any(|it| *it == before || *it == after)
+    }
+
     /// Who receives what; plants are not on the network.
     pub(crate) fn roster(&self) -> Roster {
         let pairs = self.remote_ios.iter().flat_map(|reader| {
@@ -60,5 +73,6 @@ pub fn parts(cluster: &Cluster) -> Parts {
             })
             .collect(),
         has_two_networks: cluster.has_two_networks(),
+        change: None,
     }
 }

@@ -108,6 +108,7 @@ mod tests {
             header: Header {
                 cluster: ClusterHash(1),
                 configuration: ConfigurationHash(1),
+                prepared: None,
                 moment: Moment::default(),
                 sender: Member::Station(StationId(0)),
                 alone: false,

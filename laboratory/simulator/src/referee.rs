@@ -26,10 +26,14 @@ mod violation;
 
 use std::collections::VecDeque;
 use std::hash::{Hash, Hasher};
+use std::sync::Arc;
 
+use understudy_cycle::{OnlineChange, Program, Versions};
 use understudy_executable::{Executable, Scratch};
 use understudy_remote_io::{Event, Ramp, Settings};
-use understudy_wire::{Image, Lineage, Moment, PointValue, ProgramHash, Source};
+use understudy_wire::{
+    Image, Lineage, Moment, PointValue, ProgramHash, ProgramId, Source, Step,
+};
 
 use descent::Descent;
 use unrecorded::Unrecorded;
@@ -49,8 +53,10 @@ const CHOICE_SAMPLES: u32 = 256;
 /// Checks one remote I/O.
 #[derive(Debug, Clone)]
 pub struct Referee {
-    executable: Executable,
-    hash: ProgramHash,
+    program: Program,
+    /// The online change that its program may go through.
+    change: Option<Arc<OnlineChange>>,
+    place: ProgramId,
     fail_safe: Image,
     ramps: Vec<Ramp>,
     hold_cycles: u32,
@@ -87,6 +93,8 @@ struct State {
     lineage: Lineage,
     /// The cycle of the sample that led to it.
     stepped: Moment,
+    /// The program whose state it is.
+    program: ProgramHash,
     bits: Image,
 }
 
@@ -109,8 +117,9 @@ impl Referee {
     /// For the remote I/O of these settings, whose program is `executable`.
     pub fn new(settings: &Settings, executable: Executable) -> Self {
         Self {
-            executable,
-            hash: settings.hash,
+            program: Program { hash: settings.hash, executable },
+            change: None,
+            place: settings.program,
             fail_safe: settings.fail_safe.clone(),
             ramps: settings.ramps.clone(),
             hold_cycles: settings.hold_cycles,
@@ -131,6 +140,17 @@ impl Referee {
             cold_starts: 0,
             applied: false,
         }
+    }
+
+    /// Judges the program across this change too.
+    #[must_use]
+    pub fn with_change(mut self, change: Option<&Arc<OnlineChange>>) -> Self {
+        self.change = change.cloned();
+        self
+    }
+
+    fn versions(&self) -> Versions<'_> {
+        Versions::new(&self.program, self.change.as_ref(), self.place)
     }
 
     /// What the plant shows, as it says itself.
@@ -158,10 +178,16 @@ impl Referee {
         self.gaps
     }
 
-    /// A station reports the state that it holds after the sample of `moment`. It counts only where nothing else is known.
-    pub fn holds(&mut self, moment: Moment, lineage: Lineage, state: &Image) {
+    /// A station reports the state that it holds after the sample of `moment`, of another program than the first where that has changed. It counts only
+    /// where nothing else is known.
+    pub fn holds(
+        &mut self,
+        moment: Moment,
+        (changed, lineage): (Option<ProgramHash>, Lineage),
+        state: &Image,
+    ) {
         if self.unjudged == Some((moment, lineage)) && self.blind {
-            self.goes_on_from(lineage, state.clone());
+            self.goes_on_from((changed, lineage), state.clone());
         }
     }
 
@@ -222,12 +248,13 @@ impl Referee {
     /// The violation that it is, if it is one; the referee goes on with what was sampled and applied.
     pub fn observe(&mut self, event: &Event) -> Result<(), Violation> {
         match event {
-            Event::Sampled { moment, inputs, born, before } => {
+            Event::Sampled { moment, inputs, born, before, change } => {
                 self.unrecorded.resumes(inputs);
                 let continued = self.continue_from(*moment, *born, *before);
                 self.is_new = false;
-                self.unjudged = self.blind.then(|| (*moment, before.after(inputs)));
-                self.step(*moment, inputs);
+                let step = Step { change: *change, inputs: inputs.clone() };
+                self.unjudged = self.blind.then(|| (*moment, before.after_step(&step)));
+                self.step(*moment, &step);
                 self.unrecorded.sampled();
                 continued
             }
@@ -240,10 +267,20 @@ impl Referee {
         }
     }
 
-    /// The reference run goes on from a state that is known from elsewhere, for want of a start that was seen.
-    pub fn goes_on_from(&mut self, lineage: Lineage, bits: Image) {
+    /// The reference run goes on from a state that is known from elsewhere, for want of a start that was seen; of another program than the first where
+    /// that has changed. One that is not known here says nothing.
+    pub fn goes_on_from(
+        &mut self,
+        (changed, lineage): (Option<ProgramHash>, Lineage),
+        bits: Image,
+    ) {
+        let hash = changed.unwrap_or(self.program.hash);
+        let fits = |program: &Program| program.executable.state_count() == bits.width();
+        if !self.versions().of(hash).is_some_and(fits) {
+            return;
+        }
         self.truth = None;
-        self.remember(Moment::default(), lineage, bits);
+        self.remember(Moment::default(), (hash, lineage), bits);
         self.floor = self.states.len() - 1;
     }
 
@@ -251,14 +288,19 @@ impl Referee {
         self.states.iter().rposition(|state| state.lineage == lineage)
     }
 
-    fn remember(&mut self, stepped: Moment, lineage: Lineage, bits: Image) {
+    fn remember(
+        &mut self,
+        stepped: Moment,
+        (program, lineage): (ProgramHash, Lineage),
+        bits: Image,
+    ) {
         if self.floor > 0 && self.states.len() >= REMEMBERED {
             self.states.pop_front();
             self.floor -= 1;
         } else if self.states.len() >= REMEMBERED_FROM_FLOOR {
             self.states.remove(1);
         }
-        self.states.push_back(State { lineage, stepped, bits });
+        self.states.push_back(State { lineage, stepped, program, bits });
         self.newest = Some(self.states.len() - 1);
         self.blind = false;
     }
@@ -290,16 +332,16 @@ impl Referee {
                 Err(Violation::WentBack { moment, from, applied })
             };
         }
-        if before == Lineage::genesis(self.hash, born) {
+        let started = self.versions().all().find(|it| before == Lineage::genesis(it.hash, born));
+        if let Some(Program { hash, executable }) = started.cloned() {
             self.choice = 0;
             self.cold_starts += 1;
             self.applied = false;
             self.last_true = None;
-            let initial =
-                Image::from_words(self.executable.state_count(), self.executable.initial());
+            let initial = Image::from_words(executable.state_count(), executable.initial());
             let initial = initial.expect("a circuit packs its initial state");
             // The floor stays until an output is applied: a cold start of which nothing came may be undone.
-            self.remember(born, before, initial);
+            self.remember(born, (hash, before), initial);
             return Ok(());
         }
         if let Some(from) = self.warm_start_from(born, before) {
@@ -318,7 +360,9 @@ impl Referee {
 
     /// The place of the state whose retentive values a history begins with.
     fn warm_start_from(&self, born: Moment, start: Lineage) -> Option<usize> {
-        self.states.iter().rposition(|state| Lineage::warm(self.hash, born, state.lineage) == start)
+        self.states
+            .iter()
+            .rposition(|state| Lineage::warm(state.program, born, state.lineage) == start)
     }
 
     /// The program starts from its initial state with the retentive values of the state at `from`.
@@ -332,47 +376,75 @@ impl Referee {
         let chosen = std::mem::take(&mut self.choice) > 0;
         let state = &self.states[from];
         let (stepped, applied) = (state.stepped, self.states[self.floor].stepped);
-        let bits = self.executable.restarted(state.bits.words());
-        let bits = Image::from_words(self.executable.state_count(), &bits);
+        let program = self.versions().of(state.program).unwrap_or(&self.program).clone();
+        let bits = program.executable.restarted(state.bits.words());
+        let bits = Image::from_words(program.executable.state_count(), &bits);
+        let bits = bits.expect("a state of this program is packed");
         self.last_true = None;
-        self.remember(born, start, bits.expect("a state of this program is packed"));
+        self.remember(born, (program.hash, start), bits);
         if from >= self.floor || chosen {
             return Ok(());
         }
         Err(Violation::WentBack { moment, from: stepped, applied })
     }
 
-    /// Finds the samples without a record that lead to a lineage from a state that may be continued from, and goes there.
+    /// Finds the samples without a record that lead to a lineage from a state that may be continued from, and goes there; the first of them may
+    /// have a change mark.
     fn recover(&mut self, lineage: Lineage) -> bool {
         let newest = (self.floor..self.states.len()).rev().take(RECENT_STATES);
-        let from: Vec<Lineage> = newest.map(|place| self.states[place].lineage).collect();
-        let Some((start, samples)) = self.unrecorded.samples_to(lineage, &from) else {
+        let mut from: Vec<(usize, Option<ProgramHash>, Lineage)> = Vec::new();
+        for place in newest {
+            let state = &self.states[place];
+            from.push((place, None, state.lineage));
+            let others = self.versions().all().map(|program| program.hash);
+            let others = others.filter(|hash| *hash != state.program);
+            from.extend(others.map(|to| (place, Some(to), state.lineage.changed(to))));
+        }
+        let lineages: Vec<Lineage> = from.iter().map(|(.., lineage)| *lineage).collect();
+        let Some((start, samples)) = self.unrecorded.samples_to(lineage, &lineages) else {
             return false;
         };
-        let place = self.states.len() - 1 - start;
+        let (place, mut change, _) = from[start];
         self.newest = Some(place);
         let stepped = self.states[place].stepped;
-        for inputs in &samples {
-            self.step(stepped, inputs);
+        for inputs in samples {
+            self.step(stepped, &Step { change: change.take(), inputs });
         }
         self.truth = None;
         true
     }
 
-    fn step(&mut self, moment: Moment, inputs: &Image) {
+    fn step(&mut self, moment: Moment, step: &Step) {
         self.choice = self.choice.saturating_sub(1);
         let Some(place) = self.newest else {
             return;
         };
-        let State { lineage, mut bits, .. } = self.states[place].clone();
-        let mut outputs = Image::zero(self.executable.output_count());
-        self.executable.step(
+        let State { lineage, program: before, mut bits, .. } = self.states[place].clone();
+        let hash = step.change.unwrap_or(before);
+        let versions = Versions::new(&self.program, self.change.as_ref(), self.place);
+        let program = versions.of(hash);
+        let Some(program) = program else {
+            // A program that is not known here: nothing after it is judged.
+            self.gaps += 1;
+            return self.misses_records();
+        };
+        if hash != before {
+            let converted = versions.convert(before, hash, bits.words());
+            let converted = converted
+                .and_then(|words| Image::from_words(program.executable.state_count(), &words).ok());
+            let Some(converted) = converted else {
+                return self.misses_records();
+            };
+            bits = converted;
+        }
+        let mut outputs = Image::zero(program.executable.output_count());
+        program.executable.step(
             &mut self.scratch,
             bits.words_mut(),
-            inputs.words(),
+            step.inputs.words(),
             outputs.words_mut(),
         );
-        self.remember(moment, lineage.after(inputs), bits);
+        self.remember(moment, (hash, lineage.after_step(step)), bits);
         self.truth = Some((moment, outputs));
     }
 

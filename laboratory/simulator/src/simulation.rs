@@ -16,7 +16,7 @@ use understudy_cycle::{Input, Machine, Output, RemoteIoInput};
 use understudy_node::Station;
 use understudy_remote_io::RemoteIo;
 use understudy_wire::{
-    Epoch, Field, Frame, Member, ProgramId, ProgramSet, StateChoice, StationId, StationSet, Time,
+    Configurations, Epoch, Field, Frame, Header, Member, ProgramId, ProgramSet, StateChoice, StationId, StationSet, Time,
     Write,
 };
 
@@ -115,7 +115,8 @@ impl Simulation {
             .remote_ios
             .iter()
             .map(|settings| {
-                Referee::new(settings, programs[settings.program.index()].executable.clone())
+                let program = programs[settings.program.index()].executable.clone();
+                Referee::new(settings, program).with_change(parts.change.as_ref())
             })
             .collect();
         let disks = Disks::new(parts.stations.len(), parts.remote_ios.len());
@@ -123,7 +124,7 @@ impl Simulation {
             let mut settings = settings.clone();
             settings.epoch = Epoch(1 + rank as u64);
             let slots = settings.agreement.schedule.spare_slots();
-            let mut slot = Slot::new(disks.station(now, settings));
+            let mut slot = Slot::new(disks.station(now, settings, parts.change.as_ref()));
             if slots.contains(StationId(rank as u8)) {
                 slot.crash();
             }
@@ -132,7 +133,7 @@ impl Simulation {
         let stations: Vec<_> = stations.collect();
         let remote_ios = parts.remote_ios.iter();
         let remote_ios: Vec<_> =
-            remote_ios.map(|settings| Slot::new(disks.remote_io(now, settings.clone()))).collect();
+            remote_ios.map(|settings| Slot::new(disks.remote_io(now, settings.clone(), parts.change.as_ref()))).collect();
         let due = stations.iter().map(Slot::due);
         let due = due.chain(remote_ios.iter().map(Slot::due)).collect();
         let mut simulation = Self {
@@ -424,6 +425,9 @@ impl Simulation {
             match output {
                 Output::Send(frame) => self.send(frame),
                 Output::Report(event) => {
+                    if let understudy_node::Event::Configured(configurations) = event {
+                        self.disks.configure(member, configurations);
+                    }
                     observe(self.now, self.pace.cycle(), member, Record::Station(&event));
                 }
                 Output::Retain(record) => self.disks.write(member, record),
@@ -450,6 +454,9 @@ impl Simulation {
                     self.show_field(program);
                 }
                 Output::Report(event) => {
+                    if let understudy_remote_io::Event::Configured(configurations) = event {
+                        self.disks.configure(member, configurations);
+                    }
                     self.judge(program, &event, observe);
                     self.show_spares(program, &event);
                     observe(self.now, self.pace.cycle(), member, Record::RemoteIo(&event));
@@ -481,8 +488,8 @@ impl Simulation {
         if let Member::Station(station) = frame.header.sender {
             self.unannounced.remove(station);
         }
-        let configuration = self.parts.stations[0].agreement.configuration;
-        if frame.header.configuration == configuration {
+        let Header { configuration: own, prepared, .. } = frame.header;
+        if self.parts.are_right(Configurations { own, prepared }) {
             self.pace.saw(self.now, frame.header.moment);
         }
         self.links.send(self.now, self.pace.cycle(), frame);

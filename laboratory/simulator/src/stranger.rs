@@ -44,8 +44,8 @@ fn make_false(frame: &mut Frame) {
         Body::Turn(turn) => turn.words.iter_mut().for_each(|word| flip(&mut word.sum)),
         Body::Sample(sample) => {
             if let Some(newest) = sample.history.last_mut() {
-                flip(newest);
-                sample.after = sample.before.after(newest);
+                flip(&mut newest.inputs);
+                sample.after = sample.before.after_step(newest);
             }
         }
         // A state is encrypted for one who has a key; anybody can ask for one.
@@ -71,6 +71,7 @@ mod tests {
                 header: Header {
                     cluster: ClusterHash(1),
                     configuration: ConfigurationHash(1),
+                    prepared: None,
                     moment: Moment::default(),
                     sender,
                     alone: false,

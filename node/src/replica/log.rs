@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use understudy_wire::{Image, Lineage, Moment, Sample};
+use understudy_wire::{Lineage, Moment, Sample, Step};
 
 use super::lineages_of;
 
@@ -17,7 +17,7 @@ pub(super) struct Log {
     /// After the newest sample.
     head: Lineage,
     /// Oldest first.
-    samples: VecDeque<Image>,
+    samples: VecDeque<Step>,
     /// Cycle of the newest sample.
     pub(super) moment: Moment,
 }
@@ -52,7 +52,7 @@ impl Log {
         self.moment = moment;
         while self.samples.len() > MAXIMUM_LOG {
             if let Some(oldest) = self.samples.pop_front() {
-                self.base = self.base.after(&oldest);
+                self.base = self.base.after_step(&oldest);
             }
         }
     }
@@ -63,8 +63,8 @@ impl Log {
         let mut found = None;
         for kept in 0..=self.samples.len() {
             found = place_of(before).map(|known| (kept, known)).or(found);
-            if let Some(inputs) = self.samples.get(kept) {
-                before = before.after(inputs);
+            if let Some(step) = self.samples.get(kept) {
+                before = before.after_step(step);
             }
         }
         found
@@ -79,8 +79,8 @@ impl Log {
                 self.base = lineage;
                 return true;
             }
-            if let Some(inputs) = self.samples.get(place) {
-                before = before.after(inputs);
+            if let Some(step) = self.samples.get(place) {
+                before = before.after_step(step);
             }
         }
         false
@@ -92,9 +92,9 @@ impl Log {
     }
 
     /// The oldest sample, once.
-    pub(super) fn take(&mut self) -> Option<Image> {
+    pub(super) fn take(&mut self) -> Option<Step> {
         let oldest = self.samples.pop_front()?;
-        self.base = self.base.after(&oldest);
+        self.base = self.base.after_step(&oldest);
         Some(oldest)
     }
 

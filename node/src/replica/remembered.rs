@@ -1,10 +1,10 @@
 //! The newest sample of a program that a station remembers, for a remote I/O that has lost its memory, and which other stations cannot have proved
 //! an output of a newer one.
 
+use understudy_cycle::Versions;
 use understudy_wire::{Holding, Moment, Recalled, Sample, SamplesReceived, StationId, StationSet};
 
 use super::Replica;
-use crate::settings::Program;
 
 /// The newest sample of the program that this station remembers, for a remote I/O that has lost its memory.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -21,7 +21,7 @@ impl Replica {
     /// Remembers the sample of `moment`, whether it can be followed or not.
     pub(crate) fn remember(
         &mut self,
-        program: &Program,
+        versions: Versions<'_>,
         moment: Moment,
         sample: &Sample,
         received: SamplesReceived,
@@ -29,7 +29,7 @@ impl Replica {
         let Some(inputs) = sample.without_forces() else {
             return;
         };
-        if inputs.width() == program.executable.input_count() {
+        if inputs.width() == versions.input_count() {
             if let Remembered::Received(known) = &mut self.remembered {
                 // A copy of it, or of one before it, says nothing of the stations that were received since.
                 if moment.epoch == known.sampled.epoch && moment <= known.sampled {
@@ -125,9 +125,9 @@ impl Replica {
     }
 
     /// Takes what another station remembers, where this one has received no sample.
-    pub(crate) fn take_recalled(&mut self, program: &Program, recalled: &Recalled) {
+    pub(crate) fn take_recalled(&mut self, versions: Versions<'_>, recalled: &Recalled) {
         if self.remembered == Remembered::Nothing
-            && recalled.inputs.width() == program.executable.input_count()
+            && recalled.inputs.width() == versions.input_count()
         {
             let recalled = Recalled { received: SamplesReceived::Nothing, ..recalled.clone() };
             self.remembered = Remembered::Relayed(recalled);

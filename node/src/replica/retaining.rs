@@ -9,6 +9,7 @@
 
 use std::collections::VecDeque;
 
+use understudy_cycle::{Program, Versions};
 use understudy_executable::Scratch;
 use understudy_wire::{
     Carried, ClusterHash, Digest, Image, Kept, Lineage, ProgramId, Retained, RetainedRun,
@@ -16,7 +17,6 @@ use understudy_wire::{
 };
 
 use super::{Held, Replica, State};
-use crate::settings::Program;
 
 /// What a replica keeps on disk, and what it has found there.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
@@ -50,7 +50,6 @@ impl Retaining {
     pub(super) fn stepped(
         &mut self,
         id: ProgramId,
-        program: &Program,
         held: &Held,
         inputs: &Image,
     ) {
@@ -59,7 +58,7 @@ impl Retaining {
         let Some(keeps) = &mut self.keeps else {
             return;
         };
-        let State { bits, lineage, stepped, digest } = &held.state;
+        let State { bits, program, lineage, stepped, digest } = &held.state;
         let leads_on = keeps.at.is_some_and(|at| at.after(inputs) == *lineage);
         keeps.at = Some(*lineage);
         keeps.steps += 1;
@@ -77,7 +76,7 @@ impl Retaining {
             Retained::State(RetainedState {
                 cluster: keeps.cluster,
                 program: id,
-                hash: program.hash,
+                hash: *program,
                 number,
                 born: held.born,
                 lineage: *lineage,
@@ -98,7 +97,7 @@ impl Replica {
     /// Takes what was kept before the power failed, in the order of its numbers; of another program it takes the number alone.
     pub(crate) fn find_retained(
         &mut self,
-        program: &Program,
+        versions: Versions<'_>,
         scratch: &mut Scratch,
         run: &RetainedRun,
     ) {
@@ -107,15 +106,18 @@ impl Replica {
             return;
         };
         keeps.number = keeps.number.max(kept.number.saturating_add(1));
-        let inputs = program.executable.input_count();
-        if kept.hash != program.hash
-            || kept.state.width() != program.executable.state_count()
+        let inputs = versions.input_count();
+        let Some(program) = versions.of(kept.hash) else {
+            return;
+        };
+        if kept.state.width() != program.executable.state_count()
             || run.steps.iter().any(|step| step.inputs.width() != inputs)
         {
             return;
         }
         let mut state = State {
             bits: kept.state.clone(),
+            program: kept.hash,
             lineage: kept.lineage,
             stepped: kept.stepped,
             digest: kept.digest,
@@ -142,11 +144,11 @@ impl Replica {
     }
 
     /// The retained state that it reports, while it holds none.
-    pub(crate) fn retained(&self, program: &Program) -> Option<Kept> {
+    pub(crate) fn retained(&self) -> Option<Kept> {
         let found = self.retaining.found.as_ref().filter(|_| self.held.is_none())?;
         let (of, is_whole) = match self.retaining.carried {
             Some(carried) => (carried.from, carried.is_whole),
-            None => (program.hash, true),
+            None => (found.state.program, true),
         };
         Some(Kept { holding: found.holding(self.id), of, is_whole })
     }
@@ -184,26 +186,27 @@ impl Replica {
     /// the retained one.
     pub(super) fn start_in(
         &self,
-        program: &Program,
+        versions: Versions<'_>,
         sample: &Sample,
         lineages: &[Lineage],
     ) -> Option<(usize, State)> {
         let place_of = |start| lineages.iter().position(|&lineage| lineage == start);
-        let executable = &program.executable;
-        let state = |lineage, words: &[u64]| State {
-            bits: Image::from_words(executable.state_count(), words)
-                .expect("a state of this program is packed"),
-            lineage,
-            stepped: sample.born,
-            digest: Digest::default(),
+        let start = |program: &Program, lineage, words: &[u64]| {
+            let place = place_of(lineage)?;
+            let bits = Image::from_words(program.executable.state_count(), words)
+                .expect("a state of this program is packed");
+            let (stepped, digest) = (sample.born, Digest::default());
+            Some((place, State { bits, program: program.hash, lineage, stepped, digest }))
         };
-        let genesis = Lineage::genesis(program.hash, sample.born);
-        if let Some(place) = place_of(genesis) {
-            return Some((place, state(genesis, executable.initial())));
-        }
-        let found = self.retaining.found.as_ref()?;
-        let warm = Lineage::warm(program.hash, sample.born, found.state.lineage);
-        let place = place_of(warm)?;
-        Some((place, state(warm, &executable.restarted(found.state.bits.words()))))
+        versions.all().find_map(|program| {
+            let genesis = Lineage::genesis(program.hash, sample.born);
+            if let Some(cold) = start(program, genesis, program.executable.initial()) {
+                return Some(cold);
+            }
+            let found = self.retaining.found.as_ref();
+            let found = found.filter(|found| found.state.program == program.hash)?;
+            let warm = Lineage::warm(program.hash, sample.born, found.state.lineage);
+            start(program, warm, &program.executable.restarted(found.state.bits.words()))
+        })
     }
 }

@@ -91,6 +91,7 @@ impl Truth {
             header: Header {
                 cluster: ClusterHash(1),
                 configuration: ConfigurationHash(1),
+                prepared: None,
                 moment: moment(self.cycle),
                 sender: Member::RemoteIo(ProgramId(0)),
                 alone: false,

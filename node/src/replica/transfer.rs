@@ -13,12 +13,14 @@
 
 use std::collections::VecDeque;
 
+use understudy_cycle::Versions;
 use understudy_executable::Scratch;
-use understudy_wire::{Digest, Image, Lineage, Partial, Segment, SegmentMask, StationId, Transfer};
+use understudy_wire::{
+    Digest, Image, Lineage, Partial, Segment, SegmentMask, StationId, Step, Transfer,
+};
 
 use super::log::Log;
 use super::{Held, Remembered, Replica, Standing, State};
-use crate::settings::Program;
 
 /// Segments of wide states that a station sends in a cycle, all states together: 16 KiB.
 pub(crate) const SEGMENTS_A_CYCLE: usize = 2;
@@ -75,7 +77,6 @@ impl Replica {
     /// still be sent in this cycle.
     pub(crate) fn transfer(
         &mut self,
-        program: &Program,
         to: StationId,
         partial: Option<&Partial>,
         budget: &mut usize,
@@ -95,7 +96,7 @@ impl Replica {
             Some(Transfer {
                 to,
                 program: self.id,
-                hash: program.hash,
+                hash: held.state.program,
                 born: held.born,
                 lineage: held.state.lineage,
                 stepped: held.state.stepped,
@@ -144,16 +145,18 @@ impl Replica {
     /// that of this replica from now on.
     pub(crate) fn adopt(
         &mut self,
-        program: &Program,
+        versions: Versions<'_>,
         scratch: &mut Scratch,
         (from, transfer): (StationId, &Transfer),
         shadow_cycles: u32,
     ) -> bool {
         let segment = &transfer.state;
+        let Some(program) = versions.of(transfer.hash) else {
+            return false;
+        };
         let width = program.executable.state_count();
         if self.standing != Standing::Lost
             || self.joining.behind.is_some()
-            || transfer.hash != program.hash
             || segment.width as usize != width
         {
             return false;
@@ -174,6 +177,7 @@ impl Replica {
                         born: transfer.born,
                         state: State {
                             bits: Image::zero(width),
+                            program: transfer.hash,
                             lineage: transfer.lineage,
                             stepped: transfer.stepped,
                             digest: transfer.digest,
@@ -196,13 +200,13 @@ impl Replica {
             return false;
         };
         Digest::of(&arrived.held.state.bits) == arrived.whole
-            && self.arrived(program, scratch, (from, arrived.held), shadow_cycles)
+            && self.arrived(versions, scratch, (from, arrived.held), shadow_cycles)
     }
 
     /// Takes a whole state, if it leads to the last sample.
     fn arrived(
         &mut self,
-        program: &Program,
+        versions: Versions<'_>,
         scratch: &mut Scratch,
         (from, held): (StationId, Held),
         shadow_cycles: u32,
@@ -221,14 +225,14 @@ impl Replica {
             return false;
         }
         self.joining.behind = Some(Behind { from, held, past: VecDeque::new() });
-        self.catch_up(program, scratch, shadow_cycles).is_some()
+        self.catch_up(versions, scratch, shadow_cycles).is_some()
     }
 
     /// Replays some samples of the log onto a state that was transferred. Once none is left, the replica has that state: the station
     /// that it is from.
     pub(super) fn catch_up(
         &mut self,
-        program: &Program,
+        versions: Versions<'_>,
         scratch: &mut Scratch,
         shadow_cycles: u32,
     ) -> Option<StationId> {
@@ -240,11 +244,16 @@ impl Replica {
         }
         let is_wide = Segment::count(held.state.bits.width()) > 1;
         let most = if is_wide { REPLAYED_A_CYCLE } else { usize::MAX };
-        let samples: Vec<Image> = std::iter::from_fn(|| log.take()).take(most).collect();
+        let samples: Vec<Step> = std::iter::from_fn(|| log.take()).take(most).collect();
         let (moment, is_over) = (log.moment, log.is_empty());
         let before = (self.held.replace(held), std::mem::replace(&mut self.past, past));
-        for inputs in &samples {
-            self.step(program, scratch, inputs, moment);
+        let replayed =
+            samples.iter().try_for_each(|step| self.step(versions, scratch, step, moment));
+        if replayed.is_err() {
+            // The log changes to a program that is not loaded here.
+            (self.held, self.past) = before;
+            self.step.after = None;
+            return None;
         }
         if is_over {
             if let Some(held) = &mut self.held {

@@ -13,7 +13,7 @@
 use std::sync::Arc;
 
 use understudy_wire::{
-    Body, Frame, Header, Holding, Member, ProgramSet, Recalled, Relayed, Sample, StationId, Turn,
+    Body, Frame, Header, Holding, Member, ProgramSet, Recalled, Relayed, StationId, Turn,
     encode,
 };
 
@@ -25,7 +25,7 @@ impl Station {
         let is_new = !self.has_sample(frame.header.sender);
         if let Body::Sample(sample) = &frame.body
             && is_new
-            && leads_to_its_lineage(sample)
+            && sample.is_intact()
         {
             self.cycle.samples.push(Arc::clone(frame));
         }
@@ -122,10 +122,4 @@ impl Station {
         let mut samples = self.cycle.samples.iter();
         samples.any(|frame| frame.header.sender == sender)
     }
-}
-
-/// Whether the sample is unchanged since it was sampled.
-fn leads_to_its_lineage(sample: &Sample) -> bool {
-    let newest = sample.history.last();
-    newest.is_some_and(|newest| sample.before.after(newest) == sample.after)
 }

@@ -31,8 +31,7 @@ impl Station {
             if others_give {
                 continue;
             }
-            let program = &self.settings.programs[program.index()];
-            for transfer in replica.transfer(program, station, partial, &mut budget) {
+            for transfer in replica.transfer(station, partial, &mut budget) {
                 self.member.send(Body::Transfer(transfer));
             }
         }
@@ -46,9 +45,13 @@ impl Station {
         let Some(replica) = replica_mut(&mut self.replicas, transfer.program) else {
             return;
         };
-        let program = &self.settings.programs[transfer.program.index()];
+        let versions = self.settings.versions(&self.member, transfer.program);
         let shadow_cycles = self.settings.agreement.shadow_cycles;
-        if replica.adopt(program, &mut self.scratch, (from, transfer), shadow_cycles) {
+        if versions.of(transfer.hash).is_none() {
+            let moment = self.member.moment();
+            return self.miss_program(moment, transfer.program, transfer.hash);
+        }
+        if replica.adopt(versions, &mut self.scratch, (from, transfer), shadow_cycles) {
             let event = Event::Adopted {
                 moment: self.member.moment(),
                 program: transfer.program,
@@ -80,11 +83,7 @@ impl Station {
             self.member.send(Body::Join(Join {
                 wants,
                 holdings,
-                retained: self
-                    .replicas
-                    .iter()
-                    .filter_map(|it| it.retained(&self.settings.programs[it.id().index()]))
-                    .collect(),
+                retained: self.replicas.iter().filter_map(Replica::retained).collect(),
                 recalled,
                 lacks: self.lacks(),
                 partial,

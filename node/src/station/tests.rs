@@ -178,6 +178,7 @@ fn frame(moment: Moment, (sender, body): (Member, Body)) -> Arc<Frame> {
     let header = Header {
         cluster: ClusterHash(1),
         configuration: ConfigurationHash(2),
+        prepared: None,
         moment,
         sender,
         alone: false,

@@ -150,9 +150,11 @@ impl Station {
                 replica.may_publish(moment) && Segment::count(state.width()) == 1
             });
             if let Some((lineage, state)) = state {
-                let event =
-                    Event::Holds { moment, program: replica.id(), lineage, state: state.clone() };
-                self.report(event);
+                let (program, of) = (replica.id(), replica.last_step().program);
+                let first = self.settings.programs[program.index()].hash;
+                let changed = (of != first).then_some(of);
+                let state = state.clone();
+                self.report(Event::Holds { moment, program, changed, lineage, state });
             }
         }
     }
@@ -190,7 +192,13 @@ impl Station {
             let place = place_of(replicas, program)?;
             Some(replicas[place].outputs())
         };
-        let word_of = |mask| match &self.settings.generated {
+        let is_first = |replica: &Replica| {
+            replica.last_step().program == self.settings.programs[replica.id().index()].hash
+        };
+        // It is generated from the programs that this station started with.
+        let generated = self.settings.generated.as_ref();
+        let generated = generated.filter(|_| self.replicas.iter().all(is_first));
+        let word_of = |mask| match generated {
             None => understudy_parity::sum(mask, outputs_of),
             Some(generated) => {
                 let steps = self.replicas.iter().map(Replica::last_step);

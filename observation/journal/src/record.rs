@@ -181,10 +181,12 @@ pub fn moment(event: &Happening) -> Option<Moment> {
             | Station::Readmitted { moment, .. }
             | Station::SamplesMissing { moment, .. }
             | Station::SamplesReturned { moment, .. }
+            | Station::NotPrepared { moment, .. }
             | Station::Stalled { moment, .. } => Some(*moment),
-            Station::Refused { .. } | Station::RefusalEnded { .. } | Station::Outvoted { .. } => {
-                None
-            }
+            Station::Refused { .. }
+            | Station::RefusalEnded { .. }
+            | Station::Outvoted { .. }
+            | Station::Configured(_) => None,
         },
         Happening::RemoteIo(event) => match event {
             RemoteIo::Sampled { moment, .. }
@@ -215,11 +217,13 @@ pub fn moment(event: &Happening) -> Option<Moment> {
             | RemoteIo::ValueFault { moment, .. }
             | RemoteIo::Disputed { moment, .. }
             | RemoteIo::ConfigurationDisputed { moment, .. }
+            | RemoteIo::ProgramChanged { moment, .. }
             | RemoteIo::Stalled { moment, .. } => Some(*moment),
             RemoteIo::StartedCold { born, .. } | RemoteIo::StartedWarm { born, .. } => Some(*born),
             RemoteIo::Refused { .. }
             | RemoteIo::RefusalEnded { .. }
-            | RemoteIo::Outvoted { .. } => None,
+            | RemoteIo::Outvoted { .. }
+            | RemoteIo::Configured(_) => None,
         },
         Happening::Plant(understudy_plant::Event::Stepped { moment, .. }) => Some(*moment),
         Happening::Plant(_) | Happening::Host(_) | Happening::Run(_) => None,

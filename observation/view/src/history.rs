@@ -12,7 +12,9 @@ use understudy_cluster::Cluster;
 use understudy_remote_io::{Event, Missing};
 use understudy_simulator::{Referee, Violation};
 use understudy_typed::{Fault, Program as TypedProgram};
-use understudy_wire::{Image, Lineage, Moment, ProgramId, Source, StationId, StationSet, Write};
+use understudy_wire::{
+    Image, Lineage, Moment, ProgramHash, ProgramId, Source, StationId, StationSet, Write,
+};
 
 use order::Order;
 
@@ -85,7 +87,7 @@ pub struct History {
     /// The newest samples, while it is not known which state they belong to.
     unplaced: VecDeque<Event>,
     /// The state after a sample that is still to come.
-    awaited: Option<(Moment, Lineage, Image)>,
+    awaited: Option<(Moment, (Option<ProgramHash>, Lineage), Image)>,
     end: End,
     order: Order,
     /// Whether fail-safe outputs depend on earlier deadlines.
@@ -231,16 +233,21 @@ impl History {
     }
 
     /// A station holds this state after the sample of `moment`: where a journal begins in the middle of a run, it is known from here on.
-    pub(crate) fn holds(&mut self, moment: Moment, lineage: Lineage, state: &Image) {
+    pub(crate) fn holds(
+        &mut self,
+        moment: Moment,
+        (changed, lineage): (Option<ProgramHash>, Lineage),
+        state: &Image,
+    ) {
         if self.referee.standing().is_some() {
             return;
         }
         let place = self.unplaced.iter().position(|it| is_of(it, moment));
         let Some(place) = place else {
-            self.awaited = Some((moment, lineage, state.clone()));
+            self.awaited = Some((moment, (changed, lineage), state.clone()));
             return;
         };
-        self.referee.goes_on_from(lineage, state.clone());
+        self.referee.goes_on_from((changed, lineage), state.clone());
         let later: Vec<Event> = self.unplaced.drain(..).skip(place + 1).collect();
         self.awaited = None;
         for event in later {
@@ -255,7 +262,8 @@ impl History {
     /// Takes a sample; what it did, where the state before it is known, and what is wrong with it.
     fn sample(&mut self, event: &Event) -> (Option<Sampled>, Option<Violation>) {
         let violation = self.referee.observe(event).err();
-        let Event::Sampled { moment, inputs, before, .. } = event else {
+        let Event::Sampled { moment, inputs, before, change: None, .. } = event else {
+            // The state before a change mark is one of another program than that which takes the sample.
             return (None, violation);
         };
         let truth = self.referee.truth().filter(|(of, _)| of == moment);
@@ -296,9 +304,9 @@ impl History {
             return;
         }
         match self.awaited.take_if(|(of, ..)| *of == moment) {
-            Some((_, lineage, state)) => {
+            Some((_, of, state)) => {
                 self.unplaced.clear();
-                self.referee.goes_on_from(lineage, state);
+                self.referee.goes_on_from(of, state);
             }
             None => {
                 if self.unplaced.len() == NEWEST {

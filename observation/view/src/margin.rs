@@ -199,6 +199,7 @@ fn turn(station: StationId, holds: ProgramSet, words: Vec<Word>) -> Arc<Frame> {
         header: Header {
             cluster: ClusterHash::default(),
             configuration: ConfigurationHash::default(),
+            prepared: None,
             moment: Moment::default(),
             sender: Member::Station(station),
             alone: false,

@@ -3,13 +3,15 @@
 //! ```text
 //!   retentive in both, of one type                         kept
 //!   the same, and the type has become wider                converted: INT to DINT or REAL, WORD to DWORD, the values of an enumeration by their names
+//!   the same, and the type has become narrower             converted, where the new type has the value
 //!   retentive in the new program only                      new: it has its initial value
-//!   retentive in the old program only, or of a type that
-//!   does not have all values of the old one                dropped
+//!   retentive in the old program only, or of a value that
+//!   the new type does not have                             dropped
 //! ```
 //!
 //! A path is that of a variable, of a member of a structure or of a function block, or of elements of an array. What has become of a path depends
-//! on the declarations, except where a value has no name in its enumeration or is outside of a declared subrange: that one is dropped. References
+//! on the declarations, except where a value has no name in its enumeration, is none of a narrower type or is outside of a declared subrange: that one
+//! is dropped. References
 //! are bound anew by the calls. The scans since the cold start become those of the same time, rounded up, so that no moment that a retentive variable
 //! holds is one of the future.
 //!
@@ -118,6 +120,18 @@ impl Program {
             walk.state[SCANS] = u64::try_from(scans).unwrap_or(u64::MAX);
         }
         CarriedState { state: walk.state, paths }
+    }
+
+    /// The state with which this program goes on from a state of the program before it, in an online change: as [`Self::carried`], with all variables
+    /// in place of the retentive ones. A program that a fault has stopped stays stopped.
+    ///
+    /// # Panics
+    /// If `state` is shorter than a state of `before`.
+    pub fn changed(&self, before: &Self, state: &[u64], told: Told<'_>) -> CarriedState {
+        let [new, old] = [self, before].map(Self::all_retentive);
+        let mut changed = new.carried(&old, state, told);
+        changed.state[..SCANS].copy_from_slice(&state[..SCANS]);
+        changed
     }
 }
 

@@ -29,6 +29,17 @@ impl Program {
         self.retained.splice(first..behind, std::iter::once(start..end));
     }
 
+    /// The same program, all of whose variables are retentive.
+    pub(crate) fn all_retentive(&self) -> Self {
+        let mut whole = self.clone();
+        for variable in &self.variables {
+            let end = variable.slot.saturating_add(variable.of.slots() as u32);
+            // What lives in the frames of one scan is no state.
+            whole.retain(variable.slot..end.min(self.state));
+        }
+        whole
+    }
+
     /// Whether a restart keeps anything.
     pub fn is_retentive(&self) -> bool {
         !self.retained.is_empty()

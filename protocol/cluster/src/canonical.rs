@@ -41,18 +41,18 @@ pub(crate) fn circuit_text(circuit: &Circuit, retentive: &[u64]) -> String {
     walk.text
 }
 
-/// A typed program: its layout, its routines with the lines that a fault names, and its initial state. Names of variables inside are not in
-/// it.
+/// A typed program: its layout, its routines with the lines that a fault names, and its initial state. The names and types of its variables are in it,
+/// because a program after it takes over their values by them.
 pub(crate) fn typed_text(program: &TypedProgram) -> String {
     let TypedProgram {
         name: _,
         period,
         budget,
-        enumerations: _,
-        structures: _,
+        enumerations,
+        structures,
         routines,
         tasks,
-        variables: _,
+        variables,
         inputs,
         outputs,
         state,
@@ -66,7 +66,7 @@ pub(crate) fn typed_text(program: &TypedProgram) -> String {
         false => format!("retained {retained:?}\n"),
     };
     format!(
-        "typed program\nperiod {period}\nbudget {budget}\nmemory {state} {frames}\n{inputs:#?}\n{outputs:#?}\n{tasks:#?}\n{initial:?}\n{routines:#?}\n{kept}"
+        "typed program\nperiod {period}\nbudget {budget}\nmemory {state} {frames}\n{inputs:#?}\n{outputs:#?}\n{tasks:#?}\n{initial:?}\n{routines:#?}\n{variables:?}\n{structures:?}\n{enumerations:?}\n{kept}"
     )
 }
 

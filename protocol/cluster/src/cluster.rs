@@ -15,11 +15,10 @@ use crate::source::{InputSource, OperatorDeclaration, SignalDeclaration};
 use crate::undriven::initial_image;
 use serde::{Deserialize, Serialize};
 use understudy_bits::Inexact;
-use understudy_cycle::{Agreement, Mode};
+use understudy_cycle::{Agreement, Mode, Program};
 use understudy_executable::Interface;
 use understudy_ladder::Program as LadderProgram;
 use understudy_logic::Circuit;
-use understudy_node::Program;
 use understudy_parity::ParityController;
 use understudy_plant::{Followed, Plant};
 use understudy_remote_io::{
@@ -215,6 +214,8 @@ pub struct Cluster {
     pub(crate) security: Security,
     pub(crate) agreement: Arc<Agreement>,
     pub(crate) canonical_text: String,
+    /// The same without the programs: what an online change does not touch.
+    pub(crate) frame_text: String,
     pub(crate) controllers: Vec<Controller>,
     pub(crate) understudies: Vec<Understudy>,
     pub(crate) remote_ios: Vec<RemoteIo>,

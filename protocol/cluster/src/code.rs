@@ -126,6 +126,23 @@ impl Code {
     /// # Panics
     /// If `state` is shorter than a state of `before`.
     pub fn carried(&self, before: &Self, state: &[u64]) -> CarriedState {
+        self.with_values_of(before, state, TypedProgram::carried)
+    }
+
+    /// The state with which it goes on from a state of the program before it, in an online change; as [`Self::carried`], of all variables.
+    ///
+    /// # Panics
+    /// If `state` is shorter than a state of `before`.
+    pub fn changed(&self, before: &Self, state: &[u64]) -> CarriedState {
+        self.with_values_of(before, state, TypedProgram::changed)
+    }
+
+    fn with_values_of(
+        &self,
+        before: &Self,
+        state: &[u64],
+        take: impl FnOnce(&TypedProgram, &TypedProgram, &[u64], Told<'_>) -> CarriedState,
+    ) -> CarriedState {
         let (old, new) = (before.layout(), self.layout());
         let held =
             |layout: Option<&Layout>, address| layout.is_none_or(|layout| layout.holds(address));
@@ -133,7 +150,7 @@ impl Code {
             is_known: &|address| held(old, address),
             is_read: &|address| held(new, address),
         };
-        let mut carried = self.typed.carried(&before.typed, &before.typed_state(state), told);
+        let mut carried = take(&self.typed, &before.typed, &before.typed_state(state), told);
         if let Some(layout) = new {
             let executable = self.executable();
             let registers = layout.registers(&self.typed, &carried.state, executable.initial());

@@ -16,8 +16,12 @@ use crate::source::{InputSource, InputSourceKind};
 /// Raised when equal texts would mean something else than before.
 const VERSION: u32 = 1;
 
-/// `plants` in the order of programs, from [`plant_text`]; empty where there is none.
-pub(crate) fn configuration_text(cluster: &Cluster, plants: &[String]) -> String {
+/// `plants` in the order of programs, from [`plant_text`]; empty where there is none. `program_text` says what of a program is in it.
+pub(crate) fn configuration_text(
+    cluster: &Cluster,
+    plants: &[String],
+    program_text: impl Fn(&Code) -> String,
+) -> String {
     let agreement = &cluster.agreement;
     let schedule = &agreement.schedule;
     let mut text = String::new();
@@ -45,7 +49,7 @@ pub(crate) fn configuration_text(cluster: &Cluster, plants: &[String]) -> String
     let programs = cluster.controllers.iter().zip(cluster.programs.iter());
     for ((controller, program), ((remote_io, plant), plant_text)) in programs.zip(remote_ios) {
         line(format_args!("controller {}", controller.name));
-        line(format_args!("{}", indented(&controller.code.text())));
+        line(format_args!("{}", indented(&program_text(&controller.code))));
         line(format_args!("remote io {}", remote_io.name));
         line(format_args!("  hold {}", remote_io.hold_cycles));
         line(format_args!("  fail-safe {}", remote_io.fail_safe));
@@ -78,6 +82,19 @@ pub(crate) fn configuration_text(cluster: &Cluster, plants: &[String]) -> String
         line(format_args!("understudy {}{spare}", understudy.name));
     }
     text
+}
+
+/// In the place of a program.
+pub(crate) const PROGRAM: &str = "the program";
+
+/// A text that has [`PROGRAM`] in the place of each program, with the programs that `next` gives one after another.
+pub(crate) fn with_programs(text: &str, mut next: impl FnMut() -> String) -> String {
+    let place = indented(PROGRAM);
+    let lines = text.lines().map(|line| {
+        let line = if line == place { indented(&next()) } else { line.to_owned() };
+        line + "\n"
+    });
+    lines.collect()
 }
 
 /// Source of an input; texts for people are not in it.

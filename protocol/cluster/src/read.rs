@@ -55,7 +55,7 @@ use std::time::Duration;
 use understudy_cycle::{Agreement, Mode, Schedule, Turns};
 use understudy_executable::Interface;
 use understudy_logic::Circuit;
-use understudy_node::Program;
+use understudy_cycle::Program;
 use understudy_remote_io::{Release, Restart, StaleState, ValueFault};
 use understudy_text::{Diagnostic, Report};
 use understudy_wire::{ClusterHash, ConfigurationHash, MAXIMUM_PROGRAMS, StationId, StationSet};
@@ -66,7 +66,7 @@ use self::names::Names;
 use crate::address::Addresses;
 use crate::cluster::{Cluster, Controller, Link, RemoteIo, Security, Understudy};
 use crate::code::Code;
-use crate::configuration::configuration_text;
+use crate::configuration::{PROGRAM, configuration_text};
 use crate::file::{self, ClusterFile, ControllerSection};
 
 /// The longest cluster file in bytes.
@@ -229,6 +229,7 @@ fn build(
         security: overrides.security.unwrap_or([Security::Keys, Security::Off][cluster.security]),
         agreement: Arc::new(agreement.clone()),
         canonical_text: String::new(),
+        frame_text: String::new(),
         controllers,
         understudies,
         remote_ios,
@@ -238,7 +239,8 @@ fn build(
         programs,
         parity,
     };
-    cluster.canonical_text = configuration_text(&cluster, &plants.texts);
+    cluster.canonical_text = configuration_text(&cluster, &plants.texts, Code::text);
+    cluster.frame_text = configuration_text(&cluster, &plants.texts, |_| PROGRAM.to_owned());
     let configuration = ConfigurationHash::of(cluster.canonical_text.as_bytes());
     cluster.agreement = Arc::new(Agreement { configuration, ..agreement });
     Some(cluster)

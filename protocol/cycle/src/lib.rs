@@ -7,6 +7,7 @@
 
 mod agreement;
 mod attendance;
+mod change;
 mod clock;
 mod copies;
 mod machine;
@@ -18,6 +19,9 @@ mod waking;
 
 pub use agreement::{Agreement, Mode};
 pub use attendance::{Attendance, Change};
+pub use change::{
+    ChangeOrder, Changing, Conversion, OnlineChange, Program, ProgramChange, Versions,
+};
 pub use clock::{Arrival, CycleClock};
 pub use copies::Copies;
 pub use machine::{Input, Machine, Output, Outvoted, RemoteIoInput};

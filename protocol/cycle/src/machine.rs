@@ -7,6 +7,8 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use crate::change::ChangeOrder;
+
 use understudy_wire::{
     ConfigurationHash, Force, Frame, Image, OrderRefusal, Retained, SignalPlace, StateChoice, Time,
     Write, WriteAnswer,
@@ -21,6 +23,8 @@ pub enum Input<'a> {
     Frame(&'a Arc<Frame>),
     /// An input that only a remote I/O takes; stations and plants ignore it.
     RemoteIo(RemoteIoInput<'a>),
+    /// An engineer moves an online change on.
+    Change(&'a ChangeOrder),
 }
 
 /// An input of a remote I/O, from its field equipment or from the operator.
@@ -60,7 +64,7 @@ pub enum Output<Event> {
     Retain(Retained),
     /// The answer to a write.
     Answer(WriteAnswer),
-    /// What became of the release, the choice, the force or the end of a force that was given last; once for each.
+    /// What became of the release, the choice, the force, the end of a force or the step of an online change that was given last; once for each.
     Obeyed(Result<(), OrderRefusal>),
 }
 

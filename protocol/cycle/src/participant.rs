@@ -10,11 +10,13 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_wire::{
-    Body, ConfigurationHash, Frame, Header, Member, Moment, StationId, StationSet, Time,
+    Body, ConfigurationHash, Configurations, Frame, Header, Member, Moment, OrderRefusal, StationId,
+    StationSet, Time,
 };
 
 use crate::agreement::Agreement;
 use crate::attendance::{Attendance, Change};
+use crate::change::{ChangeOrder, Changing, OnlineChange};
 use crate::clock::{Arrival, CycleClock};
 use crate::copies::Copies;
 use crate::machine::{Output, Outvoted};
@@ -62,6 +64,8 @@ pub enum Notice {
     },
     /// This member does not take part yet, and more stations have one other configuration than have its own.
     Outvoted(Outvoted),
+    /// The configuration that this member runs, and the one that it has loaded beside it, after an order of an online change.
+    Configured(Configurations),
     /// The host woke this member too late to keep its times.
     Stalled {
         /// Current cycle.
@@ -76,6 +80,7 @@ pub enum Notice {
 pub struct Endpoint<Event> {
     own: Member,
     agreement: Arc<Agreement>,
+    changing: Changing,
     reception: Reception,
     outbox: VecDeque<Output<Event>>,
 }
@@ -86,6 +91,7 @@ impl<Event: From<Refusal>> Endpoint<Event> {
         Self {
             own,
             agreement: Arc::clone(agreement),
+            changing: Changing::new(agreement.configuration),
             reception: Reception::new(own, agreement),
             outbox: VecDeque::new(),
         }
@@ -94,7 +100,7 @@ impl<Event: From<Refusal>> Endpoint<Event> {
     /// Whether a frame with this header counts that arrives at `now`; reports when the refusal of a member begins and ends.
     pub fn admits(&mut self, now: Time, header: &Header) -> bool {
         let member = header.sender;
-        match self.reception.admit(now, header) {
+        match self.reception.admit(now, header, self.changing.configurations()) {
             Admission::Admitted => true,
             Admission::AdmittedAgain => {
                 self.report(Event::from(Refusal::Ends { member }));
@@ -102,11 +108,18 @@ impl<Event: From<Refusal>> Endpoint<Event> {
             }
             Admission::Dropped => false,
             Admission::Refused { theirs } => {
-                let ours = self.agreement.configuration;
+                let ours = self.changing.configurations().own;
                 self.report(Event::from(Refusal::Begins { member, theirs, ours }));
                 false
             }
         }
+    }
+
+    /// Takes an order of an online change, as [`Changing::take`] does, and answers it.
+    pub fn take_change(&mut self, now: Time, order: &ChangeOrder, may_forget: bool) {
+        let may_forget = may_forget && !self.reception.needs_prepared(now);
+        let outcome = self.changing.take(order, may_forget);
+        self.put(Output::Obeyed(outcome));
     }
 
     /// Reports the refusals that have ended by `now`.
@@ -118,10 +131,12 @@ impl<Event: From<Refusal>> Endpoint<Event> {
 
     /// A frame of this member.
     pub fn frame(&self, moment: Moment, alone: bool, body: Body) -> Frame {
+        let Configurations { own, prepared } = self.changing.configurations();
         Frame {
             header: Header {
                 cluster: self.agreement.cluster,
-                configuration: self.agreement.configuration,
+                configuration: own,
+                prepared,
                 moment,
                 sender: self.own,
                 alone,
@@ -192,6 +207,37 @@ impl<Event: From<Refusal> + From<Notice>> Participant<Event> {
         self.clock.moment().unwrap_or_default()
     }
 
+    /// What it knows of an online change.
+    pub fn changing(&self) -> &Changing {
+        &self.endpoint.changing
+    }
+
+    /// Takes an order of an online change, as [`Changing::take`] does, and answers it.
+    pub fn take_change(&mut self, now: Time, order: &ChangeOrder, may_forget: bool) {
+        let before = self.changing().configurations();
+        self.endpoint.take_change(now, order, may_forget);
+        let configurations = self.changing().configurations();
+        if configurations != before {
+            self.report(Event::from(Notice::Configured(configurations)));
+        }
+    }
+
+    /// Starts with a change that it had loaded before, and with the configurations that it had then. A change of other configurations is left out:
+    /// its refusal says so.
+    ///
+    /// # Errors
+    /// As of [`Changing::take`].
+    pub fn restore_change(
+        &mut self,
+        change: Arc<OnlineChange>,
+        Configurations { own, prepared }: Configurations,
+    ) -> Result<(), OrderRefusal> {
+        let changing = &mut self.endpoint.changing;
+        changing.take(&ChangeOrder::Prepare(change), true)?;
+        changing.take(&ChangeOrder::Run(own), true)?;
+        if prepared.is_none() { changing.take(&ChangeOrder::Forget, true) } else { Ok(()) }
+    }
+
     /// As [`Endpoint::admits`].
     pub fn admits(&mut self, now: Time, header: &Header) -> bool {
         self.endpoint.admits(now, header)
@@ -219,7 +265,7 @@ impl<Event: From<Refusal> + From<Notice>> Participant<Event> {
         };
         let since = *self.outvoted_since.get_or_insert(now);
         if now.since(since) >= OUTVOTED_AFTER && self.outvoted.is_none() {
-            let ours = self.agreement().configuration;
+            let ours = self.changing().configurations().own;
             let (stations, others) = (stations as u32, others as u32);
             let outvoted = Outvoted { ours, theirs, stations, others };
             self.outvoted = Some(outvoted);
@@ -330,7 +376,7 @@ impl<Event: From<Refusal> + From<Notice>> Participant<Event> {
 impl<Event> Hash for Participant<Event> {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
         let Self {
-            endpoint: Endpoint { own: _, agreement: _, reception, outbox: _ },
+            endpoint: Endpoint { own: _, agreement: _, changing, reception, outbox: _ },
             clock,
             attendance,
             copies,
@@ -338,7 +384,7 @@ impl<Event> Hash for Participant<Event> {
             outvoted_since,
             outvoted,
         } = self;
-        (reception, clock, attendance, copies, waking).hash(hasher);
+        (changing, reception, clock, attendance, copies, waking).hash(hasher);
         (outvoted_since, outvoted).hash(hasher);
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use crate::agreement::Agreement;
-use understudy_wire::{ClusterHash, ConfigurationHash, Header, Member, Time};
+use understudy_wire::{ClusterHash, ConfigurationHash, Configurations, Header, Member, Time};
 
 /// A refusal has ended when no frame of the other configuration was received for this time, and for some periods.
 const REFUSED_FOR: Duration = Duration::from_secs(1);
@@ -15,11 +15,12 @@ const REFUSED_FOR_PERIODS: u32 = 4;
 pub(crate) struct Reception {
     own: Member,
     cluster: ClusterHash,
-    configuration: ConfigurationHash,
     stations: usize,
     programs: usize,
     refused_for: Duration,
     refused: BTreeMap<Member, Other>,
+    /// When frames of members were admitted last that only have the prepared configuration in common with this one.
+    by_prepared: BTreeMap<Member, Time>,
 }
 
 /// A refused member.
@@ -55,16 +56,21 @@ impl Reception {
         Self {
             own,
             cluster: agreement.cluster,
-            configuration: agreement.configuration,
             stations: agreement.schedule.stations(),
             programs: agreement.schedule.controllers(),
             refused_for: REFUSED_FOR.max(agreement.schedule.period() * REFUSED_FOR_PERIODS),
             refused: BTreeMap::new(),
+            by_prepared: BTreeMap::new(),
         }
     }
 
-    /// Decides on the header of a frame that arrives at `now`.
-    pub(crate) fn admit(&mut self, now: Time, header: &Header) -> Admission {
+    /// Decides on the header of a frame that arrives at `now` at a member with these configurations.
+    pub(crate) fn admit(
+        &mut self,
+        now: Time,
+        header: &Header,
+        configurations: Configurations,
+    ) -> Admission {
         let known = match header.sender {
             Member::Station(station) => station.index() < self.stations,
             Member::RemoteIo(program) | Member::Plant(program) => program.index() < self.programs,
@@ -72,7 +78,7 @@ impl Reception {
         if header.cluster != self.cluster || header.sender == self.own {
             return Admission::Dropped;
         }
-        if header.configuration != self.configuration {
+        if !configurations.admit(header) {
             // A sender that is in no cluster of this size is reported too, once for all of them.
             let key = if known { header.sender } else { self.own };
             let theirs = header.configuration;
@@ -85,6 +91,14 @@ impl Reception {
             let other = Other { member: header.sender, configuration: theirs, received: now };
             self.refused.insert(key, other);
             return Admission::Refused { theirs };
+        }
+        if configurations.prepared.is_some() && known {
+            let without = Configurations { prepared: None, ..configurations };
+            if without.admit(header) {
+                self.by_prepared.remove(&header.sender);
+            } else {
+                self.by_prepared.insert(header.sender, now);
+            }
         }
         match known {
             true if self.refused.remove(&header.sender).is_some() => Admission::AdmittedAgain,
@@ -100,6 +114,11 @@ impl Reception {
         let (key, member) = (*key, other.member);
         self.refused.remove(&key);
         Some(member)
+    }
+
+    /// Whether a member is received at `now` that would be refused without the prepared configuration.
+    pub(crate) fn needs_prepared(&self, now: Time) -> bool {
+        self.by_prepared.values().any(|received| now.since(*received) < self.refused_for)
     }
 
     /// The number of members with another configuration that are received.
@@ -133,6 +152,7 @@ mod tests {
         Header {
             cluster: ClusterHash(1),
             configuration: ConfigurationHash(configuration),
+            prepared: None,
             moment: Moment::default(),
             sender,
             alone: false,
@@ -160,10 +180,11 @@ mod tests {
             Member::RemoteIo(ProgramId(40)),
         ] {
             let mut reception = Reception::new(own, &agreement);
-            let first = reception.admit(Time(0), &header(sender, 3));
+            let ours = Configurations { own: ConfigurationHash(2), prepared: None };
+            let first = reception.admit(Time(0), &header(sender, 3), ours);
             assert_eq!(first, Admission::Refused { theirs: ConfigurationHash(3) }, "{sender:?}");
             let last = Time(0) + PERIOD * 50;
-            assert_eq!(reception.admit(last, &header(sender, 3)), Admission::Dropped);
+            assert_eq!(reception.admit(last, &header(sender, 3), ours), Admission::Dropped);
             assert_eq!(reception.ended(last + (REFUSED_FOR - PERIOD)), None, "{sender:?}");
             assert_eq!(reception.ended(last + REFUSED_FOR), Some(sender));
             assert_eq!((reception.ended(last + REFUSED_FOR), reception.refused()), (None, 0));

@@ -94,6 +94,7 @@ fn datagram(cluster: &Cluster, keys: &MemberKeys, sender: Member) -> Vec<u8> {
         header: Header {
             cluster: agreement.cluster,
             configuration: agreement.configuration,
+            prepared: None,
             moment: Moment::default(),
             sender,
             alone: false,

@@ -36,6 +36,7 @@ fn turn() -> (Frame, Vec<u8>) {
         header: Header {
             cluster: ClusterHash(1),
             configuration: ConfigurationHash(2),
+            prepared: None,
             moment,
             sender: OWN,
             alone: false,

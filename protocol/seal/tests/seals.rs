@@ -81,6 +81,7 @@ fn framed(sender: Member, cycle: u64, body: Body) -> Frame {
         header: Header {
             cluster: ClusterHash(1),
             configuration: ConfigurationHash(2),
+            prepared: None,
             moment: Moment { epoch: Epoch(3), cycle: Cycle(cycle) },
             sender,
             alone: false,

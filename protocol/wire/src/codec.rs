@@ -22,7 +22,7 @@ use crate::write::{MAXIMUM_PULSES, MAXIMUM_SESSIONS, Pulse, WriteId};
 pub const MAXIMUM_FRAME_BYTES: usize = 32 * 1024;
 
 const MAGIC: [u8; 4] = *b"UNDR";
-const VERSION: u8 = 10;
+const VERSION: u8 = 11;
 const PREFIX_BYTES: usize = 5;
 const CHECKSUM_BYTES: usize = 4;
 /// Maximum number of positions that a plant shows.
@@ -198,8 +198,9 @@ fn kept_sample(sample: &Sample) -> Result<(), FrameError> {
     }
     kept_writes(&sample.writes)?;
     kept_pulses(&sample.pulses)?;
-    let width = sample.history[0].width();
-    if sample.history.iter().chain(&sample.unforced).all(|image| image.width() == width) {
+    let width = sample.history[0].inputs.width();
+    let inputs = sample.history.iter().map(|step| &step.inputs);
+    if inputs.chain(&sample.unforced).all(|image| image.width() == width) {
         Ok(())
     } else {
         Err(FrameError::Promise("all samples of a program are of one width"))

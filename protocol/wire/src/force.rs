@@ -7,7 +7,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::identifier::Moment;
+use crate::identifier::{ConfigurationHash, Moment};
+use crate::set::StationSet;
 
 /// Maximum duration of one force, in seconds.
 pub const MAXIMUM_FORCE_SECONDS: u32 = 3600;
@@ -165,6 +166,35 @@ pub enum OrderRefusal {
         /// Cycle of the newest available state.
         newest: Moment,
     },
+    /// Another online change is prepared.
+    #[error("another online change is prepared: accept it or cancel it first")]
+    AnotherChange,
+    /// The change begins and ends with other configurations than that of the member.
+    #[error("the change is not one of the configuration {own} that this member runs")]
+    OtherConfiguration {
+        /// Configuration of the member.
+        own: ConfigurationHash,
+    },
+    /// The member has not loaded the change.
+    #[error("this member has not loaded the change: prepare it first")]
+    NotPrepared,
+    /// Stations that compute the program and are received have not loaded the change: they would be silent after the switch.
+    #[error("stations that compute the program have not loaded the change: {}", stations_text(*.stations))]
+    StationsNotPrepared {
+        /// These stations.
+        stations: StationSet,
+    },
+    /// The program does not run, so there is no state to go on from.
+    #[error("the program does not run yet: no history of it is known")]
+    NotRunning,
+    /// The program, or a member that is received, still is that of the other configuration.
+    #[error("the other configuration is still needed: by a program that was not switched, or by a member that is received and has not accepted")]
+    StillNeeded,
+}
+
+fn stations_text(stations: StationSet) -> String {
+    let ranks: Vec<_> = stations.iter().map(|station| station.0.to_string()).collect();
+    format!("those of rank {}", ranks.join(", "))
 }
 
 impl OrderRefusal {
@@ -178,6 +208,12 @@ impl OrderRefusal {
         match self {
             Self::NoSignal | Self::Value { .. } | Self::Incomplete | Self::NotForced => "U0556",
             Self::NoChoice | Self::OtherState { .. } => "U0583",
+            Self::AnotherChange
+            | Self::OtherConfiguration { .. }
+            | Self::NotPrepared
+            | Self::StationsNotPrepared { .. }
+            | Self::NotRunning
+            | Self::StillNeeded => "U0632",
         }
     }
 }

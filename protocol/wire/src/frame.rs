@@ -44,9 +44,37 @@ pub struct Header {
     pub moment: Moment,
     /// Sender.
     pub sender: Member,
+    /// The configuration that the sender has loaded beside its own, for an online change: members of either admit the frames of the other.
+    pub prepared: Option<ConfigurationHash>,
     /// Whether the sender has received no other member in this epoch yet; an epoch that only its founder knows binds no
     /// member.
     pub alone: bool,
+}
+
+/// The configuration of a member, and the one that it has loaded beside it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Configurations {
+    /// The one that it runs.
+    pub own: ConfigurationHash,
+    /// The one that an online change leads to, or came from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prepared: Option<ConfigurationHash>,
+}
+
+impl Configurations {
+    /// Whether a member with these takes a frame with this header: sender and receiver have a configuration in common.
+    pub fn admit(&self, header: &Header) -> bool {
+        header.configuration == self.own
+            || header.prepared == Some(self.own)
+            || self.prepared == Some(header.configuration)
+    }
+
+    /// Whether members with these and with `other` take each other's frames.
+    pub fn agree(&self, other: &Self) -> bool {
+        self.own == other.own
+            || other.prepared == Some(self.own)
+            || self.prepared == Some(other.own)
+    }
 }
 
 /// Content of a frame, by kind.
@@ -79,8 +107,8 @@ pub struct Sample {
     pub before: Lineage,
     /// The lineage after it, L(i)(t+1): a sample that does not lead to it was changed after it was sampled.
     pub after: Lineage,
-    /// Oldest first; the last is u(i)(t). Never empty.
-    pub history: SmallVec<[Image; 2]>,
+    /// Oldest first; the last is that of this cycle. Never empty.
+    pub history: SmallVec<[Step; 2]>,
     /// The cycle of the newest sample whose outputs were applied, direct or reconstructed: the history never continues
     /// from a state before it. `None` where no output of this history was applied.
     pub applied: Option<Moment>,
@@ -104,7 +132,28 @@ impl Sample {
     /// u(i)(t) without the forces of operators: what a remote I/O that restarts goes on from, because a force ends with its process. `None`
     /// without history.
     pub fn without_forces(&self) -> Option<&Image> {
-        self.unforced.as_ref().or(self.history.last())
+        self.unforced.as_ref().or(self.history.last().map(|step| &step.inputs))
+    }
+
+    /// Whether its last step leads from [`Self::before`] to [`Self::after`]; another one was changed on its way.
+    pub fn is_intact(&self) -> bool {
+        self.history.last().is_some_and(|newest| self.before.after_step(newest) == self.after)
+    }
+}
+
+/// One step of a program: what it reads, and the program that takes it from here on, where that changes.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Step {
+    /// The change mark: this program takes the step, with the state of the one before it as its own. `None` where the program stays.
+    pub change: Option<ProgramHash>,
+    /// u(i)(t).
+    pub inputs: Image,
+}
+
+impl Step {
+    /// A step without a change of the program.
+    pub fn of(inputs: Image) -> Self {
+        Self { change: None, inputs }
     }
 }
 

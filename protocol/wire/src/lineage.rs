@@ -1,7 +1,7 @@
 //! Equality of states, without sending or hashing a state.
 //!
-//! L(i)(0) = H(program, birth), or H(program, birth, retained lineage) of a warm start; L(i)(t+1) = H(L(i)(t), u(i)(t)).
-//! A state is a function of its first state and of the inputs since, so equal lineages mean equal states, up to a
+//! L(i)(0) = H(program, birth), or H(program, birth, retained lineage) of a warm start; L(i)(t+1) = H(L(i)(t), u(i)(t)),
+//! where a change mark makes L(i)(t) to H(L(i)(t), new program) before. A state is a function of its first state and of the inputs since, so equal lineages mean equal states, up to a
 //! collision of 64 bits and to a value fault; a [`Digest`] of the state itself is sent with it, and differs between
 //! replicas of equal lineage only after a value fault.
 
@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
 use crate::identifier::{Moment, ProgramHash};
+use crate::frame::Step;
 use crate::image::Image;
 
 /// Identifies an initial state and all inputs since.
@@ -20,6 +21,9 @@ pub struct Lineage(pub u64);
 
 /// What a warm start adds to its genesis: "warm" in ASCII, and no width of an image.
 const WARM: u64 = 0x7761_726d_0000_0000;
+
+/// What a change mark adds: "change" in ASCII, and no width of an image.
+const CHANGE: u64 = 0x6368_616e_6765_0000;
 
 impl Lineage {
     /// L(i)(0): the initial state of a program that its remote I/O started cold at `born`.
@@ -39,6 +43,19 @@ impl Lineage {
         // A program without inputs steps too, and each of its states has its own lineage.
         let first = self.fold(inputs.width() as u64);
         inputs.words().iter().copied().fold(first, Self::fold)
+    }
+
+    /// L(i)(t) where the program changes to `program` before it takes u(i)(t): its first state is a function of the state before and of both
+    /// programs.
+    #[must_use]
+    pub fn changed(self, program: ProgramHash) -> Self {
+        [CHANGE, program.0].into_iter().fold(self, Self::fold)
+    }
+
+    /// L(i)(t+1), after a step.
+    #[must_use]
+    pub fn after_step(self, step: &Step) -> Self {
+        step.change.map_or(self, |program| self.changed(program)).after(&step.inputs)
     }
 
     fn fold(self, word: u64) -> Self {

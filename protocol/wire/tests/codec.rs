@@ -22,6 +22,7 @@ fn frame(sender: Member, body: Body) -> Frame {
         header: Header {
             cluster: ClusterHash(1),
             configuration: ConfigurationHash(2),
+            prepared: None,
             moment: moment(3, 4),
             sender,
             alone: false,

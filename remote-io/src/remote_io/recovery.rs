@@ -220,7 +220,7 @@ impl RemoteIo {
     fn start(&mut self, moment: Moment, (from, holding): (StationId, Holding)) {
         let lineage = holding.lineage;
         self.report(Event::AdoptedLineage { moment, lineage, from });
-        let history = History::from(holding.born, lineage, self.settings.agreement.history);
+        let history = History::from(holding.born, (None, lineage), self.settings.agreement.history);
         self.sample_from(moment, history, Some((from, holding)));
     }
 
@@ -230,7 +230,7 @@ impl RemoteIo {
         self.authority = if awaits_release { Authority::Operator } else { Authority::Proof };
         self.last_true = None;
         self.report(Event::StartedCold { born: moment, awaits_release, lost });
-        let history = History::genesis(self.settings.hash, moment, self.settings.agreement.history);
+        let history = History::genesis(self.hash(), moment, self.settings.agreement.history);
         self.sample_from(moment, history, None);
     }
 

@@ -1,6 +1,6 @@
 //! The arbiter's side: what is added to the history of the program in each cycle.
 
-use understudy_wire::{Body, Image, Moment, Sample, Source, Time, WriteId};
+use understudy_wire::{Body, Image, Moment, Sample, Source, Step, Time, WriteId};
 
 use super::{Authority, Execution, RemoteIo};
 use crate::channel;
@@ -77,7 +77,9 @@ impl RemoteIo {
             unforced.set(stop.reset, true);
             self.program = Execution::Stopped;
         }
-        history.push(&inputs);
+        let before_change = history.program();
+        let change = self.wanted.filter(|wanted| before_change != Some(*wanted));
+        history.push(Step { change, inputs: inputs.clone() });
         run.sampled = true;
         let forced = |input| self.forcing.refuses_write(input, now);
         void_writes.extend(self.writing.sampled(operator_inputs, moment, history, &forced));
@@ -108,7 +110,10 @@ impl RemoteIo {
         if let Some(noted) = noted {
             self.prepare_note(moment, after, noted);
         }
-        self.report(Event::Sampled { moment, inputs, born, before });
+        if let Some(to) = change {
+            self.report(Event::ProgramChanged { moment, from: before_change, to });
+        }
+        self.report(Event::Sampled { moment, inputs, born, before, change });
         self.report_void(&void_writes);
         self.report_validity(&validity);
         self.member.send_cyclic(now, body);

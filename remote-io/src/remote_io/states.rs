@@ -146,6 +146,7 @@ impl Bench {
             header: Header {
                 cluster: ClusterHash(1),
                 configuration: ConfigurationHash(2),
+                prepared: None,
                 moment: moment(self.cycle),
                 sender: Member::Station(StationId(rank)),
                 alone: false,

@@ -16,7 +16,7 @@
 
 use understudy_cycle::Output;
 use understudy_wire::{
-    Image, Kept, Lineage, Moment, Note, ProgramHash, Recalled, Retained, SamplesReceived,
+    Configurations, Image, Kept, Lineage, Moment, Note, ProgramHash, Recalled, Retained, SamplesReceived,
     StationId, StationSet,
 };
 
@@ -59,14 +59,14 @@ impl RemoteIo {
             note.cluster == cluster && note.recalled.program == self.settings.program
         });
         let fits = |note: &Note| note.recalled.inputs.width() == width;
-        let found = found.filter(|note| note.hash != self.settings.hash || fits(note));
+        let found = found.filter(|note| !self.is_loaded(note.hash) || fits(note));
         self.noting = Noting { is_on: true, number, found, is_damaged, next: None };
         self
     }
 
     /// What it noted of this program before it was started.
     fn noted(&self) -> Option<&Note> {
-        self.noted_of(self.settings.hash)
+        self.noting.found.as_ref().filter(|note| self.is_loaded(note.hash))
     }
 
     fn noted_of(&self, program: ProgramHash) -> Option<&Note> {
@@ -75,14 +75,14 @@ impl RemoteIo {
 
     /// The newest applied output of the program before this one, of an earlier life.
     pub(super) fn applied_of_another(&self) -> Option<Moment> {
-        let found = self.noting.found.as_ref().filter(|note| note.hash != self.settings.hash);
+        let found = self.noting.found.as_ref().filter(|note| !self.is_loaded(note.hash));
         found.map(Note::applied)
     }
 
     /// The newest applied output of a program, and the lineage after its sample.
     fn newest_applied_of(&self, program: ProgramHash) -> Option<(Moment, Lineage)> {
         match self.knowledge.floor() {
-            Some(floor) if program == self.settings.hash => Some((floor.moment, floor.lineage)),
+            Some(floor) if self.is_loaded(program) => Some((floor.moment, floor.lineage)),
             // Outputs of this program were applied since those of any other one.
             Some(_) => None,
             None => self.noted_of(program).map(|note| (note.applied(), note.lineage)),
@@ -105,10 +105,12 @@ impl RemoteIo {
 
     /// Whether it ran another configuration before it was started.
     pub(super) fn has_another_configuration(&self) -> bool {
-        let configuration = self.settings.agreement.configuration;
+        let Configurations { own, prepared } = self.member.changing().configurations();
         let found = self.noting.found.as_ref();
         self.knowledge.floor().is_none()
-            && found.is_some_and(|note| note.configuration != configuration)
+            && found.is_some_and(|note| {
+                note.configuration != own && prepared != Some(note.configuration)
+            })
     }
 
     /// Prepares the note of a sample.
@@ -116,8 +118,8 @@ impl RemoteIo {
         let agreement = &self.settings.agreement;
         self.noting.next = Some(Note {
             cluster: agreement.cluster,
-            configuration: agreement.configuration,
-            hash: self.settings.hash,
+            configuration: self.member.changing().configurations().own,
+            hash: self.running().unwrap_or(self.hash()),
             is_retentive: self.settings.restart.is_some(),
             number: self.noting.number,
             lineage: after,
@@ -218,8 +220,11 @@ impl RemoteIo {
             lost,
             awaits_release,
         });
-        let start = Lineage::warm(self.settings.hash, moment, kept.holding.lineage);
-        let history = History::from(moment, start, self.settings.agreement.history);
+        // A station has taken over the values of any other program into that of its configuration.
+        let program = if self.is_loaded(kept.of) { kept.of } else { self.hash() };
+        let start = Lineage::warm(program, moment, kept.holding.lineage);
+        let capacity = self.settings.agreement.history;
+        let history = History::from(moment, (Some(program), start), capacity);
         let width = self.settings.undriven.width();
         let note = self.noting.found.clone().filter(|note| note.recalled.inputs.width() == width);
         self.sample_from(moment, history, None);

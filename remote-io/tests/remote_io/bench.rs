@@ -96,6 +96,7 @@ impl Bench {
         let header = Header {
             cluster: ClusterHash(1),
             configuration: ConfigurationHash(2),
+            prepared: None,
             moment: self.moment(),
             sender: Member::Station(StationId(rank)),
             alone,

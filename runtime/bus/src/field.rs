@@ -86,6 +86,7 @@ impl FieldDriver for SimulatedField {
             header: Header {
                 cluster: self.agreement.cluster,
                 configuration: self.agreement.configuration,
+                prepared: None,
                 moment,
                 sender: Member::RemoteIo(self.program),
                 alone: false,

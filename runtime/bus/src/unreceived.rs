@@ -78,6 +78,7 @@ mod tests {
             header: Header {
                 cluster: ClusterHash::of(b"cell"),
                 configuration: ConfigurationHash(1),
+                prepared: None,
                 moment: Moment::default(),
                 sender: Member::RemoteIo(ProgramId(of)),
                 alone: false,

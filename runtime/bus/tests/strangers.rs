@@ -76,6 +76,7 @@ fn sync(sender: Member) -> (Frame, Vec<u8>) {
         header: Header {
             cluster: agreement().cluster,
             configuration: agreement().configuration,
+            prepared: None,
             moment: Moment { epoch: Epoch(STRANGE_LIFE), cycle: Cycle(1) },
             sender,
             alone: false,

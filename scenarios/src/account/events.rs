@@ -36,9 +36,9 @@ impl Account {
                     trace.push(at, &sum);
                 }
             }
-            StationEvent::Holds { moment, program, lineage, state } => {
+            StationEvent::Holds { moment, program, changed, lineage, state } => {
                 if let Some(referee) = self.terms.referees.get_mut(program.index()) {
-                    referee.holds(*moment, *lineage, state);
+                    referee.holds(*moment, (*changed, *lineage), state);
                 }
             }
             StationEvent::Refused { member, theirs, ours } => {

@@ -7,7 +7,7 @@ use std::time::Duration;
 use understudy_cycle::{Input, Machine, Output};
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
-    Lineage, Member, Moment, ProgramId, ProgramSet, Sample, StationId, StationSet, Time, Turn,
+    Lineage, Member, Moment, ProgramId, ProgramSet, Sample, StationId, StationSet, Step, Time, Turn,
     Word,
 };
 
@@ -156,6 +156,7 @@ fn frame(sender: Member, moment: Moment, body: Body) -> Frame {
             // As long as real hashes are on the wire.
             cluster: ClusterHash(u64::MAX),
             configuration: ConfigurationHash(u64::MAX),
+            prepared: None,
             moment,
             sender,
             alone: false,
@@ -171,7 +172,7 @@ fn sample() -> Body {
         base: Lineage(u64::MAX),
         before: Lineage(u64::MAX),
         after: Lineage(u64::MAX),
-        history: (0..8).map(|_| Image::zero(WIDTH)).collect(),
+        history: (0..8).map(|_| Step::of(Image::zero(WIDTH))).collect(),
         applied: None,
         excluded: StationSet::EMPTY,
         gone: StationSet::EMPTY,

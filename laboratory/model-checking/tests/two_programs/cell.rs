@@ -54,10 +54,10 @@ pub(crate) fn parts(understudies: usize, turns: Turns) -> Parts {
         shadow_cycles: 1,
         listen_cycles: 1,
     });
-    let programs: Arc<[understudy_node::Program]> = circuits
+    let programs: Arc<[understudy_cycle::Program]> = circuits
         .iter()
         .zip(1..)
-        .map(|(circuit, hash)| understudy_node::Program {
+        .map(|(circuit, hash)| understudy_cycle::Program {
             hash: ProgramHash(hash),
             executable: circuit.into(),
         })
@@ -102,5 +102,6 @@ pub(crate) fn parts(understudies: usize, turns: Turns) -> Parts {
         fed_by: vec![None; circuits.len()],
         follows: vec![Vec::new(); circuits.len()],
         has_two_networks: false,
+        change: None,
     }
 }

@@ -233,7 +233,7 @@ fn what_follows_missing_records_is_not_judged_until_a_state_is_known() {
     let wrong = referee.observe(&applied(8, true, Source::FailSafe));
     assert!(wrong.is_err(), "{wrong:?}");
     // From a state that is known it judges again: x = 1 and u = 1 give 0.
-    referee.goes_on_from(after(&[true]), bit(true));
+    referee.goes_on_from((None, after(&[true])), bit(true));
     assert_eq!(referee.observe(&sampled(9, &[true], true)), Ok(()));
     let wrong = referee.observe(&applied(9, true, Source::Direct));
     assert!(wrong.is_err(), "{wrong:?}");
@@ -287,9 +287,9 @@ fn a_state_that_a_station_holds_ends_a_gap() {
     let next = [true, true, false, true, true, false, true];
     assert_eq!(referee.observe(&sampled(10, &next, true)), Ok(()));
     let lineage = after(&[true, true, false, true, true, false, true, true]);
-    referee.holds(moment(9), lineage, &bit(false));
+    referee.holds(moment(9), (None, lineage), &bit(false));
     assert_eq!(referee.standing(), None, "of another cycle");
-    referee.holds(moment(10), lineage, &bit(true));
+    referee.holds(moment(10), (None, lineage), &bit(true));
     assert_eq!(referee.standing(), Some((lineage, &bit(true))));
     assert_eq!(referee.observe(&applied(10, true, Source::Direct)), Ok(()));
     let held = applied(11, true, Source::Held);

@@ -3,14 +3,13 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use understudy_cycle::{Agreement, Input, Machine, RemoteIoInput};
-use understudy_node::Program;
+use understudy_cycle::{Agreement, ChangeOrder, Input, Machine, Program, RemoteIoInput};
 use understudy_wire::{
     ConfigurationHash, Epoch, Frame, Member, ProgramHash, ProgramId, SignalPlace, StationId,
 };
 
 use super::{Observe, Record, Simulation};
-use crate::fault::{Action, Fault};
+use crate::fault::{Action, ChangeStep, Fault};
 use crate::slot::Slot;
 
 impl Simulation {
@@ -41,6 +40,7 @@ impl Simulation {
                     machine.flip_state(program, usize::from(bit));
                 }
             }
+            (_, Action::Change { step }) => self.change(member, step, observe),
             (Member::RemoteIo(program), Action::Release) => {
                 self.referees[program.index()].operator_chooses();
                 self.give(member, Input::RemoteIo(RemoteIoInput::Release), observe);
@@ -80,6 +80,30 @@ impl Simulation {
                 self.wakeups.set(member, slot.due());
                 self.catch_up(member, waiting, observe);
             }
+        }
+    }
+
+    /// An engineer takes a step of the online change at one member.
+    fn change(&mut self, member: Member, step: ChangeStep, observe: &mut Observe<'_>) {
+        let Some(change) = self.parts.change.clone() else {
+            return;
+        };
+        let changed = |program: ProgramId| change.of(program);
+        let order = match (step, member) {
+            (ChangeStep::Prepare, _) => Some(ChangeOrder::Prepare(Arc::clone(&change))),
+            (ChangeStep::Switch, Member::RemoteIo(program)) => {
+                changed(program).map(|it| ChangeOrder::Switch(it.after.hash))
+            }
+            (ChangeStep::SwitchBack, Member::RemoteIo(program)) => {
+                changed(program).map(|it| ChangeOrder::Switch(it.before.hash))
+            }
+            (ChangeStep::Switch | ChangeStep::SwitchBack, _) => None,
+            (ChangeStep::Accept, _) => Some(ChangeOrder::Run(change.after)),
+            (ChangeStep::TakeBack, _) => Some(ChangeOrder::Run(change.before)),
+            (ChangeStep::Forget, _) => Some(ChangeOrder::Forget),
+        };
+        if let Some(order) = order {
+            self.give(member, Input::Change(&order), observe);
         }
     }
 
@@ -123,7 +147,7 @@ impl Simulation {
                     self.note_crash(station);
                 }
                 let slot = &mut self.stations[station.index()];
-                slot.restart(self.disks.station(self.now, settings));
+                slot.restart(self.disks.station(self.now, settings, self.parts.change.as_ref()));
                 self.wakeups.set(member, slot.due());
             }
             Member::RemoteIo(program) => {
@@ -136,7 +160,7 @@ impl Simulation {
                 // It may go on with what its stations have started with it before.
                 *misled = has_wrong_programs.then(|| misled.unwrap_or_default());
                 let slot = &mut self.remote_ios[program.index()];
-                slot.restart(self.disks.remote_io(self.now, settings));
+                slot.restart(self.disks.remote_io(self.now, settings, self.parts.change.as_ref()));
                 self.wakeups.set(member, slot.due());
                 self.show_field(program);
             }

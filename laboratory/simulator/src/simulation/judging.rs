@@ -156,14 +156,14 @@ impl Simulation {
     /// Stations that run and that the remote I/O of a program can receive: those with its configuration, and the others.
     fn received_by(&self, program: ProgramId) -> (StationSet, StationSet) {
         let remote_io = self.remote_ios[program.index()].running();
-        let own = remote_io.map(RemoteIo::configuration);
+        let own = remote_io.map(RemoteIo::configurations);
         let (mut equal, mut others) = (StationSet::EMPTY, StationSet::EMPTY);
         for (rank, slot) in (0..).zip(&self.stations) {
             let station = StationId(rank);
             let reaches = self.links.reaches(Member::Station(station), Member::RemoteIo(program));
             if let (Some(running), true) = (slot.running(), reaches) {
-                let set =
-                    if Some(running.configuration()) == own { &mut equal } else { &mut others };
+                let agrees = own.is_some_and(|own| own.agree(&running.configurations()));
+                let set = if agrees { &mut equal } else { &mut others };
                 set.insert(station);
             }
         }
@@ -216,8 +216,7 @@ impl Simulation {
     fn received_both_ways(&self, program: ProgramId, stations: StationSet) -> StationSet {
         let remote_io = Member::RemoteIo(program);
         let running = self.remote_ios[program.index()].running();
-        let right = self.parts.remote_ios[program.index()].agreement.configuration;
-        if running.is_none_or(|it| it.configuration() != right) {
+        if running.is_none_or(|it| !self.parts.are_right(it.configurations())) {
             return StationSet::EMPTY;
         }
         let reaches = |station: &StationId| {
@@ -229,11 +228,10 @@ impl Simulation {
 
     /// The stations that run with the right configuration and a state of a program that its next sample could extend.
     fn with_state(&self, program: ProgramId) -> StationSet {
-        let right = self.parts.remote_ios[program.index()].agreement.configuration;
         let referee = &self.referees[program.index()];
         let holds = |station: &StationId| {
             let admitted = self.stations[station.index()].running();
-            let admitted = admitted.filter(|it| it.configuration() == right);
+            let admitted = admitted.filter(|it| self.parts.are_right(it.configurations()));
             let state = admitted.and_then(|it| it.state_of(program));
             state.is_some_and(|(lineage, _)| referee.would_be_lost(lineage))
         };

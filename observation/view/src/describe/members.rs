@@ -4,7 +4,7 @@ use understudy_journal::Members;
 use understudy_node::Event as StationEvent;
 use understudy_plant::Event as PlantEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Lacking, LackingReason, ValueFault};
-use understudy_wire::{Member, Moment, ProgramSet, SignalPlace, StationId, StationSet, Word};
+use understudy_wire::{Configurations, Member, Moment, ProgramSet, SignalPlace, StationId, StationSet, Word};
 
 use super::signals::Names;
 use super::{Words, list, program_name, programs, source_text, stations};
@@ -39,6 +39,11 @@ descriptions! { station: StationEvent, members: Members;
         format!("receives samples of {} again", members.name(Member::RemoteIo(*program)));
     Refused { member, theirs, ours } => "refused" Alarm refused_text(*member, theirs, ours, members);
     RefusalEnded { member } => "refusal-ended" Notice refusal_ended_text(*member, members);
+    Configured(configurations) => "configured" Notice configured_text(*configurations);
+    NotPrepared { program, missing, .. } => "not-prepared" Alarm {
+        let whose = program_name(*program, members);
+        format!("does not compute {whose} any more: its program has changed to {missing}, which is not loaded here")
+    };
     Outvoted { theirs, stations, others } => "outvoted" Alarm outvoted_text(theirs, *stations, *others);
     Stalled { late, .. } => "stalled" Notice format!("host stall: woken {late:.1?} late");
 }
@@ -117,6 +122,8 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
     };
     Refused { member, theirs, ours } => "refused" Alarm refused_text(*member, theirs, ours, members);
     RefusalEnded { member } => "refusal-ended" Notice refusal_ended_text(*member, members);
+    Configured(configurations) => "configured" Notice configured_text(*configurations);
+    ProgramChanged { to, .. } => "program-changed" Notice format!("its program is {to} from this cycle on");
     Outvoted { theirs, stations, others } => "outvoted" Alarm outvoted_text(theirs, *stations, *others);
     Stalled { late, .. } => "stalled" Notice format!("host stall: woken {late:.1?} late");
     Forced { force, .. } => "forced" Alarm members.force(force);
@@ -267,6 +274,13 @@ pub(crate) fn odd_configuration_text<H: std::fmt::Display>(
 
 fn refusal_ended_text(member: Member, members: &Members) -> String {
     format!("{} is no longer received with another configuration", members.name(member))
+}
+
+fn configured_text(Configurations { own, prepared }: Configurations) -> String {
+    match prepared {
+        Some(prepared) => format!("runs configuration {own}, and has loaded {prepared} for an online change"),
+        None => format!("runs configuration {own}, and has loaded no other one"),
+    }
 }
 
 fn outvoted_text<H: std::fmt::Display>(theirs: &H, stations: u32, others: u32) -> String {

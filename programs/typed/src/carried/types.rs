@@ -10,16 +10,19 @@ pub(super) enum Conversion {
     Same,
     /// To a type that has all values of the first.
     Wider(Elementary, Elementary),
+    /// To a type that has some values of the first: this one must be among them.
+    Narrower(Elementary, Elementary),
     /// From the number of a name in one enumeration to its number in another one.
     ByName(Vec<(u64, u64)>),
 }
 
 impl Conversion {
-    /// The value as the new type stores it; none for a number without a name.
+    /// The value as the new type stores it; none for a number without a name, and for a value that the new type does not have.
     pub(super) fn of(&self, stored: u64) -> Option<u64> {
         match self {
             Self::Same => Some(stored),
             Self::Wider(from, to) => Some(widened(*from, *to, stored)),
+            Self::Narrower(from, to) => narrowed(*from, *to, stored),
             Self::ByName(numbers) => {
                 let mut numbers = numbers.iter();
                 numbers.find(|(before, _)| *before == stored).map(|(_, now)| *now)
@@ -28,7 +31,7 @@ impl Conversion {
     }
 }
 
-/// The conversion between two types without parts, where the second one has all values of the first.
+/// The conversion between two types without parts, where one of them has all values of the other.
 pub(super) fn conversion(
     (old, from): (&Program, &Type),
     (new, to): (&Program, &Type),
@@ -36,7 +39,8 @@ pub(super) fn conversion(
     match (from, to) {
         (Type::Elementary(from), Type::Elementary(to)) if from == to => Some(Conversion::Same),
         (Type::Elementary(from), Type::Elementary(to)) => {
-            is_wider(*from, *to).then_some(Conversion::Wider(*from, *to))
+            let wider = is_wider(*from, *to).then_some(Conversion::Wider(*from, *to));
+            wider.or_else(|| is_wider(*to, *from).then_some(Conversion::Narrower(*from, *to)))
         }
         (Type::Enumeration(one, from), Type::Enumeration(other, to)) => {
             let before = &old.enumerations[one.0 as usize].values;
@@ -54,9 +58,26 @@ pub(super) fn conversion(
     }
 }
 
-/// A value of one type as one of a type that has all its values.
+/// A value of one type as one of another type; none where that does not have it.
 pub(super) fn converted(from: Elementary, to: Elementary, stored: u64) -> Option<u64> {
-    (from == to).then_some(stored).or_else(|| is_wider(from, to).then(|| widened(from, to, stored)))
+    if from == to {
+        Some(stored)
+    } else if is_wider(from, to) {
+        Some(widened(from, to, stored))
+    } else {
+        is_wider(to, from).then(|| narrowed(from, to, stored)).flatten()
+    }
+}
+
+/// A value of a type that has all values of `to`; none where this one is not among them.
+fn narrowed(from: Elementary, to: Elementary, stored: u64) -> Option<u64> {
+    let value = match (from, to) {
+        (Elementary::Lreal, Elementary::Real) => u64::from((f64::from_bits(stored) as f32).to_bits()),
+        (Elementary::Lreal, _) => f64::from_bits(stored) as i64 as u64 & to.mask(),
+        (Elementary::Real, _) => f32::from_bits(stored as u32) as i64 as u64 & to.mask(),
+        _ => from.signed(stored) as u64 & to.mask(),
+    };
+    (widened(to, from, value) == stored).then_some(value)
 }
 
 /// Whether a type has all values of another one, and means the same by them.

@@ -136,6 +136,7 @@ mod tests {
         let header = Header {
             cluster: ClusterHash(u64::MAX),
             configuration: ConfigurationHash(u64::MAX),
+            prepared: None,
             moment: LATE,
             sender,
             alone: true,

@@ -70,6 +70,7 @@ impl Machine for Chatter {
                     header: Header {
                         cluster: agreement.cluster,
                         configuration: agreement.configuration,
+                        prepared: None,
                         moment: Moment { epoch: Epoch(self.life), cycle: Cycle(self.cycle) },
                         sender: self.own,
                         alone: false,

@@ -88,17 +88,27 @@ impl Writer<'_> {
         self.diagnostics.push(Diagnostic::error(code, message, span));
     }
 
-    /// A hidden variable; a name with a dot is none that a person can write.
+    /// A name for what is hidden: one with a dot is none that a person can write. It names what it belongs to, so that it stays where other parts of
+    /// the chart change.
+    fn hidden_name(&self, what: &str) -> String {
+        let is_free = |name: &String| {
+            self.declarations.iter().all(|known| !known.name.as_str().eq_ignore_ascii_case(name))
+        };
+        let numbered = (2..).map(|number| format!("{what}.{number}"));
+        std::iter::once(what.to_owned()).chain(numbered).find(is_free).unwrap_or_default()
+    }
+
+    /// A hidden variable.
     fn hidden(&mut self, what: &str, of: Elementary, span: &Span) -> String {
-        let name = format!("{what}.{}", self.declarations.len());
+        let name = self.hidden_name(what);
         let declaration = declare(&name, Class::Local, elementary(of, span), None, span);
         self.declarations.push(declaration);
         name
     }
 
     /// A hidden TON.
-    fn timer(&mut self, span: &Span) -> String {
-        let name = format!("timer.{}", self.declarations.len());
+    fn timer(&mut self, what: &str, span: &Span) -> String {
+        let name = self.hidden_name(&format!("timer.{what}"));
         let of =
             TypeName { kind: TypeKind::Named(Name::new("TON", span.clone())), span: span.clone() };
         self.declarations.push(declare(&name, Class::Local, of, None, span));
@@ -107,7 +117,7 @@ impl Writer<'_> {
 
     /// A TON that is TRUE when a step has been active for that time. Where a transition enters the step that it leaves, the time begins again.
     fn step_timer(&mut self, step: &str, duration: &Expression, span: &Span) -> String {
-        let timer = self.timer(span);
+        let timer = self.timer(step, span);
         let again = |transition: &&Transition| {
             let has = |names: &[Name]| names.iter().any(|name| name.is(step));
             has(&transition.from) && has(&transition.to)
@@ -126,7 +136,7 @@ impl Writer<'_> {
     }
 
     fn steps(&mut self, span: &Span) {
-        let begun = self.hidden("begun", Elementary::Bool, span);
+        let begun = self.hidden("begun.chart", Elementary::Bool, span);
         let mut first = vec![assign(path(&begun, None, span), boolean(true, span), span)];
         let mut seen: HashMap<String, Span> = HashMap::new();
         for step in &self.chart.steps {
@@ -201,7 +211,12 @@ impl Writer<'_> {
             let mut condition = all(steps.chain(rivals).collect(), Operator::And, span);
             // The condition is looked at only where it counts.
             condition = join(condition, Operator::AndThen, transition.condition.clone());
-            let fires = self.hidden("fires", Elementary::Bool, span);
+            let names = [&transition.from, &transition.to].map(|names| {
+                let names: Vec<&str> = names.iter().map(Name::as_str).collect();
+                names.join("+")
+            });
+            let what = format!("fires.{}", names.join("."));
+            let fires = self.hidden(&what, Elementary::Bool, span);
             self.statements.push(assign(path(&fires, None, span), condition, span));
             for name in transition.to.iter().filter(|name| known(name)) {
                 self.entered.entry(name.key()).or_default().push(fires.clone());
@@ -290,8 +305,9 @@ impl Writer<'_> {
             "D" => deed.drives.push(join(is_active(), Operator::And, is_over())),
             "DS" => deed.sets.push(join(is_active(), Operator::And, is_over())),
             "SD" | "SL" => {
-                let stored = self.hidden("stored", Elementary::Bool, &span);
-                let timer = self.timer(&span);
+                let what = format!("{}.{step}", association.action);
+                let stored = self.hidden(&format!("stored.{what}"), Elementary::Bool, &span);
+                let timer = self.timer(&what, &span);
                 let set = assign(path(&stored, None, &span), boolean(true, &span), &span);
                 let is_new = join(begins(), Operator::And, not(variable(&stored, &span)));
                 deed.before.push(when(is_new, vec![set], &span));
@@ -321,7 +337,7 @@ impl Writer<'_> {
             let stored = match action {
                 None if deed.drives.is_empty() => name.as_str().to_owned(),
                 _ => {
-                    let stored = self.hidden("stored", Elementary::Bool, &span);
+                    let stored = self.hidden(&format!("stored.{name}"), Elementary::Bool, &span);
                     deed.drives.push(variable(&stored, &span));
                     stored
                 }

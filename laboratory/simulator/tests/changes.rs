@@ -1,0 +1,265 @@
+//! Online changes of a program while members are killed, cut off and restarted: no output is ever wrong, none is missed where one member at most
+//! fails, and the state goes on.
+
+use std::sync::Arc;
+
+use proptest::prelude::*;
+use understudy_cluster::{ChangeTexts, Cluster, read};
+use understudy_remote_io::Event;
+use understudy_simulator::{
+    Action, ChangeStep, Fault, Network, Parts, Record, Simulation, Tally, parts,
+};
+use understudy_wire::{Image, Member, ProgramId, Source, StationId};
+
+const CLUSTER: &str = r#"
+[cluster]
+name = "changes"
+
+[[controller]]
+name = "counter"
+ladder = "counter.st"
+
+[[controller]]
+name = "lamp"
+ladder = "lamp.st"
+
+[[remote_io]]
+controller = "counter"
+
+[[remote_io]]
+controller = "lamp"
+"#;
+
+/// Counts scans.
+const BEFORE: &str = "
+PROGRAM counter
+  VAR_INPUT go : BOOL; END_VAR
+  VAR_OUTPUT shown : DINT; END_VAR
+  VAR count : INT; unused : REAL := 2.5; END_VAR
+  count := count + 1;
+  shown := count;
+END_PROGRAM";
+
+/// Goes on with the count, in a wider type, in steps of ten, and with a variable of its own.
+const AFTER: &str = "
+PROGRAM counter
+  VAR_INPUT go : BOOL; END_VAR
+  VAR_OUTPUT shown : DINT; END_VAR
+  VAR table : ARRAY[1..40] OF LREAL; count : DINT; END_VAR
+  count := count + 10;
+  table[3] := table[3] + 1.0;
+  shown := count;
+END_PROGRAM";
+
+const LAMP: &str = "
+PROGRAM lamp
+  VAR_INPUT go : BOOL; END_VAR
+  VAR_OUTPUT on : BOOL; END_VAR
+  on := NOT on;
+END_PROGRAM";
+
+const COUNTER: ProgramId = ProgramId(0);
+const MEMBERS: [Member; 5] = [
+    Member::Station(StationId(0)),
+    Member::Station(StationId(1)),
+    Member::Station(StationId(2)),
+    Member::RemoteIo(ProgramId(0)),
+    Member::RemoteIo(ProgramId(1)),
+];
+
+fn cluster(counter: &str) -> Cluster {
+    let loaded = read("cluster.toml", CLUSTER, &mut |name| match name {
+        "counter.st" => Ok(counter.to_owned()),
+        _ => Ok(LAMP.to_owned()),
+    });
+    loaded.cluster.unwrap_or_else(|| panic!("{:?}", loaded.reports))
+}
+
+fn changing() -> Parts {
+    let (before, after) = (cluster(BEFORE), cluster(AFTER));
+    let texts = ChangeTexts::between(&before, &after).expect("only a program differs");
+    let change = texts.load(&before).expect("it is of this cluster");
+    Parts { change: Some(Arc::new(change)), ..parts(&before) }
+}
+
+fn at(cycle: u64, phase: f64, member: Member, action: Action) -> Fault {
+    Fault { at_cycle: cycle, phase, member, action }
+}
+
+fn step(cycle: u64, member: Member, step: ChangeStep) -> Fault {
+    at(cycle, 0.3, member, Action::Change { step })
+}
+
+/// The whole change, one step every twenty cycles from `cycle` on, each at all members.
+fn whole_change(cycle: u64) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    for member in MEMBERS {
+        faults.push(step(cycle, member, ChangeStep::Prepare));
+        faults.push(step(cycle + 40, member, ChangeStep::Accept));
+        faults.push(step(cycle + 60, member, ChangeStep::Forget));
+    }
+    faults.push(step(cycle + 20, Member::RemoteIo(COUNTER), ChangeStep::Switch));
+    faults
+}
+
+/// What was applied of the counter: the source and the count, cycle by cycle.
+#[derive(Default)]
+struct Seen {
+    counts: Vec<(Source, i32)>,
+    changes: u32,
+    not_prepared: u32,
+    configured: u32,
+    cold_starts: u32,
+}
+
+impl Seen {
+    fn note(&mut self, member: Member, record: &Record<'_>) {
+        match record {
+            Record::RemoteIo(Event::Applied { outputs, source, .. })
+                if member == Member::RemoteIo(COUNTER) =>
+            {
+                self.counts.push((*source, count_in(outputs)));
+            }
+            Record::RemoteIo(Event::ProgramChanged { .. }) => self.changes += 1,
+            Record::RemoteIo(Event::StartedCold { .. }) => self.cold_starts += 1,
+            Record::Station(understudy_node::Event::NotPrepared { .. }) => self.not_prepared += 1,
+            Record::Station(understudy_node::Event::Configured(_))
+            | Record::RemoteIo(Event::Configured(_)) => self.configured += 1,
+            _ => {}
+        }
+    }
+}
+
+fn count_in(outputs: &Image) -> i32 {
+    let bits = (0..32).map(|bit| i32::from(outputs.get(bit)) << bit);
+    bits.fold(0, |count, bit| count | bit)
+}
+
+fn run(faults: &[Fault], cycles: u64) -> (Simulation, Seen) {
+    let mut simulation = Simulation::new(changing(), Network::default(), 7);
+    for fault in faults {
+        simulation.schedule(*fault);
+    }
+    let mut seen = Seen::default();
+    let observe = &mut |_, cycle: Option<u64>, member, record: Record<'_>| {
+        if cycle.is_some() {
+            seen.note(member, &record);
+        }
+    };
+    simulation.run(cycles, 300, observe).expect("everybody comes");
+    (simulation, seen)
+}
+
+fn misses(tallies: &[Tally]) -> u64 {
+    tallies.iter().map(|tally| tally.held + tally.fail_safe).sum()
+}
+
+#[test]
+fn a_program_changes_between_two_cycles() {
+    let (simulation, seen) = run(&whole_change(20), 150);
+    assert!(simulation.violations().is_empty(), "{:?}", simulation.violations());
+    assert_eq!(misses(simulation.tallies()), 0);
+    assert_eq!((seen.changes, seen.not_prepared), (1, 0));
+    // Each member prepares, accepts and forgets.
+    assert_eq!(seen.configured, 15);
+    let steps: Vec<i32> = seen.counts.windows(2).map(|pair| pair[1].1 - pair[0].1).collect();
+    let change = steps.iter().position(|step| *step == 10).expect("the new program");
+    assert!(steps[..change].iter().all(|step| *step == 1), "{steps:?}");
+    assert!(steps[change..].iter().all(|step| *step == 10), "{steps:?}");
+    assert!((36..44).contains(&change), "{change}");
+}
+
+/// Back before it is accepted, and after it.
+#[test]
+fn a_change_is_undone() {
+    let remote_io = Member::RemoteIo(COUNTER);
+    let mut faults = whole_change(20);
+    faults.retain(|fault| !matches!(fault.action, Action::Change { step: ChangeStep::Forget }));
+    faults.push(step(50, remote_io, ChangeStep::SwitchBack));
+    faults.push(step(70, remote_io, ChangeStep::Switch));
+    faults.push(step(90, remote_io, ChangeStep::SwitchBack));
+    for member in MEMBERS {
+        faults.push(step(110, member, ChangeStep::TakeBack));
+        faults.push(step(120, member, ChangeStep::Forget));
+    }
+    let (simulation, seen) = run(&faults, 150);
+    assert!(simulation.violations().is_empty(), "{:?}", simulation.violations());
+    assert_eq!(misses(simulation.tallies()), 0);
+    assert_eq!(seen.changes, 4);
+    let steps = seen.counts.windows(2).map(|pair| pair[1].1 - pair[0].1);
+    let mut runs: Vec<i32> = steps.collect();
+    runs.dedup();
+    assert_eq!(runs, [1, 10, 1, 10, 1]);
+}
+
+#[test]
+fn no_switch_while_a_living_station_is_not_prepared() {
+    let mut faults = whole_change(20);
+    let lagging = Member::Station(StationId(2));
+    faults.retain(|fault| fault.member != lagging);
+    let (simulation, seen) = run(&faults, 150);
+    assert!(simulation.violations().is_empty(), "{:?}", simulation.violations());
+    assert_eq!(misses(simulation.tallies()), 0);
+    assert_eq!((seen.changes, seen.not_prepared), (0, 0));
+}
+
+/// A station that was down while the others prepared is silent for the changed program, and not for the other one, until it is prepared too.
+#[test]
+fn a_straggler_is_silent_until_it_is_prepared() {
+    let understudy = Member::Station(StationId(2));
+    let mut faults = whole_change(20);
+    faults.retain(|fault| fault.member != understudy);
+    faults.retain(|fault| !matches!(fault.action, Action::Change { step: ChangeStep::Forget }));
+    faults.push(at(10, 0.5, understudy, Action::Crash));
+    faults.push(at(60, 0.5, understudy, Action::Restart));
+    faults.push(step(100, understudy, ChangeStep::Prepare));
+    // From here on it has to be there for both programs.
+    faults.push(at(140, 0.5, Member::Station(StationId(0)), Action::Crash));
+    let (simulation, seen) = run(&faults, 170);
+    assert!(simulation.violations().is_empty(), "{:?}", simulation.violations());
+    assert_eq!(misses(simulation.tallies()), 0);
+    assert_eq!((seen.changes, seen.not_prepared), (1, 1));
+    assert!(simulation.tallies()[0].reconstructed > 20);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 150, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// One member at a time is killed, suspended or cut off, and comes back, at any phase of a change and of a change back.
+    #[test]
+    fn whatever_fails_during_a_change(
+        begins in 20_u64..40,
+        undone: bool,
+        faults in prop::collection::vec((0..MEMBERS.len(), 0..3_usize, 1_u64..30, 0.0..1.0), 1..5),
+    ) {
+        let mut schedule = whole_change(begins);
+        if undone {
+            schedule.push(step(begins + 30, Member::RemoteIo(COUNTER), ChangeStep::SwitchBack));
+            schedule.push(step(begins + 36, Member::RemoteIo(COUNTER), ChangeStep::Switch));
+        }
+        let mut cycle = begins - 10;
+        let mut of_stations = true;
+        for (place, kind, lasts, phase) in faults {
+            let member = MEMBERS[place];
+            of_stations &= matches!(member, Member::Station(_));
+            let (begin, end) = match kind {
+                0 => (Action::Crash, Action::Restart),
+                1 => (Action::Stop, Action::Continue),
+                _ => {
+                    let to = MEMBERS[(place + 1) % MEMBERS.len()];
+                    (Action::Cut { to }, Action::Heal { to })
+                }
+            };
+            schedule.push(at(cycle, phase, member, begin));
+            schedule.push(at(cycle + lasts, phase, member, end));
+            // It is synchronised again before the next one fails.
+            cycle += lasts + 25;
+        }
+        let (simulation, seen) = run(&schedule, 260);
+        prop_assert!(simulation.violations().is_empty(), "{:?}", simulation.violations());
+        prop_assert_eq!(seen.cold_starts, 0);
+        if of_stations {
+            prop_assert_eq!(misses(simulation.tallies()), 0);
+        }
+    }
+}

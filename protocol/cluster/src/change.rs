@@ -1,0 +1,314 @@
+//! An online change between two cluster files: what it replaces, and why it needs a stop where it does.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use understudy_cycle::{Conversion, OnlineChange, Program, ProgramChange};
+use understudy_typed::CarriedState;
+use understudy_wire::{ConfigurationHash, Image, ProgramHash, ProgramId, RetainedProgram};
+
+use crate::cluster::Cluster;
+use crate::code::Code;
+use crate::configuration::with_programs;
+use crate::source_text::read_kept;
+
+/// What every member is given to prepare an online change: the texts of the programs that change, before and after.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ChangeTexts {
+    /// Hash of the cluster, as in frames.
+    pub cluster: u64,
+    /// The configuration before.
+    pub before: ConfigurationHash,
+    /// The configuration after.
+    pub after: ConfigurationHash,
+    /// In the order of programs, each once.
+    pub programs: Vec<ChangedText>,
+}
+
+/// One program that changes.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ChangedText {
+    /// Which program.
+    pub program: ProgramId,
+    /// Its text before.
+    pub before: ProgramText,
+    /// Its text after.
+    pub after: ProgramText,
+}
+
+/// The text of a program.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProgramText {
+    /// Hash of the program.
+    pub hash: ProgramHash,
+    /// The name of its file, whose ending tells the language.
+    pub file: String,
+    /// Period of the cluster in nanoseconds.
+    pub period: u64,
+    /// The text.
+    pub text: String,
+}
+
+/// A difference between two configurations that no online change can make.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NeedsStop {
+    /// They are of two clusters.
+    #[error("the two files are of different clusters, `{before}` and `{after}`")]
+    OtherCluster {
+        /// Name of the cluster before.
+        before: String,
+        /// Name of the cluster after.
+        after: String,
+    },
+    /// The points of a program differ.
+    #[error("the inputs or outputs of `{program}` differ: {point}")]
+    Points {
+        /// Name of the controller.
+        program: String,
+        /// The first point that differs.
+        point: String,
+    },
+    /// Something else than a program differs.
+    #[error("the two files differ in `{before}` and `{after}`")]
+    Settings {
+        /// The first line of the canonical text of the configuration before that differs; empty where it has ended.
+        before: String,
+        /// The same of the configuration after.
+        after: String,
+    },
+}
+
+impl ChangeTexts {
+    /// The change from one cluster file to another one.
+    ///
+    /// # Errors
+    /// Why it needs a stop.
+    pub fn between(before: &Cluster, after: &Cluster) -> Result<Self, Vec<NeedsStop>> {
+        if before.name() != after.name() {
+            let (before, after) = (before.name().to_owned(), after.name().to_owned());
+            return Err(vec![NeedsStop::OtherCluster { before, after }]);
+        }
+        let mut reasons = Vec::new();
+        if let Some((before, after)) = first_difference(&before.frame_text, &after.frame_text) {
+            reasons.push(NeedsStop::Settings { before, after });
+        }
+        let pairs = before.controllers().iter().zip(after.controllers());
+        let mut programs = Vec::new();
+        for (place, (old, new)) in (0..).zip(pairs) {
+            if let Some(point) = different_point(&old.code, &new.code) {
+                reasons.push(NeedsStop::Points { program: old.name.clone(), point });
+            }
+            if old.hash != new.hash {
+                programs.push(ChangedText {
+                    program: ProgramId(place),
+                    before: ProgramText::of(&old.code, old.hash),
+                    after: ProgramText::of(&new.code, new.hash),
+                });
+            }
+        }
+        if reasons.is_empty() {
+            Ok(Self {
+                cluster: before.agreement().cluster.0,
+                before: before.agreement().configuration,
+                after: after.agreement().configuration,
+                programs,
+            })
+        } else {
+            Err(reasons)
+        }
+    }
+
+    /// What a member loads, whose cluster file is `cluster`: that before the change, or that after it.
+    ///
+    /// # Errors
+    /// Why these texts are not a change of that cluster.
+    pub fn load(&self, cluster: &Cluster) -> Result<OnlineChange, ChangeError> {
+        let agreement = cluster.agreement();
+        if self.cluster != agreement.cluster.0 {
+            return Err(ChangeError::OtherCluster);
+        }
+        let own = agreement.configuration;
+        if own != self.before && own != self.after {
+            return Err(ChangeError::OtherConfiguration { own, before: self.before });
+        }
+        let (mut programs, mut codes) = (Vec::new(), Vec::new());
+        for changed in &self.programs {
+            let controller = cluster.controllers().get(changed.program.index());
+            let Some(controller) = controller else {
+                return Err(ChangeError::NoSuchProgram { program: changed.program });
+            };
+            let read = |text: &ProgramText| {
+                let code = read_kept(&text.kept());
+                code.ok_or_else(|| ChangeError::Unreadable { file: text.file.clone() })
+            };
+            let (before, after) = (read(&changed.before)?, read(&changed.after)?);
+            if let Some(point) = different_point(&before, &after)
+                .or_else(|| different_point(&controller.code, &after))
+            {
+                return Err(ChangeError::Points { program: controller.name.clone(), point });
+            }
+            let of_file = if own == self.before { &changed.before } else { &changed.after };
+            if of_file.hash != controller.hash {
+                return Err(ChangeError::OtherProgram { program: controller.name.clone() });
+            }
+            codes.push((changed.program, [before.clone(), after.clone()]));
+            let program = |code: &Code, text: &ProgramText| Program {
+                hash: text.hash,
+                executable: code.executable(),
+            };
+            programs.push(ProgramChange {
+                program: changed.program,
+                before: program(&before, &changed.before),
+                after: program(&after, &changed.after),
+                forward: Arc::new(Between { from: before.clone(), to: after.clone() }),
+                back: Arc::new(Between { from: after, to: before }),
+            });
+        }
+        let change = OnlineChange { before: self.before, after: self.after, programs };
+        for (side, claimed) in [(false, self.before), (true, self.after)] {
+            if configuration_with(cluster, &codes, side) != claimed {
+                return Err(ChangeError::NotItsResult { claimed });
+            }
+        }
+        Ok(change)
+    }
+}
+
+impl ProgramText {
+    fn of(code: &Code, hash: ProgramHash) -> Self {
+        let RetainedProgram { hash, file, period, text, .. } = code.source().kept(hash);
+        Self { hash, file, period, text }
+    }
+
+    fn kept(&self) -> RetainedProgram {
+        let Self { hash, file, period, text } = self.clone();
+        RetainedProgram { hash, file, period, text, inputs: Vec::new() }
+    }
+}
+
+/// Why a member does not load an online change.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ChangeError {
+    /// It is one of another cluster.
+    #[error("the change is one of another cluster")]
+    OtherCluster,
+    /// The member runs neither configuration.
+    #[error("the change leads on from configuration {before}, and this member runs {own}")]
+    OtherConfiguration {
+        /// Configuration of the member.
+        own: ConfigurationHash,
+        /// Configuration that the change leads on from.
+        before: ConfigurationHash,
+    },
+    /// A program of the change is none of the cluster.
+    #[error("the cluster has no program {}", .program.0)]
+    NoSuchProgram {
+        /// The program.
+        program: ProgramId,
+    },
+    /// The program of the change is another one than that of the cluster file.
+    #[error("the change is of another text of `{program}` than that which this member runs")]
+    OtherProgram {
+        /// Name of the controller.
+        program: String,
+    },
+    /// The texts do not make the configuration that they are said to make.
+    #[error("these texts do not make configuration {claimed} of the cluster file that this member runs")]
+    NotItsResult {
+        /// That configuration.
+        claimed: ConfigurationHash,
+    },
+    /// A text is not the program that its hash names.
+    #[error("`{file}` is read as another program here: this release differs from that of the tool")]
+    Unreadable {
+        /// File of the text.
+        file: String,
+    },
+    /// The points of a program differ.
+    #[error("the inputs or outputs of `{program}` differ: {point}")]
+    Points {
+        /// Name of the controller.
+        program: String,
+        /// The first point that differs.
+        point: String,
+    },
+}
+
+/// The way from one program to another one: by the names and types of its variables.
+#[derive(Debug)]
+struct Between {
+    from: Code,
+    to: Code,
+}
+
+impl Conversion for Between {
+    fn convert(&self, state: &[u64]) -> Vec<u64> {
+        self.to.changed(&self.from, state).state
+    }
+}
+
+/// What becomes of each variable of a program in an online change: of a state as stations hold it, or of the initial one.
+pub fn fates(before: &Code, after: &Code, state: Option<&Image>) -> CarriedState {
+    let initial = before.executable();
+    let words = state.map_or(initial.initial(), Image::words);
+    after.changed(before, words)
+}
+
+/// The configuration of a cluster in which these programs stand in the place of its own: those before the change, or those after it.
+fn configuration_with(
+    cluster: &Cluster,
+    codes: &[(ProgramId, [Code; 2])],
+    is_after: bool,
+) -> ConfigurationHash {
+    let mut controllers = (0..).map(ProgramId).zip(cluster.controllers());
+    let text = with_programs(&cluster.frame_text, || {
+        let Some((place, controller)) = controllers.next() else {
+            return String::new();
+        };
+        match codes.iter().find(|(program, _)| *program == place) {
+            Some((_, [before, after])) => if is_after { after } else { before }.text(),
+            None => controller.code.text(),
+        }
+    });
+    ConfigurationHash::of(text.as_bytes())
+}
+
+/// The first point that is not equal in both, in words.
+fn different_point(before: &Code, after: &Code) -> Option<String> {
+    let (old, new) = (before.interface(), after.interface());
+    let sides = [("input", &old.inputs, &new.inputs), ("output", &old.outputs, &new.outputs)];
+    for (side, old, new) in sides {
+        let (old, new): (Vec<_>, Vec<_>) = (old.iter().collect(), new.iter().collect());
+        for place in 0..old.len().max(new.len()) {
+            let is_equal = match (old.get(place), new.get(place)) {
+                (Some(one), Some(other)) => {
+                    (&one.name, one.of, one.bit, one.range)
+                        == (&other.name, other.of, other.bit, other.range)
+                }
+                _ => false,
+            };
+            if !is_equal {
+                let point = new.get(place).or(old.get(place))?;
+                return Some(format!("{side} `{}` of type {}", point.name, point.of));
+            }
+        }
+    }
+    None
+}
+
+fn first_difference(before: &str, after: &str) -> Option<(String, String)> {
+    let (mut old, mut new) = (before.lines(), after.lines());
+    loop {
+        match (old.next(), new.next()) {
+            (None, None) => return None,
+            (one, other) if one != other => {
+                let line = |line: Option<&str>| line.unwrap_or_default().trim().to_owned();
+                return Some((line(one), line(other)));
+            }
+            _ => {}
+        }
+    }
+}

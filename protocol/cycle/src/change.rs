@@ -1,0 +1,194 @@
+//! An online change: the programs of another configuration, loaded beside those that run.
+//!
+//! ```text
+//!   running ── prepare ──► both loaded ── switch ──► remote I/O i marks its history: program i is the new one ── accept ──► running
+//!      ▲                     │    ▲                      │       ▲                                                │
+//!      └────── forget ───────┘    └──── switch back ─────┘       └───────────── take back the acceptance ─────────┘
+//! ```
+//!
+//! A change mark is part of a sample, so of the lineage: a station that follows the sample converts its state, and one that has not loaded the new
+//! program cannot follow and is silent. Members with a configuration in common admit each other's frames ([`understudy_wire::Configurations`]), so
+//! it does not matter which of them accepts first.
+
+use std::fmt::Debug;
+use std::hash::{Hash, Hasher};
+use std::sync::Arc;
+
+use understudy_executable::Executable;
+use understudy_wire::{ConfigurationHash, Configurations, OrderRefusal, ProgramHash, ProgramId};
+
+/// Compiled program of the cluster.
+#[derive(Debug, Clone)]
+pub struct Program {
+    /// Hash of its canonical text.
+    pub hash: ProgramHash,
+    /// Its f and h, (1) and (2).
+    pub executable: Executable,
+}
+
+/// A state of one program as the first state of another one.
+pub trait Conversion: Debug + Send + Sync {
+    /// The state for the packed `state`: a function of both programs and of the state, so all stations compute the same.
+    fn convert(&self, state: &[u64]) -> Vec<u64>;
+}
+
+/// One program that a change replaces, with the way there and back.
+#[derive(Debug, Clone)]
+pub struct ProgramChange {
+    /// Which program.
+    pub program: ProgramId,
+    /// The program of the configuration before; its points are those of `after`.
+    pub before: Program,
+    /// The program of the configuration after.
+    pub after: Program,
+    /// From a state of `before` to one of `after`.
+    pub forward: Arc<dyn Conversion>,
+    /// From a state of `after` to one of `before`.
+    pub back: Arc<dyn Conversion>,
+}
+
+/// What an online change replaces. Everything else of the two configurations is equal.
+#[derive(Debug, Clone)]
+pub struct OnlineChange {
+    /// The configuration before.
+    pub before: ConfigurationHash,
+    /// The configuration after.
+    pub after: ConfigurationHash,
+    /// In the order of programs.
+    pub programs: Vec<ProgramChange>,
+}
+
+impl OnlineChange {
+    /// What it does to a program; none where that stays.
+    pub fn of(&self, program: ProgramId) -> Option<&ProgramChange> {
+        self.programs.iter().find(|change| change.program == program)
+    }
+}
+
+/// The programs that one state machine can execute in the place of one program.
+#[derive(Debug, Clone, Copy)]
+pub struct Versions<'a> {
+    /// That of the configuration with which the member started.
+    first: &'a Program,
+    change: Option<&'a ProgramChange>,
+}
+
+impl<'a> Versions<'a> {
+    /// The program that a member started with, and the change that it has loaded.
+    pub fn new(first: &'a Program, change: Option<&'a Arc<OnlineChange>>, program: ProgramId) -> Self {
+        Self { first, change: change.and_then(|change| change.of(program)) }
+    }
+
+    /// Each once.
+    pub fn all(self) -> impl Iterator<Item = &'a Program> {
+        let changed = self.change.map(|change| [&change.before, &change.after]);
+        let others = changed.into_iter().flatten();
+        let first = self.first;
+        std::iter::once(first).chain(others.filter(move |it| it.hash != first.hash))
+    }
+
+    /// The program with this hash.
+    pub fn of(self, hash: ProgramHash) -> Option<&'a Program> {
+        self.all().find(|program| program.hash == hash)
+    }
+
+    /// Width of u in bits, which a change does not touch.
+    pub fn input_count(self) -> usize {
+        self.first.executable.input_count()
+    }
+
+    /// The first state of `to` for the state of `from`; none where one of them is not loaded.
+    pub fn convert(self, from: ProgramHash, to: ProgramHash, state: &[u64]) -> Option<Vec<u64>> {
+        let change = self.change?;
+        match (change.before.hash, change.after.hash) {
+            hashes if hashes == (from, to) => Some(change.forward.convert(state)),
+            hashes if hashes == (to, from) => Some(change.back.convert(state)),
+            _ => None,
+        }
+    }
+}
+
+/// An order that moves an online change on. Every member takes all but the switch, which is for remote I/Os.
+#[derive(Debug, Clone)]
+pub enum ChangeOrder {
+    /// The change is loaded: both its programs are known from now on.
+    Prepare(Arc<OnlineChange>),
+    /// The program of this remote I/O becomes the one with this hash, with the next sample.
+    Switch(ProgramHash),
+    /// This configuration, one of the two of the change, is the member's own from now on.
+    Run(ConfigurationHash),
+    /// The other configuration of the change is forgotten.
+    Forget,
+}
+
+/// What a member knows of an online change.
+#[derive(Debug, Clone)]
+pub struct Changing {
+    own: ConfigurationHash,
+    change: Option<Arc<OnlineChange>>,
+}
+
+impl Changing {
+    /// A member that runs the configuration `own`, and has loaded no other one.
+    pub fn new(own: ConfigurationHash) -> Self {
+        Self { own, change: None }
+    }
+
+    /// Its configuration, and the one that it has loaded beside it.
+    pub fn configurations(&self) -> Configurations {
+        let prepared = self.change.as_ref().map(|change| {
+            if change.before == self.own { change.after } else { change.before }
+        });
+        Configurations { own: self.own, prepared }
+    }
+
+    /// The change that it has loaded.
+    pub fn change(&self) -> Option<&Arc<OnlineChange>> {
+        self.change.as_ref()
+    }
+
+    /// The hash that a program has in the member's own configuration; `first` is that of the configuration with which it started.
+    pub fn hash_of(&self, program: ProgramId, first: ProgramHash) -> ProgramHash {
+        let Some((change, of)) = self.change.as_ref().and_then(|it| Some((it, it.of(program)?)))
+        else {
+            return first;
+        };
+        if change.before == self.own { of.before.hash } else { of.after.hash }
+    }
+
+    /// Takes an order; `may_forget` says whether nothing needs the other configuration any more.
+    ///
+    /// # Errors
+    /// Nothing changes, because of the refusal.
+    pub fn take(&mut self, order: &ChangeOrder, may_forget: bool) -> Result<(), OrderRefusal> {
+        match order {
+            ChangeOrder::Prepare(change) => match &self.change {
+                Some(known) if (known.before, known.after) == (change.before, change.after) => {}
+                Some(_) => return Err(OrderRefusal::AnotherChange),
+                None if change.before == self.own || change.after == self.own => {
+                    self.change = Some(Arc::clone(change));
+                }
+                None => return Err(OrderRefusal::OtherConfiguration { own: self.own }),
+            },
+            ChangeOrder::Run(configuration) => {
+                let Configurations { own, prepared } = self.configurations();
+                if own != *configuration && prepared != Some(*configuration) {
+                    return Err(OrderRefusal::NotPrepared);
+                }
+                self.own = *configuration;
+            }
+            ChangeOrder::Forget if !may_forget => return Err(OrderRefusal::StillNeeded),
+            ChangeOrder::Forget => self.change = None,
+            // A remote I/O makes change marks, and takes this order itself.
+            ChangeOrder::Switch(_) => return Err(OrderRefusal::NotRunning),
+        }
+        Ok(())
+    }
+}
+
+/// Of the two, only what frames and states depend on: the rest follows from the configurations.
+impl Hash for Changing {
+    fn hash<H: Hasher>(&self, hasher: &mut H) {
+        self.configurations().hash(hasher);
+    }
+}
