@@ -117,7 +117,7 @@ impl<Event: From<Refusal>> Endpoint<Event> {
 
     /// Takes an order of an online change, as [`Changing::take`] does, and answers it.
     pub fn take_change(&mut self, now: Time, order: &ChangeOrder, may_forget: bool) {
-        let may_forget = may_forget && !self.reception.needs_prepared(now);
+        let may_forget = may_forget && !self.reception.receives_other(now);
         let outcome = self.changing.take(order, may_forget);
         self.put(Output::Obeyed(outcome));
     }

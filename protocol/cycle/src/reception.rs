@@ -19,8 +19,8 @@ pub(crate) struct Reception {
     programs: usize,
     refused_for: Duration,
     refused: BTreeMap<Member, Other>,
-    /// When frames of members were admitted last that only have the prepared configuration in common with this one.
-    by_prepared: BTreeMap<Member, Time>,
+    /// When frames of members were admitted last that run the other configuration of an online change.
+    others: BTreeMap<Member, Time>,
 }
 
 /// A refused member.
@@ -60,7 +60,7 @@ impl Reception {
             programs: agreement.schedule.controllers(),
             refused_for: REFUSED_FOR.max(agreement.schedule.period() * REFUSED_FOR_PERIODS),
             refused: BTreeMap::new(),
-            by_prepared: BTreeMap::new(),
+            others: BTreeMap::new(),
         }
     }
 
@@ -93,11 +93,10 @@ impl Reception {
             return Admission::Refused { theirs };
         }
         if configurations.prepared.is_some() && known {
-            let without = Configurations { prepared: None, ..configurations };
-            if without.admit(header) {
-                self.by_prepared.remove(&header.sender);
+            if header.configuration == configurations.own {
+                self.others.remove(&header.sender);
             } else {
-                self.by_prepared.insert(header.sender, now);
+                self.others.insert(header.sender, now);
             }
         }
         match known {
@@ -116,9 +115,9 @@ impl Reception {
         Some(member)
     }
 
-    /// Whether a member is received at `now` that would be refused without the prepared configuration.
-    pub(crate) fn needs_prepared(&self, now: Time) -> bool {
-        self.by_prepared.values().any(|received| now.since(*received) < self.refused_for)
+    /// Whether a member is received at `now` that runs the other configuration of an online change.
+    pub(crate) fn receives_other(&self, now: Time) -> bool {
+        self.others.values().any(|received| now.since(*received) < self.refused_for)
     }
 
     /// The number of members with another configuration that are received.
