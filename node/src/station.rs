@@ -486,6 +486,10 @@ impl Machine for Station {
         self.member.wakeup()
     }
 
+    fn configurations(&self) -> Option<Configurations> {
+        Some(self.configurations())
+    }
+
     fn outvoted(&self) -> Option<Outvoted> {
         self.member.outvoted()
     }

@@ -504,6 +504,10 @@ impl Machine for RemoteIo {
         self.member.wakeup()
     }
 
+    fn configurations(&self) -> Option<Configurations> {
+        Some(self.configurations())
+    }
+
     fn outvoted(&self) -> Option<Outvoted> {
         self.member.outvoted()
     }

@@ -60,8 +60,8 @@ pub(super) fn ask(call: &Call, cluster: &Cluster, name: &str) -> Result<Answer, 
         let wants_more = match told {
             Told::Line(line) => present.take(line),
             Told::By(reporter) => {
-                other =
-                    reporter.filter(|theirs| theirs.configuration != ours.configuration).cloned();
+                let own = cluster.agreement().configuration;
+                other = reporter.filter(|theirs| !theirs.is_of(own)).cloned();
                 true
             }
             Told::Lost(_) => true,

@@ -22,8 +22,8 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_cycle::{Agreement, Endpoint, Input, Machine, Output};
-use understudy_wire::{Body, Field, Frame, Header, Image, Member, Moment, ProgramId, Time};
+use understudy_cycle::{Agreement, Endpoint, Input, Machine, OnlineChange, Output};
+use understudy_wire::{Body, Configurations, Field, Frame, Header, Image, Member, Moment, ProgramId, Time};
 
 use crate::event::{Event, Pace};
 use crate::followed::{Followed, Hearing};
@@ -197,6 +197,14 @@ impl PlantMachine {
         self.endpoint.report(Event::Stepped { moment, pace, outputs, field });
     }
 
+    /// It had loaded a change before it was started, with these configurations; without effect where that is none of its own.
+    #[must_use]
+    pub fn changed(mut self, change: &Arc<OnlineChange>, configurations: Configurations) -> Self {
+        // One that is refused is of another cluster file, and its members say so.
+        let _ = self.endpoint.restore_change(Arc::clone(change), configurations);
+        self
+    }
+
     fn send_field(&mut self, moment: Moment, field: Field) {
         self.endpoint.send(moment, false, Body::Field(field));
     }
@@ -221,5 +229,9 @@ impl Machine for PlantMachine {
 
     fn wakeup(&self) -> Time {
         self.wakeup
+    }
+
+    fn configurations(&self) -> Option<Configurations> {
+        Some(self.endpoint.configurations())
     }
 }

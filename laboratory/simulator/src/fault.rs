@@ -35,8 +35,10 @@ pub enum ChangeStep {
     Accept,
     /// The old configuration is its own again.
     TakeBack,
-    /// It forgets the configuration that is not its own.
+    /// The change is over: it forgets the old configuration.
     Forget,
+    /// The change is over, and was taken back: it forgets the new configuration.
+    ForgetNew,
 }
 
 /// What can be done to a member. What does not concern a member (a state that it does not hold) does nothing.

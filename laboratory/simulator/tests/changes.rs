@@ -191,7 +191,7 @@ fn a_change_is_undone() {
     faults.push(step(90, remote_io, ChangeStep::SwitchBack));
     for member in MEMBERS {
         faults.push(step(110, member, ChangeStep::TakeBack));
-        faults.push(step(120, member, ChangeStep::Forget));
+        faults.push(step(120, member, ChangeStep::ForgetNew));
     }
     let (simulation, seen) = run(&faults, 150);
     assert!(simulation.violations().is_empty(), "{:?}", simulation.violations());

@@ -137,13 +137,16 @@ impl Line {
             Vain::NotAdmitted(reason.to_owned())
         })?;
         let status = call.ask(&Request::Status).unwrap_or_default();
-        self.check(&Reporter { configuration: theirs, version: version_of(&status) })?;
+        let mut hashes = theirs.split_whitespace().map(str::to_owned);
+        let configuration = hashes.next().unwrap_or_default();
+        let version = version_of(&status);
+        self.check(&Reporter { configuration, prepared: hashes.next(), version })?;
         Ok(call.with_configuration(self.configuration))
     }
 
     /// Whether records have the configuration of the cluster file, and a version that is read here.
     pub(crate) fn check(&self, reporter: &Reporter) -> Result<(), Vain> {
-        if reporter.configuration != self.configuration.to_string() {
+        if !reporter.is_of(self.configuration) {
             return Err(Vain::Other(reporter.configuration.clone()));
         }
         check_version(reporter.version).map_err(|wrong| Vain::Version(wrong.found))

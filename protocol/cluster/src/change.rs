@@ -169,11 +169,28 @@ impl ChangeTexts {
         }
         let change = OnlineChange { before: self.before, after: self.after, programs };
         for (side, claimed) in [(false, self.before), (true, self.after)] {
-            if configuration_with(cluster, &codes, side) != claimed {
+            let text = text_with(cluster, &codes, side);
+            if ConfigurationHash::of(text.as_bytes()) != claimed {
                 return Err(ChangeError::NotItsResult { claimed });
             }
         }
         Ok(change)
+    }
+}
+
+impl ChangeTexts {
+    /// The canonical text of one of the two configurations; none for another one, and where a text cannot be read.
+    pub fn canonical_text(&self, cluster: &Cluster, of: ConfigurationHash) -> Option<String> {
+        let is_after = of == self.after;
+        if !is_after && of != self.before {
+            return None;
+        }
+        let codes = self.programs.iter().map(|changed| {
+            let texts = [&changed.before, &changed.after];
+            let [before, after] = texts.map(|text| read_kept(&text.kept()));
+            Some((changed.program, [before?, after?]))
+        });
+        Some(text_with(cluster, &codes.collect::<Option<Vec<_>>>()?, is_after))
     }
 }
 
@@ -257,14 +274,10 @@ pub fn fates(before: &Code, after: &Code, state: Option<&Image>) -> CarriedState
     after.changed(before, words)
 }
 
-/// The configuration of a cluster in which these programs stand in the place of its own: those before the change, or those after it.
-fn configuration_with(
-    cluster: &Cluster,
-    codes: &[(ProgramId, [Code; 2])],
-    is_after: bool,
-) -> ConfigurationHash {
+/// The canonical text of a cluster in which these programs stand in the place of its own: those before the change, or those after it.
+fn text_with(cluster: &Cluster, codes: &[(ProgramId, [Code; 2])], is_after: bool) -> String {
     let mut controllers = (0..).map(ProgramId).zip(cluster.controllers());
-    let text = with_programs(&cluster.frame_text, || {
+    with_programs(&cluster.frame_text, || {
         let Some((place, controller)) = controllers.next() else {
             return String::new();
         };
@@ -272,8 +285,7 @@ fn configuration_with(
             Some((_, [before, after])) => if is_after { after } else { before }.text(),
             None => controller.code.text(),
         }
-    });
-    ConfigurationHash::of(text.as_bytes())
+    })
 }
 
 /// The first point that is not equal in both, in words.

@@ -108,8 +108,17 @@ impl<'a> Versions<'a> {
     }
 }
 
+/// Two changes are equal that lead from one configuration to the same other one.
+impl PartialEq for OnlineChange {
+    fn eq(&self, other: &Self) -> bool {
+        (self.before, self.after) == (other.before, other.after)
+    }
+}
+
+impl Eq for OnlineChange {}
+
 /// An order that moves an online change on. Every member takes all but the switch, which is for remote I/Os.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ChangeOrder {
     /// The change is loaded: both its programs are known from now on.
     Prepare(Arc<OnlineChange>),
@@ -117,8 +126,8 @@ pub enum ChangeOrder {
     Switch(ProgramHash),
     /// This configuration, one of the two of the change, is the member's own from now on.
     Run(ConfigurationHash),
-    /// The other configuration of the change is forgotten.
-    Forget,
+    /// The change is over: this configuration, which the member runs, is the only one from now on.
+    Forget(ConfigurationHash),
 }
 
 /// What a member knows of an online change.
@@ -163,7 +172,7 @@ impl Changing {
     pub fn take(&mut self, order: &ChangeOrder, may_forget: bool) -> Result<(), OrderRefusal> {
         match order {
             ChangeOrder::Prepare(change) => match &self.change {
-                Some(known) if (known.before, known.after) == (change.before, change.after) => {}
+                Some(known) if known == change => {}
                 Some(_) => return Err(OrderRefusal::AnotherChange),
                 None if change.before == self.own || change.after == self.own => {
                     self.change = Some(Arc::clone(change));
@@ -177,8 +186,11 @@ impl Changing {
                 }
                 self.own = *configuration;
             }
-            ChangeOrder::Forget if !may_forget => return Err(OrderRefusal::StillNeeded),
-            ChangeOrder::Forget => self.change = None,
+            ChangeOrder::Forget(kept) if *kept != self.own => {
+                return Err(OrderRefusal::OtherConfiguration { own: self.own });
+            }
+            ChangeOrder::Forget(_) if !may_forget => return Err(OrderRefusal::StillNeeded),
+            ChangeOrder::Forget(_) => self.change = None,
             // A remote I/O makes change marks, and takes this order itself.
             ChangeOrder::Switch(_) => return Err(OrderRefusal::NotRunning),
         }

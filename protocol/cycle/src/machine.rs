@@ -10,7 +10,7 @@ use std::time::Duration;
 use crate::change::ChangeOrder;
 
 use understudy_wire::{
-    ConfigurationHash, Force, Frame, Image, OrderRefusal, Retained, SignalPlace, StateChoice, Time,
+    ConfigurationHash, Configurations, Force, Frame, Image, OrderRefusal, Retained, SignalPlace, StateChoice, Time,
     Write, WriteAnswer,
 };
 
@@ -94,6 +94,11 @@ pub trait Machine {
 
     /// When it wants [`Input::Wakeup`] at the latest.
     fn wakeup(&self) -> Time;
+
+    /// The configuration that it runs, and the one that it has loaded beside it; nothing of what is no member of a cluster.
+    fn configurations(&self) -> Option<Configurations> {
+        None
+    }
 
     /// The majority against this member, whose process should end then.
     fn outvoted(&self) -> Option<Outvoted> {

@@ -122,6 +122,27 @@ impl<Event: From<Refusal>> Endpoint<Event> {
         self.put(Output::Obeyed(outcome));
     }
 
+    /// Starts with a change that it had loaded before, and with the configurations that it had then. A change of other configurations is left out:
+    /// its refusal says so.
+    ///
+    /// # Errors
+    /// As of [`Changing::take`].
+    pub fn restore_change(
+        &mut self,
+        change: Arc<OnlineChange>,
+        Configurations { own, prepared }: Configurations,
+    ) -> Result<(), OrderRefusal> {
+        let changing = &mut self.changing;
+        changing.take(&ChangeOrder::Prepare(change), true)?;
+        changing.take(&ChangeOrder::Run(own), true)?;
+        if prepared.is_none() { changing.take(&ChangeOrder::Forget(own), true) } else { Ok(()) }
+    }
+
+    /// Its configuration, and the one that it has loaded beside it.
+    pub fn configurations(&self) -> Configurations {
+        self.changing.configurations()
+    }
+
     /// Reports the refusals that have ended by `now`.
     pub fn end_refusals(&mut self, now: Time) {
         while let Some(member) = self.reception.ended(now) {
@@ -222,20 +243,16 @@ impl<Event: From<Refusal> + From<Notice>> Participant<Event> {
         }
     }
 
-    /// Starts with a change that it had loaded before, and with the configurations that it had then. A change of other configurations is left out:
-    /// its refusal says so.
+    /// As [`Endpoint::restore_change`].
     ///
     /// # Errors
-    /// As of [`Changing::take`].
+    /// As there.
     pub fn restore_change(
         &mut self,
         change: Arc<OnlineChange>,
-        Configurations { own, prepared }: Configurations,
+        configurations: Configurations,
     ) -> Result<(), OrderRefusal> {
-        let changing = &mut self.endpoint.changing;
-        changing.take(&ChangeOrder::Prepare(change), true)?;
-        changing.take(&ChangeOrder::Run(own), true)?;
-        if prepared.is_none() { changing.take(&ChangeOrder::Forget, true) } else { Ok(()) }
+        self.endpoint.restore_change(change, configurations)
     }
 
     /// As [`Endpoint::admits`].

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use ring::aead::{Aad, LessSafeKey, Nonce};
 use understudy_wire::{
-    Body, ClusterHash, ConfigurationHash, Frame, FrameError, Header, MAXIMUM_FRAME_BYTES, Member,
+    Body, ClusterHash, ConfigurationHash, Configurations, Frame, FrameError, MAXIMUM_FRAME_BYTES, Member,
     StationId, Via, decode,
 };
 
@@ -91,7 +91,7 @@ pub struct Opener {
     senders: BTreeMap<Member, Sender>,
     transfers: BTreeMap<StationId, LessSafeKey>,
     revoked: Arc<Revocations>,
-    agreed: Option<(ClusterHash, ConfigurationHash)>,
+    agreed: Option<(ClusterHash, Configurations)>,
 }
 
 impl Opener {
@@ -127,8 +127,15 @@ impl Opener {
         cluster: ClusterHash,
         configuration: ConfigurationHash,
     ) -> Self {
-        self.agreed = Some((cluster, configuration));
+        self.agreed = Some((cluster, Configurations { own: configuration, prepared: None }));
         self
+    }
+
+    /// The member has these configurations from now on.
+    pub fn agree(&mut self, configurations: Configurations) {
+        if let Some((_, agreed)) = &mut self.agreed {
+            *agreed = configurations;
+        }
     }
 
     /// [`Self::open_over`] the network that every cluster has.
@@ -187,8 +194,10 @@ impl Opener {
                 "sender and receiver are those of its envelope",
             )));
         }
-        let Header { cluster, configuration, .. } = frame.header;
-        let agrees = self.agreed.is_none_or(|agreed| agreed == (cluster, configuration));
+        let header = &frame.header;
+        let agrees = self.agreed.is_none_or(|(cluster, configurations)| {
+            header.cluster == cluster && configurations.admit(header)
+        });
         // A frame of another configuration is refused by its receiver, and does not begin a life.
         if begins && agrees {
             known.take(via, envelope)?;

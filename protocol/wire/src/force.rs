@@ -169,8 +169,8 @@ pub enum OrderRefusal {
     /// Another online change is prepared.
     #[error("another online change is prepared: accept it or cancel it first")]
     AnotherChange,
-    /// The change begins and ends with other configurations than that of the member.
-    #[error("the change is not one of the configuration {own} that this member runs")]
+    /// The order is for another configuration than that of the member.
+    #[error("this member runs configuration {own}, which is not the one of the order")]
     OtherConfiguration {
         /// Configuration of the member.
         own: ConfigurationHash,

@@ -4,6 +4,7 @@
 //! ([`Lineage`]), and the bytes of a [`Frame`] ([`encode`], [`decode`]).
 
 mod audience;
+mod change;
 mod codec;
 mod force;
 mod frame;
@@ -19,6 +20,7 @@ mod via;
 mod write;
 
 pub use audience::{Audience, Roster, Topic, ZENOH_PORT_OFFSET};
+pub use change::ChangeRequest;
 pub use codec::{FrameError, MAXIMUM_FRAME_BYTES, decode, encode};
 pub use force::{
     Force, ForceError, MAXIMUM_FORCE_SECONDS, MAXIMUM_OWNER_LENGTH, MAXIMUM_REASON_LENGTH,

@@ -8,6 +8,7 @@
 //! | `configuration` | asked: the canonical text of the configuration | all | yes |
 //! | `status` | asked: what it said when it was ready | all | yes |
 //! | `command/release`, `command/stop` | asked: done | engineers | no |
+//! | `command/prepare`, `command/change` | asked with the texts of an online change, or a step of it, as JSON: done, or why not | engineers | no |
 //! | `write/operator`, `write/engineer` | asked with a write as JSON: its outcome | operators; engineers | no |
 //! | `command/force`, `command/unforce` | asked with a force or a signal as JSON: done, or why not | engineers | no |
 //! | `refused` | asked with a refused order of a person as JSON: it is recorded | all | no |
@@ -15,7 +16,8 @@
 //! | `attendance` | told by a remote I/O, once a second and at once while a station is missed: the stations that it misses; with its configuration | all | no |
 //! | `journal` | told: the lines of its journal, those of a moment at once; twice a second those in effect again; with its configuration | all | no |
 //!
-//! and under `understudy/cluster/<member>`, for callers whose cluster file may be another one: asked, the hash of the configuration.
+//! and under `understudy/cluster/<member>`, for callers whose cluster file may be another one: asked, the hash of the configuration, and behind it
+//! that of the one that an online change has loaded.
 //!
 //! Invariants: the cycle never waits for the channel, which has a thread and a bounded queue of its own; a channel that cannot be
 //! opened is tried again, and the member runs without it; who is revoked is cut off as soon as the list of the admitted changes.
@@ -36,12 +38,13 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, channel};
 use std::time::Duration;
 
 use serde_json::json;
-use understudy_wire::{ConfigurationHash, Time};
+use understudy_wire::Time;
 use zenoh::Wait;
 use zenoh::pubsub::Publisher;
 use zenoh::qos::CongestionControl;
 use zenoh::query::{Query, Queryable};
 
+use crate::changes::Changes;
 use crate::clock::Clock;
 use crate::connections::{Connections, Relay, inner_address};
 use crate::endpoints::Endpoints;
@@ -61,7 +64,9 @@ pub(crate) use tls::{
 };
 pub use tls::{Admitted, TlsKeys, Validity};
 
-use answers::{answer, given, of_configuration, with_value};
+pub(crate) use answers::given;
+
+use answers::{answer, hashes, of_configuration, with_value};
 use followed::Line;
 use refused::RefusedReports;
 use spares::SpareReports;
@@ -103,8 +108,8 @@ pub struct ChannelSettings {
     pub keys: TlsKeys,
     /// Says who is admitted now; asked again and again.
     pub admitted: Box<dyn FnMut() -> Admitted + Send>,
-    /// The canonical text of its configuration.
-    pub configuration: String,
+    /// Its configuration, and the one that an online change has loaded beside it.
+    pub changes: Changes,
     /// Finds the lines of its journal that are in effect.
     pub in_effect: Box<dyn LinesInEffect>,
 }
@@ -364,19 +369,18 @@ impl<E: Send + 'static> Channel<E> {
         };
         let (journal, attendance) = (publisher(JOURNAL_KEY)?, publisher(ATTENDANCE_KEY)?);
         let mut answers = Vec::new();
-        for (what, text) in [
-            ("configuration", self.settings.configuration.clone()),
-            ("status", self.status.clone()),
-        ] {
-            let key = format!("{}/{what}", self.prefix);
-            answers.push(answer(&session, key, move |_| text.clone())?);
-        }
-        let own = ConfigurationHash::of(self.settings.configuration.as_bytes());
+        let status = self.status.clone();
+        let key = format!("{}/status", self.prefix);
+        answers.push(answer(&session, key, move |_| status.clone())?);
+        let changes = self.settings.changes.clone();
+        let key = format!("{}/configuration", self.prefix);
+        answers.push(answer(&session, key, move |_| changes.text())?);
+        let changes = self.settings.changes.clone();
         let key = hash_key(&self.name);
-        answers.push(answer(&session, key, move |_| own.to_string())?);
-        let control = self.control.clone();
+        answers.push(answer(&session, key, move |_| hashes(changes.configurations()))?);
+        let (control, changes) = (self.control.clone(), self.settings.changes.clone());
         let release = move |query: &Query| {
-            let order = of_configuration(query, own).map(|()| Order::Release);
+            let order = of_configuration(query, &changes).map(|()| Order::Release);
             order.map_or_else(|reason| reason, |order| given(&control, order))
         };
         let key = format!("{}/command/release", self.prefix);
@@ -389,16 +393,19 @@ impl<E: Send + 'static> Channel<E> {
         let key = format!("{}/command/stop", self.prefix);
         answers.push(answer(&session, key, stop)?);
         for word in ["force", "unforce", "choose"] {
-            let control = self.control.clone();
+            let (control, changes) = (self.control.clone(), self.settings.changes.clone());
             let force = move |query: &Query| {
-                let order = of_configuration(query, own).and_then(|()| with_value(word, query));
+                let order = of_configuration(query, &changes).and_then(|()| with_value(word, query));
                 order.map_or_else(|reason| reason, |order| given(&control, order))
             };
             let key = format!("{}/command/{word}", self.prefix);
             answers.push(answer(&session, key, force)?);
         }
         for (role, key) in WRITE_KEYS {
-            answers.push(self.answer_writes(&session, role, key, own)?);
+            answers.push(self.answer_writes(&session, role, key)?);
+        }
+        for key in ["prepare", "change"] {
+            answers.push(self.answer_changes(&session, key)?);
         }
         answers.push(self.answer_refused(&session)?);
         answers.push(self.answer_spares(&session)?);

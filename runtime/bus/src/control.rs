@@ -7,7 +7,7 @@ use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::signal::{SigSet, Signal};
 use nix::sys::signalfd::{SfdFlags, SignalFd};
-use understudy_wire::{Force, Write};
+use understudy_wire::{ChangeRequest, Force, Write};
 
 use crate::error::BusError;
 use crate::orders::{Control, Cuts, Order};
@@ -151,6 +151,11 @@ pub(crate) fn order(line: &str) -> Option<Order> {
         ("unforce", signal) => serde_json::from_str(signal).ok().map(Order::Unforce),
         _ => None,
     }
+}
+
+/// A step of an online change.
+pub(crate) fn change_request(line: &str) -> Option<ChangeRequest> {
+    serde_json::from_str(line.strip_prefix("change ")?).ok()
 }
 
 /// The links that a laboratory wants to be cut; no operator can.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_cycle::Agreement;
-use understudy_wire::{Actuation, Body, Frame, Header, Image, Member, Moment, ProgramId};
+use understudy_wire::{Actuation, Body, Configurations, Frame, Header, Image, Member, Moment, ProgramId};
 
 /// Drives and senses the field of one member; never blocks.
 pub trait FieldDriver: Send {
@@ -16,6 +16,9 @@ pub trait FieldDriver: Send {
 
     /// u(i), where `frame` comes from this field.
     fn sense<'frame>(&mut self, frame: &'frame Frame) -> Option<&'frame Image>;
+
+    /// The member has these configurations from now on.
+    fn agree(&mut self, _configurations: Configurations) {}
 
     /// How long a field that is reached over the link may be silent.
     fn patience(&self) -> Option<Duration> {
@@ -64,13 +67,15 @@ const PLANT_PATIENCE: Duration = Duration::from_secs(1);
 pub struct SimulatedField {
     program: ProgramId,
     agreement: Arc<Agreement>,
+    configurations: Configurations,
     has_plant: bool,
 }
 
 impl SimulatedField {
     /// The field of the remote I/O of `program`.
     pub fn new(program: ProgramId, agreement: Arc<Agreement>) -> Self {
-        Self { program, agreement, has_plant: false }
+        let configurations = Configurations { own: agreement.configuration, prepared: None };
+        Self { program, agreement, configurations, has_plant: false }
     }
 
     /// The cluster has a plant there, whose silence is reported.
@@ -85,8 +90,8 @@ impl FieldDriver for SimulatedField {
         Some(Frame {
             header: Header {
                 cluster: self.agreement.cluster,
-                configuration: self.agreement.configuration,
-                prepared: None,
+                configuration: self.configurations.own,
+                prepared: self.configurations.prepared,
                 moment,
                 sender: Member::RemoteIo(self.program),
                 alone: false,
@@ -98,12 +103,16 @@ impl FieldDriver for SimulatedField {
     fn sense<'frame>(&mut self, frame: &'frame Frame) -> Option<&'frame Image> {
         let header = &frame.header;
         let ours = header.cluster == self.agreement.cluster
-            && header.configuration == self.agreement.configuration
+            && self.configurations.admit(header)
             && header.sender == Member::Plant(self.program);
         match &frame.body {
             Body::Field(field) if ours => Some(&field.sensors),
             _ => None,
         }
+    }
+
+    fn agree(&mut self, configurations: Configurations) {
+        self.configurations = configurations;
     }
 
     fn patience(&self) -> Option<Duration> {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 
 use understudy_seal::{Opener, Refusal, Seal};
-use understudy_wire::{Frame, FrameError, Member, Via, decode};
+use understudy_wire::{Configurations, Frame, FrameError, Member, Via, decode};
 
 use crate::refused_as::RefusedAs;
 use crate::rights::run_in_background;
@@ -80,6 +80,13 @@ impl Guard {
             keys.new_life = Some(new_life);
         }
         self
+    }
+
+    /// From now on the member has these configurations.
+    pub(crate) fn agree(&mut self, configurations: Configurations) {
+        if let Self::Keys(keys) = self {
+            keys.opener.agree(configurations);
+        }
     }
 
     /// Asks for a new life, which a thread of its own prepares: a life is noted on the disk before it is used.

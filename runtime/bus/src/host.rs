@@ -154,6 +154,7 @@ impl<M: Machine> Host<'_, M> {
     /// [`BusError::System`] where the system refuses to let it sleep; [`BusError::Outvoted`] where a majority has another configuration.
     pub fn run(mut self) -> Result<Summary, BusError> {
         let mut round = Round::default();
+        self.agree();
         self.drain(self.clock.now(), &mut round);
         loop {
             if self.obey(&mut round) || self.machine.outvoted().is_some() {
@@ -225,14 +226,24 @@ impl<M: Machine> Host<'_, M> {
                 Order::Force(force) => Input::RemoteIo(RemoteIoInput::Force(force)),
                 Order::Unforce(signal) => Input::RemoteIo(RemoteIoInput::Unforce(*signal)),
                 Order::Write(write) => Input::RemoteIo(RemoteIoInput::Write(write)),
+                Order::Change(order) => Input::Change(order),
             };
             debug!(order = ?given.order, "an order");
             let now = self.clock.now();
             self.machine.handle_input(now, input);
+            self.agree();
             self.drain(now, round);
             given.answer(round.obeyed.take());
         }
         false
+    }
+
+    /// Lets what opens frames know which configurations the member has.
+    fn agree(&mut self) {
+        if let Some(configurations) = self.machine.configurations() {
+            self.guard.agree(configurations);
+            self.field.agree(configurations);
+        }
     }
 
     /// Looks at the field where that was longer ago than a breath: a member that was suspended while it took its frames would sample the field of

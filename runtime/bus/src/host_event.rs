@@ -34,6 +34,14 @@ pub enum HostEvent {
         /// What the system lets it have.
         rights: Rights,
     },
+    /// An engineer has asked for a step of an online change.
+    ChangeOrdered {
+        /// What, in words.
+        step: String,
+        /// Why it was not done, with its code.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        refused: Option<String>,
+    },
     /// Datagrams arrived that are no frames, since the last such record.
     RefusedBytes {
         /// How many.

@@ -6,6 +6,7 @@
 
 mod anchor;
 mod announcer;
+mod changes;
 mod channel;
 mod clock;
 mod connections;
@@ -48,6 +49,7 @@ mod writes;
 mod zenoh_link;
 
 pub use announcer::{Announcer, Question};
+pub use changes::{ChangeKeeper, Changes};
 pub use channel::{
     Admitted, ChannelSettings, DONE, LinesInEffect, Reporter, SPARE_REPORTS_EVERY, SpareReport,
     TlsKeys, Validity,

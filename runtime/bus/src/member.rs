@@ -10,11 +10,11 @@ use nix::sys::prctl::set_pdeathsig;
 use nix::sys::signal::Signal;
 use serde::Serialize;
 use understudy_cycle::Machine;
-use understudy_wire::ConfigurationHash;
 
-use crate::channel::{Channel, ChannelSettings, Reporter, followed};
+use crate::changes::Changes;
+use crate::channel::{Channel, ChannelSettings, DONE, followed};
 use crate::clock::Clock;
-use crate::control::{Commands, ending_signals, watch};
+use crate::control::{Commands, change_request, ending_signals, watch};
 use crate::endpoints::Endpoints;
 use crate::error::BusError;
 use crate::field::FieldDriver;
@@ -42,6 +42,8 @@ pub struct MemberSettings {
     pub period: Duration,
     /// Closes and opens the frames.
     pub guard: Guard,
+    /// What it knows of online changes.
+    pub changes: Changes,
     /// Where operators can call; nowhere without it.
     pub channel: Option<ChannelSettings>,
     /// What it keeps for the time after a power failure.
@@ -80,6 +82,7 @@ where
         link: kind,
         period,
         mut guard,
+        changes,
         channel,
         retention,
         mut field,
@@ -98,8 +101,7 @@ where
     let _member = span.clone().entered();
     let (output, telemetry): (Box<dyn Write + Send>, _) = match channel {
         Some(settings) => {
-            let configuration = ConfigurationHash::of(settings.configuration.as_bytes());
-            let (output, telemetry) = followed(output, Reporter::with(configuration));
+            let (output, telemetry) = followed(output, settings.changes.clone());
             (Box::new(output), Some((settings, telemetry)))
         }
         None => (Box::new(output), None),
@@ -183,7 +185,14 @@ where
             })
             .map_err(|source| BusError::System { what: "a thread for the cycle", source })?;
         let watched = watch(commands, &signals, finished.as_fd(), &control, |line| {
-            let event = HostEvent::UnknownCommand { line };
+            let event = match change_request(&line) {
+                Some(request) => {
+                    let said = changes.take(&control, &request);
+                    let refused = (said != DONE).then_some(said);
+                    HostEvent::ChangeOrdered { step: request.words(), refused }
+                }
+                None => HostEvent::UnknownCommand { line },
+            };
             noted.record(clock.now(), Noted::Host(event));
         });
         if watched.is_err() {

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde_json::json;
 use understudy_wire::{
-    ClusterHash, ConfigurationHash, Force, Role, SignalPlace, StateChoice, Write,
+    ChangeRequest, ClusterHash, ConfigurationHash, Force, Role, SignalPlace, StateChoice, Write,
 };
 use zenoh::Wait;
 
@@ -47,6 +47,10 @@ pub enum Request {
     Write(Write),
     /// To record an order that was refused before it was sent.
     Refused(RefusedOrder),
+    /// To load an online change from these texts, as JSON.
+    Prepare(String),
+    /// To take a step of an online change.
+    Change(ChangeRequest),
     /// Records where a spare is.
     Spare(SpareReport),
     /// To end.
@@ -67,18 +71,27 @@ impl Request {
             Self::Write(_) => WRITE_KEYS[0].1,
             Self::Refused(_) => REFUSED_KEY,
             Self::Spare(_) => SPARE_KEY,
+            Self::Prepare(_) => "command/prepare",
+            Self::Change(_) => "command/change",
             Self::Stop => "command/stop",
         }
     }
 
     /// Whether it means signals or states of a program: a member with another configuration would take it for others.
     fn is_of_configuration(&self) -> bool {
-        matches!(self, Self::Write(_)) || self.is_command() && *self != Self::Stop
+        let is_of_all = matches!(self, Self::Stop | Self::Prepare(_) | Self::Change(_));
+        matches!(self, Self::Write(_)) || self.is_command() && !is_of_all
     }
 
     /// Whether it is answered by [`DONE`](crate::DONE), or with the reason why it is not done.
     pub fn is_command(&self) -> bool {
         self.key().starts_with("command/") && !matches!(self, Self::Write(_))
+    }
+
+    /// How long its answer may take.
+    fn patience(&self) -> Duration {
+        // Programs are read and compiled before.
+        if matches!(self, Self::Prepare(_)) { PATIENCE * 12 } else { PATIENCE }
     }
 
     /// What it comes with.
@@ -90,6 +103,8 @@ impl Request {
             Self::Write(write) => serde_json::to_string(write),
             Self::Refused(order) => serde_json::to_string(&order.clone().bounded()),
             Self::Spare(report) => serde_json::to_string(report),
+            Self::Change(request) => serde_json::to_string(request),
+            Self::Prepare(texts) => return texts.clone(),
             _ => return String::new(),
         };
         text.unwrap_or_default()
@@ -197,7 +212,7 @@ impl Call {
                     .filter(|_| request.is_of_configuration())
                     .map(|configuration| configuration.to_string()),
             )
-            .timeout(PATIENCE)
+            .timeout(request.patience())
             .wait()
             .map_err(|_| unanswered())?;
         let mut is_late = false;

@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
+use understudy_cycle::ChangeOrder;
 use understudy_wire::{
     Force, Member, OrderRefusal, ProgramSet, SignalPlace, StateChoice, StationSet, Via, Write,
     WriteAnswer,
@@ -34,6 +35,8 @@ pub enum Order {
     Unforce(SignalPlace),
     /// An operator writes a value.
     Write(Write),
+    /// An engineer moves an online change on.
+    Change(ChangeOrder),
     /// The laboratory cuts these links and pulls these cables, and no others.
     Cut(Cuts),
 }

@@ -18,14 +18,14 @@ use std::time::{Duration, Instant, SystemTime};
 use members::{Chatter, endpoints, peers, station};
 use serde_json::json;
 use understudy_bus::{
-    Admitted, BusError, Call, ChannelSettings, Commands, DONE, Documents, Endpoints, Guard,
+    Admitted, BusError, Call, Changes, ChannelSettings, Commands, DONE, Documents, Endpoints, Guard,
     LinesInEffect, LinkKind, MemberSettings, NoField, Peer, Request, Summary, TlsKeys, Validity,
     run_member,
 };
 use understudy_cycle::Mode;
 use understudy_keys::{Authority, Date, People};
 use understudy_testing::press_cell;
-use understudy_wire::{ConfigurationHash, Force, Role, SignalPlace, Write, WriteId};
+use understudy_wire::{ConfigurationHash, Configurations, Force, Role, SignalPlace, Write, WriteId};
 use zenoh::Wait;
 
 const DEADLINE: Duration = Duration::from_secs(60);
@@ -97,6 +97,12 @@ fn router(folder: &Path, member: SocketAddr, own: SocketAddr) -> zenoh::Session 
     zenoh::open(config).wait().expect("a free port")
 }
 
+fn changes() -> Changes {
+    let text = "what everybody has to agree on";
+    let own = ConfigurationHash::of(text.as_bytes());
+    Changes::new(Configurations { own, prepared: None }, None, text.to_owned(), None)
+}
+
 /// A member that runs with a channel for those who are admitted.
 fn member_with(
     endpoints: Endpoints,
@@ -104,7 +110,9 @@ fn member_with(
     admitted: fn() -> Admitted,
 ) -> JoinHandle<Result<Summary, BusError>> {
     spawn(move || {
+        let changes = changes();
         let settings = MemberSettings {
+            changes: changes.clone(),
             retention: Default::default(),
             endpoints,
             link: LinkKind::Udp,
@@ -113,7 +121,7 @@ fn member_with(
             channel: Some(ChannelSettings {
                 keys,
                 admitted: Box::new(admitted),
-                configuration: "what everybody has to agree on".into(),
+                changes,
                 in_effect: Box::new(NothingInEffect),
             }),
             field: Box::new(NoField),

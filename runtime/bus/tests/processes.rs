@@ -21,7 +21,7 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde::{Deserialize, Serialize};
 use understudy_bus::{
-    Commands, FieldDriver, Guard, HostEvent, LinkKind, MemberSettings, NoField, Noted, Peer,
+    Changes, Commands, FieldDriver, Guard, HostEvent, LinkKind, MemberSettings, NoField, Noted, Peer,
     Record, SimulatedField, run_member, zenoh_runtime,
 };
 use understudy_wire::Member;
@@ -74,6 +74,7 @@ fn act(part: &Part) -> ExitCode {
         _ => Box::new(NoField),
     };
     let settings = MemberSettings {
+        changes: Changes::none(agreement().configuration),
         retention: Default::default(),
         guard: Guard::Off,
         channel: None,

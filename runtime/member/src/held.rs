@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::SystemTime;
 
 use understudy_bus::{
-    Admitted, ChannelSettings, Guard, LinesInEffect, NewLife, TlsKeys, Validity, hold_back_signals,
+    Admitted, Changes, ChannelSettings, Guard, LinesInEffect, NewLife, TlsKeys, Validity, hold_back_signals,
 };
 use understudy_cluster::{Cluster, Security};
 use understudy_cycle::spare::AttendanceCount;
@@ -26,6 +26,7 @@ pub(crate) fn read_keys(
     options: &MemberOptions,
     cluster: &Cluster,
     member: Member,
+    changes: Changes,
 ) -> Result<Held, MemberError> {
     let folder = match (&options.keys, cluster.security()) {
         (_, Security::Off) => {
@@ -48,7 +49,7 @@ pub(crate) fn read_keys(
         (Ok(seal), Ok(watch)) => Ok(Held {
             guard: Guard::with_keys(seal, keys.opener()).with_lives(new_life(&keys)),
             // In a laboratory standard input is the operator.
-            channel: (!options.in_laboratory).then(|| channel(keys, cluster)),
+            channel: (!options.in_laboratory).then(|| channel(keys, cluster, changes)),
             _watch: Some(watch),
         }),
         (Err(error), _) | (_, Err(error)) => Err(MemberError::Keys(vec![error])),
@@ -64,7 +65,7 @@ fn new_life(keys: &Arc<MemberKeys>) -> NewLife {
     })
 }
 
-fn channel(keys: Arc<MemberKeys>, cluster: &Cluster) -> ChannelSettings {
+fn channel(keys: Arc<MemberKeys>, cluster: &Cluster, changes: Changes) -> ChannelSettings {
     let tls = keys.tls().clone();
     ChannelSettings {
         keys: tls_keys(&tls),
@@ -77,7 +78,7 @@ fn channel(keys: Arc<MemberKeys>, cluster: &Cluster) -> ChannelSettings {
                 members: admitted.members,
             }
         }),
-        configuration: cluster.canonical_text().to_owned(),
+        changes,
         in_effect: Box::new(InEffect {
             records: RecordsInEffect::default(),
             attendance: AttendanceCount::new(&cluster.agreement().schedule),

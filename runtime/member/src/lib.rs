@@ -7,6 +7,7 @@
 //!   device ──► field driver ───────────────────────────────┘
 //! ```
 
+mod changes;
 mod error;
 mod field;
 mod held;

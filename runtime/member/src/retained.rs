@@ -14,11 +14,13 @@ use understudy_wire::{
 
 use crate::run::MemberOptions;
 
-/// What a station has kept of each program with retentive variables that it runs, and the files.
+/// What a station has kept of each program with retentive variables that it runs, and the files. `is_loaded` says whether it has loaded a program
+/// besides that of the cluster file, by an online change.
 pub(crate) fn retained_runs(
     cluster: &Cluster,
     options: &MemberOptions,
     settings: &Settings,
+    is_loaded: impl Fn(ProgramId, ProgramHash) -> bool,
 ) -> (Vec<RetainedRun>, Retention) {
     let (mut runs, mut retention) = (Vec::new(), Retention::default());
     let is_retentive =
@@ -38,7 +40,10 @@ pub(crate) fn retained_runs(
         retention.found.extend(found);
         let newest = of_program.iter().max_by_key(|run| run.state.number);
         let hash = settings.programs[program.index()].hash;
-        if let Some(newest) = newest.filter(|newest| newest.state.hash != hash) {
+        let is_other = |newest: &&RetainedRun| {
+            newest.state.hash != hash && !is_loaded(program, newest.state.hash)
+        };
+        if let Some(newest) = newest.filter(is_other) {
             let controller = &cluster.controllers()[program.index()];
             match carried_run(&controller.code, hash, &files, newest) {
                 Ok((run, state)) => {
@@ -75,6 +80,7 @@ pub(crate) fn retained_notes(
     folder: &Path,
     name: &str,
     settings: &understudy_remote_io::Settings,
+    is_loaded: impl Fn(ProgramId, ProgramHash) -> bool,
 ) -> (FoundNotes, Retention) {
     let program = settings.program;
     let code = &cluster.controllers()[program.index()].code;
@@ -90,7 +96,8 @@ pub(crate) fn retained_notes(
         // The file has the name of this remote I/O: with other controllers before it, its program had another number.
         note.recalled.program = program;
     }
-    if let Some(note) = notes.newest.as_mut().filter(|note| note.hash != hash) {
+    if let Some(note) = notes.newest.as_mut().filter(|note| note.hash != hash && !is_loaded(program, note.hash))
+    {
         match files.program(note.hash).and_then(of_this_release) {
             Ok((kept, before)) => {
                 let old = before.interface().inputs;

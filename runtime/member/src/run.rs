@@ -20,6 +20,7 @@ use understudy_plant::PlantMachine;
 use understudy_remote_io::RemoteIo;
 use understudy_wire::{Epoch, Image, Member, ProgramId, Time};
 
+use crate::changes::{StartedChange, started_change};
 use crate::error::MemberError;
 use crate::field::Equipment;
 use crate::held::read_keys;
@@ -63,10 +64,16 @@ pub fn run_station(cluster: &Cluster, options: &MemberOptions) -> Result<(), Mem
     };
     let settings = cluster.station_settings(station, epoch_of_the_clock());
     let settings = settings.ok_or_else(wrong)?;
-    let (runs, retention) = retained_runs(cluster, options, &settings);
+    let started = started_change(cluster, options);
+    let is_loaded = |program, hash| started.has_loaded(program, hash);
+    let (runs, retention) = retained_runs(cluster, options, &settings, is_loaded);
     let settings = later_than_retained(settings, &runs);
-    let machine = Station::new(Time::default(), settings).retaining(cluster.retain_every(), &runs);
-    run(cluster, options, member, machine, Box::new(NoField), retention)
+    let mut machine = Station::new(Time::default(), settings);
+    if let Some((change, configurations)) = &started.restored {
+        machine = machine.changed(change, *configurations);
+    }
+    let machine = machine.retaining(cluster.retain_every(), &runs);
+    run(cluster, options, member, machine, Box::new(NoField), (retention, started))
 }
 
 /// Runs a remote I/O until it is told to end.
@@ -82,14 +89,20 @@ pub fn run_remote_io(cluster: &Cluster, options: &MemberOptions) -> Result<(), M
     let settings = cluster.remote_io_settings(program).ok_or_else(wrong)?;
     let field = field_of(options, cluster, program, settings.fail_safe.clone())?;
     let is_retentive = settings.restart.is_some();
-    let machine = RemoteIo::new(Time::default(), settings.clone());
+    let started = started_change(cluster, options);
+    let mut machine = RemoteIo::new(Time::default(), settings.clone());
+    if let Some((change, configurations)) = &started.restored {
+        machine = machine.changed(change, *configurations);
+    }
     let Some(folder) = &options.retain else {
         let retention = Retention { is_missing: is_retentive, ..Retention::default() };
-        return run(cluster, options, member, machine, field, retention);
+        return run(cluster, options, member, machine, field, (retention, started));
     };
-    let (notes, retention) = retained_notes(cluster, folder, &options.name, &settings);
+    let (notes, retention) = retained_notes(cluster, folder, &options.name, &settings, |program, hash| {
+            started.has_loaded(program, hash)
+        });
     let machine = machine.noting(notes.newest, notes.is_damaged);
-    run(cluster, options, member, machine, field, retention)
+    run(cluster, options, member, machine, field, (retention, started))
 }
 
 /// Runs a simulated plant until it is told to end.
@@ -103,8 +116,12 @@ pub fn run_plant(cluster: &Cluster, options: &MemberOptions) -> Result<(), Membe
         return Err(wrong());
     };
     let settings = cluster.plant_settings(program).ok_or_else(wrong)?;
-    let machine = PlantMachine::new(settings, Time::default());
-    run(cluster, options, member, machine, Box::new(NoField), Retention::default())
+    let started = started_change(cluster, options);
+    let mut machine = PlantMachine::new(settings, Time::default());
+    if let Some((change, configurations)) = &started.restored {
+        machine = machine.changed(change, *configurations);
+    }
+    run(cluster, options, member, machine, Box::new(NoField), (Retention::default(), started))
 }
 
 fn wrong_kind(options: &MemberOptions, wanted: &'static str, command: &'static str) -> MemberError {
@@ -136,7 +153,7 @@ fn run<M>(
     member: Member,
     machine: M,
     field: Box<dyn FieldDriver>,
-    retention: Retention,
+    (mut retention, started): (Retention, StartedChange),
 ) -> Result<(), MemberError>
 where
     M: Machine + Send,
@@ -146,12 +163,15 @@ where
     let endpoints = Endpoints::new(cluster.agreement().cluster, member, peers, cluster.roster());
     let endpoints = endpoints.map_err(MemberError::Endpoints)?;
     let endpoints = endpoints.with_multicast(options.multicast);
-    let keys = read_keys(options, cluster, member)?;
+    let StartedChange { changes, found, .. } = started;
+    retention.found.extend(found);
+    let keys = read_keys(options, cluster, member, changes.clone())?;
     let settings = MemberSettings {
         endpoints,
         link: link_kind(cluster),
         period: cluster.agreement().schedule.period(),
         guard: keys.guard,
+        changes,
         channel: keys.channel,
         retention,
         field,

@@ -80,7 +80,7 @@ impl Watch {
             Told::By(reporter) => {
                 self.report(call, &mut reported);
                 let theirs = reporter.map(|by| by.configuration.as_str()).unwrap_or_default();
-                let same = theirs == self.configuration.to_string();
+                let same = reporter.is_some_and(|by| by.is_of(self.configuration));
                 if !same {
                     other = Some(format!("it runs configuration {theirs}"));
                 }

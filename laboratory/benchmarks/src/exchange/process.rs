@@ -13,10 +13,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use understudy::{Answer, Status};
 use understudy_bus::{
-    BusError, Clock, Commands, Endpoints, EventSink as _, Journal, LinkKind, MemberSettings,
+    BusError, Changes, Clock, Commands, Endpoints, EventSink as _, Journal, LinkKind, MemberSettings,
     NoField, Noted, Peer, Record, free_addresses, keep_times, zenoh_runtime,
 };
-use understudy_wire::{ClusterHash, Member, ProgramId, Roster, StationId};
+use understudy_wire::{ClusterHash, ConfigurationHash, Member, ProgramId, Roster, StationId};
 
 use crate::children::{Running, guard, refused};
 
@@ -143,6 +143,7 @@ fn play_part(part: Part) -> Result<(), BusError> {
         Carrier::Raw => run_raw(&endpoints, settings, meter),
         Carrier::Link(link) => {
             let member_settings = MemberSettings {
+                changes: Changes::none(ConfigurationHash(0)),
                 retention: Default::default(),
                 guard: guard(&endpoints),
                 endpoints,

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use understudy::{Answer, Status};
 use understudy_bus::{
-    Commands, Endpoints, LinkKind, MemberSettings, NoField, Noted, Peer, Record, free_addresses,
+    Changes, Commands, Endpoints, LinkKind, MemberSettings, NoField, Noted, Peer, Record, free_addresses,
 };
 use understudy_cluster::{Cluster, Overrides, press_cell, read_with_files};
 use understudy_cycle::Turns;
@@ -196,6 +196,7 @@ fn play(part: Part) -> Result<(), Answer> {
     let cluster = case.cluster()?;
     let endpoints = Endpoints::new(cluster.agreement().cluster, own, peers, cluster.roster())?;
     let settings = MemberSettings {
+        changes: Changes::none(cluster.agreement().configuration),
         retention: Default::default(),
         guard: guard(&endpoints),
         endpoints,

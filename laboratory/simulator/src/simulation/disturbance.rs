@@ -100,7 +100,8 @@ impl Simulation {
             (ChangeStep::Switch | ChangeStep::SwitchBack, _) => None,
             (ChangeStep::Accept, _) => Some(ChangeOrder::Run(change.after)),
             (ChangeStep::TakeBack, _) => Some(ChangeOrder::Run(change.before)),
-            (ChangeStep::Forget, _) => Some(ChangeOrder::Forget),
+            (ChangeStep::Forget, _) => Some(ChangeOrder::Forget(change.after)),
+            (ChangeStep::ForgetNew, _) => Some(ChangeOrder::Forget(change.before)),
         };
         if let Some(order) = order {
             self.give(member, Input::Change(&order), observe);

@@ -55,6 +55,9 @@ descriptions! { host: HostEvent, members: Members;
         "received {} for {silence_ms} ms and cannot reopen its link{}: {reason}",
         nothing_of(*peer, members), over(*network)
     );
+    ChangeOrdered { step, refused: None } => "change-ordered" Notice format!("was asked {step}");
+    ChangeOrdered { step, refused: Some(refused) } => "change-ordered" Warning
+        format!("was asked {step}, and refused: {refused}");
     RetainFailed { reason } => "retain-failed" Alarm format!(
         "what it keeps for the time after a power failure is not written to its disk: {reason}"
     );

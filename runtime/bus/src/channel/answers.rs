@@ -1,15 +1,16 @@
 //! What a member answers to the requests of operators.
 
-use understudy_wire::ConfigurationHash;
+use understudy_wire::Configurations;
 use zenoh::Wait;
 use zenoh::query::{Query, Queryable};
 
 use super::{DONE, ORDER_PATIENCE};
+use crate::changes::Changes;
 use crate::control::{LINE_BYTES, order};
 use crate::orders::{Control, Order, Unknown};
 
 /// The answer to a command.
-pub(super) fn given(control: &Control, order: Order) -> String {
+pub(crate) fn given(control: &Control, order: Order) -> String {
     match control.ask(order, ORDER_PATIENCE) {
         Ok(Some(Ok(()))) => DONE.to_owned(),
         Ok(Some(Err(refusal))) => format!("{}: {refusal}", refusal.code()),
@@ -25,14 +26,20 @@ pub(super) fn given(control: &Control, order: Order) -> String {
 }
 
 /// Whether an order is for this configuration, where its sender says one: the signals of another one are others.
-pub(super) fn of_configuration(query: &Query, own: ConfigurationHash) -> Result<(), String> {
+pub(super) fn of_configuration(query: &Query, changes: &Changes) -> Result<(), String> {
     let theirs = query.attachment().map(|theirs| theirs.to_bytes());
     match theirs.map(|theirs| String::from_utf8_lossy(&theirs).into_owned()) {
-        Some(theirs) if theirs != own.to_string() => Err(format!(
-            "U0563: this member runs configuration {own}, and the order is for configuration {theirs:.32}: take the file that it runs"
+        Some(theirs) if !changes.admits(&theirs) => Err(format!(
+            "U0563: this member runs configuration {}, and the order is for configuration {theirs:.32}: take the file that it runs",
+            changes.configurations().own
         )),
         _ => Ok(()),
     }
+}
+
+/// The configurations of a member, as it tells them to a caller who may have another one.
+pub(super) fn hashes(Configurations { own, prepared }: Configurations) -> String {
+    prepared.map_or_else(|| own.to_string(), |prepared| format!("{own} {prepared}"))
 }
 
 /// A command that comes with a value.

@@ -11,8 +11,9 @@ use std::io::{self, Write};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 
 use serde::{Deserialize, Serialize};
-use understudy_wire::ConfigurationHash;
+use understudy_wire::{ConfigurationHash, Configurations};
 
+use crate::changes::Changes;
 use crate::journal::JOURNAL_VERSION;
 
 /// Lines of the journal that wait for those who follow it, at most; they lose what comes on top.
@@ -44,6 +45,9 @@ pub(crate) struct Followed<W> {
 pub struct Reporter {
     /// Hash of its configuration.
     pub configuration: String,
+    /// Hash of the configuration that it has loaded for an online change.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prepared: Option<String>,
     /// Version of its journal.
     pub version: u32,
 }
@@ -51,7 +55,19 @@ pub struct Reporter {
 impl Reporter {
     /// This program with a configuration.
     pub fn with(configuration: ConfigurationHash) -> Self {
-        Self { configuration: configuration.to_string(), version: JOURNAL_VERSION }
+        Self::of(Configurations { own: configuration, prepared: None })
+    }
+
+    /// This program with the configurations of an online change.
+    pub(crate) fn of(Configurations { own, prepared }: Configurations) -> Self {
+        let prepared = prepared.map(|prepared| prepared.to_string());
+        Self { configuration: own.to_string(), prepared, version: JOURNAL_VERSION }
+    }
+
+    /// Whether what it tells is of the signals of a configuration: both of an online change have the same.
+    pub fn is_of(&self, configuration: ConfigurationHash) -> bool {
+        let hash = configuration.to_string();
+        self.configuration == hash || self.prepared.as_ref() == Some(&hash)
     }
 }
 
@@ -59,17 +75,17 @@ impl Reporter {
 pub(crate) struct Telemetry {
     pub(super) lines: Receiver<Line>,
     pub(super) wake: SyncSender<Line>,
-    reporter: Reporter,
+    changes: Changes,
     /// Number of the last line that was told.
     told: u64,
     /// A line that did not follow the one before it.
     next: Option<Line>,
 }
 
-pub(crate) fn followed<W: Write>(inner: W, reporter: Reporter) -> (Followed<W>, Telemetry) {
+pub(crate) fn followed<W: Write>(inner: W, changes: Changes) -> (Followed<W>, Telemetry) {
     let (sender, lines) = sync_channel(WAITING_LINES);
     let followed = Followed { inner, begun: Vec::new(), count: 0, lines: sender.clone() };
-    (followed, Telemetry { lines, wake: sender, reporter, told: 0, next: None })
+    (followed, Telemetry { lines, wake: sender, changes, told: 0, next: None })
 }
 
 impl<W: Write> Write for Followed<W> {
@@ -122,7 +138,7 @@ impl Telemetry {
     }
 
     fn told_at_once(&self, lines: Batch, text: &[u8]) -> Vec<u8> {
-        let head = Head { lines, reporter: Some(self.reporter.clone()) };
+        let head = Head { lines, reporter: Some(Reporter::of(self.changes.configurations())) };
         // Writing to memory does not fail.
         let mut told = serde_json::to_vec(&head).unwrap_or_default();
         told.push(b'\n');
@@ -183,6 +199,10 @@ mod tests {
         Reporter::with(ConfigurationHash::of(b"a cluster"))
     }
 
+    fn changes() -> Changes {
+        Changes::none(ConfigurationHash::of(b"a cluster"))
+    }
+
     /// What is told next, without waiting.
     fn told(telemetry: &mut Telemetry) -> Option<String> {
         let first = telemetry.take_next().or_else(|| telemetry.lines.try_recv().ok())?;
@@ -191,7 +211,7 @@ mod tests {
 
     #[test]
     fn what_is_written_is_followed_line_by_line_and_never_waited_for() {
-        let (mut followed, telemetry) = followed(Vec::new(), reporter());
+        let (mut followed, telemetry) = followed(Vec::new(), changes());
         followed.write_all(b"one\ntw").expect("it is memory");
         followed.write_all(b"o\n").expect("it is memory");
         let lines = telemetry.lines.try_iter().map(|line| (line.number, line.text));
@@ -208,7 +228,7 @@ mod tests {
     /// Whatever finds no room in the queue, or is dropped on its way, is counted before the next line.
     #[test]
     fn who_follows_knows_what_is_lost() {
-        let (mut followed, mut telemetry) = followed(Vec::new(), reporter());
+        let (mut followed, mut telemetry) = followed(Vec::new(), changes());
         let mut gaps = Gaps::default();
         let (mut next, mut lost_in_all, mut taken) = (0, 0, 0);
         for round in 0..60_u32 {

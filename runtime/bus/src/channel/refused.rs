@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 
-use understudy_wire::Time;
+use understudy_wire::{ChangeRequest, Time};
 use zenoh::query::Queryable;
 
 use super::{Channel, DONE, REFUSED_KEY, answer};
@@ -47,6 +47,35 @@ impl<E: Send + 'static> Channel<E> {
         if let Some(reason) = invalid.filter(|_| was_valid) {
             self.sink.record(now, Noted::Host(HostEvent::ChannelFailed { reason }));
         }
+    }
+
+    /// Takes the texts of an online change, or a step of it; which, `what` says. Each is recorded with its answer.
+    pub(super) fn answer_changes(
+        &self,
+        session: &zenoh::Session,
+        what: &'static str,
+    ) -> zenoh::Result<Queryable<()>> {
+        let (control, changes) = (self.control.clone(), self.settings.changes.clone());
+        let (mut sink, clock) = (self.sink.clone(), self.clock);
+        let sink = std::sync::Mutex::new(move |event| sink.record(clock.now(), Noted::Host(event)));
+        let key = format!("{}/command/{what}", self.prefix);
+        answer(session, key, move |query| {
+            let bytes = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
+            let text = String::from_utf8_lossy(&bytes);
+            let (step, said) = match what {
+                "prepare" => ("to load an online change".to_owned(), changes.prepare(&control, &text)),
+                _ => match serde_json::from_str::<ChangeRequest>(&text) {
+                    // The files of this machine are no affair of a caller.
+                    Err(_) | Ok(ChangeRequest::Prepare { .. }) => return "invalid step".to_owned(),
+                    Ok(request) => (request.words(), changes.take(&control, &request)),
+                },
+            };
+            if let Ok(mut record) = sink.lock() {
+                let refused = (said != DONE).then(|| said.clone());
+                record(HostEvent::ChangeOrdered { step, refused });
+            }
+            said
+        })
     }
 
     /// Records orders that were refused before they were sent.

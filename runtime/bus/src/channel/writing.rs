@@ -1,6 +1,6 @@
 //! Writes of operators.
 
-use understudy_wire::{ConfigurationHash, Role, Write, WriteAnswer, WriteOutcome, WriteRefusal};
+use understudy_wire::{Role, Write, WriteAnswer, WriteOutcome, WriteRefusal};
 use zenoh::Wait;
 use zenoh::query::{Query, Queryable};
 
@@ -15,16 +15,16 @@ impl<E> Channel<E> {
         session: &zenoh::Session,
         role: Role,
         key: &str,
-        own: ConfigurationHash,
     ) -> zenoh::Result<Queryable<()>> {
         let key = format!("{}/{key}", self.prefix);
         let (control, callers, clock) = (self.control.clone(), self.callers.clone(), self.clock);
+        let changes = self.settings.changes.clone();
         let declared = key.clone();
         session
             .declare_queryable(declared)
             .callback(move |query: Query| {
                 let order =
-                    of_configuration(&query, own).and_then(|()| with_value("write", &query));
+                    of_configuration(&query, &changes).and_then(|()| with_value("write", &query));
                 let refused = match order {
                     Ok(Order::Write(write)) => {
                         let write = Write { role, ..write };
