@@ -2,6 +2,7 @@
 
 mod allocate;
 mod catalogue;
+mod change;
 mod doctor;
 mod gateway;
 pub(crate) mod keys;
@@ -36,6 +37,7 @@ pub(crate) fn group() -> Group {
     entries.extend(of_members());
     entries.push(command("spare", |it, console| spare::run(&it, console)));
     entries.push(command("operate", |it, _| operate::run(&it)));
+    entries.push(command("change", |it, _| change::run(&it)));
     entries.push(command("gateway", |it, console| gateway::run(&it, console)));
 
     Group { name: "deployment", title: "Deploy and operate clusters", entries }

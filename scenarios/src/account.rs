@@ -18,7 +18,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_bus::{HostEvent, Quantiles};
-use understudy_cluster::AlarmDeclaration;
+use understudy_cluster::{AlarmDeclaration, Cluster};
 use understudy_cycle::Agreement;
 use understudy_journal::{
     AlarmChange, Happening, Members, Numbering, Record, TimeOfDay, TimesOfDay, moment,
@@ -71,6 +71,8 @@ pub struct Terms {
     pub plants: ProgramSet,
     /// Alarms on signals.
     pub alarms: Arc<[AlarmDeclaration]>,
+    /// The cluster, for an online change of it.
+    pub cluster: Arc<Cluster>,
 }
 
 /// Who says where the origin is.

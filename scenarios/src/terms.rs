@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use understudy_cluster::Cluster;
+use understudy_cluster::{ChangeTexts, Cluster};
 use understudy_journal::Members;
 use understudy_simulator::Referee;
 pub use understudy_simulator::parts;
@@ -45,6 +45,15 @@ impl Terms {
             signals: signals.collect(),
             alarms: Arc::clone(cluster.alarms()),
             plants,
+            cluster: Arc::new(cluster.clone()),
+        }
+    }
+
+    /// The programs may change by these texts from now on; those of another cluster are refused by its members.
+    pub(crate) fn learn(&mut self, texts: &ChangeTexts) {
+        if let Ok(change) = texts.load(&self.cluster) {
+            let change = Arc::new(change);
+            self.referees.iter_mut().for_each(|referee| referee.learn(&change));
         }
     }
 }

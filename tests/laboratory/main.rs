@@ -9,6 +9,7 @@
 mod alarms;
 mod boiler;
 mod campaigns;
+mod changes;
 mod deaths;
 mod drafts;
 mod field;

@@ -30,7 +30,7 @@ use understudy_journal::{
     RunSocket, commands as queue_of_commands, keep_cluster, monotonic_ns,
 };
 use understudy_simulator::Action;
-use understudy_wire::Member;
+use understudy_wire::{ConfigurationHash, Member};
 
 use understudy_scenarios::{Account, OriginRule, Scenario, Terms};
 
@@ -217,6 +217,7 @@ fn run(
         orders: PendingOrders::default(),
         // Less than a member takes, so that each caller gets an answer.
         write_limiter: WriteLimiter::new(WRITES_PER_SECOND / 2),
+        change: None,
         refused_orders: RefusedOrders::default(),
         directory: directory.path().to_owned(),
         sender,
@@ -287,6 +288,8 @@ struct Laboratory<'w> {
     commanded: bool,
     orders: PendingOrders,
     write_limiter: WriteLimiter,
+    /// The configuration of the online change that the journal knows.
+    change: Option<ConfigurationHash>,
     refused_orders: RefusedOrders,
     directory: PathBuf,
     sender: Sender<Said>,

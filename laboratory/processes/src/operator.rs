@@ -1,8 +1,9 @@
 //! What the laboratory does when somebody commands.
 
-use understudy_journal::{Command, Commanded, Done, OperatorAction, Refusal};
+use understudy_cluster::ChangeTexts;
+use understudy_journal::{Command, Commanded, Done, OperatorAction, Refusal, RunEvent};
 use understudy_simulator::{Action, Fault};
-use understudy_wire::{Member, WriteRefusal};
+use understudy_wire::{ChangeRequest, Member, WriteRefusal};
 
 use super::Laboratory;
 use crate::process::Process;
@@ -24,6 +25,7 @@ impl Laboratory<'_> {
                 | Command::Force(_)
                 | Command::Unforce { .. }
                 | Command::Choose { .. }
+                | Command::Change { .. }
         );
         let done = self.obey_command(member, &command).await;
         let is_sent = is_decided_there && done.is_ok();
@@ -118,6 +120,10 @@ impl Laboratory<'_> {
             Command::Write(write) => {
                 return self.tell(member, line("write", serde_json::to_string(write))).await;
             }
+            Command::Change { request } => {
+                self.note_change(request);
+                return self.tell(member, line("change", serde_json::to_string(request))).await;
+            }
             Command::Unforce { signal } => {
                 return self.tell(member, line("unforce", serde_json::to_string(signal))).await;
             }
@@ -152,6 +158,22 @@ impl Laboratory<'_> {
             }
         }
         Ok(Done::default())
+    }
+
+    /// Records the texts of a change that a member is asked to load, once.
+    fn note_change(&mut self, request: &ChangeRequest) {
+        let ChangeRequest::Prepare { file } = request else {
+            return;
+        };
+        // Where they cannot be read, the member says so.
+        let texts = std::fs::read_to_string(file).ok();
+        let texts = texts.and_then(|text| serde_json::from_str::<ChangeTexts>(&text).ok());
+        if let Some(texts) = texts
+            && self.change != Some(texts.after)
+        {
+            self.change = Some(texts.after);
+            self.note(RunEvent::ChangeLoaded { texts: Box::new(texts) });
+        }
     }
 
     async fn tell(

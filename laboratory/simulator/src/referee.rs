@@ -149,6 +149,17 @@ impl Referee {
         self
     }
 
+    /// From now on the program may change by this.
+    pub fn learn(&mut self, change: &Arc<OnlineChange>) {
+        self.change = Some(Arc::clone(change));
+    }
+
+    /// Whether a state that is remembered is one of the first program, and not of one that it has changed to.
+    pub fn is_of_first(&self, lineage: Lineage) -> bool {
+        let place = self.place_of(lineage);
+        place.is_some_and(|place| self.states[place].program == self.program.hash)
+    }
+
     fn versions(&self) -> Versions<'_> {
         Versions::new(&self.program, self.change.as_ref(), self.place)
     }

@@ -16,7 +16,7 @@ use understudy_journal::{
 };
 use understudy_node::Event as StationEvent;
 use understudy_remote_io::Event as RemoteIoEvent;
-use understudy_wire::{Member, Moment, Write, WriteAnswer};
+use understudy_wire::{ChangeRequest, Member, Moment, Write, WriteAnswer};
 
 use crate::error::AttachError;
 use crate::follower::{Calls, Follower, Told};
@@ -303,6 +303,10 @@ impl Recorder {
             // Handled before, because its outcome takes cycles.
             Command::Write(_) => return Err(Refusal::Busy),
             Command::Unforce { signal } => Request::Unforce(*signal),
+            Command::Change { request: ChangeRequest::Prepare { .. } } => {
+                return Err(elsewhere("`understudy change` sends the texts to its machine"));
+            }
+            Command::Change { request } => Request::Change(request.clone()),
             Command::Isolate | Command::Rejoin => return Err(elsewhere(LINKS)),
             Command::Kill | Command::Restart | Command::Stop | Command::Continue => {
                 return Err(elsewhere(PROCESS));

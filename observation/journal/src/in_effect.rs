@@ -120,6 +120,8 @@ fn effect(record: &Record) -> Option<Effect> {
             Station::Joins { .. } => of("joins"),
             Station::Adopted { program, .. } => about("adopted", program),
             Station::Excluded { program, .. } => about("excluded", program),
+            Station::Configured(_) => of("configured"),
+            Station::NotPrepared { program, .. } => about("not-prepared", program),
             Station::Readmitted { program, .. } => about("readmitted", program),
             Station::Refused { member, .. } => about("refused", member),
             Station::SamplesMissing { program, .. } => about("samples-missing", program),
@@ -181,6 +183,8 @@ fn of_remote_io(record: &Record, event: &RemoteIo) -> Option<Effect> {
         RemoteIo::ChoiceRefused { newest: Some(_), .. } => of("choice-refused"),
         RemoteIo::Protected { .. } | RemoteIo::Unprotected { .. } => of("protection"),
         RemoteIo::Released { .. } => of("released"),
+        RemoteIo::Configured(_) => of("configured"),
+        RemoteIo::ProgramChanged { .. } => of("program-changed"),
         RemoteIo::Forced { force, .. } => about("forced", &force.signal),
         RemoteIo::Unforced { signal, .. } => return Some(Effect::Ends(about("forced", signal))),
         RemoteIo::SignalValidity { input, .. } => about("validity", input),
@@ -200,6 +204,7 @@ fn of_remote_io(record: &Record, event: &RemoteIo) -> Option<Effect> {
 
 fn of_run(event: &RunEvent) -> Option<Subject> {
     Some(match event {
+        RunEvent::ChangeLoaded { .. } => (None, "change-loaded", String::new()),
         RunEvent::Started { member } | RunEvent::Ended { member, .. } => {
             (Some(*member), "process", String::new())
         }

@@ -21,7 +21,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use tokio::sync::{mpsc, oneshot};
 use understudy_wire::{
-    Force, Member, OrderRefusal, SignalPlace, StateChoice, Write, WriteOutcome, WriteRefusal,
+    ChangeRequest, Force, Member, OrderRefusal, SignalPlace, StateChoice, Write, WriteOutcome, WriteRefusal,
 };
 
 use crate::record::RunEvent;
@@ -66,6 +66,11 @@ pub enum Command {
     Force(Force),
     /// Write a value to an operator input of a remote I/O.
     Write(Write),
+    /// Take a step of an online change.
+    Change {
+        /// Which.
+        request: ChangeRequest,
+    },
     /// Take it back.
     Unforce {
         /// Which signal.

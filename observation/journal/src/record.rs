@@ -7,6 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 use serde_json::value::RawValue;
 use understudy_bus::{HostEvent, RefusedOrder};
+use understudy_cluster::ChangeTexts;
 use understudy_simulator::Action;
 use understudy_wire::{Member, Moment};
 
@@ -98,6 +99,11 @@ pub enum RunEvent {
         reason: String,
         /// Why it was not done, where it was not.
         refused: Option<String>,
+    },
+    /// The texts of an online change were given to members: from here on the programs can change to these.
+    ChangeLoaded {
+        /// The texts.
+        texts: Box<ChangeTexts>,
     },
     /// An order of a person was refused before it was a command to a member: it names something that does not exist, or the person has no right to it.
     CommandRefused(RefusedOrder),

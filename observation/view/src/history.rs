@@ -6,9 +6,11 @@
 mod order;
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use understudy_cluster::Cluster;
+use understudy_cycle::OnlineChange;
 use understudy_remote_io::{Event, Missing};
 use understudy_simulator::{Referee, Violation};
 use understudy_typed::{Fault, Program as TypedProgram};
@@ -217,6 +219,11 @@ impl History {
         self.referee.asked(write.input, write.value);
     }
 
+    /// Its program may change by this from now on.
+    pub(crate) fn learn(&mut self, change: &Arc<OnlineChange>) {
+        self.referee.learn(change);
+    }
+
     /// Its remote I/O starts again.
     pub(crate) fn starts_again(&mut self) {
         self.referee.starts_again();
@@ -269,6 +276,8 @@ impl History {
         let truth = self.referee.truth().filter(|(of, _)| of == moment);
         let sampled = truth.and_then(|(_, outputs)| {
             let state = self.referee.state_of(*before)?;
+            // Explanations are of the program that the cluster file has.
+            self.referee.is_of_first(*before).then_some(())?;
             let after = before.after(inputs);
             let fault = self.fault_after(after);
             let was_stopped = self.fault_in(state).is_some();

@@ -212,8 +212,8 @@ impl OrderRefusal {
             | Self::OtherConfiguration { .. }
             | Self::NotPrepared
             | Self::StationsNotPrepared { .. }
-            | Self::NotRunning
-            | Self::StillNeeded => "U0632",
+            | Self::NotRunning => "U0632",
+            Self::StillNeeded => "U0634",
         }
     }
 }

@@ -229,6 +229,7 @@ impl Account {
                     referee.asked(write.input, write.value);
                 }
             }
+            RunEvent::ChangeLoaded { texts } => self.terms.learn(texts),
             RunEvent::Commanded { .. } | RunEvent::CommandRefused(_) => {}
             RunEvent::Interrupted => {
                 self.interrupted = true;

@@ -1,5 +1,6 @@
 //! Orders that were sent to a remote I/O over a way without an answer, until its journal has their outcome.
 
+use understudy_bus::HostEvent;
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_simulator::Action;
 use understudy_wire::{Member, OrderRefusal, StateChoice, WriteAnswer, WriteOutcome, WriteRefusal};
@@ -101,6 +102,15 @@ fn outcome(
     record: &Record,
     taken: bool,
 ) -> Option<Result<Done, Refusal>> {
+    if let (Command::Change { request }, Happening::Host(HostEvent::ChangeOrdered { step, refused })) =
+        (command, &record.event)
+    {
+        let is_of_it = record.member == Some(member) && !taken && *step == request.words();
+        return is_of_it.then(|| match refused {
+            None => Ok(Done::default()),
+            Some(why) => Err(Refusal::of_answer(why.clone())),
+        });
+    }
     let Happening::RemoteIo(event) = &record.event else {
         return None;
     };

@@ -168,6 +168,9 @@ descriptions! { run: RunEvent, members: Members;
         let refused = refused.as_ref().map_or_else(String::new, |why| format!("; refused: {why}"));
         format!("{owner} commands {what} of {}: {reason}{refused}", members.name(*member))
     };
+    ChangeLoaded { texts } => "change-loaded" Notice format!(
+        "an online change from configuration {} to {} is given to the members", texts.before, texts.after
+    );
     CommandRefused(order) => "command-refused" Warning refused_text(order);
     Acknowledged(seen) => "acknowledged" Notice format!(
         "{} has acknowledged the alarm {} of {} of cycle {}",

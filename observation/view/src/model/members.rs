@@ -55,6 +55,13 @@ impl Model {
             StationEvent::RefusalEnded { member } => {
                 self.refusal_ends(&record.name, *member, cycle);
             }
+            StationEvent::NotPrepared { .. } => {
+                let text = describe(record, &self.members, &self.writes).text;
+                self.alarms.raise((record.name.clone(), "not-prepared"), cycle, text);
+            }
+            StationEvent::Adopted { .. } | StationEvent::Synchronised { .. } => {
+                self.alarms.over(&(record.name.clone(), "not-prepared"), cycle);
+            }
             _ => {}
         }
         let own = |change| Some(Change::Station(station, change));

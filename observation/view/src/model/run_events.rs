@@ -1,5 +1,7 @@
 //! What the laboratory does, and what it sees of the processes that it runs.
 
+use std::sync::Arc;
+
 use understudy_journal::{Action, Command, Process, Record, RunEvent};
 use understudy_wire::Member;
 
@@ -77,6 +79,13 @@ impl Model {
             } => {
                 if let Some(history) = self.histories.get_mut(program.index()) {
                     history.asked(write);
+                }
+            }
+            RunEvent::ChangeLoaded { texts } => {
+                // Texts that are none of this cluster were refused by its members.
+                if let Ok(change) = texts.load(&self.cluster) {
+                    let change = Arc::new(change);
+                    self.histories.iter_mut().for_each(|history| history.learn(&change));
                 }
             }
             RunEvent::Commanded { .. }

@@ -1,0 +1,306 @@
+//! `understudy change`: an online change of programs, while the cluster runs.
+
+mod members;
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use clap::{Args, ValueEnum};
+use serde_json::{Value, json};
+use understudy_cluster::{ChangeTexts, Cluster, NeedsStop, Overrides, fates};
+use understudy_typed::Fate;
+use understudy_view::Run;
+use understudy_wire::{ChangeRequest, Member};
+
+use self::members::Members;
+use crate::answer::{Answer, Status};
+use crate::files;
+
+/// Change the programs of a running cluster
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  understudy change cell/cluster.toml new/cluster.toml
+  understudy change runs/latest new/cluster.toml prepare
+  understudy change runs/latest new/cluster.toml switch
+  understudy change runs/latest new/cluster.toml accept
+  understudy change cell/cluster.toml new/cluster.toml cancel --keys keys/members/engineer
+
+Without a step, and with `plan`, it says what would change and touches nothing. `prepare` loads the new programs at all members beside the old ones;
+`switch` changes the programs between two cycles; `accept` ends the change with the new programs, `cancel` with the old ones. A step can be given again,
+also from another machine: it goes on where the members are.")]
+pub(crate) struct Arguments {
+    /// Cluster file that the members run, or directory of a running laboratory
+    #[arg(value_name = "CLUSTER.toml|RUN")]
+    before: PathBuf,
+    /// Cluster file with the new programs
+    #[arg(value_name = "NEW.toml")]
+    after: PathBuf,
+    /// Step
+    #[arg(value_enum, default_value = "plan")]
+    step: Step,
+    /// Folder of the engineer's keys, for members that run elsewhere
+    #[arg(long, value_name = "DIR")]
+    keys: Option<PathBuf>,
+    /// Members that are left out, because they are down
+    #[arg(long, value_name = "NAME")]
+    without: Vec<String>,
+    /// Go on although values are dropped
+    #[arg(long)]
+    drop: bool,
+    /// Directory of runs
+    #[arg(long, value_name = "DIR", default_value = "runs")]
+    out: PathBuf,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Step {
+    /// Say what would change
+    Plan,
+    /// Load the new programs at all members, beside the old ones
+    Prepare,
+    /// Change the programs between two cycles
+    Switch,
+    /// End the change with the new programs
+    Accept,
+    /// End the change with the old programs
+    Cancel,
+}
+
+/// Time limit for members that still need the other configuration: histories have to leave the change behind.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+const AGAIN: Duration = Duration::from_millis(200);
+
+pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
+    let before = match arguments.before.is_dir() {
+        true => Run::open(&arguments.before)?.cluster().as_ref().clone(),
+        false => files::cluster(&arguments.before, Overrides::default())?.0,
+    };
+    let (after, used) = files::cluster(&arguments.after, Overrides::default())?;
+    let texts = ChangeTexts::between(&before, &after).map_err(|reasons| needs_stop(&reasons))?;
+    let plan = Plan::of(&before, &after, &texts);
+    if arguments.step == Step::Plan {
+        return Ok(plan.answer().with_used(used));
+    }
+    if texts.programs.is_empty() {
+        let message = "the programs of the two files are equal: there is nothing to change";
+        return Err(Answer::failed(Status::BadInput, "U0630", message.to_owned()));
+    }
+    let members = Members::of(arguments, &before)?;
+    match arguments.step {
+        Step::Plan | Step::Prepare => {
+            if plan.drops() && !arguments.drop {
+                let message = format!(
+                    "values are dropped, so the new program begins with their initial values; with --drop it goes on\n{}",
+                    plan.text()
+                );
+                return Err(Answer::failed(Status::BadInput, "U0635", message));
+            }
+            let asked = members.prepare(&texts)?;
+            Ok(asked.answer("loaded the change", plan.json()))
+        }
+        Step::Switch => {
+            let asked = switch(&members, &texts, true);
+            Ok(asked.answer("changes its program with its next sample", plan.json()))
+        }
+        Step::Accept => {
+            let asked = switch(&members, &texts, true);
+            finish(&members, asked, texts.after, "runs the new configuration", plan.json())
+        }
+        Step::Cancel => {
+            let asked = switch(&members, &texts, false);
+            finish(&members, asked, texts.before, "runs the old configuration", plan.json())
+        }
+    }
+}
+
+/// Asks the remote I/Os of the programs for the new ones, or for the old ones.
+fn switch(members: &Members<'_>, texts: &ChangeTexts, is_forward: bool) -> Asked {
+    let mut asked = Asked::default();
+    for changed in &texts.programs {
+        let to = if is_forward { changed.after.hash } else { changed.before.hash };
+        members.ask(Member::RemoteIo(changed.program), &ChangeRequest::Switch { to }, &mut asked);
+    }
+    asked
+}
+
+/// Makes a configuration that of all members, and ends the change.
+fn finish(
+    members: &Members<'_>,
+    mut asked: Asked,
+    configuration: understudy_wire::ConfigurationHash,
+    done: &str,
+    plan: Value,
+) -> Result<Answer, Answer> {
+    let is_forward = asked.is_done();
+    if !is_forward {
+        return Ok(asked.answer(done, plan));
+    }
+    asked = Asked::default();
+    for member in members.all() {
+        members.ask(member, &ChangeRequest::Run { configuration }, &mut asked);
+    }
+    if !asked.is_done() {
+        return Ok(asked.answer(done, plan));
+    }
+    let begun = Instant::now();
+    let mut left = members.all();
+    loop {
+        let mut ended = Asked::default();
+        for member in std::mem::take(&mut left) {
+            members.ask(member, &ChangeRequest::Forget { configuration }, &mut ended);
+        }
+        let waits = ended.of_code("U0634");
+        asked.take(ended, &waits);
+        if waits.is_empty() || begun.elapsed() >= PATIENCE {
+            asked.waits_for(members, &waits);
+            return Ok(asked.answer(done, plan));
+        }
+        left = waits;
+        pause();
+    }
+}
+
+#[allow(clippy::disallowed_methods, reason = "a person waits, and members go on meanwhile")]
+fn pause() {
+    std::thread::sleep(AGAIN);
+}
+
+fn needs_stop(reasons: &[NeedsStop]) -> Answer {
+    let mut answer = Answer::failed(
+        Status::BadInput,
+        "U0630",
+        "the change needs a stop: an online change replaces programs and nothing else".to_owned(),
+    );
+    for reason in reasons {
+        answer = answer.and_failure(Status::BadInput, "U0630", reason.to_string());
+    }
+    answer
+}
+
+/// What members said, by name.
+#[derive(Default)]
+struct Asked(Vec<(Member, String, Result<(), String>)>);
+
+impl Asked {
+    fn is_done(&self) -> bool {
+        self.0.iter().all(|(.., said)| said.is_ok())
+    }
+
+    /// The members that refused with a code.
+    fn of_code(&self, code: &str) -> Vec<Member> {
+        let refused = self.0.iter().filter(|(.., said)| {
+            said.as_ref().is_err_and(|why| why.starts_with(code))
+        });
+        refused.map(|(member, ..)| *member).collect()
+    }
+
+    /// Takes what was refused later, but for members that are asked again.
+    fn take(&mut self, later: Self, waits: &[Member]) {
+        for (member, name, said) in later.0 {
+            if said.is_err() && !waits.contains(&member) {
+                self.0.retain(|(known, ..)| *known != member);
+                self.0.push((member, name, said));
+            }
+        }
+    }
+
+    fn waits_for(&mut self, members: &Members<'_>, waits: &[Member]) {
+        for member in waits {
+            let name = members.name(*member);
+            self.0.retain(|(known, ..)| known != member);
+            let why = "U0634: it still needs the other configuration; give this step again".to_owned();
+            self.0.push((*member, name, Err(why)));
+        }
+    }
+
+    fn answer(&self, done: &str, plan: Value) -> Answer {
+        let mut text = String::new();
+        let mut rows = Vec::new();
+        let width = self.0.iter().map(|(_, name, _)| name.chars().count()).max().unwrap_or(0);
+        for (_, name, said) in &self.0 {
+            let words = said.as_ref().map_or_else(String::as_str, |()| done);
+            // Writing to memory does not fail.
+            let _ = writeln!(text, "{name:<width$}  {words}");
+            rows.push(json!({ "member": name, "done": said.is_ok(), "refused": said.as_ref().err() }));
+        }
+        let mut answer = Answer::done(text.trim_end(), json!({ "members": rows, "plan": plan }));
+        for (_, name, said) in &self.0 {
+            if let Err(why) = said {
+                let (code, words) = why.split_once(": ").unwrap_or(("U0632", why));
+                let code = if code.starts_with('U') { code } else { "U0632" };
+                answer = answer.and_failure(Status::Failed, code, format!("{name}: {words}"));
+            }
+        }
+        answer
+    }
+}
+
+/// What would change.
+struct Plan {
+    programs: Vec<(String, understudy_typed::CarriedState)>,
+}
+
+impl Plan {
+    fn of(before: &Cluster, after: &Cluster, texts: &ChangeTexts) -> Self {
+        let programs = texts.programs.iter().map(|changed| {
+            let place = changed.program.index();
+            let (old, new) = (&before.controllers()[place], &after.controllers()[place]);
+            (new.name.clone(), fates(&old.code, &new.code, None))
+        });
+        Self { programs: programs.collect() }
+    }
+
+    fn drops(&self) -> bool {
+        self.programs.iter().any(|(_, state)| state.dropped().next().is_some())
+    }
+
+    fn text(&self) -> String {
+        let mut text = String::new();
+        for (name, state) in &self.programs {
+            let count = |fate| state.paths.iter().filter(|path| path.fate == fate).count();
+            let _ = writeln!(
+                text,
+                "{name}: {} variables kept, {} converted, {} new, {} dropped",
+                count(Fate::Kept),
+                count(Fate::Converted),
+                count(Fate::New),
+                count(Fate::Dropped)
+            );
+            for path in state.paths.iter().filter(|path| path.fate != Fate::Kept) {
+                let types = match (&path.before, &path.now) {
+                    (Some(before), Some(now)) if before != now => format!("{before} to {now}"),
+                    (Some(of), _) | (None, Some(of)) => of.clone(),
+                    (None, None) => String::new(),
+                };
+                let _ = writeln!(text, "  {:<9}  {}  {types}", path.fate.name(), path.path);
+            }
+        }
+        text.trim_end().to_owned()
+    }
+
+    fn json(&self) -> Value {
+        let programs = self.programs.iter().map(|(name, state)| {
+            let paths = state.paths.iter().map(|path| {
+                json!({
+                    "path": path.path,
+                    "fate": path.fate.name(),
+                    "before": path.before,
+                    "now": path.now,
+                })
+            });
+            json!({ "program": name, "paths": paths.collect::<Vec<_>>() })
+        });
+        Value::Array(programs.collect())
+    }
+
+    fn answer(&self) -> Answer {
+        let text = match self.programs.is_empty() {
+            true => "the programs of the two files are equal: there is nothing to change".to_owned(),
+            false => self.text(),
+        };
+        Answer::done(text, json!({ "plan": self.json() }))
+    }
+}

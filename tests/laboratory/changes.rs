@@ -1,0 +1,137 @@
+//! Online changes on real processes: the program changes between two cycles while stations are killed, goes on with its state, and goes back.
+
+use std::fs;
+use std::path::Path;
+
+use nix::sys::signal::Signal;
+use serde_json::Value;
+use understudy_journal::{Command, Commander, OperatorAction};
+use understudy_wire::{Member, StationId};
+
+use super::deaths::{Records, is};
+use super::shared::{answer, empty_folder, some_at_a_time};
+use super::{no_orphan, running_with, signal};
+
+const CLUSTER: &str = r#"
+[cluster]
+name = "changes"
+period = "50ms"
+security = "off"
+
+[[controller]]
+name = "counter"
+ladder = "counter.st"
+
+[[controller]]
+name = "lamp"
+ladder = "lamp.st"
+
+[[remote_io]]
+controller = "counter"
+
+[[remote_io]]
+controller = "lamp"
+"#;
+
+const LAMP: &str = "
+PROGRAM lamp
+  VAR_INPUT go : BOOL; END_VAR
+  VAR_OUTPUT on : BOOL; END_VAR
+  on := NOT on;
+END_PROGRAM";
+
+/// Counts its scans by `step`, in a variable of that type.
+fn counter(of: &str, step: u32) -> String {
+    format!(
+        "
+PROGRAM counter
+  VAR_INPUT go : BOOL; END_VAR
+  VAR_OUTPUT shown : DINT; END_VAR
+  VAR count : {of}; END_VAR
+  count := count + {step};
+  shown := count;
+END_PROGRAM"
+    )
+}
+
+fn write_cluster(folder: &Path, counter: &str) -> String {
+    fs::create_dir_all(folder).expect("a folder");
+    let file = folder.join("cluster.toml");
+    for (name, text) in [("cluster.toml", CLUSTER), ("counter.st", counter), ("lamp.st", LAMP)] {
+        fs::write(folder.join(name), text).expect("written");
+    }
+    file.to_str().expect("text").to_owned()
+}
+
+/// What the remote I/O of the counter applied of proved outputs: the cycle and the count.
+fn counts(journal: &str) -> Vec<(u64, u64)> {
+    let records = journal.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
+    let applied = records.filter(|record| is(record, "counter-io", "applied"));
+    let proved = applied.filter(|record| record["event"]["missing"].is_null());
+    let count = |record: Value| {
+        let event = &record["event"];
+        Some((event["moment"]["cycle"].as_u64()?, event["outputs"]["words"][0].as_u64()?))
+    };
+    proved.filter_map(count).collect()
+}
+
+#[test]
+fn a_program_changes_while_stations_are_killed() {
+    let _one = some_at_a_time();
+    let out = empty_folder("changes");
+    let before = write_cluster(&out.join("before"), &counter("INT", 1));
+    let after = write_cluster(&out.join("after"), &counter("DINT", 10));
+    let runs = out.join("runs");
+    let more = ["--cycles", "100000", "--allow-commands"];
+    let (mut child, _errors) = running_with(&["lab", &before, "--out"], &runs, &more, "synchronised: ");
+    let run = fs::canonicalize(runs.join("latest")).expect("a run");
+    let commander = Commander::of_run(run.clone());
+    let mut records = Records::of(&run);
+    let act = |station: u8, command: Command| {
+        let action = OperatorAction::Command {
+            member: Member::Station(StationId(station)),
+            command,
+            owner: "anna".to_owned(),
+            reason: "a test".to_owned(),
+        };
+        commander.act_and_wait(&action).expect("it is done");
+    };
+    let run_text = run.to_str().expect("text");
+    let step = |step: &str| answer(&["change", run_text, &after, step]);
+    let done = |word: &str| {
+        let (exit, document, errors) = step(word);
+        assert_eq!(exit, 0, "{word}: {document:#} {errors}");
+    };
+    // Nothing is loaded yet.
+    let (exit, document, _) = step("switch");
+    assert_eq!((exit, &document["failures"][0]["code"]), (1, &Value::from("U0632")), "{document:#}");
+    done("prepare");
+    // The new program has the state, and both stations can fail after each other.
+    done("switch");
+    records.wait_for("the change", |record| is(record, "counter-io", "program-changed"));
+    for (station, name) in [(0, "counter"), (2, "understudy")] {
+        act(station, Command::Kill);
+        records.wait_for("its end", |record| is(record, "counter-io", "unprotected"));
+        act(station, Command::Restart);
+        records.wait_for("its state", |record| is(record, name, "synchronised"));
+        records.wait_for("protection", |record| is(record, "counter-io", "protected"));
+    }
+    done("cancel");
+    records.wait_for("the change back", |record| is(record, "counter-io", "program-changed"));
+    done("prepare");
+    done("accept");
+    records.wait_for("the new change", |record| is(record, "counter-io", "program-changed"));
+    signal(child.id(), Signal::SIGINT);
+    child.wait().expect("it ends");
+    no_orphan(&runs);
+    let journal = fs::read_to_string(run.join("journal.jsonl")).expect("a journal");
+    let counts = counts(&journal);
+    let pairs = counts.windows(2).filter(|pair| pair[1].0 == pair[0].0 + 1);
+    let mut steps: Vec<u64> = pairs.map(|pair| pair[1].1 - pair[0].1).collect();
+    steps.dedup();
+    // Outputs that are held in a stall of this machine leave a pair out, and no other step in.
+    assert_eq!(steps, [1, 10, 1, 10], "{steps:?}");
+    let summary = fs::read_to_string(run.join("summary.json")).expect("a summary");
+    let summary: Value = serde_json::from_str(&summary).expect("JSON");
+    assert_eq!(summary["violation_count"], 0, "{summary:#}");
+}
