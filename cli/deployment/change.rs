@@ -191,9 +191,10 @@ impl Asked {
 
     /// The members that refused with a code.
     fn of_code(&self, code: &str) -> Vec<Member> {
-        let refused = self.0.iter().filter(|(.., said)| {
-            said.as_ref().is_err_and(|why| why.starts_with(code))
-        });
+        let refused = self
+            .0
+            .iter()
+            .filter(|(.., said)| said.as_ref().is_err_and(|why| why.starts_with(code)));
         refused.map(|(member, ..)| *member).collect()
     }
 
@@ -211,7 +212,8 @@ impl Asked {
         for member in waits {
             let name = members.name(*member);
             self.0.retain(|(known, ..)| known != member);
-            let why = "U0634: it still needs the other configuration; give this step again".to_owned();
+            let why =
+                "U0634: it still needs the other configuration; give this step again".to_owned();
             self.0.push((*member, name, Err(why)));
         }
     }
@@ -224,7 +226,9 @@ impl Asked {
             let words = said.as_ref().map_or_else(String::as_str, |()| done);
             // Writing to memory does not fail.
             let _ = writeln!(text, "{name:<width$}  {words}");
-            rows.push(json!({ "member": name, "done": said.is_ok(), "refused": said.as_ref().err() }));
+            rows.push(
+                json!({ "member": name, "done": said.is_ok(), "refused": said.as_ref().err() }),
+            );
         }
         let mut answer = Answer::done(text.trim_end(), json!({ "members": rows, "plan": plan }));
         for (_, name, said) in &self.0 {
@@ -298,7 +302,9 @@ impl Plan {
 
     fn answer(&self) -> Answer {
         let text = match self.programs.is_empty() {
-            true => "the programs of the two files are equal: there is nothing to change".to_owned(),
+            true => {
+                "the programs of the two files are equal: there is nothing to change".to_owned()
+            }
             false => self.text(),
         };
         Answer::done(text, json!({ "plan": self.json() }))

@@ -26,7 +26,6 @@ use self::retaining::Retaining;
 pub(crate) use self::transfer::SEGMENTS_A_CYCLE;
 use self::transfer::{Joining, Snapshot};
 
-
 /// Whether the outputs of a replica may be published.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Standing {
@@ -307,8 +306,7 @@ impl Replica {
 
     /// Keeps a sample that cannot be followed: for a state of one segment, which comes at once, the newest is enough.
     fn keep(&mut self, versions: Versions<'_>, sample: &Sample, moment: Moment) {
-        let one_segment =
-            |program: &Program| Segment::count(program.executable.state_count()) == 1;
+        let one_segment = |program: &Program| Segment::count(program.executable.state_count()) == 1;
         let is_whole = versions.all().all(one_segment);
         match &mut self.joining.log {
             Some(log) if !is_whole => log.extend(sample, moment),

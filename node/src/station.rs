@@ -23,11 +23,14 @@ use std::sync::Arc;
 pub use turn::STATES_EVERY;
 
 use smallvec::SmallVec;
-use understudy_cycle::{Arrival, ChangeOrder, Input, Machine, OnlineChange, Output, Outvoted, Participant};
+use understudy_cycle::{
+    Arrival, ChangeOrder, Input, Machine, OnlineChange, Output, Outvoted, Participant,
+};
 use understudy_executable::Scratch;
 use understudy_wire::{
     Body, Configurations, Digest, Frame, Holding, Image, Lineage, Member, Moment, ProgramHash,
-    ProgramId, ProgramSet, Recalled, RetainedRun, Sample, SamplesReceived, StationId, StationSet, Time,
+    ProgramId, ProgramSet, Recalled, RetainedRun, Sample, SamplesReceived, StationId, StationSet,
+    Time,
 };
 
 use crate::event::Event;

@@ -7,7 +7,8 @@ use smallvec::SmallVec;
 use understudy_cycle::{Notice, Outvoted, Refusal};
 use understudy_wire::{
     ConfigurationHash, Configurations, Force, Image, Lineage, Member, Moment, OrderRefusal,
-    ProgramHash, ProgramId, SignalPlace, Source, StationId, StationSet, Write, WriteId, WriteRefusal,
+    ProgramHash, ProgramId, SignalPlace, Source, StationId, StationSet, Write, WriteId,
+    WriteRefusal,
 };
 
 use crate::settings::ValueFault;

@@ -39,7 +39,9 @@ use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_cycle::{Arrival, Input, Machine, OnlineChange, Output, Outvoted, Participant, RemoteIoInput};
+use understudy_cycle::{
+    Arrival, Input, Machine, OnlineChange, Output, Outvoted, Participant, RemoteIoInput,
+};
 use understudy_wire::{
     Body, Configurations, Frame, Holding, Image, Join, Kept, Member, Moment, OrderRefusal,
     ProgramHash, ProgramId, Recalled, Source, StateChoice, StationId, StationSet, Time,

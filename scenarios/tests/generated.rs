@@ -26,7 +26,7 @@ struct Reference {
 
 impl Reference {
     fn sampled(&mut self, cluster: &Cluster, program: ProgramId, event: &RemoteIoEvent) {
-        let RemoteIoEvent::Sampled { moment, inputs, born, before } = event else {
+        let RemoteIoEvent::Sampled { moment, inputs, born, before, .. } = event else {
             return;
         };
         let found = &cluster.programs()[program.index()];

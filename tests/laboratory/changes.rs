@@ -83,7 +83,8 @@ fn a_program_changes_while_stations_are_killed() {
     let after = write_cluster(&out.join("after"), &counter("DINT", 10));
     let runs = out.join("runs");
     let more = ["--cycles", "100000", "--allow-commands"];
-    let (mut child, _errors) = running_with(&["lab", &before, "--out"], &runs, &more, "synchronised: ");
+    let (mut child, _errors) =
+        running_with(&["lab", &before, "--out"], &runs, &more, "synchronised: ");
     let run = fs::canonicalize(runs.join("latest")).expect("a run");
     let commander = Commander::of_run(run.clone());
     let mut records = Records::of(&run);
@@ -104,7 +105,11 @@ fn a_program_changes_while_stations_are_killed() {
     };
     // Nothing is loaded yet.
     let (exit, document, _) = step("switch");
-    assert_eq!((exit, &document["failures"][0]["code"]), (1, &Value::from("U0632")), "{document:#}");
+    assert_eq!(
+        (exit, &document["failures"][0]["code"]),
+        (1, &Value::from("U0632")),
+        "{document:#}"
+    );
     done("prepare");
     // The new program has the state, and both stations can fail after each other.
     done("switch");

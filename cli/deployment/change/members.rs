@@ -72,7 +72,11 @@ impl<'a> Members<'a> {
         let mut asked = Asked::default();
         for member in self.all() {
             match &file {
-                None => self.note(member, self.call(member, &Request::Prepare(json.clone())), &mut asked),
+                None => self.note(
+                    member,
+                    self.call(member, &Request::Prepare(json.clone())),
+                    &mut asked,
+                ),
                 Some(file) => {
                     let request = ChangeRequest::Prepare { file: file.display().to_string() };
                     self.ask(member, &request, &mut asked);

@@ -23,7 +23,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_cycle::{Agreement, Endpoint, Input, Machine, OnlineChange, Output};
-use understudy_wire::{Body, Configurations, Field, Frame, Header, Image, Member, Moment, ProgramId, Time};
+use understudy_wire::{
+    Body, Configurations, Field, Frame, Header, Image, Member, Moment, ProgramId, Time,
+};
 
 use crate::event::{Event, Pace};
 use crate::followed::{Followed, Hearing};

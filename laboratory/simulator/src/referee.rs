@@ -31,9 +31,7 @@ use std::sync::Arc;
 use understudy_cycle::{OnlineChange, Program, Versions};
 use understudy_executable::{Executable, Scratch};
 use understudy_remote_io::{Event, Ramp, Settings};
-use understudy_wire::{
-    Image, Lineage, Moment, PointValue, ProgramHash, ProgramId, Source, Step,
-};
+use understudy_wire::{Image, Lineage, Moment, PointValue, ProgramHash, ProgramId, Source, Step};
 
 use descent::Descent;
 use unrecorded::Unrecorded;

@@ -16,8 +16,8 @@ use understudy_cycle::{Input, Machine, Output, RemoteIoInput};
 use understudy_node::Station;
 use understudy_remote_io::RemoteIo;
 use understudy_wire::{
-    Configurations, Epoch, Field, Frame, Header, Member, ProgramId, ProgramSet, StateChoice, StationId, StationSet, Time,
-    Write,
+    Configurations, Epoch, Field, Frame, Header, Member, ProgramId, ProgramSet, StateChoice,
+    StationId, StationSet, Time, Write,
 };
 
 use crate::disk::Disks;
@@ -132,8 +132,11 @@ impl Simulation {
         });
         let stations: Vec<_> = stations.collect();
         let remote_ios = parts.remote_ios.iter();
-        let remote_ios: Vec<_> =
-            remote_ios.map(|settings| Slot::new(disks.remote_io(now, settings.clone(), parts.change.as_ref()))).collect();
+        let remote_ios: Vec<_> = remote_ios
+            .map(|settings| {
+                Slot::new(disks.remote_io(now, settings.clone(), parts.change.as_ref()))
+            })
+            .collect();
         let due = stations.iter().map(Slot::due);
         let due = due.chain(remote_ios.iter().map(Slot::due)).collect();
         let mut simulation = Self {

@@ -47,12 +47,7 @@ struct Keeps {
 
 impl Retaining {
     /// Keeps a step that led to `held`.
-    pub(super) fn stepped(
-        &mut self,
-        id: ProgramId,
-        held: &Held,
-        inputs: &Image,
-    ) {
+    pub(super) fn stepped(&mut self, id: ProgramId, held: &Held, inputs: &Image) {
         self.found = None;
         self.before.clear();
         let Some(keeps) = &mut self.keeps else {

@@ -13,8 +13,7 @@
 use std::sync::Arc;
 
 use understudy_wire::{
-    Body, Frame, Header, Holding, Member, ProgramSet, Recalled, Relayed, StationId, Turn,
-    encode,
+    Body, Frame, Header, Holding, Member, ProgramSet, Recalled, Relayed, StationId, Turn, encode,
 };
 
 use super::{Station, replica_mut};

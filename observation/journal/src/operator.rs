@@ -21,7 +21,8 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use tokio::sync::{mpsc, oneshot};
 use understudy_wire::{
-    ChangeRequest, Force, Member, OrderRefusal, SignalPlace, StateChoice, Write, WriteOutcome, WriteRefusal,
+    ChangeRequest, Force, Member, OrderRefusal, SignalPlace, StateChoice, Write, WriteOutcome,
+    WriteRefusal,
 };
 
 use crate::record::RunEvent;

@@ -233,7 +233,9 @@ pub enum ChangeError {
         program: String,
     },
     /// The texts do not make the configuration that they are said to make.
-    #[error("these texts do not make configuration {claimed} of the cluster file that this member runs")]
+    #[error(
+        "these texts do not make configuration {claimed} of the cluster file that this member runs"
+    )]
     NotItsResult {
         /// That configuration.
         claimed: ConfigurationHash,

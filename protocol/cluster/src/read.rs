@@ -52,10 +52,10 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
+use understudy_cycle::Program;
 use understudy_cycle::{Agreement, Mode, Schedule, Turns};
 use understudy_executable::Interface;
 use understudy_logic::Circuit;
-use understudy_cycle::Program;
 use understudy_remote_io::{Release, Restart, StaleState, ValueFault};
 use understudy_text::{Diagnostic, Report};
 use understudy_wire::{ClusterHash, ConfigurationHash, MAXIMUM_PROGRAMS, StationId, StationSet};

@@ -75,7 +75,11 @@ pub struct Versions<'a> {
 
 impl<'a> Versions<'a> {
     /// The program that a member started with, and the change that it has loaded.
-    pub fn new(first: &'a Program, change: Option<&'a Arc<OnlineChange>>, program: ProgramId) -> Self {
+    pub fn new(
+        first: &'a Program,
+        change: Option<&'a Arc<OnlineChange>>,
+        program: ProgramId,
+    ) -> Self {
         Self { first, change: change.and_then(|change| change.of(program)) }
     }
 
@@ -145,9 +149,10 @@ impl Changing {
 
     /// Its configuration, and the one that it has loaded beside it.
     pub fn configurations(&self) -> Configurations {
-        let prepared = self.change.as_ref().map(|change| {
-            if change.before == self.own { change.after } else { change.before }
-        });
+        let prepared = self
+            .change
+            .as_ref()
+            .map(|change| if change.before == self.own { change.after } else { change.before });
         Configurations { own: self.own, prepared }
     }
 

@@ -10,8 +10,8 @@ use std::time::Duration;
 use crate::change::ChangeOrder;
 
 use understudy_wire::{
-    ConfigurationHash, Configurations, Force, Frame, Image, OrderRefusal, Retained, SignalPlace, StateChoice, Time,
-    Write, WriteAnswer,
+    ConfigurationHash, Configurations, Force, Frame, Image, OrderRefusal, Retained, SignalPlace,
+    StateChoice, Time, Write, WriteAnswer,
 };
 
 /// An input of a member.

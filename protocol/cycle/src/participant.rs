@@ -10,8 +10,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_wire::{
-    Body, ConfigurationHash, Configurations, Frame, Header, Member, Moment, OrderRefusal, StationId,
-    StationSet, Time,
+    Body, ConfigurationHash, Configurations, Frame, Header, Member, Moment, OrderRefusal,
+    StationId, StationSet, Time,
 };
 
 use crate::agreement::Agreement;

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use ring::aead::{Aad, LessSafeKey, Nonce};
 use understudy_wire::{
-    Body, ClusterHash, ConfigurationHash, Configurations, Frame, FrameError, MAXIMUM_FRAME_BYTES, Member,
-    StationId, Via, decode,
+    Body, ClusterHash, ConfigurationHash, Configurations, Frame, FrameError, MAXIMUM_FRAME_BYTES,
+    Member, StationId, Via, decode,
 };
 
 use crate::envelope::{

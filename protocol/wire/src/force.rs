@@ -188,7 +188,9 @@ pub enum OrderRefusal {
     #[error("the program does not run yet: no history of it is known")]
     NotRunning,
     /// The program, or a member that is received, still is that of the other configuration.
-    #[error("the other configuration is still needed: by a program that was not switched, or by a member that is received and has not accepted")]
+    #[error(
+        "the other configuration is still needed: by a program that was not switched, or by a member that is received and has not accepted"
+    )]
     StillNeeded,
 }
 

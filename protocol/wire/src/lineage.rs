@@ -10,8 +10,8 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
-use crate::identifier::{Moment, ProgramHash};
 use crate::frame::Step;
+use crate::identifier::{Moment, ProgramHash};
 use crate::image::Image;
 
 /// Identifies an initial state and all inputs since.

@@ -80,6 +80,10 @@ impl RemoteIo {
         let living: StationSet =
             self.holders.stations().filter(|station| self.holders.is_living(*station)).collect();
         let stations = living.without(self.prepared);
-        if stations.is_empty() { Ok(()) } else { Err(OrderRefusal::StationsNotPrepared { stations }) }
+        if stations.is_empty() {
+            Ok(())
+        } else {
+            Err(OrderRefusal::StationsNotPrepared { stations })
+        }
     }
 }

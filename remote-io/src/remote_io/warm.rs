@@ -16,8 +16,8 @@
 
 use understudy_cycle::Output;
 use understudy_wire::{
-    Configurations, Image, Kept, Lineage, Moment, Note, ProgramHash, Recalled, Retained, SamplesReceived,
-    StationId, StationSet,
+    Configurations, Image, Kept, Lineage, Moment, Note, ProgramHash, Recalled, Retained,
+    SamplesReceived, StationId, StationSet,
 };
 
 use super::recovery::Verdict;

@@ -395,7 +395,8 @@ impl<E: Send + 'static> Channel<E> {
         for word in ["force", "unforce", "choose"] {
             let (control, changes) = (self.control.clone(), self.settings.changes.clone());
             let force = move |query: &Query| {
-                let order = of_configuration(query, &changes).and_then(|()| with_value(word, query));
+                let order =
+                    of_configuration(query, &changes).and_then(|()| with_value(word, query));
                 order.map_or_else(|reason| reason, |order| given(&control, order))
             };
             let key = format!("{}/command/{word}", self.prefix);

@@ -6,7 +6,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_cycle::Agreement;
-use understudy_wire::{Actuation, Body, Configurations, Frame, Header, Image, Member, Moment, ProgramId};
+use understudy_wire::{
+    Actuation, Body, Configurations, Frame, Header, Image, Member, Moment, ProgramId,
+};
 
 /// Drives and senses the field of one member; never blocks.
 pub trait FieldDriver: Send {

@@ -18,14 +18,16 @@ use std::time::{Duration, Instant, SystemTime};
 use members::{Chatter, endpoints, peers, station};
 use serde_json::json;
 use understudy_bus::{
-    Admitted, BusError, Call, Changes, ChannelSettings, Commands, DONE, Documents, Endpoints, Guard,
-    LinesInEffect, LinkKind, MemberSettings, NoField, Peer, Request, Summary, TlsKeys, Validity,
-    run_member,
+    Admitted, BusError, Call, Changes, ChannelSettings, Commands, DONE, Documents, Endpoints,
+    Guard, LinesInEffect, LinkKind, MemberSettings, NoField, Peer, Request, Summary, TlsKeys,
+    Validity, run_member,
 };
 use understudy_cycle::Mode;
 use understudy_keys::{Authority, Date, People};
 use understudy_testing::press_cell;
-use understudy_wire::{ConfigurationHash, Configurations, Force, Role, SignalPlace, Write, WriteId};
+use understudy_wire::{
+    ConfigurationHash, Configurations, Force, Role, SignalPlace, Write, WriteId,
+};
 use zenoh::Wait;
 
 const DEADLINE: Duration = Duration::from_secs(60);

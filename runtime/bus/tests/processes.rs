@@ -21,8 +21,8 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde::{Deserialize, Serialize};
 use understudy_bus::{
-    Changes, Commands, FieldDriver, Guard, HostEvent, LinkKind, MemberSettings, NoField, Noted, Peer,
-    Record, SimulatedField, run_member, zenoh_runtime,
+    Changes, Commands, FieldDriver, Guard, HostEvent, LinkKind, MemberSettings, NoField, Noted,
+    Peer, Record, SimulatedField, run_member, zenoh_runtime,
 };
 use understudy_wire::Member;
 

@@ -155,7 +155,9 @@ impl ChangeKeeper for Keeper {
             self.loaded = None;
         }
         kept.map_err(|error| {
-            format!("U0633: it is done, and not kept on the disk, so it ends with the process: {error}")
+            format!(
+                "U0633: it is done, and not kept on the disk, so it ends with the process: {error}"
+            )
         })?;
         Ok(text)
     }

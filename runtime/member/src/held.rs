@@ -4,7 +4,8 @@ use std::sync::Arc;
 use std::time::SystemTime;
 
 use understudy_bus::{
-    Admitted, Changes, ChannelSettings, Guard, LinesInEffect, NewLife, TlsKeys, Validity, hold_back_signals,
+    Admitted, Changes, ChannelSettings, Guard, LinesInEffect, NewLife, TlsKeys, Validity,
+    hold_back_signals,
 };
 use understudy_cluster::{Cluster, Security};
 use understudy_cycle::spare::AttendanceCount;

@@ -96,7 +96,8 @@ pub(crate) fn retained_notes(
         // The file has the name of this remote I/O: with other controllers before it, its program had another number.
         note.recalled.program = program;
     }
-    if let Some(note) = notes.newest.as_mut().filter(|note| note.hash != hash && !is_loaded(program, note.hash))
+    if let Some(note) =
+        notes.newest.as_mut().filter(|note| note.hash != hash && !is_loaded(program, note.hash))
     {
         match files.program(note.hash).and_then(of_this_release) {
             Ok((kept, before)) => {

@@ -98,7 +98,8 @@ pub fn run_remote_io(cluster: &Cluster, options: &MemberOptions) -> Result<(), M
         let retention = Retention { is_missing: is_retentive, ..Retention::default() };
         return run(cluster, options, member, machine, field, (retention, started));
     };
-    let (notes, retention) = retained_notes(cluster, folder, &options.name, &settings, |program, hash| {
+    let (notes, retention) =
+        retained_notes(cluster, folder, &options.name, &settings, |program, hash| {
             started.has_loaded(program, hash)
         });
     let machine = machine.noting(notes.newest, notes.is_damaged);

@@ -7,8 +7,8 @@ use std::time::Duration;
 use understudy_cycle::{Input, Machine, Output};
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
-    Lineage, Member, Moment, ProgramId, ProgramSet, Sample, StationId, StationSet, Step, Time, Turn,
-    Word,
+    Lineage, Member, Moment, ProgramId, ProgramSet, Sample, StationId, StationSet, Step, Time,
+    Turn, Word,
 };
 
 use super::meter::{Exchange, Meter};

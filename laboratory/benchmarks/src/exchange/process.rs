@@ -13,8 +13,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use understudy::{Answer, Status};
 use understudy_bus::{
-    BusError, Changes, Clock, Commands, Endpoints, EventSink as _, Journal, LinkKind, MemberSettings,
-    NoField, Noted, Peer, Record, free_addresses, keep_times, zenoh_runtime,
+    BusError, Changes, Clock, Commands, Endpoints, EventSink as _, Journal, LinkKind,
+    MemberSettings, NoField, Noted, Peer, Record, free_addresses, keep_times, zenoh_runtime,
 };
 use understudy_wire::{ClusterHash, ConfigurationHash, Member, ProgramId, Roster, StationId};
 

@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use understudy::{Answer, Status};
 use understudy_bus::{
-    Changes, Commands, Endpoints, LinkKind, MemberSettings, NoField, Noted, Peer, Record, free_addresses,
+    Changes, Commands, Endpoints, LinkKind, MemberSettings, NoField, Noted, Peer, Record,
+    free_addresses,
 };
 use understudy_cluster::{Cluster, Overrides, press_cell, read_with_files};
 use understudy_cycle::Turns;

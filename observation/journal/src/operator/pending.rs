@@ -102,8 +102,10 @@ fn outcome(
     record: &Record,
     taken: bool,
 ) -> Option<Result<Done, Refusal>> {
-    if let (Command::Change { request }, Happening::Host(HostEvent::ChangeOrdered { step, refused })) =
-        (command, &record.event)
+    if let (
+        Command::Change { request },
+        Happening::Host(HostEvent::ChangeOrdered { step, refused }),
+    ) = (command, &record.event)
     {
         let is_of_it = record.member == Some(member) && !taken && *step == request.words();
         return is_of_it.then(|| match refused {

@@ -4,7 +4,9 @@ use understudy_journal::Members;
 use understudy_node::Event as StationEvent;
 use understudy_plant::Event as PlantEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Lacking, LackingReason, ValueFault};
-use understudy_wire::{Configurations, Member, Moment, ProgramSet, SignalPlace, StationId, StationSet, Word};
+use understudy_wire::{
+    Configurations, Member, Moment, ProgramSet, SignalPlace, StationId, StationSet, Word,
+};
 
 use super::signals::Names;
 use super::{Words, list, program_name, programs, source_text, stations};
@@ -278,7 +280,9 @@ fn refusal_ended_text(member: Member, members: &Members) -> String {
 
 fn configured_text(Configurations { own, prepared }: Configurations) -> String {
     match prepared {
-        Some(prepared) => format!("runs configuration {own}, and has loaded {prepared} for an online change"),
+        Some(prepared) => {
+            format!("runs configuration {own}, and has loaded {prepared} for an online change")
+        }
         None => format!("runs configuration {own}, and has loaded no other one"),
     }
 }

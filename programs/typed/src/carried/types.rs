@@ -72,7 +72,9 @@ pub(super) fn converted(from: Elementary, to: Elementary, stored: u64) -> Option
 /// A value of a type that has all values of `to`; none where this one is not among them.
 fn narrowed(from: Elementary, to: Elementary, stored: u64) -> Option<u64> {
     let value = match (from, to) {
-        (Elementary::Lreal, Elementary::Real) => u64::from((f64::from_bits(stored) as f32).to_bits()),
+        (Elementary::Lreal, Elementary::Real) => {
+            u64::from((f64::from_bits(stored) as f32).to_bits())
+        }
         (Elementary::Lreal, _) => f64::from_bits(stored) as i64 as u64 & to.mask(),
         (Elementary::Real, _) => f32::from_bits(stored as u32) as i64 as u64 & to.mask(),
         _ => from.signed(stored) as u64 & to.mask(),

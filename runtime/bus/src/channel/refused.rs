@@ -63,7 +63,9 @@ impl<E: Send + 'static> Channel<E> {
             let bytes = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
             let text = String::from_utf8_lossy(&bytes);
             let (step, said) = match what {
-                "prepare" => ("to load an online change".to_owned(), changes.prepare(&control, &text)),
+                "prepare" => {
+                    ("to load an online change".to_owned(), changes.prepare(&control, &text))
+                }
                 _ => match serde_json::from_str::<ChangeRequest>(&text) {
                     // The files of this machine are no affair of a caller.
                     Err(_) | Ok(ChangeRequest::Prepare { .. }) => return "invalid step".to_owned(),
