@@ -17,7 +17,7 @@
 use std::collections::VecDeque;
 
 use smallvec::SmallVec;
-use understudy_wire::{Image, Lineage, Moment, ProgramHash, Step};
+use understudy_wire::{Image, Lineage, MAXIMUM_CHANGE_MARKS, Moment, ProgramHash, Step};
 
 /// The last samples of a program and their lineages.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -51,6 +51,13 @@ impl History {
     /// The program that takes the next sample, unless that changes it; none where it is not known.
     pub(crate) fn program(&self) -> Option<ProgramHash> {
         self.samples.iter().rev().find_map(|(step, _)| step.change).or(self.program)
+    }
+
+    /// Whether its samples have as many change marks as they may.
+    pub(crate) fn is_full_of_changes(&self) -> bool {
+        // The oldest sample leaves where the window is full, and may be one with a mark; this is on the safe side.
+        let marks = self.samples.iter().filter(|(step, _)| step.change.is_some());
+        marks.count() >= MAXIMUM_CHANGE_MARKS
     }
 
     /// Whether all its states are of this program.

@@ -30,6 +30,10 @@ fn shift_register() -> Circuit {
     builder.finish().expect("a circuit")
 }
 
+fn versions(program: &Program) -> Versions<'_> {
+    Versions::new(program, None, ProgramId(0))
+}
+
 fn program() -> Program {
     Program { hash: HASH, executable: (&shift_register()).into() }
 }
@@ -101,7 +105,11 @@ impl Truth {
                 base: self.lineages[first],
                 before: self.lineages[self.inputs.len() - 1],
                 after: self.lineages[self.inputs.len()],
-                history: self.inputs[first..].iter().cloned().collect(),
+                history: self.inputs[first..]
+                    .iter()
+                    .cloned()
+                    .map(understudy_wire::Step::of)
+                    .collect(),
                 applied: None,
                 excluded: StationSet::EMPTY,
                 gone: StationSet::EMPTY,
@@ -177,8 +185,8 @@ proptest! {
                         missed += 1;
                         continue;
                     }
-                    let followed = replica.follow(&program, &mut scratch, &frame, SHADOW_CYCLES);
-                    let again = replica.follow(&program, &mut scratch, &frame, SHADOW_CYCLES);
+                    let followed = replica.follow(versions(&program), &mut scratch, &frame, SHADOW_CYCLES);
+                    let again = replica.follow(versions(&program), &mut scratch, &frame, SHADOW_CYCLES);
                     let current = replica.is_current(frame.header.moment);
                     prop_assert!(!current || followed != Followed::Lost);
                     prop_assert_eq!(again == Followed::Lost, followed == Followed::Lost);
@@ -194,7 +202,7 @@ proptest! {
                 }
                 Step::Transfer { age } => {
                     let lost = replica.standing() == Standing::Lost;
-                    let adopted = replica.adopt(&program, &mut scratch, (StationId(1), &truth.transfer(age)), SHADOW_CYCLES);
+                    let adopted = replica.adopt(versions(&program), &mut scratch, (StationId(1), &truth.transfer(age)), SHADOW_CYCLES);
                     prop_assert!(lost || !adopted);
                     if adopted {
                         prop_assert_eq!(replica.standing(), Standing::Shadow(SHADOW_CYCLES));
@@ -223,19 +231,24 @@ fn a_transferred_state_is_published_only_after_its_shadow_mode() {
     }
     let mut replica = Replica::new(ProgramId(0), &program, HISTORY);
     let follow = |replica: &mut Replica, scratch: &mut Scratch, frame: &Arc<Frame>| {
-        replica.follow(&program, scratch, frame, SHADOW_CYCLES)
+        replica.follow(versions(&program), scratch, frame, SHADOW_CYCLES)
     };
     assert_eq!(follow(&mut replica, &mut scratch, &truth.frame()), Followed::Lost);
     let wrong = Transfer { hash: ProgramHash(12), ..truth.transfer(0) };
-    assert!(!replica.adopt(&program, &mut scratch, (StationId(1), &wrong), SHADOW_CYCLES));
     assert!(!replica.adopt(
-        &program,
+        versions(&program),
+        &mut scratch,
+        (StationId(1), &wrong),
+        SHADOW_CYCLES
+    ));
+    assert!(!replica.adopt(
+        versions(&program),
         &mut scratch,
         (StationId(1), &truth.transfer(7)),
         SHADOW_CYCLES
     ));
     assert!(replica.adopt(
-        &program,
+        versions(&program),
         &mut scratch,
         (StationId(1), &truth.transfer(2)),
         SHADOW_CYCLES
@@ -260,7 +273,7 @@ fn a_station_is_a_witness_from_its_second_sample_on() {
         let Body::Sample(sample) = &frame.body else {
             panic!("a sample");
         };
-        replica.remember(&program, frame.header.moment, sample, SamplesReceived::First);
+        replica.remember(versions(&program), frame.header.moment, sample, SamplesReceived::First);
         let recalled = replica.recalled(moment(0)).expect("it was received");
         recalled.received == SamplesReceived::Later
     };

@@ -6,16 +6,16 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_cycle::{Agreement, Input, Machine, Mode, Output, Schedule, Turns};
+use understudy_cycle::{Agreement, Input, Machine, Mode, Output, Program, Schedule, Turns};
 use understudy_logic::{Circuit, CircuitBuilder};
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
     Lineage, Member, Moment, ProgramHash, ProgramId, ProgramSet, Segment, StationId, StationSet,
-    Time, Word,
+    Step, Time, Word,
 };
 
 use super::Station;
-use crate::{Event, Program, Settings};
+use crate::{Event, Settings};
 
 const PERIOD: Duration = Duration::from_millis(10);
 const CYCLE_US: u64 = 10_000;
@@ -114,7 +114,7 @@ fn sent(what: Sent, cycle: u64, to: u8) -> Option<(Member, Body)> {
                 base: lineage(program, born, oldest),
                 before: lineage(program, born, cycle),
                 after,
-                history: (oldest..=cycle).map(|_| input()).collect(),
+                history: (oldest..=cycle).map(|_| Step::of(input())).collect(),
                 applied: None,
                 excluded: StationSet::EMPTY,
                 gone: StationSet::EMPTY,

@@ -13,7 +13,9 @@
 
 use bincode::config::{Configuration, Limit};
 
-use crate::frame::{Body, Frame, MAXIMUM_HISTORY, Recalled, Relayed, Sample, Word};
+use crate::frame::{
+    Body, Frame, MAXIMUM_CHANGE_MARKS, MAXIMUM_HISTORY, Recalled, Relayed, Sample, Word,
+};
 use crate::identifier::{MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, Member, ProgramId};
 use crate::set::ProgramSet;
 use crate::write::{MAXIMUM_PULSES, MAXIMUM_SESSIONS, Pulse, WriteId};
@@ -195,6 +197,10 @@ fn keeps_promises(frame: &Frame) -> Result<(), FrameError> {
 fn kept_sample(sample: &Sample) -> Result<(), FrameError> {
     if !(1..=MAXIMUM_HISTORY).contains(&sample.history.len()) {
         return Err(FrameError::Promise("a sample carries 1 to 32 cycles"));
+    }
+    let marks = sample.history.iter().filter(|step| step.change.is_some()).count();
+    if marks > MAXIMUM_CHANGE_MARKS {
+        return Err(FrameError::Promise("a sample carries at most 4 change marks"));
     }
     kept_writes(&sample.writes)?;
     kept_pulses(&sample.pulses)?;

@@ -24,6 +24,9 @@ use crate::write::{Pulse, WriteId};
 /// Samples that one [`Sample`] may carry, this cycle's included.
 pub const MAXIMUM_HISTORY: usize = 32;
 
+/// Change marks among them, at most: a further change waits until the first of them has left the history.
+pub const MAXIMUM_CHANGE_MARKS: usize = 4;
+
 /// Content of one datagram.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Frame {

@@ -27,8 +27,9 @@ pub use force::{
     OrderRefusal, PointValue, SignalPlace, check_owner_and_reason,
 };
 pub use frame::{
-    Actuation, Body, Configurations, Field, Frame, Header, Holding, Join, Kept, MAXIMUM_HISTORY,
-    Partial, Recalled, Relayed, Sample, SamplesReceived, Source, Step, Transfer, Turn, Word,
+    Actuation, Body, Configurations, Field, Frame, Header, Holding, Join, Kept,
+    MAXIMUM_CHANGE_MARKS, MAXIMUM_HISTORY, Partial, Recalled, Relayed, Sample, SamplesReceived,
+    Source, Step, Transfer, Turn, Word,
 };
 pub use identifier::{
     ClusterHash, ConfigurationHash, Cycle, Epoch, MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, Member,

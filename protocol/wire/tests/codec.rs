@@ -6,7 +6,8 @@ use understudy_wire::{
     Actuation, Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Field, Frame,
     FrameError, Header, Holding, Image, Join, Kept, Lineage, MAXIMUM_FRAME_BYTES, MAXIMUM_STATIONS,
     Member, Moment, Partial, ProgramHash, ProgramId, ProgramSet, Pulse, Recalled, Relayed, Sample,
-    SamplesReceived, Segment, StationId, StationSet, Transfer, Turn, Word, WriteId, decode, encode,
+    SamplesReceived, Segment, StationId, StationSet, Step, Transfer, Turn, Word, WriteId, decode,
+    encode,
 };
 
 fn moment(epoch: u64, cycle: u64) -> Moment {
@@ -73,7 +74,10 @@ fn every_kind() -> Vec<(&'static str, Frame)> {
         base: Lineage(5),
         before: Lineage(6),
         after: Lineage(7),
-        history: smallvec![image(4, 0b0011), image(4, 0b1010)],
+        history: smallvec![
+            Step { change: Some(ProgramHash(9)), inputs: image(4, 0b0011) },
+            Step::of(image(4, 0b1010))
+        ],
         applied: Some(moment(3, 3)),
         excluded: StationSet::from_bits(0b10),
         gone: StationSet::from_bits(0b100),
@@ -208,18 +212,30 @@ fn a_frame_that_breaks_a_promise_never_leaves() {
     for writes in
         [vec![write(1, 1), write(1, 2)], (0..17).map(|session| write(session, 1)).collect()]
     {
-        let sample =
-            Sample { history: smallvec![image(1, 0)], writes: writes.into(), ..empty.clone() };
+        let sample = Sample {
+            history: smallvec![Step::of(image(1, 0))],
+            writes: writes.into(),
+            ..empty.clone()
+        };
         check_refused(remote_io, Body::Sample(sample));
     }
     for pulses in [vec![pulse(1, 2), pulse(1, 3)], (0..17).map(|input| pulse(input, 2)).collect()] {
-        let sample =
-            Sample { history: smallvec![image(1, 0)], pulses: pulses.into(), ..empty.clone() };
+        let sample = Sample {
+            history: smallvec![Step::of(image(1, 0))],
+            pulses: pulses.into(),
+            ..empty.clone()
+        };
         check_refused(remote_io, Body::Sample(sample));
     }
-    let uneven = Sample { history: smallvec![image(1, 0), image(2, 0)], ..empty.clone() };
+    let marks = (0..5).map(|hash| Step { change: Some(ProgramHash(hash)), inputs: image(1, 0) });
+    let marked = Sample { history: marks.collect(), ..empty.clone() };
+    check_refused(remote_io, Body::Sample(marked));
+    let uneven = Sample {
+        history: smallvec![Step::of(image(1, 0)), Step::of(image(2, 0))],
+        ..empty.clone()
+    };
     check_refused(remote_io, Body::Sample(uneven));
-    let history = smallvec![image(1, 0)];
+    let history = smallvec![Step::of(image(1, 0))];
     let uneven = Sample { history, unforced: Some(image(2, 0)), ..empty.clone() };
     check_refused(remote_io, Body::Sample(uneven));
     let word = |members| Word { mask: ProgramSet::from_bits(members), sum: Image::default() };
@@ -235,7 +251,7 @@ fn a_frame_that_breaks_a_promise_never_leaves() {
     check_refused(station, Body::Turn(turn(0b10, &[0])));
     check_refused(station, Body::Turn(turn(0b1, &[0, 0])));
     check_refused(station, Body::Turn(turn(0b1, &[1, 0])));
-    let sample = Sample { history: smallvec![image(1, 0)], ..empty.clone() };
+    let sample = Sample { history: smallvec![Step::of(image(1, 0))], ..empty.clone() };
     let relaying = |programs: [u8; 2], sample: &Sample| {
         let relayed =
             programs.map(|program| Relayed { program: ProgramId(program), sample: sample.clone() });

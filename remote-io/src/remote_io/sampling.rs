@@ -78,7 +78,8 @@ impl RemoteIo {
             self.program = Execution::Stopped;
         }
         let before_change = history.program();
-        let change = self.wanted.filter(|wanted| before_change != Some(*wanted));
+        let is_full = history.is_full_of_changes();
+        let change = self.wanted.filter(|wanted| before_change != Some(*wanted) && !is_full);
         history.push(Step { change, inputs: inputs.clone() });
         run.sampled = true;
         let forced = |input| self.forcing.refuses_write(input, now);

@@ -131,7 +131,7 @@ fn a_failed_channel_keeps_no_forced_value_over_a_restart() {
             let said = bench.receive(bench.start(), 0, false, Body::Sync);
             if let Some(sample) = sample_of(&said) {
                 let moment = bench.moment();
-                let inputs = sample.history.last().expect("its inputs").clone();
+                let inputs = sample.history.last().expect("its inputs").inputs.clone();
                 last = Some((held_after(sample, moment), recalled_of(sample, moment), inputs));
             }
             for rank in [0, 1] {

@@ -67,7 +67,7 @@ mod tests {
     use smallvec::smallvec;
     use understudy_wire::{
         ClusterHash, ConfigurationHash, Header, Image, Lineage, Moment, ProgramId, Sample,
-        StationId, StationSet,
+        StationId, StationSet, Step,
     };
 
     use super::*;
@@ -88,7 +88,7 @@ mod tests {
                 base: lineage,
                 before: lineage,
                 after: lineage,
-                history: smallvec![Image::zero(1)],
+                history: smallvec![Step::of(Image::zero(1))],
                 applied: None,
                 excluded: StationSet::EMPTY,
                 gone,

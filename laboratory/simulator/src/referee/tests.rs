@@ -82,6 +82,7 @@ fn sampled(cycle: u64, before: &[bool], input: bool) -> Event {
         inputs: bit(input),
         born: moment(0),
         before: after(before),
+        change: None,
     }
 }
 
@@ -203,6 +204,7 @@ fn a_cold_start_is_counted() {
         inputs: bit(true),
         born: moment(cycle),
         before: Lineage::genesis(ProgramHash(5), moment(cycle)),
+        change: None,
     };
     for cycle in [1, 5] {
         assert_eq!(referee.observe(&cold(cycle)), Ok(()));

@@ -119,8 +119,9 @@ mod tests {
     use smallvec::SmallVec;
     use understudy_wire::{
         Body, ClusterHash, ConfigurationHash, Cycle, Digest, Epoch, Frame, Header, Holding, Image,
-        Lineage, MAXIMUM_HISTORY, Member, Moment, ProgramId, ProgramSet, Pulse, Recalled, Sample,
-        StationId, StationSet, Turn, Word, WriteId, encode,
+        Lineage, MAXIMUM_CHANGE_MARKS, MAXIMUM_HISTORY, Member, Moment, ProgramHash, ProgramId,
+        ProgramSet, Pulse, Recalled, Sample, StationId, StationSet, Step, Turn, Word, WriteId,
+        encode,
     };
 
     use super::*;
@@ -136,7 +137,7 @@ mod tests {
         let header = Header {
             cluster: ClusterHash(u64::MAX),
             configuration: ConfigurationHash(u64::MAX),
-            prepared: None,
+            prepared: Some(ConfigurationHash(u64::MAX)),
             moment: LATE,
             sender,
             alone: true,
@@ -166,7 +167,12 @@ mod tests {
                     base: Lineage(u64::MAX),
                     before: Lineage(u64::MAX),
                     after: Lineage(u64::MAX),
-                    history: std::iter::repeat_n(ones(bits), history).collect(),
+                    history: (0..history)
+                        .map(|place| Step {
+                            change: (place < MAXIMUM_CHANGE_MARKS).then_some(ProgramHash(u64::MAX)),
+                            inputs: ones(bits),
+                        })
+                        .collect(),
                     applied: Some(LATE),
                     excluded: StationSet::from_bits(u128::MAX),
                     gone: StationSet::from_bits(u128::MAX),

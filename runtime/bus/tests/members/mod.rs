@@ -10,7 +10,7 @@ use understudy_cycle::{Agreement, Input, Machine, Mode, Output, RemoteIoInput, S
 use understudy_seal::{ClusterSecret, FrameKey, Opener, Seal, Title};
 use understudy_wire::{
     Body, ClusterHash, ConfigurationHash, Cycle, Epoch, Field, Frame, Header, Image, Lineage,
-    Member, Moment, ProgramId, Roster, Sample, StationId, StationSet, Time,
+    Member, Moment, ProgramId, Roster, Sample, StationId, StationSet, Step, Time,
 };
 
 /// How often each member says something.
@@ -101,7 +101,7 @@ impl Machine for Chatter {
             Input::RemoteIo(RemoteIoInput::Unforce(_)) => {
                 self.said.push_back(Output::Obeyed(Ok(())));
             }
-            Input::RemoteIo(_) => {}
+            Input::RemoteIo(_) | Input::Change(_) => {}
         }
     }
 
@@ -120,7 +120,7 @@ fn sample() -> Sample {
         base: Lineage(1),
         before: Lineage(1),
         after: Lineage(2),
-        history: [Image::zero(3)].into_iter().collect(),
+        history: [Step::of(Image::zero(3))].into_iter().collect(),
         applied: None,
         excluded: StationSet::EMPTY,
         gone: StationSet::EMPTY,
