@@ -46,11 +46,19 @@ impl Terms {
             alarms: Arc::clone(cluster.alarms()),
             plants,
             cluster: Arc::new(cluster.clone()),
+            change: None,
         }
     }
 
     /// The programs may change by these texts from now on; those of another cluster are refused by its members.
     pub(crate) fn learn(&mut self, texts: &ChangeTexts) {
+        if let Some(last) = self.change.take()
+            && last.after == texts.before
+            && let Ok(cluster) = self.cluster.changed(&last, last.after)
+        {
+            self.cluster = Arc::new(cluster);
+        }
+        self.change = Some(texts.clone());
         if let Ok(change) = texts.load(&self.cluster) {
             let change = Arc::new(change);
             self.referees.iter_mut().for_each(|referee| referee.learn(&change));

@@ -20,6 +20,6 @@ mod world;
 
 pub use checker::{Counterexample, Verdict, check};
 pub use properties::{ALL, Promise, Property};
-pub use start::Start;
+pub use start::{Changed, Start};
 pub use step::{Budget, Step};
 pub use world::{Model, World};

@@ -3,7 +3,7 @@
 //! Each start is a schedule of faults too, so that a counterexample is one from its first cycle on: those who restart do so in the first slot of
 //! the run, all at one time; those who are behind stood still for the cycle before it.
 
-use understudy_simulator::{Action, Fault};
+use understudy_simulator::{Action, ChangeStep, Fault};
 use understudy_wire::{MAXIMUM_HISTORY, Member};
 
 use crate::properties::{ALL, Promise, Property};
@@ -18,9 +18,23 @@ pub struct Start {
     pub misled: Vec<Member>,
     /// Who stood still for a cycle.
     pub behind: Vec<Member>,
+    /// What an engineer does in an online change: the members that have loaded it, and the steps as the run begins.
+    pub change: Changed,
     /// Links, from a sender to a receiver, that were broken for longer than the history of a sample.
     pub broken: Vec<(Member, Member)>,
 }
+
+/// An online change at the beginning of a run.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Changed {
+    /// Members that have loaded it.
+    pub prepared: Vec<Member>,
+    /// Steps in the first slot of the run.
+    pub steps: Vec<(Member, ChangeStep)>,
+}
+
+/// Cycles after which every member has received that the others have loaded a change.
+const CHANGE_CYCLES: u64 = 2;
 
 /// Cycles for which a link was broken: a sample carries no longer history.
 const BROKEN_CYCLES: u64 = MAXIMUM_HISTORY as u64 + 2;
@@ -41,6 +55,9 @@ impl Start {
     pub(crate) fn first(&self) -> Place {
         Place {
             cycle: match (self.behind.is_empty(), self.broken.is_empty()) {
+                (true, true) if !self.change.prepared.is_empty() => {
+                    SYNCHRONISED.cycle + CHANGE_CYCLES
+                }
                 (true, true) => SYNCHRONISED.cycle,
                 (false, true) => SYNCHRONISED.cycle + 1,
                 (_, false) => SYNCHRONISED.cycle + BROKEN_CYCLES,
@@ -51,7 +68,8 @@ impl Start {
 
     /// All to whom something has happened, in the order of the schedule.
     pub(crate) fn members(&self) -> impl Iterator<Item = Member> + '_ {
-        self.behind.iter().chain(&self.restarted).chain(&self.misled).copied()
+        let changing = self.change.steps.iter().map(|(member, _)| member);
+        self.behind.iter().chain(&self.restarted).chain(&self.misled).chain(changing).copied()
     }
 
     /// What has happened, in the order in which it has to be scheduled.
@@ -73,9 +91,16 @@ impl Start {
         let misled = self.misled.iter().flat_map(|&member| {
             [Action::Crash, Action::RestartWrongProgram].map(|action| fault(first, member, action))
         });
+        let change = |step| Action::Change { step };
+        let prepared = self.change.prepared.iter();
+        let prepared =
+            prepared.map(|&member| fault(SYNCHRONISED, member, change(ChangeStep::Prepare)));
+        let steps = self.change.steps.iter();
+        let steps = steps.map(|&(member, step)| fault(first, member, change(step)));
         let broken = self.broken.iter().flat_map(|&(from, to)| {
             [fault(SYNCHRONISED, from, Action::Cut { to }), fault(first, from, Action::Heal { to })]
         });
-        stops.chain(goes_on).chain(restarts).chain(misled).chain(broken).collect()
+        let others = stops.chain(goes_on).chain(restarts).chain(misled).chain(broken);
+        others.chain(prepared).chain(steps).collect()
     }
 }

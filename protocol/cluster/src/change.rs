@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use understudy_cycle::{Conversion, OnlineChange, Program, ProgramChange};
+use understudy_cycle::{Agreement, Conversion, OnlineChange, Program, ProgramChange};
 use understudy_typed::CarriedState;
 use understudy_wire::{ConfigurationHash, Image, ProgramHash, ProgramId, RetainedProgram};
 
@@ -121,6 +121,17 @@ impl ChangeTexts {
         }
     }
 
+    /// The change back.
+    #[must_use]
+    pub fn back(self) -> Self {
+        let Self { cluster, before, after, programs } = self;
+        let programs = programs.into_iter().map(|changed| {
+            let ChangedText { program, before, after } = changed;
+            ChangedText { program, before: after, after: before }
+        });
+        Self { cluster, before: after, after: before, programs: programs.collect() }
+    }
+
     /// What a member loads, whose cluster file is `cluster`: that before the change, or that after it.
     ///
     /// # Errors
@@ -178,19 +189,34 @@ impl ChangeTexts {
     }
 }
 
-impl ChangeTexts {
-    /// The canonical text of one of the two configurations; none for another one, and where a text cannot be read.
-    pub fn canonical_text(&self, cluster: &Cluster, of: ConfigurationHash) -> Option<String> {
-        let is_after = of == self.after;
-        if !is_after && of != self.before {
-            return None;
+impl Cluster {
+    /// The same cluster with the programs of one of the two configurations of a change, as if its file named them.
+    ///
+    /// # Errors
+    /// A text that is read as another program here.
+    pub fn changed(&self, texts: &ChangeTexts, to: ConfigurationHash) -> Result<Self, ChangeError> {
+        let mut cluster = self.clone();
+        let mut programs = cluster.programs.to_vec();
+        let mut is_changed = false;
+        for changed in &texts.programs {
+            let text = if to == texts.after { &changed.after } else { &changed.before };
+            let code = read_kept(&text.kept());
+            let code = code.ok_or_else(|| ChangeError::Unreadable { file: text.file.clone() })?;
+            let place = changed.program.index();
+            let missing = || ChangeError::NoSuchProgram { program: changed.program };
+            let controller = cluster.controllers.get_mut(place).ok_or_else(missing)?;
+            is_changed |= controller.hash != text.hash;
+            controller.hash = text.hash;
+            programs[place] = Program { hash: text.hash, executable: code.executable() };
+            controller.code = code;
         }
-        let codes = self.programs.iter().map(|changed| {
-            let texts = [&changed.before, &changed.after];
-            let [before, after] = texts.map(|text| read_kept(&text.kept()));
-            Some((changed.program, [before?, after?]))
-        });
-        Some(text_with(cluster, &codes.collect::<Option<Vec<_>>>()?, is_after))
+        // It was generated from the programs of the file.
+        cluster.parity = cluster.parity.filter(|_| !is_changed);
+        cluster.programs = programs.into();
+        cluster.canonical_text = text_with(&cluster, &[], false);
+        let configuration = ConfigurationHash::of(cluster.canonical_text.as_bytes());
+        cluster.agreement = Arc::new(Agreement { configuration, ..(*cluster.agreement).clone() });
+        Ok(cluster)
     }
 }
 

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use understudy_bus::{ChangeKeeper, Changes, FoundFile};
-use understudy_cluster::{ChangeTexts, Cluster};
+use understudy_cluster::{ChangeError, ChangeTexts, Cluster};
 use understudy_cycle::OnlineChange;
 use understudy_wire::{ConfigurationHash, Configurations, ProgramHash, ProgramId};
 
@@ -18,27 +18,48 @@ use crate::run::MemberOptions;
 /// The longest text of a change that is read from a file.
 const MOST_BYTES: u64 = 32 << 20;
 
-/// What is kept of a change.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-struct KeptChange {
-    configurations: Configurations,
-    texts: ChangeTexts,
-}
-
-/// A change with the texts that it was loaded from.
-#[derive(Debug, Clone)]
-struct LoadedChange {
-    texts: ChangeTexts,
-    change: Arc<OnlineChange>,
+/// What the file keeps.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+struct KeptChanges {
+    /// Changes that were accepted, each of which begins where the one before it ends: the first of them with a cluster file that the member had.
+    accepted: Vec<ChangeTexts>,
+    /// The change that is going on, with the configurations of the member.
+    current: Option<(ChangeTexts, Configurations)>,
 }
 
 /// What a member starts with.
 pub(crate) struct StartedChange {
-    /// The change, and the configurations that the member had.
+    /// The cluster, with the programs of the changes that were accepted.
+    pub(crate) cluster: Cluster,
+    /// The change that is going on, and the configurations that the member had.
     pub(crate) restored: Option<(Arc<OnlineChange>, Configurations)>,
     pub(crate) changes: Changes,
     /// The file, where it says nothing that can be used.
     pub(crate) found: Option<FoundFile>,
+}
+
+/// What a member has kept of online changes, and what takes the next one; `cluster` is that of its file.
+pub(crate) fn started_change(cluster: &Cluster, options: &MemberOptions) -> StartedChange {
+    let file = options
+        .retain
+        .as_ref()
+        .map(|folder| folder.join(format!("{}.{}.change", cluster.name(), options.name)));
+    let mut keeper =
+        Keeper { cluster: cluster.clone(), kept: KeptChanges::default(), file: file.clone() };
+    let restored = file.as_ref().map_or(Ok(None), |file| keeper.start(file));
+    let (restored, problem) = match restored {
+        Ok(restored) => (restored, None),
+        Err(problem) => (None, Some(problem)),
+    };
+    let found = file.zip(problem).map(|(path, problem)| FoundFile { path, problem: Some(problem) });
+    let own = keeper.cluster.agreement().configuration;
+    let first = Configurations { own, prepared: None };
+    let configurations = restored.as_ref().map_or(first, |(_, configurations)| *configurations);
+    let text = keeper.text(configurations.own);
+    let change = restored.as_ref().map(|(change, _)| Arc::clone(change));
+    let cluster = keeper.cluster.clone();
+    let changes = Changes::new(configurations, change, text, Some(Box::new(keeper)));
+    StartedChange { cluster, restored, changes, found }
 }
 
 impl StartedChange {
@@ -50,71 +71,83 @@ impl StartedChange {
 }
 
 struct Keeper {
+    /// With the programs of the changes that were accepted.
     cluster: Cluster,
+    kept: KeptChanges,
     /// Nothing where the member keeps nothing.
     file: Option<PathBuf>,
-    loaded: Option<LoadedChange>,
-}
-
-/// What a member has kept of an online change, and what takes the next one.
-pub(crate) fn started_change(cluster: &Cluster, options: &MemberOptions) -> StartedChange {
-    let file = options
-        .retain
-        .as_ref()
-        .map(|folder| folder.join(format!("{}.{}.change", cluster.name(), options.name)));
-    let own = cluster.agreement().configuration;
-    let mut keeper = Keeper { cluster: cluster.clone(), file: file.clone(), loaded: None };
-    let kept = file.as_ref().map_or(Ok(None), |file| keeper.kept(file));
-    let (kept, problem) = match kept {
-        Ok(kept) => (kept, None),
-        Err(problem) => (None, Some(problem)),
-    };
-    let found = file.zip(problem).map(|(path, problem)| FoundFile { path, problem: Some(problem) });
-    let first = Configurations { own, prepared: None };
-    let configurations = kept.as_ref().map_or(first, |(_, configurations)| *configurations);
-    keeper.loaded = kept.as_ref().map(|(loaded, _)| loaded.clone());
-    let restored = kept.map(|(loaded, configurations)| (loaded.change, configurations));
-    let text = keeper.text(configurations.own);
-    let change = restored.as_ref().map(|(change, _)| Arc::clone(change));
-    let changes = Changes::new(configurations, change, text, Some(Box::new(keeper)));
-    StartedChange { restored, changes, found }
 }
 
 impl Keeper {
-    /// What the file has; nothing where there is none, or where it is of a change that is over for this cluster file.
-    fn kept(&self, file: &Path) -> Result<Option<(LoadedChange, Configurations)>, String> {
+    /// Takes what the file has; the change that is going on. Changes before the cluster file that the member has now are over.
+    fn start(
+        &mut self,
+        file: &Path,
+    ) -> Result<Option<(Arc<OnlineChange>, Configurations)>, String> {
         let text = match fs::read_to_string(file) {
             Ok(text) => text,
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
             Err(error) => return Err(error.to_string()),
         };
-        let kept: KeptChange = serde_json::from_str(&text).map_err(|error| error.to_string())?;
+        let mut kept: KeptChanges =
+            serde_json::from_str(&text).map_err(|error| error.to_string())?;
         let own = self.cluster.agreement().configuration;
-        if own != kept.texts.before && own != kept.texts.after {
+        let is_newest = kept.accepted.last().is_some_and(|texts| texts.after == own);
+        let first = kept.accepted.iter().position(|texts| texts.before == own);
+        let is_current = |(texts, _): &(ChangeTexts, Configurations)| {
+            kept.accepted.is_empty() && [texts.before, texts.after].contains(&own)
+        };
+        if !is_newest && first.is_none() && !kept.current.as_ref().is_some_and(is_current) {
+            let known = kept.accepted.last().map(|texts| texts.after);
+            let known = known.or(kept.current.as_ref().map(|(texts, _)| texts.before));
+            let Some(known) = known else {
+                return Ok(None);
+            };
             return Err(format!(
-                "it is of a change from {} to {}, and the cluster file is configuration {own}",
-                kept.texts.before, kept.texts.after
+                "it is of changes that lead to {known}, and the cluster file is configuration {own}"
             ));
         }
-        let change = kept.texts.load(&self.cluster).map_err(|error| error.to_string())?;
-        let mut configurations = kept.configurations;
-        if configurations.prepared.is_none() && configurations.own != own {
-            // Its cluster file is still that of before: it goes on with what was accepted.
-            tracing::info!(%own, accepted = %configurations.own, "an online change was accepted");
-        } else if configurations.prepared.is_none() {
-            return Ok(None);
-        } else if own == kept.texts.after {
-            // The engineer has put the new cluster file there.
-            configurations = Configurations { own, prepared: Some(kept.texts.before) };
+        let over = if is_newest { kept.accepted.len() } else { first.unwrap_or(0) };
+        kept.accepted.drain(..over);
+        let mut cluster = self.cluster.clone();
+        for texts in &kept.accepted {
+            let changed = cluster.changed(texts, texts.after);
+            cluster = changed.map_err(|error| error.to_string())?;
         }
-        Ok(Some((LoadedChange { texts: kept.texts, change: Arc::new(change) }, configurations)))
+        let restored = match &kept.current {
+            None => None,
+            Some((texts, configurations)) => {
+                let change = texts.load(&cluster).map_err(|error| error.to_string())?;
+                Some((Arc::new(change), *configurations))
+            }
+        };
+        (self.cluster, self.kept) = (cluster, kept);
+        Ok(restored)
     }
 
     /// The canonical text of a configuration that is loaded.
     fn text(&self, own: ConfigurationHash) -> String {
-        let changed = self.loaded.as_ref();
-        let changed = changed.and_then(|loaded| loaded.texts.canonical_text(&self.cluster, own));
-        changed.unwrap_or_else(|| self.cluster.canonical_text().to_owned())
+        let current = self.kept.current.as_ref();
+        let changed = current.and_then(|(texts, _)| self.cluster.changed(texts, own).ok());
+        changed.as_ref().unwrap_or(&self.cluster).canonical_text().to_owned()
+    }
+
+    /// Ends the change with the configuration `own`.
+    fn end(&mut self, own: ConfigurationHash) -> Result<(), ChangeError> {
+        let Some((texts, _)) = self.kept.current.take() else {
+            return Ok(());
+        };
+        if own != self.cluster.agreement().configuration {
+            self.cluster = self.cluster.changed(&texts, own)?;
+            match self.kept.accepted.last() {
+                // A change back makes the one before it undone.
+                Some(last) if last.before == own => {
+                    self.kept.accepted.pop();
+                }
+                _ => self.kept.accepted.push(if own == texts.after { texts } else { texts.back() }),
+            }
+        }
+        Ok(())
     }
 }
 
@@ -123,12 +156,12 @@ impl ChangeKeeper for Keeper {
         let texts: ChangeTexts = serde_json::from_str(texts)
             .map_err(|error| format!("U0631: these are no texts of an online change: {error}"))?;
         let change = texts.load(&self.cluster).map_err(|error| format!("U0631: {error}"))?;
-        let change = Arc::new(change);
         // Another change is refused by the cycle while one is loaded.
-        if self.loaded.is_none() {
-            self.loaded = Some(LoadedChange { texts, change: Arc::clone(&change) });
+        if self.kept.current.is_none() {
+            let own = self.cluster.agreement().configuration;
+            self.kept.current = Some((texts, Configurations { own, prepared: None }));
         }
-        Ok(change)
+        Ok(Arc::new(change))
     }
 
     fn read(&mut self, file: &str) -> Result<String, String> {
@@ -142,18 +175,17 @@ impl ChangeKeeper for Keeper {
 
     fn keep(&mut self, configurations: Configurations) -> Result<String, String> {
         let text = self.text(configurations.own);
-        let own = self.cluster.agreement().configuration;
-        let is_over = configurations.prepared.is_none();
-        let kept = match (&self.file, &self.loaded) {
-            (Some(file), Some(_)) if is_over && configurations.own == own => remove(file),
-            (Some(file), Some(loaded)) => {
-                write(file, &KeptChange { configurations, texts: loaded.texts.clone() })
-            }
-            _ => Ok(()),
-        };
-        if is_over && configurations.own == own {
-            self.loaded = None;
+        if configurations.prepared.is_none() {
+            self.end(configurations.own).map_err(|error| format!("U0631: {error}"))?;
+        } else if let Some((_, kept)) = &mut self.kept.current {
+            *kept = configurations;
         }
+        let is_empty = self.kept.accepted.is_empty() && self.kept.current.is_none();
+        let kept = match &self.file {
+            Some(file) if is_empty => remove(file),
+            Some(file) => write(file, &self.kept),
+            None => Ok(()),
+        };
         kept.map_err(|error| {
             format!(
                 "U0633: it is done, and not kept on the disk, so it ends with the process: {error}"
@@ -171,7 +203,7 @@ fn remove(file: &Path) -> io::Result<()> {
 }
 
 /// Writes the file whole or not at all.
-fn write(file: &Path, kept: &KeptChange) -> io::Result<()> {
+fn write(file: &Path, kept: &KeptChanges) -> io::Result<()> {
     let folder = file.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(folder)?;
     let beside = file.with_extension("change.new");
@@ -180,4 +212,90 @@ fn write(file: &Path, kept: &KeptChange) -> io::Result<()> {
     new.sync_all()?;
     fs::rename(&beside, file)?;
     File::open(folder)?.sync_all()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FILE: &str = "[cluster]\nname = \"kept\"\nsecurity = \"off\"\n\n[[controller]]\nname = \"one\"\nladder = \"one.st\"\n\n[[remote_io]]\ncontroller = \"one\"\n";
+
+    /// The cluster whose program counts by `step`.
+    fn cluster(step: u32) -> Cluster {
+        let program = format!(
+            "PROGRAM one\nVAR_INPUT go : BOOL; END_VAR\nVAR_OUTPUT shown : INT; END_VAR\nVAR count : INT; END_VAR\ncount := count + {step};\nshown := count;\nEND_PROGRAM"
+        );
+        let loaded = understudy_cluster::read("cluster.toml", FILE, &mut |_| Ok(program.clone()));
+        loaded.cluster.unwrap_or_else(|| panic!("{:?}", loaded.reports))
+    }
+
+    fn hash(cluster: &Cluster) -> ConfigurationHash {
+        cluster.agreement().configuration
+    }
+
+    /// A member that starts with this cluster file: its configurations, and what takes changes.
+    fn start(file: &Path, cluster: &Cluster) -> (Result<Configurations, String>, Keeper) {
+        let (cluster, kept) = (cluster.clone(), KeptChanges::default());
+        let mut keeper = Keeper { cluster, kept, file: Some(file.to_owned()) };
+        let restored = keeper.start(file);
+        let own = hash(&keeper.cluster);
+        let none = Configurations { own, prepared: None };
+        (restored.map(|it| it.map_or(none, |(_, configurations)| configurations)), keeper)
+    }
+
+    fn prepare(keeper: &mut Keeper, before: &Cluster, after: &Cluster) {
+        let texts = ChangeTexts::between(before, after).expect("only a program differs");
+        let texts = serde_json::to_string(&texts).expect("JSON");
+        keeper.load(&texts).expect("it is of this cluster");
+        let (own, prepared) = (hash(before), Some(hash(after)));
+        keeper.keep(Configurations { own, prepared }).expect("kept");
+    }
+
+    fn end(keeper: &mut Keeper, own: &Cluster) -> String {
+        let configurations = Configurations { own: hash(own), prepared: None };
+        keeper.keep(configurations).expect("kept")
+    }
+
+    #[test]
+    fn a_member_that_starts_again_goes_on_where_it_was() {
+        let folder =
+            std::env::temp_dir().join(format!("understudy-changes-{}", std::process::id()));
+        fs::create_dir_all(&folder).expect("a folder");
+        let file = folder.join("kept.one.change");
+        let [first, second, third] = [1, 10, 100].map(cluster);
+        let known = |file: &Path, cluster: &Cluster| start(file, cluster).0.expect("it is known");
+        let alone = |cluster: &Cluster| Configurations { own: hash(cluster), prepared: None };
+        let (configurations, mut keeper) = start(&file, &first);
+        assert_eq!(configurations, Ok(alone(&first)));
+        // Prepared, with the old file and with the new one.
+        prepare(&mut keeper, &first, &second);
+        let prepared = Configurations { own: hash(&first), prepared: Some(hash(&second)) };
+        assert_eq!(known(&file, &first), prepared);
+        assert_eq!(known(&file, &second), prepared);
+        // Accepted: the old file is that of before, and a second change leads on from there.
+        assert_eq!(end(&mut keeper, &second), second.canonical_text());
+        assert_eq!(known(&file, &first), alone(&second));
+        assert_eq!(known(&file, &second), alone(&second));
+        let (_, mut keeper) = start(&file, &first);
+        prepare(&mut keeper, &second, &third);
+        assert_eq!(known(&file, &first).prepared, Some(hash(&third)));
+        end(&mut keeper, &third);
+        assert_eq!(known(&file, &first), alone(&third));
+        assert_eq!(known(&file, &second), alone(&third));
+        assert_eq!(known(&file, &third), alone(&third));
+        // One that was cancelled leaves nothing, and one back undoes the one before it.
+        prepare(&mut keeper, &third, &first);
+        end(&mut keeper, &third);
+        assert_eq!(known(&file, &first), alone(&third));
+        prepare(&mut keeper, &third, &second);
+        end(&mut keeper, &second);
+        assert_eq!(known(&file, &first), alone(&second));
+        // A cluster file of something else is not changed to what was accepted of another one.
+        let other = cluster(7);
+        let problem = start(&file, &other).0.expect_err("it is of other changes");
+        assert!(problem.contains(&hash(&other).to_string()), "{problem}");
+        fs::write(&file, "no JSON").expect("written");
+        assert!(start(&file, &first).0.is_err());
+        fs::remove_dir_all(&folder).expect("removed");
+    }
 }

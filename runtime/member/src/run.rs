@@ -62,9 +62,10 @@ pub fn run_station(cluster: &Cluster, options: &MemberOptions) -> Result<(), Mem
     let Member::Station(station) = member else {
         return Err(wrong());
     };
+    let started = started_change(cluster, options);
+    let cluster = &started.cluster.clone();
     let settings = cluster.station_settings(station, epoch_of_the_clock());
     let settings = settings.ok_or_else(wrong)?;
-    let started = started_change(cluster, options);
     let is_loaded = |program, hash| started.has_loaded(program, hash);
     let (runs, retention) = retained_runs(cluster, options, &settings, is_loaded);
     let settings = later_than_retained(settings, &runs);
@@ -86,10 +87,11 @@ pub fn run_remote_io(cluster: &Cluster, options: &MemberOptions) -> Result<(), M
     let Member::RemoteIo(program) = member else {
         return Err(wrong());
     };
+    let started = started_change(cluster, options);
+    let cluster = &started.cluster.clone();
     let settings = cluster.remote_io_settings(program).ok_or_else(wrong)?;
     let field = field_of(options, cluster, program, settings.fail_safe.clone())?;
     let is_retentive = settings.restart.is_some();
-    let started = started_change(cluster, options);
     let mut machine = RemoteIo::new(Time::default(), settings.clone());
     if let Some((change, configurations)) = &started.restored {
         machine = machine.changed(change, *configurations);
@@ -116,8 +118,9 @@ pub fn run_plant(cluster: &Cluster, options: &MemberOptions) -> Result<(), Membe
     let Member::Plant(program) = member else {
         return Err(wrong());
     };
-    let settings = cluster.plant_settings(program).ok_or_else(wrong)?;
     let started = started_change(cluster, options);
+    let cluster = &started.cluster.clone();
+    let settings = cluster.plant_settings(program).ok_or_else(wrong)?;
     let mut machine = PlantMachine::new(settings, Time::default());
     if let Some((change, configurations)) = &started.restored {
         machine = machine.changed(change, *configurations);

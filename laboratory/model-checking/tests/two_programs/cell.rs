@@ -3,7 +3,9 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_cycle::{Agreement, Mode, Schedule, Turns};
+use understudy_cycle::{
+    Agreement, Conversion, Mode, OnlineChange, Program, ProgramChange, Schedule, Turns,
+};
 use understudy_logic::{Circuit, CircuitBuilder};
 use understudy_plant::{ModelKind, Plant, Signals};
 use understudy_remote_io::{Release, StaleState, ValueFault};
@@ -25,6 +27,45 @@ fn program(first: bool) -> Circuit {
     builder.set_next(older, is);
     builder.output("y", mixed);
     builder.finish().expect("a circuit")
+}
+
+/// [`program`] with the output negated, and with one more register that is set.
+fn changed() -> Circuit {
+    let mut builder = CircuitBuilder::new("program");
+    let u = builder.input("u");
+    let (older, was) = builder.register("x1", false);
+    let (newer, is) = builder.register("x0", true);
+    let (more, set) = builder.register("x2", false);
+    let mixed = builder.graph().xor(was, u);
+    builder.set_next(newer, mixed);
+    builder.set_next(older, is);
+    builder.set_next(more, set);
+    let negated = builder.graph().xor(mixed, set);
+    builder.output("y", negated);
+    builder.finish().expect("a circuit")
+}
+
+/// Sets the register that the changed program has more, or leaves it out.
+#[derive(Debug)]
+struct MoreRegisters(bool);
+
+impl Conversion for MoreRegisters {
+    fn convert(&self, state: &[u64]) -> Vec<u64> {
+        vec![state[0] & 0b11 | u64::from(self.0) << 2]
+    }
+}
+
+/// The change of the first program.
+fn change(before: &Program, configuration: ConfigurationHash) -> OnlineChange {
+    let after = Program { hash: ProgramHash(3), executable: (&changed()).into() };
+    let program = ProgramChange {
+        program: ProgramId(0),
+        before: before.clone(),
+        after,
+        forward: Arc::new(MoreRegisters(true)),
+        back: Arc::new(MoreRegisters(false)),
+    };
+    OnlineChange { before: configuration, after: ConfigurationHash(4), programs: vec![program] }
 }
 
 /// A plant that toggles, once for each time that it is driven with 1 too; it shows all of its state.
@@ -54,13 +95,10 @@ pub(crate) fn parts(understudies: usize, turns: Turns) -> Parts {
         shadow_cycles: 1,
         listen_cycles: 1,
     });
-    let programs: Arc<[understudy_cycle::Program]> = circuits
+    let programs: Arc<[Program]> = circuits
         .iter()
         .zip(1..)
-        .map(|(circuit, hash)| understudy_cycle::Program {
-            hash: ProgramHash(hash),
-            executable: circuit.into(),
-        })
+        .map(|(circuit, hash)| Program { hash: ProgramHash(hash), executable: circuit.into() })
         .collect();
     let stations = (0..circuits.len() + understudies).map(|rank| understudy_node::Settings {
         station: StationId(rank as u8),
@@ -102,6 +140,6 @@ pub(crate) fn parts(understudies: usize, turns: Turns) -> Parts {
         fed_by: vec![None; circuits.len()],
         follows: vec![Vec::new(); circuits.len()],
         has_two_networks: false,
-        change: None,
+        change: Some(Arc::new(change(&programs[0], agreement.configuration))),
     }
 }

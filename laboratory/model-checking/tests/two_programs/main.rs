@@ -1,6 +1,7 @@
 //! Two programs, one understudy, two remote I/Os: every schedule of a few faults over a few cycles.
 
 mod cell;
+mod changes;
 mod starts;
 
 use understudy_cycle::Turns;

@@ -6,14 +6,14 @@ use understudy_wire::{Member, ProgramId, StationId};
 
 use crate::{NONE, ONE, check_from, check_turns};
 
-const STATIONS: [Member; 3] = [station(0), station(1), station(2)];
-const REMOTE_IOS: [Member; 2] = [remote_io(0), remote_io(1)];
+pub(crate) const STATIONS: [Member; 3] = [station(0), station(1), station(2)];
+pub(crate) const REMOTE_IOS: [Member; 2] = [remote_io(0), remote_io(1)];
 
-const fn station(rank: u8) -> Member {
+pub(crate) const fn station(rank: u8) -> Member {
     Member::Station(StationId(rank))
 }
 
-const fn remote_io(program: u8) -> Member {
+pub(crate) const fn remote_io(program: u8) -> Member {
     Member::RemoteIo(ProgramId(program))
 }
 
