@@ -103,16 +103,28 @@ impl Program {
     /// # Panics
     /// If `state` is shorter than a state of `before`.
     pub fn carried(&self, before: &Self, state: &[u64], told: Told<'_>) -> CarriedState {
+        self.carried_from(before, state, told, (&partners(before, self), true))
+    }
+
+    /// As [`Self::carried`], with the variables that [`partners`] finds; the paths have names only where they are listed.
+    fn carried_from(
+        &self,
+        before: &Self,
+        state: &[u64],
+        told: Told<'_>,
+        (partners, is_listed): (&[Option<usize>], bool),
+    ) -> CarriedState {
         let points = self.inputs.iter().chain(&self.outputs).filter(|point| point.range.is_some());
         let mut walk = Walk {
             old: before,
             new: self,
             kept: state,
             told,
+            is_listed,
             state: self.initial_state(),
             declared: points.map(|point| (point.slot, point.declared())).collect(),
         };
-        let paths = walk.variables();
+        let paths = walk.variables(partners);
         if self.is_retentive() && before.is_retentive() {
             let time = i128::from(before.period.max(1)) * i128::from(state[SCANS]);
             let period = i128::from(self.period.max(1));
@@ -121,15 +133,43 @@ impl Program {
         }
         CarriedState { state: walk.state, paths }
     }
+}
 
-    /// The state with which this program goes on from a state of the program before it, in an online change: as [`Self::carried`], with all variables
-    /// in place of the retentive ones. A program that a fault has stopped stays stopped.
+/// A program in the place of another one, in an online change: it takes over the values of all variables, and not of the retentive ones alone. A program
+/// that a fault has stopped stays stopped.
+#[derive(Debug, Clone)]
+pub struct Successor {
+    old: Program,
+    new: Program,
+    partners: Vec<Option<usize>>,
+}
+
+impl Successor {
+    /// `new` in the place of `old`.
+    pub fn new(old: &Program, new: &Program) -> Self {
+        let partners = partners(old, new);
+        Self { old: old.all_retentive(), new: new.all_retentive(), partners }
+    }
+
+    /// The state with which the new program goes on from a state of the old one.
     ///
     /// # Panics
-    /// If `state` is shorter than a state of `before`.
-    pub fn changed(&self, before: &Self, state: &[u64], told: Told<'_>) -> CarriedState {
-        let [new, old] = [self, before].map(Self::all_retentive);
-        let mut changed = new.carried(&old, state, told);
+    /// If `state` is shorter than a state of the old program.
+    pub fn state(&self, state: &[u64], told: Told<'_>) -> Vec<u64> {
+        self.take(state, told, false).state
+    }
+
+    /// The same, with what has become of each path.
+    ///
+    /// # Panics
+    /// As [`Self::state`].
+    pub fn carried(&self, state: &[u64], told: Told<'_>) -> CarriedState {
+        self.take(state, told, true)
+    }
+
+    fn take(&self, state: &[u64], told: Told<'_>, is_listed: bool) -> CarriedState {
+        let mut changed =
+            self.new.carried_from(&self.old, state, told, (&self.partners, is_listed));
         changed.state[..SCANS].copy_from_slice(&state[..SCANS]);
         changed
     }
@@ -162,53 +202,58 @@ struct Spot<'p> {
     slot: u32,
 }
 
+/// For each variable of the new program the one of the old program that it takes over: of its name, or else of the same name in another case.
+fn partners(old: &Program, new: &Program) -> Vec<Option<usize>> {
+    let mut known: HashMap<&str, usize> = HashMap::new();
+    // The names of a ladder may differ in their case alone, those of all other languages do not.
+    let mut folded: HashMap<String, &str> = HashMap::new();
+    for (place, variable) in old.variables.iter().enumerate() {
+        known.insert(&variable.name, place);
+        folded.insert(variable.name.to_ascii_lowercase(), &variable.name);
+    }
+    let names = new.variables.iter().map(|variable| variable.name.as_str());
+    let exact: Vec<Option<usize>> = names.clone().map(|name| known.remove(name)).collect();
+    let in_other_case = |(name, exact): (&str, Option<usize>)| {
+        exact.or_else(|| {
+            let name = folded.get(&name.to_ascii_lowercase())?;
+            known.remove(name)
+        })
+    };
+    names.zip(exact).map(in_other_case).collect()
+}
+
 struct Walk<'p> {
     old: &'p Program,
     new: &'p Program,
     kept: &'p [u64],
     told: Told<'p>,
+    /// Whether the paths are named.
+    is_listed: bool,
     state: Vec<u64>,
     /// Points of the new program with a subrange, by their slots.
     declared: HashMap<u32, Declared>,
 }
 
 impl<'p> Walk<'p> {
-    fn variables(&mut self) -> Vec<CarriedPath> {
+    /// Takes over each variable; `partners` are those of the new program in the old one.
+    fn variables(&mut self, partners: &[Option<usize>]) -> Vec<CarriedPath> {
         let (old, new) = (self.old, self.new);
         let spot = |of: &'p crate::form::Variable| Spot { of: &of.of, slot: of.slot };
-        let mut known: HashMap<&str, Spot<'_>> =
-            old.variables.iter().map(|variable| (variable.name.as_str(), spot(variable))).collect();
-        // The names of a ladder may differ in their case alone, those of all other languages do not.
-        let mut folded: HashMap<String, &str> = HashMap::new();
-        for variable in &old.variables {
-            folded.insert(variable.name.to_ascii_lowercase(), &variable.name);
-        }
+        let mut is_taken = vec![false; old.variables.len()];
         let mut paths = Vec::new();
-        let exact: Vec<bool> = new
-            .variables
-            .iter()
-            .map(|variable| known.contains_key(variable.name.as_str()))
-            .collect();
-        let mut partners: Vec<Option<Spot<'_>>> = Vec::new();
-        for (variable, exact) in new.variables.iter().zip(&exact) {
-            partners.push(exact.then(|| known.remove(variable.name.as_str())).flatten());
-        }
         for (variable, partner) in new.variables.iter().zip(partners) {
-            let in_other_case = || {
-                let name = folded.get(&variable.name.to_ascii_lowercase())?;
-                known.remove(name)
-            };
-            let partner = partner.or_else(in_other_case);
+            let partner = partner.map(|place| {
+                is_taken[place] = true;
+                spot(&old.variables[place])
+            });
             paths.extend(self.part(&variable.name, partner, Some(spot(variable))));
         }
         if old.has_unnamed_retentive() {
             let path = "memory without a name".to_owned();
             paths.push(CarriedPath { path, fate: Fate::Dropped, before: None, now: None });
         }
-        for variable in &old.variables {
-            if let Some(spot) = known.remove(variable.name.as_str()) {
-                paths.extend(self.part(&variable.name, Some(spot), None));
-            }
+        for (variable, _) in old.variables.iter().zip(is_taken).filter(|(_, taken)| !taken) {
+            paths.extend(self.part(&variable.name, Some(spot(variable)), None));
         }
         paths
     }
@@ -332,6 +377,9 @@ impl<'p> Walk<'p> {
         old: Option<Spot<'_>>,
         new: Option<Spot<'_>>,
     ) -> CarriedPath {
+        if !self.is_listed {
+            return CarriedPath { path: String::new(), fate, before: None, now: None };
+        }
         let name = |program: &Program, spot: Spot<'_>| program.type_name(spot.of);
         CarriedPath {
             path: path.to_owned(),

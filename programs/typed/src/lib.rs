@@ -26,7 +26,7 @@ mod types;
 mod validate;
 mod visit;
 
-pub use self::carried::{CarriedPath, CarriedState, Fate, Told};
+pub use self::carried::{CarriedPath, CarriedState, Fate, Successor, Told};
 pub use self::cost::Cost;
 pub use self::fault::{Cause, Fault};
 pub use self::form::{

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use understudy_cycle::{Agreement, Conversion, OnlineChange, Program, ProgramChange};
-use understudy_typed::CarriedState;
+use understudy_typed::{CarriedState, Successor, Told};
 use understudy_wire::{ConfigurationHash, Image, ProgramHash, ProgramId, RetainedProgram};
 
 use crate::cluster::Cluster;
@@ -174,8 +174,8 @@ impl ChangeTexts {
                 program: changed.program,
                 before: program(&before, &changed.before),
                 after: program(&after, &changed.after),
-                forward: Arc::new(Between { from: before.clone(), to: after.clone() }),
-                back: Arc::new(Between { from: after, to: before }),
+                forward: Arc::new(Between::new(&before, &after)),
+                back: Arc::new(Between::new(&after, &before)),
             });
         }
         let change = OnlineChange { before: self.before, after: self.after, programs };
@@ -287,11 +287,23 @@ pub enum ChangeError {
 struct Between {
     from: Code,
     to: Code,
+    successor: Successor,
+}
+
+impl Between {
+    fn new(from: &Code, to: &Code) -> Self {
+        let successor = Successor::new(from.typed(), to.typed());
+        Self { from: from.clone(), to: to.clone(), successor }
+    }
 }
 
 impl Conversion for Between {
     fn convert(&self, state: &[u64]) -> Vec<u64> {
-        self.to.changed(&self.from, state).state
+        let unlisted = |state: &[u64], told: Told<'_>| CarriedState {
+            state: self.successor.state(state, told),
+            paths: Vec::new(),
+        };
+        self.to.changed(&self.from, state, unlisted).state
     }
 }
 
@@ -299,7 +311,8 @@ impl Conversion for Between {
 pub fn fates(before: &Code, after: &Code, state: Option<&Image>) -> CarriedState {
     let initial = before.executable();
     let words = state.map_or(initial.initial(), Image::words);
-    after.changed(before, words)
+    let successor = Successor::new(before.typed(), after.typed());
+    after.changed(before, words, |state, told| successor.carried(state, told))
 }
 
 /// The canonical text of a cluster in which these programs stand in the place of its own: those before the change, or those after it.

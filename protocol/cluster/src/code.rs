@@ -126,22 +126,29 @@ impl Code {
     /// # Panics
     /// If `state` is shorter than a state of `before`.
     pub fn carried(&self, before: &Self, state: &[u64]) -> CarriedState {
-        self.with_values_of(before, state, TypedProgram::carried)
+        self.with_values_of(before, state, |state, told| {
+            self.typed.carried(&before.typed, state, told)
+        })
     }
 
     /// The state with which it goes on from a state of the program before it, in an online change; as [`Self::carried`], of all variables.
     ///
     /// # Panics
     /// If `state` is shorter than a state of `before`.
-    pub fn changed(&self, before: &Self, state: &[u64]) -> CarriedState {
-        self.with_values_of(before, state, TypedProgram::changed)
+    pub(crate) fn changed(
+        &self,
+        before: &Self,
+        state: &[u64],
+        take: impl FnOnce(&[u64], Told<'_>) -> CarriedState,
+    ) -> CarriedState {
+        self.with_values_of(before, state, take)
     }
 
     fn with_values_of(
         &self,
         before: &Self,
         state: &[u64],
-        take: impl FnOnce(&TypedProgram, &TypedProgram, &[u64], Told<'_>) -> CarriedState,
+        take: impl FnOnce(&[u64], Told<'_>) -> CarriedState,
     ) -> CarriedState {
         let (old, new) = (before.layout(), self.layout());
         let held =
@@ -150,7 +157,7 @@ impl Code {
             is_known: &|address| held(old, address),
             is_read: &|address| held(new, address),
         };
-        let mut carried = take(&self.typed, &before.typed, &before.typed_state(state), told);
+        let mut carried = take(&before.typed_state(state), told);
         if let Some(layout) = new {
             let executable = self.executable();
             let registers = layout.registers(&self.typed, &carried.state, executable.initial());
