@@ -21,15 +21,15 @@ use crate::files;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
-  understudy change cell/cluster.toml new/cluster.toml
+  understudy change examples/online-change/cluster.toml examples/online-change/new/cluster.toml
   understudy change runs/latest new/cluster.toml prepare
   understudy change runs/latest new/cluster.toml switch
   understudy change runs/latest new/cluster.toml accept
   understudy change cell/cluster.toml new/cluster.toml cancel --keys keys/members/engineer
 
-Without a step, and with `plan`, it says what would change and touches nothing. `prepare` loads the new programs at all members beside the old ones;
+Without a step, and with `plan`, it says what would change and touches nothing. `prepare` loads the new programs at all members next to the old ones;
 `switch` changes the programs between two cycles; `accept` ends the change with the new programs, `cancel` with the old ones. A step can be given again,
-also from another machine: it goes on where the members are.")]
+also from another machine: it continues where the members are.")]
 pub(crate) struct Arguments {
     /// Cluster file that the members run, or directory of a running laboratory
     #[arg(value_name = "CLUSTER.toml|RUN")]
@@ -46,7 +46,7 @@ pub(crate) struct Arguments {
     /// Members that are left out, because they are down
     #[arg(long, value_name = "NAME")]
     without: Vec<String>,
-    /// Go on although values are dropped
+    /// Continue although values are dropped
     #[arg(long)]
     drop: bool,
     /// Directory of runs
@@ -58,7 +58,7 @@ pub(crate) struct Arguments {
 enum Step {
     /// Say what would change
     Plan,
-    /// Load the new programs at all members, beside the old ones
+    /// Load the new programs at all members, next to the old ones
     Prepare,
     /// Change the programs between two cycles
     Switch,
@@ -68,7 +68,7 @@ enum Step {
     Cancel,
 }
 
-/// Time limit for members that still need the other configuration: histories have to leave the change behind.
+/// Time limit for members that still need the other configuration: histories must leave the change behind.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 const AGAIN: Duration = Duration::from_millis(200);
@@ -93,7 +93,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         Step::Plan | Step::Prepare => {
             if plan.drops() && !arguments.drop {
                 let message = format!(
-                    "values are dropped, so the new program begins with their initial values; with --drop it goes on\n{}",
+                    "values are dropped, so the new program begins with their initial values; with --drop it continues\n{}",
                     plan.text()
                 );
                 return Err(Answer::failed(Status::BadInput, "U0635", message));
@@ -163,7 +163,7 @@ fn finish(
     }
 }
 
-#[allow(clippy::disallowed_methods, reason = "a person waits, and members go on meanwhile")]
+#[allow(clippy::disallowed_methods, reason = "a person waits, and members continue meanwhile")]
 fn pause() {
     std::thread::sleep(AGAIN);
 }
