@@ -18,7 +18,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use understudy_bus::{HostEvent, Quantiles};
-use understudy_cluster::{AlarmDeclaration, ChangeTexts, Cluster};
+use understudy_cluster::{AlarmDeclaration, OnlineChanges};
 use understudy_cycle::Agreement;
 use understudy_journal::{
     AlarmChange, Happening, Members, Numbering, Record, TimeOfDay, TimesOfDay, moment,
@@ -71,10 +71,8 @@ pub struct Terms {
     pub plants: ProgramSet,
     /// Alarms on signals.
     pub alarms: Arc<[AlarmDeclaration]>,
-    /// The cluster, for an online change of it: with the programs of those before the last one.
-    pub cluster: Arc<Cluster>,
-    /// The last online change.
-    pub change: Option<ChangeTexts>,
+    /// The online changes of the run.
+    pub changes: OnlineChanges,
 }
 
 /// Who says where the origin is.

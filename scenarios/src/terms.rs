@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use understudy_cluster::{ChangeTexts, Cluster};
+use understudy_cluster::{ChangeTexts, Cluster, OnlineChanges};
 use understudy_journal::Members;
 use understudy_simulator::Referee;
 pub use understudy_simulator::parts;
@@ -45,21 +45,13 @@ impl Terms {
             signals: signals.collect(),
             alarms: Arc::clone(cluster.alarms()),
             plants,
-            cluster: Arc::new(cluster.clone()),
-            change: None,
+            changes: OnlineChanges::of(Arc::new(cluster.clone())),
         }
     }
 
     /// The programs may change by these texts from now on; those of another cluster are refused by its members.
     pub(crate) fn learn(&mut self, texts: &ChangeTexts) {
-        if let Some(last) = self.change.take()
-            && last.after == texts.before
-            && let Ok(cluster) = self.cluster.changed(&last, last.after)
-        {
-            self.cluster = Arc::new(cluster);
-        }
-        self.change = Some(texts.clone());
-        if let Ok(change) = texts.load(&self.cluster) {
+        if let Some(change) = self.changes.load(texts) {
             let change = Arc::new(change);
             self.referees.iter_mut().for_each(|referee| referee.learn(&change));
         }

@@ -21,7 +21,7 @@ mod turns;
 use std::collections::BTreeSet;
 use std::sync::{Arc, OnceLock};
 
-use understudy_cluster::Cluster;
+use understudy_cluster::{Cluster, OnlineChanges};
 use understudy_interchange::DrawnUnit;
 use understudy_journal::{Cycles, Happening, Members, Record, TimeOfDay, TimesOfDay};
 use understudy_ladder::Observer;
@@ -85,6 +85,7 @@ const LEAST_CYCLES: usize = 16;
 #[derive(Debug, Clone)]
 pub struct Model {
     pub(crate) cluster: Arc<Cluster>,
+    online_changes: OnlineChanges,
     pub(crate) members: Members,
     pub(crate) writes: Writes,
     cycles: Cycles,
@@ -170,6 +171,7 @@ impl Model {
             last_margin: LastMargin::default(),
             read_from: None,
             continues: false,
+            online_changes: OnlineChanges::of(Arc::clone(&cluster)),
             cluster,
         }
     }

@@ -12,6 +12,32 @@ use crate::code::Code;
 use crate::configuration::with_programs;
 use crate::source_text::read_kept;
 
+/// The online changes of one run, one after another: each is loaded by what the ones before it have led to.
+#[derive(Debug, Clone)]
+pub struct OnlineChanges {
+    cluster: Arc<Cluster>,
+    last: Option<ChangeTexts>,
+}
+
+impl OnlineChanges {
+    /// Of a run that begins with this cluster.
+    pub fn of(cluster: Arc<Cluster>) -> Self {
+        Self { cluster, last: None }
+    }
+
+    /// The next change; none where its texts are not of this cluster, and so were refused by its members.
+    pub fn load(&mut self, texts: &ChangeTexts) -> Option<OnlineChange> {
+        if let Some(last) = self.last.take()
+            && last.after == texts.before
+            && let Ok(changed) = self.cluster.changed(&last, last.after)
+        {
+            self.cluster = Arc::new(changed);
+        }
+        self.last = Some(texts.clone());
+        texts.load(&self.cluster).ok()
+    }
+}
+
 /// What every member is given to prepare an online change: the texts of the programs that change, before and after.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

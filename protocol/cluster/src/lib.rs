@@ -35,7 +35,9 @@ pub use address::{
     Addresses, MAXIMUM_NAME_LENGTH, MULTICAST_GROUPS, is_multicast_range, is_name, why_unreachable,
 };
 pub use alarm::{AlarmCondition, AlarmDeclaration, MAXIMUM_ALARMS, Priority};
-pub use change::{ChangeError, ChangeTexts, ChangedText, NeedsStop, ProgramText, fates};
+pub use change::{
+    ChangeError, ChangeTexts, ChangedText, NeedsStop, OnlineChanges, ProgramText, fates,
+};
 pub use cluster::{Cluster, Controller, Link, PlantPlace, RemoteIo, Security, Understudy};
 pub use code::Code;
 pub use device::{BAUD_RATES, Binding, Connection, FieldDevice, Parity, SerialLine, Side};

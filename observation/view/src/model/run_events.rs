@@ -82,8 +82,7 @@ impl Model {
                 }
             }
             RunEvent::ChangeLoaded { texts } => {
-                // Texts that are none of this cluster were refused by its members.
-                if let Ok(change) = texts.load(&self.cluster) {
+                if let Some(change) = self.online_changes.load(texts) {
                     let change = Arc::new(change);
                     self.histories.iter_mut().for_each(|history| history.learn(&change));
                 }
