@@ -48,6 +48,18 @@ fn a_finished_run_answers_every_question() {
     assert!(sources.iter().any(|run| run[2] == "reconstructed"));
     assert!(trends["faults"].as_array().is_some_and(|faults| faults.len() >= 2));
 
+    // Of many cycles there are columns: what is between the least and the greatest value is there, and what is not known is nothing.
+    let days = page.get("/api/trends?signals=0.output.0,0.state.holding&from=0&to=59999").json();
+    assert_eq!(days["column"], 100);
+    assert!(trends["column"].is_null());
+    let exact = trends["signals"][0]["runs"].as_array().expect("runs");
+    let columns = days["signals"][0]["columns"].as_array().expect("columns");
+    assert_eq!(columns.len(), 600);
+    assert!(exact.iter().any(|run| run[1] == 1), "it is on at times");
+    let is_on = |column: &serde_json::Value| column[1] == 1.0;
+    assert!(columns[..3].iter().any(is_on) && columns[3..].iter().all(serde_json::Value::is_null));
+    assert_eq!(days["signals"][1]["columns"], serde_json::json!([]), "memory is not recomputed");
+
     // Memory, as the scan of the cycle left it; in a trend the same.
     let signals = page.get("/api/signals").json();
     let memory = signals

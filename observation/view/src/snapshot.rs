@@ -27,7 +27,7 @@ pub enum RunState {
     Running,
     /// Its last record was read.
     Finished,
-    /// It was ended early on request.
+    /// It was ended early: on request, or because the process that wrote its journal ended.
     Interrupted,
 }
 

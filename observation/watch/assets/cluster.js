@@ -138,7 +138,7 @@ function redundancy(remaining) {
 }
 
 function timing(state) {
-  const micro = (value) => (value === null || value === undefined ? "not known" : value >= 1000 ? `${(value / 1000).toFixed(2)} ms` : `${value} µs`);
+  const micro = (value) => (value === null || value === undefined ? "not known" : Math.abs(value) >= 1000 ? `${(value / 1000).toFixed(2)} ms` : `${value} µs`);
   const { timing } = state;
   const times = ({ p50_ns, p999_ns, maximum_ns }) => [p50_ns, p999_ns, maximum_ns].map((ns) => (ns / 1e6).toFixed(2)).join(" / ") + " ms";
   const lines = [
@@ -148,7 +148,9 @@ function timing(state) {
     ["last turn before the deadline", micro(timing.margin_us)],
     ["minimum", micro(timing.least_margin_us)],
     ["cycle master", state.cycle_master ?? "none"],
-    ["sample to output, p50 / p99.9 / longest", timing.slowest ? `${times(timing.slowest.sample_to_output)} (${timing.slowest.name}, woken ${times(timing.slowest.wakeups)} late)` : "not known"],
+    ["sample to output, p50 / p99.9 / longest", timing.slowest ? times(timing.slowest.sample_to_output) : "not known"],
+    ["late wake-ups, p50 / p99.9 / longest", timing.slowest ? times(timing.slowest.wakeups) : "not known"],
+    ["slowest remote I/O", timing.slowest?.name ?? "not known"],
     ["host stalls", timing.stalls === 1 ? "1 stall" : `${timing.stalls} stalls`],
   ];
   keyed(

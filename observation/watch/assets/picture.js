@@ -116,6 +116,9 @@ function showAll(run, boxes, flows, state) {
       const box = boxes.get(name);
       if (box) {
         setAttribute(box.element, "data-source", program.source);
+        if (program.source === "fail-safe" && ["serving", "moving"].includes(box.element.dataset.state)) {
+          setText(box.state, `${SOURCES["fail-safe"].sign} fail-safe outputs`);
+        }
       }
     }
     const { down, words, whose, letters, out, outWords } = flows.get(index);

@@ -38,6 +38,8 @@ pub(crate) struct State {
     oldest: i64,
     newest: i64,
     finished: bool,
+    /// It was ended early, on request or by the end of the process that wrote it.
+    interrupted: bool,
     /// What is missing while the past of a long journal is being read.
     past: Option<Past>,
     /// What the scenario came to, where it is over and the cluster stays up.
@@ -239,6 +241,7 @@ pub(crate) fn state(run: &RunModel, cycle: i64, finished: bool) -> Option<State>
         oldest,
         newest,
         finished,
+        interrupted: run.is_interrupted(),
         members: members(&snapshot),
         programs: programs
             .map(|(index, program)| shown_program(run, &snapshot, index, program))

@@ -48,6 +48,11 @@ impl Model {
         self.at_ns
     }
 
+    /// The run was ended early, on request or by the end of the process that wrote it.
+    pub fn is_interrupted(&self) -> bool {
+        self.interrupted
+    }
+
     /// The last record of the run was read.
     pub fn is_finished(&self) -> bool {
         self.finished

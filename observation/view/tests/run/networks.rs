@@ -109,7 +109,7 @@ fn a_link_that_is_open_again_ends_no_alarm_of_the_other_network() {
     let failed = |network, reason| format!("cannot open its link over network {network}: {reason}");
     let (first, second) = (failed(1, "no such device"), failed(2, "down"));
     told.link(robot, Some(Via::First), Some("no such device"));
-    assert_eq!(told.lasting(i64::MAX), [first.clone()]);
+    assert_eq!(told.lasting(i64::MAX), std::slice::from_ref(&first));
     told.link(robot, Some(Via::Second), Some("down"));
     assert_eq!(told.lasting(i64::MAX), [format!("{first}; {second}")]);
     told.link(robot, Some(Via::First), None);
