@@ -109,6 +109,18 @@ fn a_finished_run_answers_every_question() {
     assert_eq!(page.end(), 0);
 }
 
+/// A cycle that is read from the journal again is shown as one of all that there are.
+#[test]
+fn a_cycle_of_the_past_names_the_newest_one() {
+    let run = simulated_run_of(&empty_folder("past"), "title = \"long\"\ncycles = 9000\n");
+    let page = Page::of_run(&run);
+    for cycle in [10, 8990] {
+        let state = page.get(&format!("/api/state?cycle={cycle}")).json();
+        assert_eq!((&state["cycle"], &state["newest"]), (&cycle.into(), &8999.into()));
+        assert_eq!(state["finished"], true);
+    }
+}
+
 #[test]
 fn a_lost_state_is_told_for_each_cycle() {
     let scenario = include_str!("../../examples/press-cell/lost-state.toml");

@@ -146,7 +146,7 @@ function timing(state) {
     ["last cycle time", micro(timing.cycle_us)],
     ["deadline", micro(run.deadline_us)],
     ["last turn before the deadline", micro(timing.margin_us)],
-    ["minimum", micro(timing.least_margin_us)],
+    ["its least in the newest cycles", timing.least_of > 0 ? `${micro(timing.least_margin_us)} of ${timing.least_of}` : "not known"],
     ["cycle master", state.cycle_master ?? "none"],
     ["sample to output, p50 / p99.9 / longest", timing.slowest ? times(timing.slowest.sample_to_output) : "not known"],
     ["late wake-ups, p50 / p99.9 / longest", timing.slowest ? times(timing.slowest.wakeups) : "not known"],

@@ -147,6 +147,8 @@ struct Timing {
     cycle_us: Option<u64>,
     margin_us: Option<i64>,
     least_margin_us: Option<i64>,
+    /// Cycles of which that is the least.
+    least_of: usize,
     stalls: u64,
     slowest: Option<Slowest>,
 }
@@ -210,8 +212,9 @@ pub fn page_state(run: &RunModel, cycle: i64) -> serde_json::Value {
 }
 
 impl State {
-    /// The alarms and events are those of a model that has read more than the one of this cycle.
-    pub(crate) fn alarms_are(&mut self, known: &Known) {
+    /// The alarms, the events and the newest cycle are those of a model that has read more than the one of this cycle.
+    pub(crate) fn rest_is(&mut self, known: &Known) {
+        self.newest = known.run.newest().map_or(self.newest, |newest| newest.max(self.newest));
         let (open, process) = known.run.open_alarms_at(self.cycle);
         self.open_alarms = open.len();
         self.unacknowledged_alarms = unacknowledged(&open);
@@ -362,6 +365,7 @@ fn timing(run: &RunModel, snapshot: &Snapshot) -> Timing {
         cycle_us: own.and_then(|timing| timing.cycle_ns).map(|cycle_ns| cycle_ns / 1000),
         margin_us: own.map(|timing| timing.margin_ns / 1000),
         least_margin_us: least.map(|least| least / 1000),
+        least_of: timings().count(),
         stalls: snapshot.host_stalls,
         slowest: snapshot.remote_ios.iter().filter_map(timed).max_by_key(Slowest::longest),
     }

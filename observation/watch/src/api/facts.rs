@@ -249,7 +249,7 @@ pub(super) async fn state(
     let mut state = state?;
     // The model of an older cycle has not read everything that is before it.
     if let Some(known) = app.model().known() {
-        state.alarms_are(known);
+        state.rest_is(known);
     }
     Ok(Json(state).into_response())
 }
