@@ -10,7 +10,7 @@ const [server, axe] = more;
 
 const member = (name) => `g.member[data-name="${name}"]`;
 const stateOf = (name) => `document.querySelector('${member(name)}')?.dataset.state`;
-const lampOf = (program) => `[...document.querySelectorAll(":is(#protection-list, #protected-list) li")].find((line) => line.textContent.includes(" ${program}: "))?.dataset.protection`;
+const lampOf = (program) => `[...document.querySelectorAll(":is(#protection-list, #protected-list) li")].find((line) => /[ ,]${program}[,:]/.test(line.textContent) || line.textContent.includes("all 2 programs"))?.dataset.protection`;
 const command = async (name, what) => {
   await click(member(name));
   // A dialog that was opened while the values were old is opened again.

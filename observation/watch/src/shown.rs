@@ -102,6 +102,8 @@ struct ShownProtection {
     #[serde(flatten)]
     protection: Protection,
     words: String,
+    /// Time of day of the first cycle.
+    since_at: Option<TimeOfDay>,
 }
 
 #[derive(Debug, Serialize)]
@@ -299,10 +301,11 @@ fn shown_program(
         signals: signals(run, index, program),
         awaits_release: program.awaits_release,
         forced: program.forces.iter().map(|force| shown_force(controller_of, force)).collect(),
-        protection: program
-            .protection
-            .clone()
-            .map(|protection| ShownProtection { words: protection.text(), protection }),
+        protection: program.protection.clone().map(|protection| ShownProtection {
+            words: protection.text(),
+            since_at: run.time_of(protection.since),
+            protection,
+        }),
         protection_words: snapshot.protection_text(program),
         lost: program.lost.clone().map(|lost| ShownLost { words: lost.text(), lost }),
         counts: Counts {

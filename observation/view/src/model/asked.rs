@@ -135,6 +135,11 @@ impl Model {
         self.times.stretches(from).take_while(move |(first, _)| *first <= to)
     }
 
+    /// Time of day of a cycle; nothing where no wall clock was recorded.
+    pub fn time_of(&self, cycle: i64) -> Option<TimeOfDay> {
+        self.times.of_cycle(cycle)
+    }
+
     /// The turns of the stations in a cycle of the cluster.
     pub fn sent_turns(&self, moment: Moment) -> &[SentTurn] {
         self.turns.of(moment)
