@@ -60,7 +60,7 @@ export function labelsOf(lane, most) {
 const SECOND = 1000;
 const STEPS = [1, 2, 5, 10, 20, 50, 100, 200, 500, ...[1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10_800, 21_600, 43_200, 86_400, 172_800, 604_800].map((seconds) => seconds * SECOND)];
 
-// Milliseconds between two ticks of so many pixels at least, for a range of so many milliseconds.
+// Milliseconds between two ticks that are at least `space` pixels apart, for a range of `length` milliseconds on `width` pixels.
 export function tickStep(length, width, space) {
   const least = length / Math.max(width / space, 1);
   return STEPS.find((step) => step >= least) ?? STEPS.at(-1);

@@ -286,7 +286,7 @@ function timeAxis(width) {
   const first = atOf(from);
   const step = tickStep((to - from) * periodMs, width, 110);
   const splits = ticks(from, to, step, periodMs, (cycle) => (first ? local(atOf(cycle)) : cycle * periodMs));
-  // A cycle begins up to a period beside a round time.
+  // A cycle begins up to a period before or after a round time.
   const words = (cycle) => {
     const at = first && new Date(atOf(cycle).getTime() + (step < 1000 ? 0 : 500));
     return at ? [step < 86_400_000 ? clock(at, step < 1000) : dayOf(at), cycle].join("\n") : `${cycle}`;

@@ -1,5 +1,5 @@
-//! The choices that could have assigned a variable otherwise, and did not: the usual idiom assigns a default first, so the cause of a value is often a
-//! condition that was false.
+//! The choices that could have assigned a variable otherwise, and did not: programs often assign a default first, so the cause of a value is a condition
+//! that was false.
 //!
 //! ```text
 //!   velocity := 0.0;              assigned last
