@@ -17,12 +17,13 @@ function extremes(signal, isNumber) {
 
 // Each signal has a lane of its own, the first on top. A BOOL is at the bottom of it where it is 0 and above where it is 1; a number lies between its
 // least and its greatest value, which the axis shows.
-export function lanesOf(signals, typeOf) {
+export function lanesOf(signals, typeOf, unitOf) {
   let base = 0;
   const lanes = signals.map((signal, index) => {
     const type = typeOf(index);
     const isNumber = type !== "BOOL";
-    return { name: signal.name, type, isNumber, height: isNumber ? HIGH : 1, limits: isNumber ? signal.limits : [], ...extremes(signal, isNumber) };
+    const unit = unitOf(index);
+    return { name: unit ? `${signal.name}, ${unit}` : signal.name, type, isNumber, height: isNumber ? HIGH : 1, limits: isNumber ? signal.limits : [], ...extremes(signal, isNumber) };
   });
   for (const lane of [...lanes].reverse()) {
     lane.base = base;

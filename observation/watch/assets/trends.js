@@ -237,11 +237,14 @@ async function refresh(now) {
 
 const atOf = (cycle) => timeOf(answer.times, cycle, run.period_us);
 
+// The unit of a signal, where the cluster file has it.
+const unitOf = (index) => find(answer.ids[index])?.operator?.unit ?? "";
+
 const nameOfFile = () => `${run.cluster}-trends-${answer.from}-${answer.to}`;
 
 function csv() {
   if (answer) {
-    const unit = (index) => (find(answer.ids[index])?.type === "TIME" ? " in ns" : "");
+    const unit = (index) => (find(answer.ids[index])?.type === "TIME" ? " in ns" : unitOf(index) ? ` in ${unitOf(index)}` : "");
     const write = answer.column ? csvOfColumns : csvOf;
     saveCsv(nameOfFile(), write(answer, (signal, index) => `${signal.name}${unit(index)}`, run.period_us, atOf));
     toast(`saved ${nameOfFile()}.csv`);
@@ -298,7 +301,7 @@ function timeAxis(width) {
 
 function draw() {
   const place = id("trend-plot");
-  const lanes = lanesOf(answer.signals, (index) => find(answer.ids[index])?.type ?? "BOOL");
+  const lanes = lanesOf(answer.signals, (index) => find(answer.ids[index])?.type ?? "BOOL", unitOf);
   const height = lanes.reduce((sum, lane) => sum + lane.height, 0);
   const letters = place.clientWidth < 700 ? 16 : 30;
   const labels = lanes.flatMap((lane) => labelsOf(lane, letters)).sort(([one], [other]) => one - other);

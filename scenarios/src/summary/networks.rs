@@ -28,7 +28,11 @@ impl NetworkFaultSummary {
                 let what =
                     if fault.is_lost { "no frames arrived" } else { "frames were lost or late" };
                 let names: Vec<&str> = fault.members.iter().map(|one| members.name(*one)).collect();
-                (format!("network {via}"), format!("{what} between {}", names.join(", ")))
+                let whom = match names.len() == members.iter().len() {
+                    true => "any members".to_owned(),
+                    false => names.join(", "),
+                };
+                (format!("network {via}"), format!("{what} between {whom}"))
             }
             NetworkSubject::Link(member, via) => {
                 let over = via.map_or_else(String::new, |via| format!(" over network {via}"));
