@@ -433,7 +433,7 @@ fn ask_elsewhere(
         let take = |told: Told<'_>| {
             let line = match told {
                 Told::Line(line) => line,
-                Told::By(_) => return true,
+                Told::By(_) | Told::Silent => return true,
                 // Standard output has records alone.
                 Told::Lost(lines) => {
                     return writeln!(std::io::stderr(), "{lines} lines were lost on their way")

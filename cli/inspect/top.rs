@@ -211,7 +211,7 @@ fn show(
                 model = whole;
             }
             if taken == 0 && run.is_finished() {
-                model.end();
+                model.end(run.has_results());
             }
             // Draws the progress of reading a long journal.
             if taken == 0 || drawn.elapsed() >= LOOK || event::poll(Duration::ZERO)? {

@@ -128,7 +128,9 @@ impl Page {
         console: &mut Console,
     ) -> Result<(Served, Commands), Answer> {
         let (commander, commands) = commands();
-        let served = self.serve(run, self.commanding(commander, Vec::new()), console)?;
+        let after_scenario = self.stays && !self.may_command();
+        let commanding = Commanding { after_scenario, ..self.commanding(commander, Vec::new()) };
+        let served = self.serve(run, commanding, console)?;
         Ok((served, commands))
     }
 
@@ -140,7 +142,7 @@ impl Page {
         let takes = self.may_command() || self.stays;
         let forbidden = (!takes).then_some("the page was started without --allow-commands");
         let forbidden = forbidden.map(str::to_owned);
-        Commanding { commander, forbidden, impossible, person: None }
+        Commanding { commander, forbidden, after_scenario: false, impossible, person: None }
     }
 
     fn serve(

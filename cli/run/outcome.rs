@@ -91,6 +91,12 @@ fn text(summary: &Summary, directory: Option<&Path>) -> String {
     for alarm in &summary.alarms {
         let _ = writeln!(text, "alarm {alarm}");
     }
+    for fault in &summary.network_faults {
+        let _ = writeln!(text, "network fault {fault}");
+    }
+    if summary.network_fault_count > summary.network_faults.len() as u64 {
+        let _ = writeln!(text, "network faults: {} in all", summary.network_fault_count);
+    }
     for death in &summary.deaths {
         let _ = writeln!(text, "ENDED UNEXPECTEDLY: {death}");
         for line in &death.said {

@@ -8,6 +8,7 @@
 mod alarms;
 mod closing;
 mod events;
+mod networks;
 mod presence;
 mod service;
 mod stalls;
@@ -35,6 +36,8 @@ use crate::scenario::{During, Scenario};
 
 pub(crate) use alarms::AlarmFinding;
 use alarms::Alarms;
+use networks::Networks;
+pub(crate) use networks::{NetworkFault, NetworkSubject};
 pub use presence::{Interval, Presence};
 pub use service::{Counts, Service};
 pub use stalls::Stall;
@@ -164,6 +167,7 @@ pub struct Account {
     stalls: Stalls,
     times: TimesOfDay,
     alarms: Alarms,
+    networks: Networks,
     pub(crate) traces: Traces,
     pub(crate) steps: Vec<DoneStep>,
     pub(crate) forces: Vec<DoneForce>,
@@ -207,6 +211,7 @@ impl Account {
             stalls: Stalls::default(),
             times: TimesOfDay::new(terms.agreement.schedule.period()),
             alarms: Alarms::new(&terms.alarms, programs),
+            networks: Networks::default(),
             traces: Traces {
                 plants: vec![PlantTrace::default(); programs],
                 stations: vec![Trace::default(); schedule.stations()],
@@ -295,6 +300,9 @@ impl Account {
     pub fn observe(&mut self, record: &Record) {
         self.records += 1;
         self.times.note(record);
+        if let (Happening::Host(event), Some(member)) = (&record.event, record.member) {
+            self.networks.note(member, event, self.next_cycle());
+        }
         match (&record.event, record.member) {
             (Happening::Station(event), Some(Member::Station(station))) => {
                 self.station(station, event);
@@ -338,6 +346,16 @@ impl Account {
                 self.stalls.stalled(number, member, late, period);
             }
         }
+    }
+
+    /// Faults of networks and links, at most 100 of them, and how many there were.
+    pub(crate) fn network_faults(&self) -> (&[NetworkFault], u64) {
+        (&self.networks.faults, self.networks.count)
+    }
+
+    /// The next cycle from the origin on.
+    fn next_cycle(&self) -> Option<u64> {
+        self.numbering.latest().and_then(|newest| self.since_origin(newest + 1))
     }
 
     /// Something is done to a member, or happens to it: answers with the first cycle whose deadline comes after it.

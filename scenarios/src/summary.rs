@@ -1,6 +1,7 @@
 //! `summary.json`: what a run came to, for machines; the table, the report and the command line read nothing else.
 
 mod expectations;
+mod networks;
 
 use std::fmt;
 
@@ -13,6 +14,7 @@ use understudy_wire::{Member, ProgramId};
 
 use crate::account::{Account, Counts, DoneForce, Interval, Presence, Service, Stall};
 use crate::scenario::{Scenario, action_text};
+pub use networks::NetworkFaultSummary;
 
 /// The whole of `summary.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -63,6 +65,10 @@ pub struct Summary {
     pub stalls: Vec<Stall>,
     /// Alarms of the cluster file that were raised.
     pub alarms: Vec<AlarmSummary>,
+    /// Networks that were not in order and links that could not be opened, in order, at most 100 of them.
+    pub network_faults: Vec<NetworkFaultSummary>,
+    /// How many there were.
+    pub network_fault_count: u64,
     /// What the scenario expects and what was found.
     pub expectations: Vec<ExpectationSummary>,
     /// How the journal fared.
@@ -358,6 +364,8 @@ impl Summary {
             first,
             active: finding.active,
         });
+        let (network_faults, network_fault_count) = account.network_faults();
+        let network_fault = |fault| NetworkFaultSummary::new(fault, members);
         let violations = account.violations.iter();
         let mut summary = Self {
             format: 1,
@@ -402,6 +410,8 @@ impl Summary {
                 .collect(),
             stalls: finished.stalls,
             alarms: alarms.collect(),
+            network_faults: network_faults.iter().map(network_fault).collect(),
+            network_fault_count,
             expectations: Vec::new(),
             journal,
         };

@@ -10,7 +10,7 @@ const [server, axe] = more;
 
 const member = (name) => `g.member[data-name="${name}"]`;
 const stateOf = (name) => `document.querySelector('${member(name)}')?.dataset.state`;
-const lampOf = (program) => `[...document.querySelectorAll(":is(#protection-list, #protected-list) li")].find((line) => line.textContent.includes(" ${program}: "))?.dataset.protection`;
+const lampOf = (program) => `[...document.querySelectorAll(":is(#protection-list, #protected-list) li")].find((line) => /[ ,]${program}[,:]/.test(line.textContent) || line.textContent.includes("all 2 programs"))?.dataset.protection`;
 const command = async (name, what) => {
   await click(member(name));
   // A dialog that was opened while the values were old is opened again.
@@ -143,6 +143,16 @@ async function drive() {
   await until("a cross-reference", `document.querySelectorAll("#ladder-cross tbody tr").length > 3`);
   await picture("ladder");
   await accessible("ladder", axe);
+  // Why, by keyboard: Tab comes to a name, the arrow keys to the next one, whatever is drawn anew meanwhile.
+  const press = (key) => evaluate(`document.activeElement.dispatchEvent(new KeyboardEvent("keydown", { key: "${key}", bubbles: true, cancelable: true }))`);
+  const focused = `(document.activeElement?.getAttribute("aria-label") ?? "")`;
+  await evaluate(`document.querySelector('#ladder-picture text.name[tabindex="0"]').focus()`);
+  const first = await evaluate(focused);
+  await press("ArrowRight");
+  await until("the next name", `${focused} !== ${JSON.stringify(first)} && ${focused}.startsWith("Why ")`);
+  await press("Enter");
+  await until("an answer by keyboard", `document.querySelector("#why:not([hidden]) h2")?.textContent.startsWith("Why is ")`);
+  await click("#why button");
   await evaluate("(() => { const palette = document.getElementById('ladder-palette'); palette.value = 'tia'; palette.dispatchEvent(new Event('change')); })()");
   await scheme("dark");
   await picture("ladder-tia-dark");

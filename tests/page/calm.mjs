@@ -43,6 +43,8 @@ run(async () => {
   await showsFailSafe(1360);
   await size(390, 1300, true);
   await new Promise((resolve) => setTimeout(resolve, 300));
+  // The understudy is in sight without scrolling, whatever the width.
+  await until("the understudy first", `document.querySelector('${member("understudy")} rect').getBoundingClientRect().right <= innerWidth`);
   await showsFailSafe(390);
   await size(1360, 1300, false);
 

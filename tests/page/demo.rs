@@ -16,7 +16,8 @@ fn the_cluster_of_a_demo_stays_up_for_the_visitor() {
     let page = Page::start(command);
     let kill = serde_json::json!({ "command": "kill" });
     page.wait_for("the first cycles", |state| member(state, "robot")["state"] == "publishing");
-    // It would disturb the scenario.
+    // It would disturb the scenario, and the page says so before a button is pressed.
+    assert_eq!(page.get("/api/run").json()["commands"]["after_scenario"], true);
     assert_eq!(give(&page, "robot", &kill), (409, "U0560".to_owned()));
     let over = page.wait_for("the verdict", |state| state["scenario_over"].is_string());
     assert_eq!(over["finished"], false);

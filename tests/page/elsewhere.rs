@@ -138,6 +138,23 @@ fn protection_is_known_at_once_and_a_remote_io_that_is_gone_is_an_alarm() {
     for page in [&first, &second, &late] {
         page.wait_for("all of them back", |state| alarms(state, NOT_DRIVEN).is_empty());
     }
+
+    // Nothing is received of any member: the page says so, and how old the last reports are.
+    for (name, _) in MEMBERS {
+        running.signal(name, Signal::SIGSTOP);
+    }
+    for page in [&first, &late] {
+        let is_over = |state: &Value| MEMBERS.iter().all(|(name, _)| is_detached(state, name));
+        let state = page.wait_for("a page that receives no member", is_over);
+        assert!(state["age_ms"].as_u64() >= Some(1_500), "{state:#}");
+        assert_eq!(state["redundancy"]["survives"], 0, "{state:#}");
+    }
+    for (name, _) in MEMBERS {
+        running.signal(name, Signal::SIGCONT);
+    }
+    first.wait_for("all of them received", |state| {
+        MEMBERS.iter().all(|(name, _)| !is_detached(state, name))
+    });
 }
 
 /// The same cluster with other outputs of the robot, with the same points.

@@ -48,6 +48,18 @@ fn a_finished_run_answers_every_question() {
     assert!(sources.iter().any(|run| run[2] == "reconstructed"));
     assert!(trends["faults"].as_array().is_some_and(|faults| faults.len() >= 2));
 
+    // Of many cycles there are columns: what is between the least and the greatest value is there, and what is not known is nothing.
+    let days = page.get("/api/trends?signals=0.output.0,0.state.holding&from=0&to=59999").json();
+    assert_eq!(days["column"], 100);
+    assert!(trends["column"].is_null());
+    let exact = trends["signals"][0]["runs"].as_array().expect("runs");
+    let columns = days["signals"][0]["columns"].as_array().expect("columns");
+    assert_eq!(columns.len(), 600);
+    assert!(exact.iter().any(|run| run[1] == 1), "it is on at times");
+    let is_on = |column: &serde_json::Value| column[1] == 1.0;
+    assert!(columns[..3].iter().any(is_on) && columns[3..].iter().all(serde_json::Value::is_null));
+    assert_eq!(days["signals"][1]["columns"], serde_json::json!([]), "memory is not recomputed");
+
     // Memory, as the scan of the cycle left it; in a trend the same.
     let signals = page.get("/api/signals").json();
     let memory = signals
@@ -95,6 +107,18 @@ fn a_finished_run_answers_every_question() {
         assert!(asset.head.contains("content-security-policy"), "{path}");
     }
     assert_eq!(page.end(), 0);
+}
+
+/// A cycle that is read from the journal again is shown as one of all that there are.
+#[test]
+fn a_cycle_of_the_past_names_the_newest_one() {
+    let run = simulated_run_of(&empty_folder("past"), "title = \"long\"\ncycles = 9000\n");
+    let page = Page::of_run(&run);
+    for cycle in [10, 8990] {
+        let state = page.get(&format!("/api/state?cycle={cycle}")).json();
+        assert_eq!((&state["cycle"], &state["newest"]), (&cycle.into(), &8999.into()));
+        assert_eq!(state["finished"], true);
+    }
 }
 
 #[test]

@@ -64,7 +64,7 @@ pub(super) fn ask(call: &Call, cluster: &Cluster, name: &str) -> Result<Answer, 
                 other = reporter.filter(|theirs| !theirs.is_of(own)).cloned();
                 true
             }
-            Told::Lost(_) => true,
+            Told::Lost(_) | Told::Silent => true,
         };
         wants_more && started.elapsed() < PATIENCE
     });

@@ -1,4 +1,4 @@
-//! One member: its words as long as it is heard, and calls again when it is not.
+//! One member: its lines as long as it is received, and calls again when it is not.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,7 +11,10 @@ use understudy_wire::Member;
 
 use crate::found::{Line, Vain};
 
-/// Between two calls to a member that was not heard.
+/// Reason of a member whose lines do not arrive over a connection that was open.
+const NOTHING_RECEIVED: &str = "nothing is received from it";
+
+/// Between two calls to a member that was not received.
 const AGAIN: Duration = Duration::from_secs(2);
 
 /// Messages to the recorder.
@@ -20,9 +23,9 @@ pub(crate) enum Told {
     Line(Member, String),
     /// So many lines of it were lost.
     Lost(Member, u64),
-    /// It is heard from now on.
+    /// It is received from now on.
     Attached(Member),
-    /// It is not heard, and why.
+    /// It is not received, and why.
     Detached(Member, String),
 }
 
@@ -58,47 +61,58 @@ pub(crate) struct Follower {
 
 impl Follower {
     pub(crate) fn run(self, first: Result<Call, String>) {
-        let member = self.peer.member;
         let mut call = first;
-        let mut said = String::new();
+        let mut said = None;
         while !self.ends.load(Ordering::Relaxed) {
             let reason = match call {
                 Ok(call) => {
-                    said.clear();
-                    self.follow(call).unwrap_or_else(|| "it ceased to be heard".to_owned())
+                    let other = self.follow(call, &mut said);
+                    other.unwrap_or_else(|| NOTHING_RECEIVED.to_owned())
                 }
                 Err(reason) => reason,
             };
-            // Reported once for all attempts.
-            if said != reason && !self.ends.load(Ordering::Relaxed) {
-                said.clone_from(&reason);
-                if self.told.blocking_send(Told::Detached(member, reason)).is_err() {
-                    return;
-                }
+            if !self.detached(&mut said, reason) {
+                return;
             }
             std::thread::sleep(AGAIN);
             call = self.line.call(&self.peer).map_err(Vain::words);
         }
     }
 
-    /// Until it is silent for too long, or starts again with what cannot be shown here: the reason.
-    fn follow(&self, call: Call) -> Option<String> {
+    /// Tells why the member is not received: once for all attempts. False where the recorder has ended.
+    fn detached(&self, said: &mut Option<String>, reason: String) -> bool {
+        if said.as_ref() == Some(&reason) || self.ends.load(Ordering::Relaxed) {
+            return true;
+        }
+        *said = Some(reason.clone());
+        self.told.blocking_send(Told::Detached(self.peer.member, reason)).is_ok()
+    }
+
+    /// Until nothing is received for too long, or it starts again with what cannot be shown here: the reason.
+    fn follow(&self, call: Call, said: &mut Option<String>) -> Option<String> {
         let member = self.peer.member;
         let call = Arc::new(call);
         self.calls.set(member, Some(Arc::clone(&call)));
-        let (mut heard, mut other) = (false, None);
+        let (mut is_attached, mut other) = (false, None);
         // The caller reports that it cannot be followed.
         let _ = call.follow(self.line.patience, |followed| {
             let told = match followed {
                 Followed::By(reporter) => {
                     let checked = reporter.ok_or(Vain::Older).and_then(|by| self.line.check(by));
                     other = checked.err().map(Vain::words);
-                    return other.is_none()
-                        && (std::mem::replace(&mut heard, true)
-                            || self.told.blocking_send(Told::Attached(member)).is_ok());
+                    if other.is_some() || std::mem::replace(&mut is_attached, true) {
+                        return other.is_none();
+                    }
+                    *said = None;
+                    Told::Attached(member)
                 }
                 Followed::Line(line) => Told::Line(member, line.to_owned()),
                 Followed::Lost(lines) => Told::Lost(member, lines),
+                // The connection may be dead, or the member: its last lines are not the present.
+                Followed::Silent => {
+                    is_attached = false;
+                    return self.detached(said, NOTHING_RECEIVED.to_owned());
+                }
             };
             self.told.blocking_send(told).is_ok() && !self.ends.load(Ordering::Relaxed)
         });

@@ -9,8 +9,8 @@
 //! What the members say becomes the journal of a run like any other, so that whatever shows a run shows a cluster elsewhere too. The
 //! members write it anyway: the cycle does not depend on readers. Cycles are counted as the cluster counts them.
 //!
-//! Invariants: a line counts only if it comes from the member that it speaks of, by a certificate of this cluster's authority; a member that is not
-//! heard any more is called again, and the journal says since when it lacks its words.
+//! Invariants: a line counts only if it comes from the member that it speaks of, by a certificate of this cluster's authority; a member of which
+//! nothing is received for 2 s is detached and called again, and the journal says since when it lacks its lines.
 
 #![allow(
     clippy::disallowed_methods,

@@ -228,7 +228,7 @@ impl Reader {
                 let has_ended = self.model.is_finished();
                 self.model = whole;
                 if has_ended {
-                    self.model.end();
+                    self.model.end(self.run.has_results());
                 }
                 unshown = true;
             }
@@ -236,7 +236,7 @@ impl Reader {
             unshown |= taken > 0;
             if taken == 0 && is_finished {
                 // Its results were there before the journal was read to its end.
-                self.model.end();
+                self.model.end(self.run.has_results());
                 unshown = true;
             }
             let ended = self.model.is_finished();

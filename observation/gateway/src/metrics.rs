@@ -271,7 +271,7 @@ pub fn exposition_of(run: &Run) -> Result<String, GatewayError> {
         return Err(GatewayError::Journal(trouble));
     }
     if is_finished {
-        model.end();
+        model.end(run.has_results());
     }
     let (snapshot, now) = (model.snapshot(), Instant::now());
     metrics.show(&model, &snapshot);

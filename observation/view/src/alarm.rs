@@ -1,6 +1,8 @@
 //! Alarms: conditions that an operator has to acknowledge, of members and of signals of the programs.
 
 mod concerns;
+mod state;
+mod texts;
 
 use std::collections::BTreeMap;
 
@@ -13,54 +15,14 @@ use understudy_wire::{Member, ProgramId};
 use crate::describe::program_name;
 use concerns::Concerns;
 pub(crate) use concerns::listed;
+pub use state::AlarmState;
+use texts::Texts;
 
 /// Alarms that are kept, at most; the oldest that are over and acknowledged go first.
 const MOST: usize = 1000;
 
 /// The kind of an alarm on a signal.
 pub(crate) const PROCESS: &str = "process";
-
-/// State of an alarm, in the sense of ISA-18.2.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum AlarmState {
-    /// Not active, and acknowledged.
-    Normal,
-    /// Active and not acknowledged.
-    Unacknowledged,
-    /// Active and acknowledged.
-    Acknowledged,
-    /// Over and not acknowledged.
-    Returned,
-    /// Shelved by an operator until a cycle.
-    Shelved,
-    /// The value of its signal is unknown, or it was not long enough known.
-    Unknown,
-}
-
-impl AlarmState {
-    /// All states.
-    pub const ALL: [Self; 6] = [
-        Self::Normal,
-        Self::Unacknowledged,
-        Self::Acknowledged,
-        Self::Returned,
-        Self::Shelved,
-        Self::Unknown,
-    ];
-
-    /// The state as JSON and the page write it.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Normal => "normal",
-            Self::Unacknowledged => "unacknowledged",
-            Self::Acknowledged => "acknowledged",
-            Self::Returned => "returned",
-            Self::Shelved => "shelved",
-            Self::Unknown => "unknown",
-        }
-    }
-}
 
 /// One alarm: a value fault, an exclusion, a dispute, a loss, or an alarm of the cluster file on a signal.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
@@ -105,6 +67,9 @@ pub struct Alarm {
     /// The effects of a cause that concerns several programs.
     #[serde(skip)]
     concerns: Concerns,
+    /// Of an alarm that was told anew.
+    #[serde(skip)]
+    texts: Texts,
 }
 
 impl Alarm {
@@ -133,6 +98,9 @@ impl Alarm {
                 ..self.clone()
             };
             then.concerns_changed();
+            if let Some(text) = self.texts.at(cycle) {
+                text.clone_into(&mut then.text);
+            }
             then
         })
     }
@@ -170,6 +138,13 @@ impl Alarm {
     /// The time of the record that raised it or told of its newest effect: what an acknowledgement has seen.
     fn newest_ns(&self) -> u64 {
         self.concerns.newest_ns().unwrap_or(self.raised_ns)
+    }
+
+    fn tell(&mut self, cycle: i64, text: String) {
+        if self.text != text {
+            self.texts.tell((self.cycle, &self.text), cycle, &text);
+            self.text = text;
+        }
     }
 
     fn concerns_changed(&mut self) {
@@ -233,9 +208,18 @@ impl Alarms {
     pub(crate) fn raise_or_retell(&mut self, subject: Subject, cycle: i64, text: String) {
         let lasting = self.lasting.get(&subject).and_then(|number| self.alarms.get_mut(number));
         match lasting {
-            Some(alarm) => alarm.text = text,
+            Some(alarm) => alarm.tell(cycle, text),
             None => self.raise(subject, cycle, text),
         }
+    }
+
+    /// What it was about is over, and what is told of it is the past.
+    pub(crate) fn over_with(&mut self, subject: &Subject, cycle: i64, text: String) {
+        let lasting = self.lasting.get(subject).and_then(|number| self.alarms.get_mut(number));
+        if let Some(alarm) = lasting {
+            alarm.tell(cycle, text);
+        }
+        self.over(subject, cycle);
     }
 
     /// Raises an alarm that lasts and requires an immediate response.
@@ -319,6 +303,7 @@ impl Alarms {
             over_at: None,
             acknowledged_at: None,
             concerns: Concerns::default(),
+            texts: Texts::default(),
         };
         complete(&mut alarm);
         self.alarms.insert(self.count, alarm);
@@ -438,6 +423,7 @@ impl Alarms {
             alarm.cycle = alarm.cycle.saturating_add(by);
             alarm.over = alarm.over.map(|over| over.saturating_add(by));
             alarm.concerns.shift(by);
+            alarm.texts.shift(by);
             for at in [&mut alarm.acknowledged_in, &mut alarm.repeated_in] {
                 *at = at.map(|at| at.saturating_add(by));
             }

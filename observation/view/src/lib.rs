@@ -13,6 +13,7 @@
 //! in its report; those before it are negative.
 
 mod alarm;
+mod coarse;
 mod describe;
 mod diff;
 mod drawing;
@@ -45,6 +46,7 @@ mod why;
 mod zone;
 
 pub use alarm::{Alarm, AlarmState};
+pub use coarse::{Coarse, MAXIMUM_COLUMNS};
 pub use diff::{Difference, Differing, RunDiff, diff};
 pub use error::ViewError;
 pub use event::{Event, Level};
@@ -75,6 +77,6 @@ pub use station::StationState;
 pub use terminal::{Key, Screen};
 pub use timeline::{Span, Timeline};
 pub use timing::CycleTiming;
-pub use value::{elementary, forced_point, forced_value, number_of, stored, value_of};
+pub use value::{elementary, forced_point, forced_value, number_of, real, stored, value_of};
 pub use why::{Addend, Reason, Reconstructed, Why};
 pub use zone::Zone;

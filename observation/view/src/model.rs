@@ -150,7 +150,7 @@ impl Model {
             counters: Counters::new(schedule.stations(), programs),
             histories: histories.collect(),
             turns: Turns::new(bounds.cycles),
-            series: Series::new(programs, schedule.stations(), bounds.changes),
+            series: Series::new(cluster.controllers(), schedule.stations(), bounds.changes),
             events: Events::new(bounds.events),
             attributions: vec![Attribution::default(); programs],
             refusals: BTreeSet::new(),
@@ -248,8 +248,9 @@ impl Model {
         self.histories.iter().any(|history| history.end().is_reached())
     }
 
-    /// The run is over: its results are there.
-    pub fn end(&mut self) {
+    /// The run is over. One without results and without a last record was ended early, by the end of the process that wrote it.
+    pub fn end(&mut self, has_results: bool) {
+        self.interrupted |= !has_results && !self.finished;
         self.finished = true;
     }
 

@@ -36,7 +36,8 @@ pub struct LostState {
     pub newest: Option<u64>,
     /// The station that holds it, or has kept it over a power failure.
     pub holder: Option<String>,
-    /// Its age in cycles, compared with the newest applied output, when the state was lost; nothing where that is not known.
+    /// Its age in cycles, compared with the newest applied output, when the state was lost; nothing where that is not known. It is not known of a
+    /// state that is as new as the newest output of which it is known that it was applied: it is lost because a newer one may have been.
     pub age_cycles: Option<u64>,
     /// Whether the operator is asked.
     pub asks: bool,
@@ -57,13 +58,15 @@ impl Protection {
 impl LostState {
     /// What is available, and how old it is.
     pub fn text(&self) -> String {
-        let age = self
-            .age_cycles
-            .map_or_else(|| "of unknown age".to_owned(), |age| format!("{age} cycles old"));
+        let age = self.age_cycles.map_or_else(String::new, |age| format!(", {age} cycles old"));
+        let doubt = match self.age_cycles {
+            Some(_) => "",
+            None => "; whether outputs of a newer one were applied is not known",
+        };
         let since = self.since;
         match (self.newest, &self.holder) {
             (Some(newest), Some(holder)) => format!(
-                "STATE LOST since cycle {since}: the newest available state is of cycle {newest} of the cluster, {age}, in {holder}"
+                "STATE LOST since cycle {since}: the newest available state is of cycle {newest} of the cluster{age}, in {holder}{doubt}"
             ),
             _ => format!("STATE LOST since cycle {since}: no station has a state of the program"),
         }

@@ -148,7 +148,12 @@ impl Run {
 
     /// Whether its journal is complete: its results are there, or its writer has ended.
     pub fn is_finished(&self) -> bool {
-        self.path.join("summary.json").is_file() || writing(&self.path) == Writing::Over
+        self.has_results() || writing(&self.path) == Writing::Over
+    }
+
+    /// Whether its results are there. A run whose process was killed has none.
+    pub fn has_results(&self) -> bool {
+        self.path.join("summary.json").is_file()
     }
 
     /// Whether a process that lives writes it.
@@ -300,7 +305,7 @@ impl Run {
             let past = model.has_origin()
                 && model.cycle().is_some_and(|newest| newest > cycle.saturating_add(BEHIND));
             if taken == 0 && is_finished {
-                model.end();
+                model.end(self.has_results());
             }
             if taken == 0 || past {
                 break;

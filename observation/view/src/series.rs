@@ -1,7 +1,9 @@
 //! The trends: images and sources of each program, and states of each station, over the cycles.
 
+use understudy_cluster::Controller;
 use understudy_wire::{Image, ProgramId, Source, StationId};
 
+use crate::coarse::Coarse;
 use crate::station::StationState;
 use crate::timeline::Timeline;
 
@@ -12,11 +14,17 @@ pub struct Series {
     outputs: Vec<Timeline<Image>>,
     sources: Vec<Timeline<Source>>,
     stations: Vec<Timeline<StationState>>,
+    coarse_inputs: Vec<Coarse>,
+    coarse_outputs: Vec<Coarse>,
 }
 
 impl Series {
-    pub(crate) fn new(programs: usize, stations: usize, most: usize) -> Self {
+    pub(crate) fn new(controllers: &[Controller], stations: usize, most: usize) -> Self {
+        let programs = controllers.len();
+        let interfaces = || controllers.iter().map(|controller| &controller.interface);
         Self {
+            coarse_inputs: interfaces().map(|of| Coarse::new(&of.inputs)).collect(),
+            coarse_outputs: interfaces().map(|of| Coarse::new(&of.outputs)).collect(),
             inputs: vec![Timeline::new(most); programs],
             outputs: vec![Timeline::new(most); programs],
             sources: vec![Timeline::new(most); programs],
@@ -34,6 +42,16 @@ impl Series {
         self.outputs.get(program.index())
     }
 
+    /// u(i) over ranges of cycles, further back than [`Series::inputs`].
+    pub fn coarse_inputs(&self, program: ProgramId) -> Option<&Coarse> {
+        self.coarse_inputs.get(program.index())
+    }
+
+    /// y(i) as driven over ranges of cycles, further back than [`Series::outputs`].
+    pub fn coarse_outputs(&self, program: ProgramId) -> Option<&Coarse> {
+        self.coarse_outputs.get(program.index())
+    }
+
     /// Sources of its outputs.
     pub fn sources(&self, program: ProgramId) -> Option<&Timeline<Source>> {
         self.sources.get(program.index())
@@ -47,6 +65,8 @@ impl Series {
     pub(crate) fn shift(&mut self, by: i64) {
         let images = self.inputs.iter_mut().chain(&mut self.outputs);
         images.for_each(|timeline| timeline.shift(by));
+        let coarse = self.coarse_inputs.iter_mut().chain(&mut self.coarse_outputs);
+        coarse.for_each(|coarse| coarse.shift(by));
         self.sources.iter_mut().for_each(|timeline| timeline.shift(by));
         self.stations.iter_mut().for_each(|timeline| timeline.shift(by));
     }
@@ -65,7 +85,9 @@ impl Series {
         }
         if let Some(inputs) = inputs {
             self.inputs[place].push(cycle, inputs);
+            self.coarse_inputs[place].push(cycle, inputs);
         }
+        self.coarse_outputs[place].push(cycle, outputs);
         self.outputs[place].push(cycle, outputs);
         self.sources[place].push(cycle, &source);
     }

@@ -27,7 +27,7 @@ pub enum RunState {
     Running,
     /// Its last record was read.
     Finished,
-    /// It was ended early on request.
+    /// It was ended early: on request, or because the process that wrote its journal ended.
     Interrupted,
 }
 
@@ -353,6 +353,9 @@ impl Snapshot {
 /// The remaining redundancy: which further failures would be masked.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct MarginSnapshot {
+    /// Stations that publish, as remote I/Os report, and of which nothing is received here: what they cover is not known.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unknown: Vec<String>,
     /// Further failures of stations that are masked whichever they are: 0, 1, or 2 and perhaps more. 0 while a remote I/O does not report:
     /// what would be masked is not known of its program.
     pub survives: u8,

@@ -6,6 +6,9 @@
 
 const EVERY_MS = 300;
 
+// Whether the page was opened at an address that another page had: it shows what the link shows, and no tour.
+export const openedByLink = location.hash.length > 1;
+
 let written = "";
 // The address as it was read or written last. Another one is a step that the page has yet to take, and is not overwritten.
 let seen = location.hash;

@@ -1,8 +1,10 @@
-// Sources as bands below the trends and faults as upright lines through them. Each source has a pattern as well as a colour.
+// Sources and alarms as bands below the trends, faults as upright lines through them, and limits as level ones. Each source has a pattern as well as a colour.
 
 import { shorten } from "/element.js";
+import { heightOf } from "/lanes.js";
 
-const PATTERNS = { direct: "plain", reconstructed: "slanted", held: "dots", "fail-safe": "filled" };
+const PATTERNS = { direct: "plain", reconstructed: "slanted", held: "dots", "fail-safe": "filled", alarm: "slanted" };
+const COLORS = { alarm: "--warn" };
 
 export function bandPlugin(answer, color) {
   return {
@@ -15,7 +17,7 @@ export function bandPlugin(answer, color) {
           const top = plot.valToPos(-0.35 - row * 0.7, "y", true);
           const bottom = plot.valToPos(-0.35 - row * 0.7 - 0.5, "y", true);
           for (const [from, to, source] of band.runs) {
-            stripe(ctx, x(from), top, x(to + 1), bottom, PATTERNS[source] ?? "none", color(`--source-${source}`) || color("--line"));
+            stripe(ctx, x(from), top, x(to + 1), bottom, PATTERNS[source] ?? "none", color(COLORS[source] ?? `--source-${source}`) || color("--line"));
           }
           ctx.fillStyle = color("--ink");
           ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
@@ -52,6 +54,31 @@ export function bandPlugin(answer, color) {
             ctx.fillText(words, left, bbox.top + (12 + row * 13) * devicePixelRatio);
           }
         });
+        ctx.restore();
+      },
+    },
+  };
+}
+
+// Limits of alarms as dashed lines in the lanes of their signals.
+export function limitPlugin(lanes, color) {
+  return {
+    hooks: {
+      draw: (plot) => {
+        const { ctx, bbox } = plot;
+        ctx.save();
+        ctx.strokeStyle = color("--warn");
+        ctx.lineWidth = devicePixelRatio;
+        ctx.setLineDash([8 * devicePixelRatio, 5 * devicePixelRatio]);
+        for (const lane of lanes) {
+          for (const limit of lane.limits) {
+            const at = plot.valToPos(heightOf(lane, limit), "y", true);
+            ctx.beginPath();
+            ctx.moveTo(bbox.left, at);
+            ctx.lineTo(bbox.left + bbox.width, at);
+            ctx.stroke();
+          }
+        }
         ctx.restore();
       },
     },

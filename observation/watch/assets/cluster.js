@@ -9,6 +9,7 @@ import { continueWords, openChoice, openMember } from "/commands.js";
 import { SOURCES } from "/sources.js";
 import * as time from "/time.js";
 import { openWhy } from "/why.js";
+import { clockOf } from "/zone.js";
 
 // States that are common; the others need no explanation.
 const LEGEND_STATES = ["publishing", "not-received", "flagged", "joining", "shadow-mode", "suspended", "killed"];
@@ -17,11 +18,20 @@ let run = null;
 let place = null;
 let picture = null;
 let large = false;
+// The program whose picture is drawn; null for all.
+let drawn = null;
 
 export function prepare(facts) {
   run = facts;
   large = overview.isLarge(run);
-  picture = makePicture(run, openMember, large ? 0 : null);
+  drawn = large ? 0 : null;
+  picture = makePicture(run, openMember, drawn);
+  addEventListener("resize", () => {
+    if (picture.isOther()) {
+      draw(drawn);
+      again();
+    }
+  });
   const table = (id, heads) =>
     el("table", { id }, el("thead", {}, el("tr", {}, heads.map((head) => el("th", { scope: "col" }, head)))), el("tbody"));
   const card = (id, heading, ...content) =>
@@ -47,11 +57,17 @@ export function prepare(facts) {
 export const selection = () => (large ? overview.selection() : {});
 export const select = (wanted) => large && overview.select(wanted);
 
-// A large cluster has the picture of one program, with the understudies.
-function choose(program) {
+// Draws the picture of one program, or of all.
+function draw(program) {
   const before = picture.element;
+  drawn = program;
   picture = makePicture(run, openMember, program);
   before.replaceWith(picture.element);
+}
+
+// A large cluster has the picture of one program, with the understudies.
+function choose(program) {
+  draw(program);
   const { name } = run.programs[program];
   for (const details of document.querySelectorAll("#signals-list details")) {
     details.open = details.dataset.key === name;
@@ -85,7 +101,12 @@ function protection(programs) {
     if (!protection) {
       return ["unknown", "?", words];
     }
-    return protection.protected ? ["protected", "●", protection.words] : ["unprotected", "⚠", protection.words];
+    if (protection.protected) {
+      return ["protected", "●", protection.words];
+    }
+    const { since, since_at: at, lacking } = protection;
+    const when = at ? `${clockOf(at, time.state()?.at)} (cycle ${since})` : `cycle ${since}`;
+    return ["unprotected", "⚠", [`NOT protected since ${when}`, lacking.map(({ text }) => text).join(", ")].filter(Boolean).join(": ")];
   };
   const isProtected = ({ protection, lost }) => protection?.protected && !lost;
   const sound = programs.filter(isProtected);
@@ -95,20 +116,28 @@ function protection(programs) {
   setAttribute(words, "data-level", sound.length === programs.length ? "all" : "some");
   document.getElementById("protection-details").hidden = sound.length === 0;
   keyed(document.getElementById("protected-list"), sound, (program) => program.name, (program) => el("li", { "data-protection": "protected" }, "● ", broken(program.name), ": protected"), () => {});
+  // One cause is one line, with the programs that it concerns; a lost state asks for an answer of its own.
+  const groups = new Map();
+  for (const program of programs.filter((program) => !isProtected(program))) {
+    const [level, sign, words] = look(program);
+    const key = program.lost ? `lost ${program.name}` : words;
+    const group = groups.get(key) ?? groups.set(key, { key, level, sign, words, programs: [], first: program }).get(key);
+    group.programs.push(program.name);
+  }
   keyed(
     document.getElementById("protection-list"),
-    programs.filter((program) => !isProtected(program)),
-    (program) => program.name,
-    ({ index }) => {
+    [...groups.values()],
+    ({ key }) => key,
+    ({ first: { index } }) => {
       const remote = run.programs[index].remote_io;
       const cold = el("button", { type: "button", "data-choice": "cold", click: () => openChoice(remote, "cold") }, "Cold start …");
       const newest = el("button", { type: "button", "data-choice": "newest", click: () => openChoice(remote, "newest") });
       return el("li", {}, el("span", { class: "protection-words" }), el("div", { class: "choices", hidden: true }, cold, " ", newest));
     },
-    (line, program) => {
-      const [level, sign, words] = look(program);
+    (line, { level, sign, words, programs: names, first: program }) => {
       setAttribute(line, "data-protection", level);
-      setText(line.querySelector(".protection-words"), `${sign} ${program.name}: ${words}`);
+      const whom = names.length > 1 && names.length === programs.length ? `all ${names.length} programs` : names.join(", ");
+      setText(line.querySelector(".protection-words"), `${sign} ${whom}: ${words}`);
       const asks = Boolean(program.lost?.asks) && !run.commands.why;
       line.querySelector(".choices").hidden = !asks;
       if (asks) {
@@ -138,7 +167,7 @@ function redundancy(remaining) {
 }
 
 function timing(state) {
-  const micro = (value) => (value === null || value === undefined ? "not known" : value >= 1000 ? `${(value / 1000).toFixed(2)} ms` : `${value} µs`);
+  const micro = (value) => (value === null || value === undefined ? "not known" : Math.abs(value) >= 1000 ? `${(value / 1000).toFixed(2)} ms` : `${value} µs`);
   const { timing } = state;
   const times = ({ p50_ns, p999_ns, maximum_ns }) => [p50_ns, p999_ns, maximum_ns].map((ns) => (ns / 1e6).toFixed(2)).join(" / ") + " ms";
   const lines = [
@@ -146,9 +175,11 @@ function timing(state) {
     ["last cycle time", micro(timing.cycle_us)],
     ["deadline", micro(run.deadline_us)],
     ["last turn before the deadline", micro(timing.margin_us)],
-    ["minimum", micro(timing.least_margin_us)],
+    ["its least in the newest cycles", timing.least_of > 0 ? `${micro(timing.least_margin_us)} of ${timing.least_of}` : "not known"],
     ["cycle master", state.cycle_master ?? "none"],
-    ["sample to output, p50 / p99.9 / longest", timing.slowest ? `${times(timing.slowest.sample_to_output)} (${timing.slowest.name}, woken ${times(timing.slowest.wakeups)} late)` : "not known"],
+    ["sample to output, p50 / p99.9 / max", timing.slowest ? times(timing.slowest.sample_to_output) : "not known"],
+    ["late wake-ups, p50 / p99.9 / max", timing.slowest ? times(timing.slowest.wakeups) : "not known"],
+    ["slowest remote I/O", timing.slowest?.name ?? "not known"],
     ["host stalls", timing.stalls === 1 ? "1 stall" : `${timing.stalls} stalls`],
   ];
   keyed(

@@ -24,7 +24,13 @@ export function obstacle(forbidden = run.commands.why) {
   if (!isLive()) {
     return "this is a replay: go live to command";
   }
-  return state()?.finished ? "the run has ended" : stale();
+  if (state()?.finished) {
+    return "the run has ended";
+  }
+  if (run.commands.after_scenario && !state()?.scenario_over) {
+    return "the scenario is still running: commands are taken after it";
+  }
+  return stale();
 }
 
 const DOWN = "it is down";

@@ -28,6 +28,17 @@ export function csvOf(answer, headOf, periodUs, atOf) {
   return `${rows.map((row) => row.map(cell).join(",")).join("\r\n")}\r\n`;
 }
 
+// A row for each column of a trend of many cycles, with the least and the greatest value of each signal in its cycles.
+export function csvOfColumns(answer, headOf, periodUs, atOf) {
+  const heads = answer.signals.flatMap((signal, index) => [`least ${headOf(signal, index)}`, `greatest ${headOf(signal, index)}`]);
+  const rows = [["cycle", "time_s", "time_of_day", ...heads]];
+  for (let cycle = answer.from, place = 0; cycle <= answer.to; cycle += answer.column, place += 1) {
+    const values = answer.signals.flatMap((signal) => signal.columns[place] ?? [null, null]);
+    rows.push([cycle, (cycle * periodUs) / 1e6, atOf(cycle) && stamp(atOf(cycle)), ...values]);
+  }
+  return `${rows.map((row) => row.map(cell).join(",")).join("\r\n")}\r\n`;
+}
+
 // The value of a run-length coded signal in ascending cycles.
 export function reader(runs) {
   let at = -1;

@@ -1,7 +1,7 @@
 // A program as a ladder with the power flow of the shown cycle; one with numbers as text, or as function blocks or a chart, with the values of its scan; for an understudy its parity words, with the outputs of their masks.
 
 import { changed } from "/address.js";
-import { act, ask } from "/ask.js";
+import { act, ask, toast } from "/ask.js";
 import { el, keyed, setAttribute, setText, svg, valueText } from "/element.js";
 import { cycleParameter, isLive, state } from "/time.js";
 import { ladderLegend } from "/legend.js";
@@ -60,6 +60,7 @@ export function prepare(facts) {
   palette(localStorage.getItem("palette") ?? "understudy");
   id("ladder-palette").value = document.documentElement.dataset.palette;
   id("ladder-picture").addEventListener("click", pick);
+  id("ladder-picture").addEventListener("keydown", key);
 }
 
 function palette(name) {
@@ -189,9 +190,11 @@ async function picture() {
   const key = `${JSON.stringify(forced)}${answer.svg}`;
   if (key !== shown) {
     shown = key;
+    const hadFocus = id("ladder-picture").contains(document.activeElement?.closest("text.name") ?? null);
     // The server draws it from the program, and escapes every name.
     id("ladder-picture").innerHTML = answer.svg;
     mark(forced);
+    reach(hadFocus);
   }
   if (rung !== null) {
     const number = [...id("ladder-picture").querySelectorAll("text.soft")].find((label) => label.textContent === String(rung));
@@ -287,27 +290,63 @@ function showText(lines, forced) {
   );
 }
 
+// Names are reached by keyboard: Tab comes to one of them, and the arrow keys come to the others.
+let reached = 0;
+
+const isInput = (name) => run.programs[program].inputs.some((input) => input.name === name || input.address === name);
+
+function reach(hadFocus) {
+  if (typeof program !== "number") {
+    return;
+  }
+  const labels = [...id("ladder-picture").querySelectorAll("text.name")].filter((label) => !isInput(nameOn(label)));
+  reached = Math.min(reached, Math.max(labels.length - 1, 0));
+  labels.forEach((label, place) => {
+    label.setAttribute("tabindex", place === reached ? "0" : "-1");
+    label.setAttribute("role", "button");
+    label.setAttribute("aria-label", `Why ${nameOn(label)}?`);
+  });
+  if (hadFocus) {
+    labels[reached]?.focus({ preventScroll: true });
+  }
+}
+
+function key(event) {
+  const label = event.target.closest?.("text.name");
+  const by = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
+  if (!label || !(by || event.key === "Enter" || event.key === " ")) {
+    return;
+  }
+  event.preventDefault();
+  // The arrow keys step through the cycles elsewhere.
+  event.stopPropagation();
+  if (!by) {
+    pick(event);
+    return;
+  }
+  const labels = [...id("ladder-picture").querySelectorAll("text.name[tabindex]")];
+  reached = (labels.indexOf(label) + by + labels.length) % labels.length;
+  labels.forEach((other, place) => other.setAttribute("tabindex", place === reached ? "0" : "-1"));
+  labels[reached].focus();
+}
+
 function askWhy(name) {
-  const index = run.programs[program].outputs.findIndex((output) => output.name.toLowerCase() === name.toLowerCase());
+  const index = run.programs[program].outputs.findIndex((output) => output.name.toLowerCase() === name.toLowerCase() || output.address === name);
   openWhy(program, index >= 0 ? index : name);
 }
 
-// A click on the name of an output asks why; in a drawing, on that of any variable.
+// A click on the name of an output or of a memory bit asks why; in a drawing, on that of any variable.
 function pick(event) {
   const label = event.target.closest?.("text.name");
   if (!label || typeof program !== "number") {
     return;
   }
   const name = nameOn(label);
-  if (!id("ladder-view-label").hidden) {
-    askWhy(name);
+  if (isInput(name) && id("ladder-view-label").hidden) {
+    toast(`${name} is an input: its remote I/O samples it`);
     return;
   }
-  const { outputs } = run.programs[program];
-  const index = outputs.findIndex((output) => output.name === name || output.address === name);
-  if (index >= 0) {
-    openWhy(program, index);
-  }
+  askWhy(name);
 }
 
 async function cross() {

@@ -68,7 +68,7 @@ function shownAddress() {
 let period = 0;
 
 function head(state, live) {
-  const when = !live ? "replay" : state.finished ? "finished" : time.stale() ? "old" : "live";
+  const when = !live ? "replay" : state.finished ? (state.interrupted ? "ended early" : "finished") : time.stale() ? "old" : "live";
   const at = state.at ? ` · ${zone.clockAndZone(state.at)}` : "";
   setText(document.getElementById("status"), `${when}${at} · cycle ${state.cycle} of ${state.newest} · period ${period} ms`);
   zone.showSwitch(state.at);

@@ -33,15 +33,21 @@ const GAP = 22;
 const BOX = { height: 62 };
 const ROWS = { station: 14, bus: 112, remote: 152, plant: 262 };
 
-// The picture of the cluster, or of one program of it with its controller and all understudies.
+// The picture of the cluster, or of one program of it with its controller and all understudies. Where it is wider than the page, the understudies come
+// first: all programs depend on them.
 export function makePicture(run, pick, only = null) {
   const shown = run.programs.filter((program) => only === null || program.index === only);
-  const shownStations = run.stations.filter((station) => only === null || station.role !== "controller" || station.program === only);
-  const names = [...shownStations.map((station) => station.name), ...shown.flatMap((program) => [program.remote_io, program.plant ?? ""])];
+  const isUnderstudy = (station) => station.role !== "controller";
+  const own = run.stations.filter((station) => only === null || isUnderstudy(station) || station.program === only);
+  const names = [...own.map((station) => station.name), ...shown.flatMap((program) => [program.remote_io, program.plant ?? ""])];
   const longest = Math.max(...names.map((name) => name.length));
   const WIDTH = Math.round(Math.min(WIDEST, Math.max(NARROWEST, longest * LETTER + 24)));
   const letters = Math.floor((WIDTH - 24) / LETTER);
-  const columns = Math.max(shownStations.length, shown.length);
+  const fits = () => Math.max(own.length, shown.length) * (WIDTH + GAP) + GAP <= innerWidth;
+  const isNarrow = !fits();
+  const shownStations = isNarrow ? [...own.filter(isUnderstudy), ...own.filter((station) => !isUnderstudy(station))] : own;
+  const shift = isNarrow ? own.filter(isUnderstudy).length : 0;
+  const columns = Math.max(shownStations.length, shown.length + shift);
   const width = columns * (WIDTH + GAP) + GAP;
   const height = (shown.some((program) => program.plant) ? ROWS.plant : ROWS.remote) + BOX.height + 14;
   const left = (column) => GAP + column * (WIDTH + GAP);
@@ -55,17 +61,19 @@ export function makePicture(run, pick, only = null) {
   const stations = shownStations.map((station, column) =>
     box(station.name, station.role, column, ROWS.station, { kind: "station", name: station.name, program: station.program }));
   const remotes = shown.map((program, column) =>
-    box(program.remote_io, "remote I/O", column, ROWS.remote, { kind: "remote-io", name: program.remote_io, program: program.index }));
+    box(program.remote_io, "remote I/O", column + shift, ROWS.remote, { kind: "remote-io", name: program.remote_io, program: program.index }));
   const plants = shown.flatMap((program, column) =>
-    program.plant ? [box(program.plant, "plant", column, ROWS.plant, { kind: "plant", name: program.plant, program: program.index })] : []);
+    program.plant ? [box(program.plant, "plant", column + shift, ROWS.plant, { kind: "plant", name: program.plant, program: program.index })] : []);
   const bus = svg("g", { class: "bus" },
     svg("line", { x1: GAP / 2, x2: width - GAP / 2, y1: ROWS.bus, y2: ROWS.bus }),
     svg("text", { x: width - GAP / 2, y: ROWS.bus - 7, "text-anchor": "end" }, "network"));
   const drops = shownStations.map((_, column) => drop(left(column) + WIDTH / 2, ROWS.station + BOX.height, ROWS.bus));
   const element = svg("svg", { class: "picture", viewBox: `0 0 ${width} ${height}`, width, height, role: "group", "aria-label": "Stations, remote I/Os and plants" },
     bus, drops, lines, stations, remotes, plants);
-  const flows = new Map(shown.map((program, column) => [program.index, makeFlow(lines, left(column) + WIDTH / 2, Math.floor(letters * 0.7), Boolean(program.plant))]));
-  return { element, show: (state) => showAll(run, boxes, flows, state) };
+  const flows = new Map(shown.map((program, column) => [program.index, makeFlow(lines, left(column + shift) + WIDTH / 2, Math.floor(letters * 0.7), Boolean(program.plant))]));
+  // Whether the window has changed so that another order is the right one.
+  const isOther = () => fits() === isNarrow;
+  return { element, isOther, show: (state) => showAll(run, boxes, flows, state) };
 }
 
 const drop = (x, from, to) => svg("line", { class: "drop", x1: x, x2: x, y1: from, y2: to });
@@ -116,6 +124,9 @@ function showAll(run, boxes, flows, state) {
       const box = boxes.get(name);
       if (box) {
         setAttribute(box.element, "data-source", program.source);
+        if (program.source === "fail-safe" && ["serving", "moving"].includes(box.element.dataset.state)) {
+          setText(box.state, `${SOURCES["fail-safe"].sign} fail-safe outputs`);
+        }
       }
     }
     const { down, words, whose, letters, out, outWords } = flows.get(index);

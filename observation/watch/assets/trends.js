@@ -2,14 +2,15 @@
 
 import { changed } from "/address.js";
 import { act, ask, toast } from "/ask.js";
-import { csvOf, reader, saveCsv, savePng } from "/download.js";
-import { el, setText, shorten, valueText } from "/element.js";
+import { csvOf, csvOfColumns, reader, saveCsv, savePng } from "/download.js";
+import { el, keyed, setText, valueText } from "/element.js";
 import { keep, kept } from "/kept.js";
 import { chooser, find, load } from "/signals.js";
 import { goTo, isLive, state } from "/time.js";
-import { bandPlugin } from "/bands.js";
+import { bandPlugin, limitPlugin } from "/bands.js";
+import { heightOf, labelsOf, lanesOf, tickStep, ticks } from "/lanes.js";
 import { bandLegend } from "/legend.js";
-import { clock, clockAndZone, timeOf } from "/zone.js";
+import { clock, clockAndZone, clockOf, dayOf, local, timeOf } from "/zone.js";
 
 let run = null;
 let plot = null;
@@ -29,9 +30,18 @@ let dragging = false;
 let dragged = false;
 
 const MAXIMUM_SIGNALS = 16;
-const MAXIMUM_SPAN = 10_000;
 const LEAST_SPAN = 5;
-const SPANS = [100, 500, 2000, MAXIMUM_SPAN];
+const SHORT_SPANS = [100, 500, 2000, 10_000];
+
+// Longer ones by their seconds.
+const LONG_SPANS = [[600, "10 min"], [3600, "1 h"], [28_800, "8 h"], [86_400, "1 day"], [604_800, "7 days"]];
+let spans = [];
+
+// Alarms that are listed below the plot, at most.
+const LISTED_ALARMS = 12;
+
+// A range that has moved by less than a column is asked for again after this time at the latest, in milliseconds.
+const LONGEST_PAUSE = 10_000;
 
 // A live page asks at most so often, in milliseconds.
 const PAUSE = 400;
@@ -40,19 +50,25 @@ const id = (name) => document.getElementById(name);
 
 export function prepare(facts) {
   run = facts;
+  const seconds = (cycles) => (cycles * run.period_us) / 1e6;
+  const short = SHORT_SPANS.map((cycles) => [cycles, `${cycles} cycles, ${seconds(cycles)} s`]);
+  const long = LONG_SPANS.map(([length, words]) => [Math.round((length * 1e6) / run.period_us), words]);
+  spans = [...short, ...long.filter(([cycles]) => cycles > SHORT_SPANS.at(-1))];
   chosen = run.programs.flatMap((program) => program.outputs.slice(0, 2).map((_, index) => `${program.index}.output.${index}`)).slice(0, 6);
   apply(kept("trends") ?? {});
   choice = chooser("trend", (signal) => chosen.includes(signal), toggle);
   const button = (name, words, click) => el("button", { id: `trend-${name}`, type: "button", click }, words);
   id("view-trends").append(
     el("div", { class: "tools" },
-      el("label", {}, "Length in cycles ", el("select", { id: "trend-span", change: (event) => { span = Number(event.target.value); zoom = null; picked(); } },
-        SPANS.map((count) => el("option", { value: count }, String(count))))),
+      el("label", {}, "Length ", el("select", { id: "trend-span", change: (event) => { span = Number(event.target.value); zoom = null; picked(); } },
+        spans.map(([count, words]) => el("option", { value: count }, words)))),
       el("span", { class: "chips", role: "group", "aria-label": "Zoom" }, button("in", "Zoom in", () => scale(0.5)), button("out", "Zoom out", () => scale(2)), button("earlier", "Earlier", () => pan(-0.5)), button("later", "Later", () => pan(0.5)), button("all", "No zoom", unzoom)),
       el("span", { class: "chips", role: "group", "aria-label": "Save" }, button("csv", "Save CSV", csv), button("png", "Save PNG", png))),
     el("p", { id: "trend-words", class: "stamp soft", role: "status" }),
     el("div", { id: "trend-plot", class: "plot", tabindex: "0", role: "group", "aria-label": "Trends of the chosen signals; plus and minus zoom, 0 ends it", keydown: key }),
     bandLegend(),
+    el("section", { id: "trend-alarms-card", class: "card", "aria-labelledby": "trend-alarms-title", hidden: true },
+      el("h2", { id: "trend-alarms-title" }, "Alarms in these cycles"), el("ul", { id: "trend-alarms", class: "plain" })),
     choice.element);
   addEventListener("resize", redraw);
   addEventListener("theme", redraw);
@@ -75,9 +91,9 @@ function apply(wanted) {
   if (wanted.signals !== undefined) {
     chosen = wanted.signals.split(",").filter(Boolean).slice(0, MAXIMUM_SIGNALS);
   }
-  span = SPANS.find((known) => known === Number(wanted.span)) ?? span;
+  span = spans.find(([known]) => known === Number(wanted.span))?.[0] ?? span;
   const [from, to] = [Number(wanted.from), Number(wanted.to)];
-  const isRange = wanted.from !== undefined && Number.isInteger(from) && Number.isInteger(to) && from < to && to - from < MAXIMUM_SPAN;
+  const isRange = wanted.from !== undefined && Number.isInteger(from) && Number.isInteger(to) && from < to;
   zoom = isRange ? { from, to } : null;
 }
 
@@ -128,14 +144,17 @@ function range() {
   if (!isLive() && has) {
     return answer;
   }
-  const to = Math.max(isLive() ? now.cycle : Math.min(now.newest, now.cycle + Math.floor(span / 2)), now.oldest);
-  return { from: Math.max(now.oldest, to - span + 1), to };
+  const to = Math.max(isLive() ? now.cycle : Math.min(now.newest, now.cycle + Math.floor(span / 2)), firstCycle());
+  return { from: Math.max(firstCycle(), to - span + 1), to };
 }
+
+// The server remembers the values of old cycles as columns, further back than their details.
+const firstCycle = () => Math.min(0, state().oldest);
 
 // Zooms around the shown cycle, or around the middle.
 function scale(factor) {
   const { from, to } = range();
-  const length = Math.min(Math.max(Math.round((to - from) * factor), LEAST_SPAN), MAXIMUM_SPAN - 1);
+  const length = Math.min(Math.max(Math.round((to - from) * factor), LEAST_SPAN), state().newest - firstCycle());
   const { cycle } = state();
   const middle = !isLive() && from <= cycle && cycle <= to ? cycle : Math.round((from + to) / 2);
   zoomTo(middle - Math.floor(length / 2), length);
@@ -147,8 +166,8 @@ function pan(share) {
 }
 
 function zoomTo(from, length) {
-  const { oldest, newest } = state();
-  const first = Math.max(Math.min(from, newest - length), oldest);
+  const { newest } = state();
+  const first = Math.max(Math.min(from, newest - length), firstCycle());
   zoom = { from: first, to: Math.max(Math.min(first + length, newest), first + 1) };
   changed();
   refresh(true);
@@ -189,7 +208,8 @@ async function refresh(now) {
     again = true;
     return;
   }
-  const pause = !now && isLive() ? PAUSE - (performance.now() - last) : 0;
+  const ofColumn = answer?.column ? Math.min((answer.column * run.period_us) / 1000, LONGEST_PAUSE) : 0;
+  const pause = !now && isLive() ? Math.max(PAUSE, ofColumn) - (performance.now() - last) : 0;
   if (pause > 0) {
     later ||= setTimeout(() => {
       later = 0;
@@ -217,12 +237,16 @@ async function refresh(now) {
 
 const atOf = (cycle) => timeOf(answer.times, cycle, run.period_us);
 
+// The unit of a signal, where the cluster file has it.
+const unitOf = (index) => find(answer.ids[index])?.operator?.unit ?? "";
+
 const nameOfFile = () => `${run.cluster}-trends-${answer.from}-${answer.to}`;
 
 function csv() {
   if (answer) {
-    const unit = (index) => (find(answer.ids[index])?.type === "TIME" ? " in ns" : "");
-    saveCsv(nameOfFile(), csvOf(answer, (signal, index) => `${signal.name}${unit(index)}`, run.period_us, atOf));
+    const unit = (index) => (find(answer.ids[index])?.type === "TIME" ? " in ns" : unitOf(index) ? ` in ${unitOf(index)}` : "");
+    const write = answer.column ? csvOfColumns : csvOf;
+    saveCsv(nameOfFile(), write(answer, (signal, index) => `${signal.name}${unit(index)}`, run.period_us, atOf));
     toast(`saved ${nameOfFile()}.csv`);
   }
 }
@@ -235,78 +259,80 @@ async function png() {
   }
 }
 
-// Height of a lane of numbers, as a multiple of a lane of a BOOL.
-const HIGH = 4;
-
-// Each signal has a lane of its own, the first on top. A BOOL is at the bottom of it where it is 0 and above where it is 1; a number lies between its
-// least and its greatest value, which the axis shows.
-function lanesOf(signals) {
-  let base = 0;
-  const lanes = signals.map((signal, index) => {
-    const type = find(answer.ids[index])?.type ?? "BOOL";
-    const isNumber = type !== "BOOL";
-    const known = signal.runs.map(([, value]) => value).filter((value) => value !== null);
-    const low = known.reduce((least, value) => Math.min(least, value), Infinity);
-    const high = known.reduce((most, value) => Math.max(most, value), -Infinity);
-    return { name: signal.name, type, isNumber, height: isNumber ? HIGH : 1, low: Number.isFinite(low) ? low : 0, high: Number.isFinite(high) ? high : 0 };
-  });
-  for (const lane of [...lanes].reverse()) {
-    lane.base = base;
-    base += lane.height;
+// The rows of a plot: the cycles, and the values of each signal at them. A column has two points, its least and its greatest value, so that a plot of
+// hours shows every peak.
+function rowsOf(lanes) {
+  const { from, to, column, signals } = answer;
+  if (!column) {
+    const cycles = Array.from({ length: to - from + 1 }, (_, place) => from + place);
+    return { cycles, values: signals.map((signal) => cycles.map(reader(signal.runs))) };
   }
-  return lanes;
+  const count = Math.ceil((to - from + 1) / column);
+  const cycles = Array.from({ length: 2 * count }, (_, place) => from + Math.floor((place * column) / 2));
+  const values = signals.map((signal) => cycles.map((_, place) => signal.columns[place >> 1]?.[place & 1] ?? null));
+  return { cycles, values };
 }
 
-// Where a value lies: a number that does not change in the middle of its lane.
-function heightOf(lane, value) {
-  if (!lane.isNumber) {
-    return lane.base + 0.7 * value;
+// The value at a point of the plot, in words.
+function wordsAt(lane, signal, values, place) {
+  const range = answer.column ? signal.columns[place >> 1] : null;
+  if (range && range[0] !== range[1]) {
+    return `${valueText(range[0], lane.type)} … ${valueText(range[1], lane.type)}`;
   }
-  const share = lane.high > lane.low ? (value - lane.low) / (lane.high - lane.low) : 0.5;
-  return lane.base + 0.2 + share * (lane.height - 0.7);
+  return values[place] === null ? "not known" : valueText(values[place], lane.type);
 }
 
-// Labels of a lane: the name, and the least and the greatest value.
-function labelsOf(lane) {
-  if (!lane.isNumber) {
-    return [[lane.base + 0.35, shorten(lane.name, 18)]];
-  }
-  const name = [lane.base + lane.height / 2 - 0.15, shorten(lane.name, 18)];
-  return lane.high > lane.low ? [[heightOf(lane, lane.low), valueText(lane.low, lane.type)], name, [heightOf(lane, lane.high), valueText(lane.high, lane.type)]] : [name];
+// The ticks of the axis of time, with their words: round times of day, and the cycle as the second scale.
+function timeAxis(width) {
+  const { from, to } = answer;
+  const periodMs = run.period_us / 1000;
+  const first = atOf(from);
+  const step = tickStep((to - from) * periodMs, width, 110);
+  const splits = ticks(from, to, step, periodMs, (cycle) => (first ? local(atOf(cycle)) : cycle * periodMs));
+  // A cycle begins up to a period before or after a round time.
+  const words = (cycle) => {
+    const at = first && new Date(atOf(cycle).getTime() + (step < 1000 ? 0 : 500));
+    return at ? [step < 86_400_000 ? clock(at, step < 1000) : dayOf(at), cycle].join("\n") : `${cycle}`;
+  };
+  const days = first && [...new Set([dayOf(first), dayOf(atOf(to))])].join(" to ");
+  const label = first ? `${days}, time of day (${clockAndZone(first).split(" ")[1]}), cycle` : "cycle";
+  return { label, splits: () => splits, values: () => splits.map(words), labelSize: 20, size: first ? 62 : 50 };
 }
 
 function draw() {
-  const lanes = lanesOf(answer.signals);
-  const height = lanes.reduce((sum, lane) => sum + lane.height, 0);
-  const labels = lanes.flatMap(labelsOf).sort(([one], [other]) => one - other);
-  // A point for each cycle, so that the values at the cursor are those of its cycle.
-  const cycles = Array.from({ length: answer.to - answer.from + 1 }, (_, place) => answer.from + place);
-  const values = answer.signals.map((signal) => cycles.map(reader(signal.runs)));
-  const rows = values.map((row, index) => row.map((value) => (value === null ? null : heightOf(lanes[index], value))));
   const place = id("trend-plot");
+  const lanes = lanesOf(answer.signals, (index) => find(answer.ids[index])?.type ?? "BOOL", unitOf);
+  const height = lanes.reduce((sum, lane) => sum + lane.height, 0);
+  const letters = place.clientWidth < 700 ? 16 : 30;
+  const labels = lanes.flatMap((lane) => labelsOf(lane, letters)).sort(([one], [other]) => one - other);
+  const left = Math.max(...[...labels.map(([, text]) => text), ...answer.sources.map(({ name }) => name.slice(0, 18))].map((text) => text.length), 8) * 7 + 22;
+  const { cycles, values } = rowsOf(lanes);
+  const rows = values.map((row, index) => row.map((value) => (value === null ? null : heightOf(lanes[index], value))));
   const dark = getComputedStyle(document.documentElement);
   const color = (name) => dark.getPropertyValue(name).trim();
   const series = answer.signals.map((signal, index) => ({
     label: signal.name,
     stroke: color(`--series-${index % 6}`),
-    width: 2,
+    dash: index < 6 ? undefined : index < 12 ? [8, 3] : [2, 3],
+    width: answer.column ? 1 : 2,
     paths: uPlot.paths.stepped({ align: 1 }),
     points: { show: false },
-    value: (_, __, ___, at) => (at === null ? "" : valueText(values[index][at], lanes[index].type)),
+    value: (_, __, ___, at) => (at === null ? "" : wordsAt(lanes[index], signal, values[index], at)),
   }));
-  const bandRows = answer.sources.length;
+  const bands = [...answer.sources, ...alarmBand()];
+  const bandRows = bands.length;
+  const unit = Math.min(Math.max(Math.floor(360 / Math.max(height, 1)), 26), 48);
   const axis = { stroke: color("--ink"), grid: { stroke: color("--line"), width: 1 }, ticks: { stroke: color("--line") } };
   const options = {
     width: place.clientWidth,
-    height: Math.max(220, 26 * height + 18 * bandRows + 110),
+    height: Math.max(220, unit * height + 18 * bandRows + 110),
     scales: { x: { time: false }, y: { range: [-0.3 - bandRows * 0.7, Math.max(height, 1)] } },
     axes: [
-      { ...axis, label: atOf(answer.from) ? `time of day (${clockAndZone(atOf(answer.from)).split(" ")[1]}), cycle` : "cycle", labelSize: 20, size: atOf(answer.from) ? 62 : 50,
-        space: 90, values: (_, values) => values.map((value) => (Number.isInteger(value) ? [clock(atOf(value), true), value].filter((part) => part !== "").join("\n") : "")) },
-      { ...axis, size: 130, splits: () => labels.map(([at]) => at), values: () => labels.map(([, text]) => text), grid: { show: false } },
+      { ...axis, ...timeAxis(place.clientWidth - left) },
+      { ...axis, size: left, splits: () => labels.map(([at]) => at), values: () => labels.map(([, text]) => text), grid: { show: false } },
     ],
     series: [{ label: "cycle", value: (_, value) => (value === null ? "" : [value, clock(atOf(value), true)].filter((part) => part !== "").join(" · ")) }, ...series],
-    plugins: [bandPlugin(answer, color)],
+    plugins: [bandPlugin({ ...answer, sources: bands }, color), limitPlugin(lanes, color)],
     cursor: { drag: { x: true, y: false, setScale: false }, bind: { dblclick: () => unzoom } },
     hooks: { setSelect: [selected] },
   };
@@ -327,7 +353,47 @@ function draw() {
   // After the plot has drawn itself, which ends with an empty legend.
   setTimeout(point);
   const seconds = ((answer.to - answer.from + 1) * run.period_us) / 1e6;
-  setText(id("trend-words"), `cycles ${answer.from} to ${answer.to}, ${seconds.toFixed(1)} s${zoom ? ", zoomed" : ""}; a click goes to the cycle, dragging zooms`);
+  const columns = answer.column ? `; the least and the greatest value of every ${answer.column} cycles` : "";
+  setText(id("trend-words"), `cycles ${answer.from} to ${answer.to}, ${lengthText(seconds)}${zoom ? ", zoomed" : ""}${columns}${missing(cycles, values)}; a click goes to the cycle, dragging zooms`);
+  showAlarms();
+}
+
+const lengthText = (seconds) => (seconds < 600 ? `${seconds.toFixed(1)} s` : seconds < 36_000 ? `${(seconds / 60).toFixed(0)} min` : `${(seconds / 3600).toFixed(1)} h`);
+
+// What is not drawn, in words.
+function missing(cycles, values) {
+  const isState = (index) => !["input", "output"].includes(find(answer.ids[index])?.kind);
+  const recomputed = answer.ids.some((_, index) => isState(index));
+  const points = values.filter((_, index) => !isState(index));
+  const first = points.length === 0 ? 0 : Math.min(...points.map((row) => row.findIndex((value) => value !== null)).map((place) => (place < 0 ? cycles.length : place)));
+  const words = [];
+  if (first > 0) {
+    words.push(first === cycles.length ? "no value of these cycles is known" : `before cycle ${cycles[first]} no value is known`);
+  }
+  if (recomputed) {
+    words.push(answer.column ? "memory, timers and variables are drawn for up to 20000 cycles" : "memory, timers and variables are drawn for the newest 2000 cycles");
+  }
+  return words.map((part) => `; ${part}`).join("");
+}
+
+// The alarms of these cycles, as one more band.
+function alarmBand() {
+  if (answer.alarms.length === 0) {
+    return [];
+  }
+  return [{ name: "alarms", runs: answer.alarms.map(({ cycle, over }) => [Math.max(cycle, answer.from), Math.min(over ?? answer.to, answer.to), "alarm"]) }];
+}
+
+function showAlarms() {
+  const newest = [...answer.alarms].reverse().slice(0, LISTED_ALARMS);
+  id("trend-alarms-card").hidden = newest.length === 0;
+  keyed(id("trend-alarms"), newest, ({ cycle, name, words }) => `${cycle} ${name} ${words}`,
+    ({ cycle }) => el("li", {}, el("button", { type: "button", class: "link", click: () => goTo(cycle) }), " ", el("span")),
+    (line, { cycle, over, name, words }) => {
+      const at = (of) => [clockOf(atOf(of), atOf(answer.to)), `cycle ${of}`].filter(Boolean).join(", ");
+      setText(line.firstChild, at(cycle));
+      setText(line.lastChild, `${name}: ${words}${over === null ? "" : `; over ${at(over)}`}`);
+    });
 }
 
 // A range was dragged.

@@ -35,6 +35,12 @@ export function clockOf(at, now) {
   return now && partsOf(new Date(now)).day !== day ? `${day} ${time.slice(0, 8)}` : time.slice(0, 8);
 }
 
+// The day in the chosen zone, such as `2026-11-26`.
+export const dayOf = (at) => partsOf(new Date(at)).day;
+
+// Milliseconds of the clock in the chosen zone: round hours of it are round hours of a person.
+export const local = (at) => at.getTime() + partsOf(at).ahead * 60_000;
+
 // The time of a cycle by the stretches of an answer; nothing without a recorded clock.
 export function timeOf(times, cycle, periodUs) {
   const [first, at] = times.findLast(([from]) => from <= cycle) ?? times[0] ?? [];

@@ -27,6 +27,8 @@ pub struct Commanding {
     pub commander: Commander,
     /// Reason why no command can be given; alarms can be acknowledged all the same.
     pub forbidden: Option<String>,
+    /// Whether commands are refused until the scenario is over.
+    pub after_scenario: bool,
     /// Commands that are impossible in this run, each with the reason.
     pub impossible: Vec<(&'static str, String)>,
     /// Person in whose name a page without logins commands: the one of the keys that it uses. `None`: the name that is entered.

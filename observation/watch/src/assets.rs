@@ -51,6 +51,7 @@ const ASSETS: &[(&str, &str, &str)] = assets![
     "trends.js": SCRIPT,
     "download.js": SCRIPT,
     "bands.js": SCRIPT,
+    "lanes.js": SCRIPT,
     "alarms.js": SCRIPT,
     "events.js": SCRIPT,
     "commands.js": SCRIPT,

@@ -74,7 +74,7 @@ pub(crate) fn follow(
         if taken == 0 && !ended && run.is_finished() {
             ended = true;
             unsaid = true;
-            lock(model, Model::end);
+            lock(model, |model| model.end(run.has_results()));
         }
         let progress = lock(model, |model| {
             let has_ended = model.known().is_some_and(Known::has_ended);

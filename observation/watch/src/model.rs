@@ -78,16 +78,20 @@ impl Model {
     pub(crate) fn past_is_read(&mut self, whole: Option<RunModel>, percent: Option<u8>) {
         if let Some(known) = &mut self.known {
             known.past_percent = percent;
-            if let Some(whole) = whole {
+            if let Some(mut whole) = whole {
+                if known.run.is_finished() {
+                    whole.end(!known.run.is_interrupted());
+                }
                 known.run = whole;
             }
         }
     }
 
     /// The journal is complete.
-    pub(crate) fn end(&mut self) {
+    pub(crate) fn end(&mut self, has_results: bool) {
         if let Some(known) = &mut self.known {
             known.ended = true;
+            known.run.end(has_results);
         }
     }
 

@@ -38,6 +38,8 @@ pub(crate) struct State {
     oldest: i64,
     newest: i64,
     finished: bool,
+    /// It was ended early, on request or by the end of the process that wrote it.
+    interrupted: bool,
     /// What is missing while the past of a long journal is being read.
     past: Option<Past>,
     /// What the scenario came to, where it is over and the cluster stays up.
@@ -100,6 +102,8 @@ struct ShownProtection {
     #[serde(flatten)]
     protection: Protection,
     words: String,
+    /// Time of day of the first cycle.
+    since_at: Option<TimeOfDay>,
 }
 
 #[derive(Debug, Serialize)]
@@ -145,6 +149,8 @@ struct Timing {
     cycle_us: Option<u64>,
     margin_us: Option<i64>,
     least_margin_us: Option<i64>,
+    /// Cycles of which that is the least.
+    least_of: usize,
     stalls: u64,
     slowest: Option<Slowest>,
 }
@@ -208,8 +214,9 @@ pub fn page_state(run: &RunModel, cycle: i64) -> serde_json::Value {
 }
 
 impl State {
-    /// The alarms and events are those of a model that has read more than the one of this cycle.
-    pub(crate) fn alarms_are(&mut self, known: &Known) {
+    /// The alarms, the events and the newest cycle are those of a model that has read more than the one of this cycle.
+    pub(crate) fn rest_is(&mut self, known: &Known) {
+        self.newest = known.run.newest().map_or(self.newest, |newest| newest.max(self.newest));
         let (open, process) = known.run.open_alarms_at(self.cycle);
         self.open_alarms = open.len();
         self.unacknowledged_alarms = unacknowledged(&open);
@@ -239,6 +246,7 @@ pub(crate) fn state(run: &RunModel, cycle: i64, finished: bool) -> Option<State>
         oldest,
         newest,
         finished,
+        interrupted: run.is_interrupted(),
         members: members(&snapshot),
         programs: programs
             .map(|(index, program)| shown_program(run, &snapshot, index, program))
@@ -293,10 +301,11 @@ fn shown_program(
         signals: signals(run, index, program),
         awaits_release: program.awaits_release,
         forced: program.forces.iter().map(|force| shown_force(controller_of, force)).collect(),
-        protection: program
-            .protection
-            .clone()
-            .map(|protection| ShownProtection { words: protection.text(), protection }),
+        protection: program.protection.clone().map(|protection| ShownProtection {
+            words: protection.text(),
+            since_at: run.time_of(protection.since),
+            protection,
+        }),
         protection_words: snapshot.protection_text(program),
         lost: program.lost.clone().map(|lost| ShownLost { words: lost.text(), lost }),
         counts: Counts {
@@ -359,6 +368,7 @@ fn timing(run: &RunModel, snapshot: &Snapshot) -> Timing {
         cycle_us: own.and_then(|timing| timing.cycle_ns).map(|cycle_ns| cycle_ns / 1000),
         margin_us: own.map(|timing| timing.margin_ns / 1000),
         least_margin_us: least.map(|least| least / 1000),
+        least_of: timings().count(),
         stalls: snapshot.host_stalls,
         slowest: snapshot.remote_ios.iter().filter_map(timed).max_by_key(Slowest::longest),
     }

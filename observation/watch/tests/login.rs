@@ -27,6 +27,7 @@ fn commanding() -> Commanding {
     Commanding {
         commander: Commander::of_run("nothing".into()),
         forbidden: None,
+        after_scenario: false,
         impossible: Vec::new(),
         person: None,
     }

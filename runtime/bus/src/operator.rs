@@ -23,6 +23,9 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// Time limit for a connection to an address that does not answer.
 const REACH: Duration = Duration::from_secs(2);
 
+/// A member that is followed tells its lines more often, twice a second at least: without any for this time it is not received.
+const SILENT_AFTER: Duration = Duration::from_secs(2);
+
 /// Lines of a journal that wait to be taken.
 const WAITING_LINES: usize = 4096;
 
@@ -120,6 +123,46 @@ pub enum Told<'a> {
     Line(&'a str),
     /// So many lines were lost on their way: they are in the journal of the member itself.
     Lost(u64),
+    /// Nothing was received for 2 s, although a member that is followed tells its lines twice a second at least.
+    Silent,
+}
+
+/// How long nothing was received from a member.
+#[derive(Debug, Default)]
+struct Silence {
+    lasted: Duration,
+}
+
+/// What follows from a silence.
+#[derive(Debug, PartialEq, Eq)]
+enum Meaning {
+    /// It may be a pause.
+    Nothing,
+    /// The member is not received.
+    IsSilent,
+    /// The connection is given up.
+    IsOver,
+}
+
+impl Silence {
+    /// How long the next line is waited for.
+    fn wait(&self, patience: Duration) -> Duration {
+        let until = if self.lasted < SILENT_AFTER { SILENT_AFTER.min(patience) } else { patience };
+        until.saturating_sub(self.lasted)
+    }
+
+    /// Nothing was received while the next line was waited for.
+    fn lasts(&mut self, patience: Duration) -> Meaning {
+        let before = self.lasted;
+        self.lasted += self.wait(patience);
+        if self.lasted >= patience {
+            Meaning::IsOver
+        } else if before < SILENT_AFTER && self.lasted >= SILENT_AFTER {
+            Meaning::IsSilent
+        } else {
+            Meaning::Nothing
+        }
+    }
 }
 
 /// A call to one member.
@@ -249,8 +292,8 @@ impl Call {
         info.routers_zid().wait().next().is_some() || info.peers_zid().wait().next().is_some()
     }
 
-    /// Gives each line of the member's journal to `take`, with who tells it and what was lost on the way, until that says false, or `patience`
-    /// passes without a line.
+    /// Gives each line of the member's journal to `take`, with who tells it, what was lost on the way and when nothing is received, until that says
+    /// false, or `patience` passes without a line.
     ///
     /// # Errors
     /// [`BusError::Unanswered`] where the journal cannot be followed.
@@ -291,16 +334,23 @@ impl Call {
             .with(zenoh::handlers::FifoChannel::new(WAITING_LINES))
             .wait()
             .map_err(|_| unanswered())?;
-        let mut gaps = Gaps::default();
+        let (mut gaps, mut silence) = (Gaps::default(), Silence::default());
         loop {
-            match subscriber.recv_timeout(patience) {
+            match subscriber.recv_timeout(silence.wait(patience)) {
                 Ok(Some(sample)) => {
+                    silence = Silence::default();
                     let bytes = sample.payload().to_bytes();
                     if !tell(&String::from_utf8_lossy(&bytes), &mut gaps, &mut take) {
                         return Ok(());
                     }
                 }
-                Ok(None) | Err(_) => return Err(unanswered()),
+                Ok(None) => match silence.lasts(patience) {
+                    Meaning::Nothing => {}
+                    Meaning::IsSilent if take(Told::Silent) => {}
+                    Meaning::IsSilent => return Ok(()),
+                    Meaning::IsOver => return Err(unanswered()),
+                },
+                Err(_) => return Err(unanswered()),
             }
         }
     }
@@ -344,6 +394,31 @@ impl Drop for Call {
     fn drop(&mut self) {
         if let Err(error) = self.session.close().wait() {
             tracing::debug!(%error, "a call was not closed");
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A silence is told once, before the connection is given up.
+    #[test]
+    fn a_silence_is_told_long_before_the_connection_is_given_up() {
+        let found = |patience| {
+            let mut silence = Silence::default();
+            let mut found = Vec::new();
+            while found.last().is_none_or(|(_, meaning)| *meaning != Meaning::IsOver) {
+                let meaning = silence.lasts(patience);
+                found.push((silence.lasted, meaning));
+            }
+            found
+        };
+        let patience = SILENT_AFTER + Duration::from_secs(3);
+        let expected = [(SILENT_AFTER, Meaning::IsSilent), (patience, Meaning::IsOver)];
+        assert_eq!(found(patience), expected);
+        for short in [Duration::from_millis(1), SILENT_AFTER] {
+            assert_eq!(found(short), [(short, Meaning::IsOver)]);
         }
     }
 }

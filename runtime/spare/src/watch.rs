@@ -88,8 +88,8 @@ impl Watch {
             }
             // Another line is of a later version.
             Told::Line(line) => serde_json::from_str(line).map_or(true, &mut report),
-            // The next report is complete in itself.
-            Told::Lost(_) => true,
+            // The next report is complete in itself, and its absence is for the patience to judge.
+            Told::Lost(_) | Told::Silent => true,
         });
         let silent = || ended.err().map(|_| "it sends no report".to_owned());
         other.or_else(silent).unwrap_or_else(|| "the call ended".to_owned())

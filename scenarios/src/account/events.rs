@@ -96,7 +96,7 @@ impl Account {
 
     /// Forces, and orders that were refused.
     fn order_decided(&mut self, program: ProgramId, event: &RemoteIoEvent) {
-        let next = self.numbering.latest().and_then(|newest| self.since_origin(newest + 1));
+        let next = self.next_cycle();
         match event {
             RemoteIoEvent::ChoiceRefused { newest, .. } => {
                 let member = Member::RemoteIo(program);
@@ -138,6 +138,9 @@ impl Account {
 
     /// Forces end with the process of their remote I/O.
     fn forces_of_ended(&mut self, member: Member, action: Action, cycle: u64) {
+        if action == Action::Crash {
+            self.networks.is_new(member, Some(cycle));
+        }
         if let (Member::RemoteIo(program), Action::Crash) = (member, action) {
             self.end_forces(Some(cycle), |of| of.program == program);
         }

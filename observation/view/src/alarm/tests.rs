@@ -133,3 +133,24 @@ fn an_acknowledgement_is_of_the_effects_that_were_seen() {
     let unseen = alarms.iter().filter(|alarm| alarm.acknowledged_by.is_none());
     assert_eq!(unseen.count(), 1, "the one before was not seen");
 }
+
+/// A replay shows the text of its time, and what is over is told as the past.
+#[test]
+fn the_past_of_an_alarm_has_the_text_of_its_time() {
+    let mut alarms = Alarms::default();
+    let subject = ("network 2".to_owned(), "network-fault");
+    alarms.raise_or_retell(subject.clone(), 10, "lost at press".to_owned());
+    alarms.raise_or_retell(subject.clone(), 20, "lost at press and robot".to_owned());
+    alarms.raise_or_retell(subject.clone(), 25, "lost at press and robot".to_owned());
+    alarms.over_with(&subject, 30, "was not in order; now it is".to_owned());
+    alarms.over_with(&subject, 40, "it does not last".to_owned());
+    alarms.shift(100);
+    let alarm = alarms.iter().next().expect("one");
+    let text = |cycle| alarm.at(cycle).map(|then| then.text);
+    assert_eq!(text(109), None);
+    assert_eq!(text(110).as_deref(), Some("lost at press"));
+    assert_eq!(text(120).as_deref(), Some("lost at press and robot"));
+    assert_eq!(text(130).as_deref(), Some("was not in order; now it is"));
+    assert_eq!(alarm.text, "was not in order; now it is");
+    assert_eq!(alarms.iter().count(), 1);
+}

@@ -48,6 +48,11 @@ impl Model {
         self.at_ns
     }
 
+    /// The run was ended early, on request or by the end of the process that wrote it.
+    pub fn is_interrupted(&self) -> bool {
+        self.interrupted
+    }
+
     /// The last record of the run was read.
     pub fn is_finished(&self) -> bool {
         self.finished
@@ -128,6 +133,11 @@ impl Model {
     /// The first cycles of stretches in which cycles are a period apart, with their times of day: those of a range of cycles.
     pub fn times(&self, from: i64, to: i64) -> impl Iterator<Item = (i64, TimeOfDay)> {
         self.times.stretches(from).take_while(move |(first, _)| *first <= to)
+    }
+
+    /// Time of day of a cycle; nothing where no wall clock was recorded.
+    pub fn time_of(&self, cycle: i64) -> Option<TimeOfDay> {
+        self.times.of_cycle(cycle)
     }
 
     /// The turns of the stations in a cycle of the cluster.

@@ -220,6 +220,8 @@ impl Model {
     fn ready(&mut self, member: Member, cycle: i64) {
         self.refuses_none(member, cycle);
         self.network_forgets(member, cycle);
+        // A new process says so where it cannot open a link.
+        self.links_forgotten(member, cycle);
         if !self.changes.now().is_down(member) {
             let change = Change::Process(member, Process::Running);
             self.changes.process(member, cycle, change);
@@ -252,9 +254,9 @@ impl Model {
                 let subject = (self.members.name(*member).to_owned(), "duplicate");
                 self.alarms.over(&subject, cycle);
             }
-            HostEvent::LinkFailed { .. } => {
+            HostEvent::LinkFailed { network, .. } => {
                 let text = describe(record, &self.members, &self.writes).text;
-                self.alarms.raise(own("link-failed"), cycle, text);
+                self.link_failed(member, *network, text, cycle);
             }
             HostEvent::RetainFailed { reason } => {
                 self.alarms.raise(own("retain-failed"), cycle, reason.clone());
@@ -272,7 +274,9 @@ impl Model {
             HostEvent::NetworkReception { network, lost, impaired } => {
                 self.network_received(member, *network, (lost, impaired), cycle);
             }
-            HostEvent::LinkReopened { .. } => self.alarms.over(&own("link-failed"), cycle),
+            HostEvent::LinkReopened { network, .. } => {
+                self.link_reopened(member, *network, cycle);
+            }
             _ => {}
         }
     }

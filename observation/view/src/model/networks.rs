@@ -1,6 +1,7 @@
 //! The two networks of a cluster, as its members receive them.
 //!
-//! A network is one alarm, however many members report it. Its text says what is left, then who is affected.
+//! A network is one alarm, however many members report it. Its text says what is left, then who is affected. A member that cannot open its links is
+//! one alarm, which lasts until all of its links are open.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,6 +11,9 @@ use super::Model;
 use crate::alarm::{Alarm, listed};
 use crate::snapshot::NetworkSnapshot;
 
+/// Alarm of a member that cannot open a link.
+const LINK_FAILED: &str = "link-failed";
+
 /// Alarm of one of two networks.
 const NETWORK_FAULT: &str = "network-fault";
 
@@ -17,6 +21,8 @@ const NETWORK_FAULT: &str = "network-fault";
 #[derive(Debug, Clone, Default)]
 pub(super) struct Networks {
     faults: [BTreeMap<Member, Faults>; 2],
+    /// By member: its links that cannot be opened, each with the network that it is over, and the text.
+    links: BTreeMap<Member, BTreeMap<Option<Via>, String>>,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -58,6 +64,47 @@ impl Model {
         }
     }
 
+    /// A member cannot open a link.
+    pub(super) fn link_failed(
+        &mut self,
+        member: Member,
+        via: Option<Via>,
+        text: String,
+        cycle: i64,
+    ) {
+        self.networks.links.entry(member).or_default().insert(via, text);
+        self.links_changed(member, cycle);
+    }
+
+    /// A link of a member is open: another one may still have failed.
+    pub(super) fn link_reopened(&mut self, member: Member, via: Option<Via>, cycle: i64) {
+        if let Some(links) = self.networks.links.get_mut(&member) {
+            links.remove(&via);
+            self.links_changed(member, cycle);
+        }
+    }
+
+    /// The process of a member begins or ends: its links are those of the process.
+    pub(super) fn links_forgotten(&mut self, member: Member, cycle: i64) {
+        if let Some(links) = self.networks.links.get_mut(&member) {
+            links.clear();
+            self.links_changed(member, cycle);
+        }
+    }
+
+    fn links_changed(&mut self, member: Member, cycle: i64) {
+        let subject = (self.members.name(member).to_owned(), LINK_FAILED);
+        let links = self.networks.links.get(&member).into_iter().flatten();
+        let texts: Vec<&str> = links.map(|(_, text)| text.as_str()).collect();
+        if texts.is_empty() {
+            self.networks.links.remove(&member);
+            let text = "could not open a link; now all of its links are open".to_owned();
+            self.alarms.over_with(&subject, cycle, text);
+        } else {
+            self.alarms.raise_or_retell(subject, cycle, texts.join("; "));
+        }
+    }
+
     /// The networks as they were in a cycle; none in a cluster with one.
     pub(crate) fn networks_at(&self, cycle: i64) -> Vec<NetworkSnapshot> {
         if !self.cluster.has_two_networks() {
@@ -83,7 +130,10 @@ impl Model {
         for via in [via, via.other()] {
             let subject = (network_name(via), NETWORK_FAULT);
             match self.network_text(via) {
-                None => self.alarms.over(&subject, cycle),
+                None => {
+                    let text = format!("network {via} was not in order; now it is");
+                    self.alarms.over_with(&subject, cycle, text);
+                }
                 Some(text) => self.alarms.raise_or_retell(subject, cycle, text),
             }
         }

@@ -44,15 +44,21 @@ impl Attribution {
     }
 }
 
+/// Whether a state is older than the newest output of which it is known that it was applied. One that is as new is lost because a newer output may
+/// have been applied, so its age is not known.
+const fn is_old(age: &u64) -> bool {
+    *age > 0
+}
+
 /// Reasons that a later cycle can refute.
 const JOINING: &str = "joining";
 
 impl Model {
-    /// The process of a remote I/O begins or ends: the alarms about its reports and its commands are over. A new one says so if its field or
-    /// its link fails.
+    /// The process of a remote I/O begins or ends: the alarms about its reports and its commands are over. A new one says so if its field
+    /// fails.
     pub(super) fn remote_io_is_new(&mut self, program: ProgramId) {
         let name = self.members.name(Member::RemoteIo(program)).to_owned();
-        let over = [STATE_LOST, "forced", "field-lost", "field-contested", "link-failed"];
+        let over = [STATE_LOST, "forced", "field-lost", "field-contested"];
         self.alarms.all_over(&name, &over, self.cycles.of(None));
         if let Some(history) = self.histories.get_mut(program.index()) {
             history.starts_again();
@@ -93,7 +99,7 @@ impl Model {
                     newest: newest.map(|newest| newest.cycle.0),
                     holder: holder
                         .map(|holder| self.members.name(Member::Station(holder)).to_owned()),
-                    age_cycles: age.and_then(|age| u64::try_from(age).ok()),
+                    age_cycles: age.and_then(|age| u64::try_from(age).ok()).filter(is_old),
                     asks: *asks,
                 };
                 self.alarms.raise(subject(STATE_LOST), cycle, lost.text());
@@ -105,7 +111,8 @@ impl Model {
                 if let Some(mut lost) = standing.and_then(|own| own.lost.clone()) {
                     let newer = lost.newest.map(|known| newest.cycle.0.saturating_sub(known));
                     let age = lost.age_cycles.zip(newer);
-                    lost.age_cycles = age.map(|(age, newer)| age.saturating_sub(newer));
+                    lost.age_cycles =
+                        age.map(|(age, newer)| age.saturating_sub(newer)).filter(is_old);
                     lost.newest = Some(newest.cycle.0);
                     self.lost_is(program, cycle, Some(lost));
                 }

@@ -124,6 +124,7 @@ impl Model {
     fn process_is(&mut self, member: Member, process: Process, cycle: i64) {
         if process != Process::Suspended {
             self.refuses_none(member, cycle);
+            self.links_forgotten(member, cycle);
         }
         let change = Change::Process(member, process);
         self.changes.process(member, cycle, change);

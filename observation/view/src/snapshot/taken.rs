@@ -369,7 +369,14 @@ impl Picture<'_> {
 
     fn margin(&self, margin: &Margin) -> MarginSnapshot {
         let is_known = self.model.program_ids().all(|program| self.reports(program));
+        let publishes = |station: &StationId| {
+            let state = self.model.station_state_in(self.standing, *station, self.cycle);
+            state == StationState::Publishing
+        };
+        let unknown = self.model.station_ids().filter(publishes).map(Member::Station);
+        let unknown = unknown.filter(|member| !self.standing.reports(*member));
         MarginSnapshot {
+            unknown: unknown.map(|member| self.name(member)).collect(),
             survives: if is_known { margin.survives } else { 0 },
             served: self.program_names(margin.served),
             singles: margin.singles.iter().map(|of| self.outcome(of)).collect(),

@@ -61,16 +61,17 @@ impl Channel {
     )]
     pub(super) fn poll(&mut self, take: &mut dyn FnMut(Result<Record, Trouble>)) -> usize {
         let began = Instant::now();
-        let mut taken = 0;
+        let (mut taken, mut reports) = (0, false);
         for record in self.receiver.try_iter().take(AT_ONCE) {
+            reports |= record.member.is_some();
             take(Ok(record));
             taken += 1;
         }
         self.read += taken as u64;
         // How many wait is not known.
         self.progress.polled(began, self.read, u64::from(taken == AT_ONCE));
-        if taken > 0 {
-            self.progress.grew = Some(began);
+        if reports {
+            self.progress.reported = Some(began);
         }
         match self.lost.swap(0, Ordering::Relaxed) {
             0 => taken,

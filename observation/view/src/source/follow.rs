@@ -39,6 +39,8 @@ pub(super) struct Follower {
     read: u64,
     listed: Listed,
     progress: Progress,
+    /// A member has reported since the end of the journal was reached.
+    reports: bool,
 }
 
 /// The closed segments after the open one, as they were listed last. A folder can have thousands, so it is listed again only when they are read.
@@ -120,6 +122,7 @@ impl Follower {
             read: 0,
             listed: Listed::default(),
             progress: Progress::default(),
+            reports: false,
         }
     }
 
@@ -158,14 +161,20 @@ impl Follower {
         let began = Instant::now();
         // What is written from now on is for the next poll.
         let end = self.ahead().map(|ahead| self.read + ahead);
-        let polled = self.try_poll(take);
+        let mut reports = false;
+        let polled = self.try_poll(&mut |found| {
+            reports |= found.as_ref().is_ok_and(|record| record.member.is_some());
+            take(found);
+        });
         match end.and_then(|end| Ok((end, polled?))) {
             Ok((end, taken)) => {
                 self.failure = None;
                 let ahead = end.saturating_sub(self.read);
                 self.progress.polled(began, self.read, ahead);
-                if ahead == 0 && (taken > 0 || self.progress.grew.is_none()) {
-                    self.progress.grew = self.age().and_then(|age| began.checked_sub(age));
+                self.reports |= reports;
+                if ahead == 0 && (self.reports || self.progress.reported.is_none()) {
+                    self.reports = false;
+                    self.progress.reported = self.age().and_then(|age| began.checked_sub(age));
                 }
                 taken
             }

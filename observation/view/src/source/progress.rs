@@ -20,8 +20,8 @@ pub struct Progress {
     pub(super) at_end: Option<Instant>,
     /// Of the bytes of the journal.
     pub(super) percent: u8,
-    /// When the journal last grew, as far as this is known.
-    pub(super) grew: Option<Instant>,
+    /// When a member last reported, as far as this is known.
+    pub(super) reported: Option<Instant>,
     /// The run has ended and all of it was read: this does not grow old.
     over: bool,
 }
@@ -72,9 +72,10 @@ impl Progress {
         self.percent
     }
 
-    /// The age of the newest record; nothing where there is no record.
+    /// The age of the newest record of a member; nothing where there is no record. What a run records itself, for example that no member is received
+    /// any more, makes the reports of the members no younger.
     pub fn age(&self, now: Instant) -> Option<Duration> {
-        Some(now.saturating_duration_since(self.grew?))
+        Some(now.saturating_duration_since(self.reported?))
     }
 
     /// Notes a poll that began at `began`, with the bytes read so far and those that are known to follow.

@@ -2,6 +2,8 @@
 //!
 //! Bounded by [`DEEPEST`] and [`MOST`]; the last reason states it. What was explained once is not explained again.
 
+mod alternatives;
+
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
@@ -72,8 +74,63 @@ impl<'m> Explainer<'m> {
         }
         match trace.last_write(part.address) {
             Some(write) => Ok(self.written(&part.name, &trace, write, place, 0)),
-            None => Ok(self.kept(part, stored, place, 0)),
+            None => {
+                let mut kept = self.kept(part, stored, place, 0);
+                if let Some((routine, line)) = self.writer_of(part, place) {
+                    let others = self.alternatives(&kept, &trace, None, (routine, line), place, 0);
+                    kept.because.splice(0..0, others);
+                }
+                Ok(kept)
+            }
         }
+    }
+
+    /// The statement that assigned a variable, in the newest scan up to `place` of those that were looked at.
+    fn writer_of(&self, part: &Part, place: usize) -> Option<(RoutineId, u32)> {
+        let mut places: Vec<usize> = self.traces.keys().copied().collect();
+        places.sort_unstable_by(|one, other| other.cmp(one));
+        places.into_iter().filter(|at| *at <= place).find_map(|at| {
+            let trace = self.traces.get(&at)?.as_ref()?;
+            let done = &trace.done[trace.last_write(part.address)?];
+            Some((done.routine, done.line))
+        })
+    }
+
+    /// The choices that could have assigned a variable otherwise, each with what it read.
+    fn alternatives(
+        &mut self,
+        assigned: &Reason,
+        trace: &Rc<Trace>,
+        after: Option<usize>,
+        (routine, line): (RoutineId, u32),
+        place: usize,
+        depth: usize,
+    ) -> Vec<Reason> {
+        let found = self.program.routine(routine);
+        if !self.text.declares(&found.name) {
+            return Vec::new();
+        }
+        let untaken = alternatives::untaken(trace, after, routine, &found.body, line);
+        let reasons = untaken.into_iter().map(|choice| {
+            let lines: Vec<String> = choice.lines.iter().map(u32::to_string).collect();
+            let (noun, lines) = match lines.len() {
+                1 => ("line", lines.join("")),
+                _ => ("lines", lines.join(", ")),
+            };
+            let mut reason = Reason {
+                at: None,
+                rung: None,
+                title: None,
+                line: None,
+                statement: None,
+                text: format!("not assigned in {noun} {lines}: this condition did not lead there"),
+                because: self.reads(&choice.done.reads, trace, place, depth, None),
+                ..assigned.clone()
+            };
+            self.locate(&mut reason, routine, choice.done.line);
+            reason
+        });
+        reasons.collect()
     }
 
     /// The program fault of the newest scan up to `place` that ended in one, with what its statement read.
@@ -183,6 +240,9 @@ impl<'m> Explainer<'m> {
             reason.because.extend(read);
             under = choice.under;
         }
+        let own = (done.routine, done.line);
+        let others = self.alternatives(&reason, trace, Some(write), own, place, depth);
+        reason.because.extend(others);
         reason
     }
 

@@ -7,7 +7,7 @@ use rand_pcg::Pcg64Mcg;
 use understudy_journal::{Happening, Record, RunEvent};
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_view::{Bounds, Model, RemoteIoState, Snapshot};
-use understudy_wire::{Member, ProgramId};
+use understudy_wire::{Member, ProgramId, StationId};
 
 use crate::support::{cell, records, scenario};
 
@@ -248,4 +248,28 @@ fn a_suspended_or_killed_remote_io_is_an_alarm_at_once() {
         assert_eq!(*name, "robot-io");
         assert!((99..130).contains(over), "{action}: over in {over}");
     }
+}
+
+/// Where a viewer receives nothing of a station that the remote I/Os receive, it does not know what is left, and does not say that nothing is.
+#[test]
+fn what_a_station_covers_is_not_known_where_its_turns_are_not_received_here() {
+    let cell = cell();
+    let text = "title = \"a viewer without one connection\"\ncycles = 400\n";
+    let records = records(&cell, &scenario(&cell, text), 1);
+    let understudy = Member::Station(StationId(2));
+    let mut model = Model::new(Arc::new(cell), Bounds::default());
+    for record in &records {
+        let is_away = model.has_origin() && model.cycle() >= Some(100);
+        if !(is_away && record.member == Some(understudy)) {
+            model.note(record);
+        }
+    }
+    let margin_in = |cycle| model.snapshot_at(cycle).expect("remembered").margin;
+    assert_eq!((margin_in(90).unknown, margin_in(90).survives), (Vec::new(), 1));
+    let unknown = margin_in(390).unknown;
+    assert_eq!(unknown, ["understudy"]);
+    let snapshot = model.snapshot();
+    assert!(snapshot.programs.iter().all(|program| {
+        program.protection.as_ref().is_some_and(|protection| protection.protected)
+    }));
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use understudy_bus::HostEvent;
+use understudy_bus::{HostEvent, LinkKind, Rights};
 use understudy_cluster::Cluster;
 use understudy_journal::{Happening, Record, RunEvent};
 use understudy_remote_io::Event as RemoteIoEvent;
@@ -27,15 +27,36 @@ struct Told {
 impl Told {
     /// A member tells what it receives over the second network.
     fn receives(&mut self, by: Member, lost: &[Member], impaired: &[Member]) {
+        let (lost, impaired) = (lost.to_vec(), impaired.to_vec());
+        self.host(by, HostEvent::NetworkReception { network: Via::Second, lost, impaired });
+    }
+
+    /// A member tells of its link over a network: why it cannot be opened, or that it is open.
+    fn link(&mut self, by: Member, network: Option<Via>, failure: Option<&str>) {
+        let (silence_ms, peer) = (0, None);
+        self.host(
+            by,
+            match failure {
+                Some(reason) => {
+                    let reason = reason.to_owned();
+                    HostEvent::LinkFailed { network, silence_ms, peer, reason }
+                }
+                None => HostEvent::LinkReopened { network, silence_ms, peer },
+            },
+        );
+    }
+
+    fn host(&mut self, by: Member, event: HostEvent) {
         self.at_ns += 1_000_000;
-        let event = HostEvent::NetworkReception {
-            network: Via::Second,
-            lost: lost.to_vec(),
-            impaired: impaired.to_vec(),
-        };
         let name = self.model.members().name(by).to_owned();
         let event = Happening::Host(event);
         self.model.note(&Record { at_ns: self.at_ns, name, member: Some(by), event });
+    }
+
+    /// The texts of the alarms of a cycle that last.
+    fn lasting(&self, cycle: i64) -> Vec<String> {
+        let alarms = self.model.alarms_at(cycle);
+        alarms.filter(|alarm| alarm.over.is_none()).map(|alarm| alarm.text).collect()
     }
 
     fn check(&self, expected: Option<&str>) {
@@ -76,6 +97,39 @@ fn a_network_is_one_alarm_however_many_members_report_it() {
     told.check(None);
     let alarms = told.model.snapshot().alarms;
     assert_eq!(alarms.len(), 1, "one, over and not acknowledged: {alarms:?}");
+    assert_eq!(alarms[0].text, "network 2 was not in order; now it is");
+}
+
+/// One network that is open again says nothing of the other one.
+#[test]
+fn a_link_that_is_open_again_ends_no_alarm_of_the_other_network() {
+    let model = Model::new(Arc::new(on_two_networks()), Bounds::default());
+    let mut told = Told { model, at_ns: 1 };
+    let robot = station(0);
+    let failed = |network, reason| format!("cannot open its link over network {network}: {reason}");
+    let (first, second) = (failed(1, "no such device"), failed(2, "down"));
+    told.link(robot, Some(Via::First), Some("no such device"));
+    assert_eq!(told.lasting(i64::MAX), std::slice::from_ref(&first));
+    told.link(robot, Some(Via::Second), Some("down"));
+    assert_eq!(told.lasting(i64::MAX), [format!("{first}; {second}")]);
+    told.link(robot, Some(Via::First), None);
+    assert_eq!(told.lasting(i64::MAX), [second]);
+    told.link(robot, Some(Via::Second), None);
+    assert_eq!(told.lasting(i64::MAX), Vec::<String>::new());
+    let alarms = told.model.snapshot().alarms;
+    assert_eq!(alarms.len(), 1, "one member, one alarm: {alarms:?}");
+    assert_eq!(alarms[0].text, "could not open a link; now all of its links are open");
+    // The links of a process end with it.
+    told.link(robot, Some(Via::First), Some("no such device"));
+    let ready = HostEvent::Ready {
+        version: 1,
+        process: 1,
+        address: ([127, 0, 0, 1], 1).into(),
+        link: LinkKind::Udp,
+        rights: Rights { real_time: false, locked_memory: false, lacking: Vec::new() },
+    };
+    told.host(robot, ready);
+    assert_eq!(told.lasting(i64::MAX), Vec::<String>::new());
 }
 
 /// No output is held in a simulated run where either network fails; with one network all are.

@@ -1,5 +1,6 @@
 //! Programs with numbers: program faults, causes and values.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use serde_json::{Value, json};
@@ -74,10 +75,14 @@ END_PROGRAM
 ";
 
 fn feed() -> Cluster {
+    cluster_of(FEED, BELT)
+}
+
+fn cluster_of(feed: &str, belt: &str) -> Cluster {
     let steady = BELT.replace("n = 60", "n = -1");
     let loaded = read_with("cluster.toml", CLUSTER, Overrides::default(), &mut |name| match name {
-        "feed.st" => Ok(FEED.to_owned()),
-        "belt.st" => Ok(BELT.to_owned()),
+        "feed.st" => Ok(feed.to_owned()),
+        "belt.st" => Ok(belt.to_owned()),
         "steady.st" => Ok(steady.clone()),
         _ => Err("no such file".to_owned()),
     });
@@ -243,4 +248,54 @@ fn runs_that_part_show_values() {
     let found = diff(&seen(&cluster, RELEASED), &seen(&cluster, quiet));
     let text = found.to_text();
     assert!(!text.contains("00000000"), "{text}");
+}
+
+/// A shuttle that stands: the conditions that were false are the answer.
+const SHUTTLE: &str = "\
+PROGRAM feed
+  VAR_INPUT speed : INT; run : BOOL; END_VAR
+  VAR_OUTPUT share : INT; rate : REAL; busy : BOOL; END_VAR
+  VAR n : INT; kept : INT; END_VAR
+  n := n + 1;
+  share := 0;
+  IF n < 0 THEN
+    share := speed;
+  ELSIF NOT run THEN
+    IF speed > 40 THEN
+      share := 2;
+    END_IF;
+    rate := 1.0;
+  END_IF;
+  IF n = 5 THEN
+    kept := speed;
+  END_IF;
+  busy := kept > 0;
+END_PROGRAM
+";
+
+#[test]
+fn the_conditions_that_were_false_explain_a_default() {
+    let cluster = cluster_of(SHUTTLE, &BELT.replace("run := TRUE;", "run := n MOD 40 < 20;"));
+    let model = seen(&cluster, "title = \"stands\"\ncycles = 100\n");
+    let mut found = BTreeSet::new();
+    for cycle in 50..95 {
+        let why = model.why("feed.share", Some(cycle)).expect("known").because.expect("a reason");
+        assert_eq!((why.value.clone(), why.line), (json!(0), Some(6)), "{why:#?}");
+        let [other] = &why.because[..] else { panic!("{why:#?}") };
+        let names: Vec<&str> = other.because.iter().map(|read| read.signal.as_str()).collect();
+        found.insert((other.line, other.text.clone(), names.join(" ")));
+    }
+    let untaken = |line, lines: &str, reads: &str| {
+        let text = format!("not assigned in {lines}: this condition did not lead there");
+        (Some(line), text, reads.to_owned())
+    };
+    // While it runs, the outer condition; otherwise the inner one, to which the outer one led.
+    let expected = [untaken(7, "lines 8, 11", "n run"), untaken(10, "line 11", "speed")];
+    assert_eq!(found, BTreeSet::from(expected));
+    // A value that was kept: what could have assigned it in this cycle.
+    let kept = model.why("feed.kept", Some(90)).expect("known").because.expect("a reason");
+    assert!(kept.text.contains("and kept since"), "{kept:#?}");
+    let other = &kept.because[0];
+    assert_eq!((other.line, other.cycle), (Some(15), 90), "{kept:#?}");
+    assert_eq!(other.because[0].signal, "n", "{kept:#?}");
 }

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use understudy_cluster::Cluster;
 use understudy_journal::{Happening, Record, RunEvent};
 use understudy_node::Event as StationEvent;
+use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_view::{
     Alarm, Bounds, LostState, Model, Protection, RemoteIoState, Snapshot, StationState,
 };
-use understudy_wire::{Member, ProgramId, StationId};
+use understudy_wire::{Cycle, Member, Moment, ProgramId, StationId};
 
 use crate::complete::without_remote_io;
 use crate::support::{cell, example, model, records, scenario};
@@ -400,5 +401,34 @@ fn a_program_that_was_never_protected_is_an_alarm() {
             let of_robot = alarm.programs.iter().any(|program| program == "robot");
             of_robot && alarm.name == "understudy" && alarm.over.is_none()
         }));
+    }
+}
+
+/// A remote I/O and the understudy that fail together leave the controller with the newest state, and nobody who can prove that it is.
+#[test]
+fn a_state_that_is_as_new_as_all_that_is_known_is_not_called_0_cycles_old() {
+    let cluster = cell();
+    let short = scenario(&cluster, "title = \"short\"\ncycles = 60\n");
+    let records = records(&cluster, &short, 1);
+    let applied = records.iter().rev().find_map(|record| match &record.event {
+        Happening::RemoteIo(RemoteIoEvent::Applied { moment, .. }) if record.name == "robot-io" => {
+            Some((record, *moment))
+        }
+        _ => None,
+    });
+    let (last, moment) = applied.expect("a deadline");
+    let ago = |cycles| Moment { cycle: Cycle(moment.cycle.0 - cycles), ..moment };
+    for (newest, age) in [(ago(0), None), (ago(7), Some(7))] {
+        let mut model = model(&cluster, &short, 1);
+        let holder = Some(StationId(0));
+        let (applied, newest) = (Some(moment), Some(newest));
+        let event = RemoteIoEvent::StateLost { moment, applied, newest, holder, asks: true };
+        model.note(&Record { event: Happening::RemoteIo(event), ..last.clone() });
+        let alarm = model.alarms().find(|alarm| alarm.alarm == "state-lost").expect("an alarm");
+        let doubts =
+            alarm.text.ends_with("whether outputs of a newer one were applied is not known");
+        assert_eq!(doubts, age.is_none(), "{}", alarm.text);
+        let old = age.map(|age| format!(", {age} cycles old, in robot"));
+        assert!(alarm.text.contains(old.as_deref().unwrap_or(" of the cluster, in robot")));
     }
 }

@@ -106,6 +106,8 @@ struct CommandFacts {
     why: Option<String>,
     /// Reason why no operator input can be written.
     write_why: Option<String>,
+    /// Whether commands are refused until the scenario is over.
+    after_scenario: bool,
     /// Commands that are impossible in this run, each with the reason.
     impossible: BTreeMap<&'static str, String>,
 }
@@ -138,6 +140,7 @@ pub(super) async fn run(
         commands: CommandFacts {
             why: app.why_not(&person).map(str::to_owned),
             write_why: app.why_not_write(&person).map(str::to_owned),
+            after_scenario: app.commanding.after_scenario,
             impossible: app.commanding.impossible.iter().cloned().collect(),
         },
         person: Some(person.name).filter(|name| !name.is_empty()),
@@ -249,7 +252,7 @@ pub(super) async fn state(
     let mut state = state?;
     // The model of an older cycle has not read everything that is before it.
     if let Some(known) = app.model().known() {
-        state.alarms_are(known);
+        state.rest_is(known);
     }
     Ok(Json(state).into_response())
 }

@@ -1,4 +1,6 @@
-//! Chosen signals over the cycles, with the source of each program's outputs and what was done to the cluster.
+//! Chosen signals over the cycles, with the source of each program's outputs, what was done to the cluster, and its alarms.
+//!
+//! Up to [`EXACT_CYCLES`] each value is there. Of more cycles there are columns, each with the least and the greatest value of its cycles.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -8,9 +10,10 @@ use axum::extract::rejection::QueryRejection;
 use axum::extract::{Query, State};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use understudy_cluster::{AlarmCondition, AlarmDeclaration};
 use understudy_journal::{TimeOfDay, source_word};
 use understudy_typed::Point;
-use understudy_view::{StateSignal, Timeline, number_of};
+use understudy_view::{Coarse, StateSignal, Timeline, number_of, real};
 use understudy_wire::{Image, ProgramId};
 
 use super::Answered;
@@ -25,7 +28,16 @@ use crate::shown;
 const MAXIMUM_SIGNALS: usize = 32;
 
 /// Cycles in one answer, at most.
-const MAXIMUM_CYCLES: i64 = 100_000;
+const MAXIMUM_CYCLES: i64 = 1_000_000_000_000;
+
+/// Cycles of which each value is in one answer, at most.
+const EXACT_CYCLES: i64 = 20_000;
+
+/// Columns of one answer, where its cycles are more.
+const COLUMNS: i64 = 600;
+
+/// Alarms in one answer, at most.
+const MAXIMUM_ALARMS: usize = 200;
 
 /// Changes of one signal, at most; what is older is left out.
 const MAXIMUM_CHANGES: usize = 20_000;
@@ -53,9 +65,12 @@ pub(super) struct Wanted {
 pub(super) struct Trends {
     from: i64,
     to: i64,
+    /// Cycles of a column; nothing where each value is there.
+    column: Option<i64>,
     signals: Vec<Trend>,
     sources: Vec<Band>,
     faults: Vec<Fault>,
+    alarms: Vec<Marked>,
     /// From this cycle on cycles are a period apart, up to the next one, with its time of day; none where no wall clock was recorded.
     times: Vec<(i64, TimeOfDay)>,
 }
@@ -65,6 +80,20 @@ struct Trend {
     name: String,
     /// From this cycle on it is this value, up to the next one; nothing where it is not known.
     runs: Vec<(i64, Option<Value>)>,
+    /// The least and the greatest value in each column; nothing where none is known.
+    columns: Vec<Option<(f64, f64)>>,
+    /// Limits of the alarms on this signal.
+    limits: Vec<f64>,
+}
+
+/// An alarm that was active in the cycles.
+#[derive(Debug, Serialize)]
+struct Marked {
+    cycle: i64,
+    /// The cycle in which it was over; nothing while it lasts.
+    over: Option<i64>,
+    name: String,
+    words: String,
 }
 
 #[derive(Debug, Serialize)]
@@ -99,10 +128,20 @@ pub(super) async fn trends(
         let done = matches!(event.event, "fault" | "ended" | "forced" | "unforced");
         done && (from..=to).contains(&event.cycle)
     });
+    let column = (to - from >= EXACT_CYCLES).then(|| (to - from) / COLUMNS + 1);
+    let alarms = known.run.alarms_at(to).filter(|alarm| alarm.over.is_none_or(|over| over >= from));
+    let alarms = alarms.map(|alarm| Marked {
+        cycle: alarm.cycle,
+        over: alarm.over,
+        name: alarm.name,
+        words: alarm.text,
+    });
     Ok(Json(Trends {
         from,
         to,
-        signals: trends_of(known, &names, from, to)?,
+        column,
+        alarms: alarms.take(MAXIMUM_ALARMS).collect(),
+        signals: trends_of(known, &names, (from, to), column)?,
         times: known.run.times(from, to).take(MAXIMUM_TIMES).collect(),
         sources: sources.collect(),
         faults: faults
@@ -112,34 +151,60 @@ pub(super) async fn trends(
     }))
 }
 
-fn trends_of(known: &Known, names: &[&str], from: i64, to: i64) -> Answered<Vec<Trend>> {
+fn trends_of(
+    known: &Known,
+    names: &[&str],
+    (from, to): (i64, i64),
+    column: Option<i64>,
+) -> Answered<Vec<Trend>> {
     let mut signals = Signals::default();
     let mut trends = Vec::new();
     let mut of_states: BTreeMap<u8, (Vec<usize>, Vec<StateSignal>)> = BTreeMap::new();
     for name in names {
         let (program, signal) = signals.find(known, name)?;
         let series = known.run.series();
-        let (label, runs) = match signal {
+        let of_program = shown::program_name(&known.run, program);
+        let trend = |label: &str| Trend {
+            name: format!("{of_program}.{label}"),
+            runs: Vec::new(),
+            columns: Vec::new(),
+            limits: Vec::new(),
+        };
+        let mut of_point = |point: &Point, (exact, coarse): Images<'_>, is_output: bool| {
+            let limits = limits(known, program, point, is_output);
+            let trend = Trend { limits, ..trend(&point.name) };
+            trends.push(match column {
+                None => {
+                    let runs = exact.map(|timeline| runs(timeline, point, from, to));
+                    Trend { runs: runs.unwrap_or_default(), ..trend }
+                }
+                Some(width) => {
+                    let count = usize::try_from((to - from) / width + 1).unwrap_or(0);
+                    let columns = coarse.map(|coarse| coarse.columns(point, from, width, count));
+                    Trend { columns: columns.unwrap_or_default(), ..trend }
+                }
+            });
+        };
+        match signal {
             Signal::Input(point) => {
-                let timeline = series.inputs(program);
-                let runs = timeline.map(|timeline| runs(timeline, &point, from, to));
-                (point.name, runs.unwrap_or_default())
+                let images = (series.inputs(program), series.coarse_inputs(program));
+                of_point(&point, images, false);
             }
             Signal::Output(point) => {
-                let timeline = series.outputs(program);
-                let runs = timeline.map(|timeline| runs(timeline, &point, from, to));
-                (point.name, runs.unwrap_or_default())
+                let images = (series.outputs(program), series.coarse_outputs(program));
+                of_point(&point, images, true);
             }
             Signal::State(signal) => {
                 let own = of_states.entry(program.0).or_default();
-                let name = signal.name.clone();
                 own.0.push(trends.len());
+                trends.push(trend(&signal.name));
                 own.1.push(signal);
-                (name, Vec::new())
             }
-        };
-        let name = format!("{}.{label}", shown::program_name(&known.run, program));
-        trends.push(Trend { name, runs });
+        }
+    }
+    // The states of the programs are recomputed, which takes too long for many cycles.
+    if column.is_some() {
+        return Ok(trends);
     }
     for (program, (places, own)) in of_states {
         let program = ProgramId(program);
@@ -156,6 +221,23 @@ fn trends_of(known: &Known, names: &[&str], from: i64, to: i64) -> Answered<Vec<
         }
     }
     Ok(trends)
+}
+
+/// The images of a program, each, and as ranges.
+type Images<'m> = (Option<&'m Timeline<Image>>, Option<&'m Coarse>);
+
+/// The limits of the alarms on a point.
+fn limits(known: &Known, program: ProgramId, point: &Point, is_output: bool) -> Vec<f64> {
+    let alarms = known.run.cluster().alarms().iter().filter(|alarm| {
+        (alarm.program, alarm.is_output, alarm.point.bit) == (program, is_output, point.bit)
+    });
+    let limit = |alarm: &AlarmDeclaration| match alarm.condition {
+        AlarmCondition::Above { limit, .. } | AlarmCondition::Below { limit, .. } => {
+            Some(real(point.of, limit))
+        }
+        AlarmCondition::Is(_) => None,
+    };
+    alarms.filter_map(limit).filter(|limit| limit.is_finite()).collect()
 }
 
 /// Values of single cycles as runs; what lies between them is not known.

@@ -44,6 +44,13 @@ pub(super) fn redundancy(snapshot: &Snapshot) -> Redundancy {
         let words = format!("{lost} has no provable outputs; of the others: {words}");
         ("some", words)
     };
+    let (level, words) = match margin.unknown.as_slice() {
+        [] => (level, words),
+        unknown => {
+            let unknown = unknown.join(" and ");
+            ("some", format!("not known: nothing is received from {unknown} here"))
+        }
+    };
     let (level, words) = match snapshot.networks_text() {
         None => (level, words),
         Some(networks) => {
