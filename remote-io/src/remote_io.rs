@@ -39,9 +39,7 @@ use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 use std::time::Duration;
 
-use understudy_cycle::{
-    Arrival, Input, Machine, OnlineChange, Output, Outvoted, Participant, RemoteIoInput,
-};
+use understudy_cycle::{Arrival, Input, Machine, Output, Outvoted, Participant, RemoteIoInput};
 use understudy_wire::{
     Body, Configurations, Frame, Holding, Image, Join, Kept, Member, Moment, OrderRefusal,
     ProgramHash, ProgramId, Recalled, Source, StateChoice, StationId, StationSet, Time,
@@ -216,22 +214,6 @@ impl RemoteIo {
         };
         remote_io.member.wake_at(remote_io.next_wakeup());
         remote_io
-    }
-
-    /// It had loaded a change before it was started, with these configurations; before [`Self::noting`]. Without effect where the change is none of
-    /// its configuration.
-    #[must_use]
-    pub fn changed(mut self, change: &Arc<OnlineChange>, configurations: Configurations) -> Self {
-        let restored = self.member.restore_change(Arc::clone(change), configurations);
-        if restored.is_ok() && configurations.prepared.is_none() {
-            self.adopt(change, configurations.own);
-        }
-        self
-    }
-
-    /// The configuration that it runs, and the one that it has loaded beside it; it refuses members with none of them.
-    pub fn configurations(&self) -> Configurations {
-        self.member.changing().configurations()
     }
 
     /// Whether the operator has to choose the state that the program continues from.

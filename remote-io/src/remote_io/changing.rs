@@ -1,5 +1,7 @@
 //! An online change of the program: this remote I/O makes the change mark, because only it makes the history.
 
+use std::sync::Arc;
+
 use understudy_cycle::{ChangeOrder, OnlineChange, Output};
 use understudy_wire::{
     ConfigurationHash, Configurations, Header, OrderRefusal, ProgramHash, StationId, StationSet,
@@ -9,6 +11,22 @@ use understudy_wire::{
 use super::RemoteIo;
 
 impl RemoteIo {
+    /// It had loaded a change before it was started, with these configurations; before [`Self::noting`]. Without effect where the change is none of
+    /// its configuration.
+    #[must_use]
+    pub fn changed(mut self, change: &Arc<OnlineChange>, configurations: Configurations) -> Self {
+        let restored = self.member.restore_change(Arc::clone(change), configurations);
+        if restored.is_ok() && configurations.prepared.is_none() {
+            self.adopt(change, configurations.own);
+        }
+        self
+    }
+
+    /// The configuration that it runs, and the one that it has loaded beside it; it refuses members with none of them.
+    pub fn configurations(&self) -> Configurations {
+        self.member.changing().configurations()
+    }
+
     /// The hash of its program in the configuration that it runs.
     pub(super) fn hash(&self) -> ProgramHash {
         self.member.changing().hash_of(self.settings.program, self.settings.hash)

@@ -1,0 +1,68 @@
+//! The steps of the reference run, across change marks, and those of samples that have no record.
+
+use understudy_cycle::Versions;
+use understudy_wire::{Image, Lineage, Moment, ProgramHash, Step};
+
+use super::{RECENT_STATES, Referee, State};
+
+impl Referee {
+    /// Finds the samples without a record that lead to a lineage from a state that may be continued from, and goes there; the first of them may
+    /// have a change mark.
+    pub(super) fn recover(&mut self, lineage: Lineage) -> bool {
+        let newest = (self.floor..self.states.len()).rev().take(RECENT_STATES);
+        let mut from: Vec<(usize, Option<ProgramHash>, Lineage)> = Vec::new();
+        for place in newest {
+            let state = &self.states[place];
+            from.push((place, None, state.lineage));
+            let others = self.versions().all().map(|program| program.hash);
+            let others = others.filter(|hash| *hash != state.program);
+            from.extend(others.map(|to| (place, Some(to), state.lineage.changed(to))));
+        }
+        let lineages: Vec<Lineage> = from.iter().map(|(.., lineage)| *lineage).collect();
+        let Some((start, samples)) = self.unrecorded.samples_to(lineage, &lineages) else {
+            return false;
+        };
+        let (place, mut change, _) = from[start];
+        self.newest = Some(place);
+        let stepped = self.states[place].stepped;
+        for inputs in samples {
+            self.step(stepped, &Step { change: change.take(), inputs });
+        }
+        self.truth = None;
+        true
+    }
+
+    pub(super) fn step(&mut self, moment: Moment, step: &Step) {
+        self.choice = self.choice.saturating_sub(1);
+        let Some(place) = self.newest else {
+            return;
+        };
+        let State { lineage, program: before, mut bits, .. } = self.states[place].clone();
+        let hash = step.change.unwrap_or(before);
+        let versions = Versions::new(&self.program, self.change.as_ref(), self.place);
+        let program = versions.of(hash);
+        let Some(program) = program else {
+            // A program that is not known here: nothing after it is judged.
+            self.gaps += 1;
+            return self.misses_records();
+        };
+        if hash != before {
+            let converted = versions.convert(before, hash, bits.words());
+            let converted = converted
+                .and_then(|words| Image::from_words(program.executable.state_count(), &words).ok());
+            let Some(converted) = converted else {
+                return self.misses_records();
+            };
+            bits = converted;
+        }
+        let mut outputs = Image::zero(program.executable.output_count());
+        program.executable.step(
+            &mut self.scratch,
+            bits.words_mut(),
+            step.inputs.words(),
+            outputs.words_mut(),
+        );
+        self.remember(moment, (hash, lineage.after_step(step)), bits);
+        self.truth = Some((moment, outputs));
+    }
+}
