@@ -17,7 +17,7 @@
 use std::collections::VecDeque;
 
 use smallvec::SmallVec;
-use understudy_wire::{Image, Lineage, Moment, ProgramHash};
+use understudy_wire::{Image, Lineage, Moment, ProgramHash, Sample};
 
 /// The last samples of a program and their lineages.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -39,6 +39,19 @@ impl History {
     /// A program that goes on from a lineage that a station holds.
     pub(crate) fn from(born: Moment, base: Lineage, capacity: usize) -> Self {
         Self { born, base, samples: VecDeque::with_capacity(capacity), confirmed: 0, capacity }
+    }
+
+    /// A program that continues from a lineage in the history of a sample that was received; nothing where it is not in there.
+    pub(crate) fn received(sample: &Sample, lineage: Lineage, capacity: usize) -> Option<Self> {
+        let mut history = Self::from(sample.born, sample.base, capacity);
+        for inputs in sample.history.iter().take(capacity) {
+            if history.head() == lineage {
+                break;
+            }
+            history.push(inputs);
+        }
+        history.confirmed = history.samples.len();
+        (history.head() == lineage).then_some(history)
     }
 
     pub(crate) fn born(&self) -> Moment {

@@ -14,6 +14,7 @@ const RETAIN_EVERY: u32 = 8;
 pub(crate) struct Disks {
     stations: Vec<Vec<RetainedRun>>,
     remote_ios: Vec<Option<Note>>,
+    twins: Vec<Option<Note>>,
     /// Remote I/Os whose notes cannot be read.
     damaged: ProgramSet,
 }
@@ -23,6 +24,7 @@ impl Disks {
         Self {
             stations: vec![Vec::new(); stations],
             remote_ios: vec![None; remote_ios],
+            twins: vec![None; remote_ios],
             damaged: ProgramSet::EMPTY,
         }
     }
@@ -40,8 +42,11 @@ impl Disks {
         settings: understudy_remote_io::Settings,
     ) -> RemoteIo {
         let program = settings.program;
-        let note = self.remote_ios[program.index()].clone();
-        RemoteIo::new(now, settings).noting(note, self.damaged.contains(program))
+        let is_twin = settings.pair.is_some_and(|pair| pair.is_twin);
+        let notes = if is_twin { &self.twins } else { &self.remote_ios };
+        let note = notes[program.index()].clone();
+        let is_damaged = !is_twin && self.damaged.contains(program);
+        RemoteIo::new(now, settings).noting(note, is_damaged)
     }
 
     /// A member keeps a record.
@@ -67,6 +72,9 @@ impl Disks {
             (Member::RemoteIo(program), Retained::Note(note)) => {
                 self.remote_ios[program.index()] = Some(note);
                 self.damaged.remove(program);
+            }
+            (Member::Twin(program), Retained::Note(note)) => {
+                self.twins[program.index()] = Some(note);
             }
             _ => {}
         }

@@ -25,8 +25,8 @@ pub use force::{
     OrderRefusal, PointValue, SignalPlace, check_owner_and_reason,
 };
 pub use frame::{
-    Actuation, Body, Field, Frame, Header, Holding, Join, Kept, MAXIMUM_HISTORY, Partial, Recalled,
-    Relayed, Sample, SamplesReceived, Source, Transfer, Turn, Word,
+    Actuation, Body, Field, Frame, Header, Holding, Join, Kept, MAXIMUM_HISTORY, Pair, Part,
+    Partial, Recalled, Relayed, Sample, SamplesReceived, Source, Transfer, Turn, Word,
 };
 pub use identifier::{
     ClusterHash, ConfigurationHash, Cycle, Epoch, MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, Member,

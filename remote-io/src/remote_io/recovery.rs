@@ -83,7 +83,10 @@ impl RemoteIo {
         // A missing station that could hold the state gets longer: it may be the only one that does.
         let patience = if self.holders.all_living() { 1 } else { 5 };
         // A history without a sample is one that no station can follow.
-        if waited < listen_cycles * patience || waited == 0 || self.sensors.is_none() {
+        if waited < listen_cycles * patience || waited == 0 || !self.may_begin(moment) {
+            return;
+        }
+        if self.sensors.is_none() {
             return;
         }
         let verdict = self.verdict();
@@ -220,7 +223,15 @@ impl RemoteIo {
     fn start(&mut self, moment: Moment, (from, holding): (StationId, Holding)) {
         let lineage = holding.lineage;
         self.report(Event::AdoptedLineage { moment, lineage, from });
-        let history = History::from(holding.born, lineage, self.settings.agreement.history);
+        let capacity = self.settings.agreement.history;
+        let sent = self.pairing.as_ref().and_then(|pairing| pairing.received());
+        // Proven outputs that the other remote I/O was not allowed to drive are not released by its failure.
+        if let (Some(sample), Release::Operator) = (sent, self.settings.release) {
+            self.authority = if sample.drives { Authority::Proof } else { Authority::Operator };
+        }
+        // With the samples that the other one has sent, a station that lacks some of them follows at once.
+        let known = sent.and_then(|sample| History::received(sample, lineage, capacity));
+        let history = known.unwrap_or_else(|| History::from(holding.born, lineage, capacity));
         self.sample_from(moment, history, Some((from, holding)));
     }
 
@@ -240,6 +251,7 @@ impl RemoteIo {
         history: History,
         state: Option<(StationId, Holding)>,
     ) {
+        self.become_author(moment);
         self.protection.starts(state.is_none());
         if self.knowledge.floor().is_none() {
             self.remember(moment, state);

@@ -14,6 +14,11 @@ pub trait FieldDriver: Send {
     /// field is reached over the link.
     fn drive(&mut self, moment: Moment, outputs: &Image, age: Duration) -> Option<Frame>;
 
+    /// Connects the field or lets it go: of two remote I/Os of a program, the author only is connected. Nothing is written when it is let go.
+    fn connect(&mut self, connects: bool) {
+        let _ = connects;
+    }
+
     /// u(i), where `frame` comes from this field.
     fn sense<'frame>(&mut self, frame: &'frame Frame) -> Option<&'frame Image>;
 
@@ -62,15 +67,24 @@ const PLANT_PATIENCE: Duration = Duration::from_secs(1);
 /// Of a remote I/O whose plant is a process of its own and is reached over the link.
 #[derive(Debug, Clone)]
 pub struct SimulatedField {
+    own: Member,
     program: ProgramId,
     agreement: Arc<Agreement>,
     has_plant: bool,
+    connected: bool,
 }
 
 impl SimulatedField {
     /// The field of the remote I/O of `program`.
     pub fn new(program: ProgramId, agreement: Arc<Agreement>) -> Self {
-        Self { program, agreement, has_plant: false }
+        let own = Member::RemoteIo(program);
+        Self { own, program, agreement, has_plant: false, connected: true }
+    }
+
+    /// Of `own`, one of two remote I/Os of the program: it is connected when it is told to.
+    #[must_use]
+    pub fn of_pair(self, own: Member) -> Self {
+        Self { own, connected: false, ..self }
     }
 
     /// The cluster has a plant there, whose silence is reported.
@@ -87,11 +101,15 @@ impl FieldDriver for SimulatedField {
                 cluster: self.agreement.cluster,
                 configuration: self.agreement.configuration,
                 moment,
-                sender: Member::RemoteIo(self.program),
+                sender: self.own,
                 alone: false,
             },
             body: Body::Actuation(Actuation { outputs: outputs.clone() }),
         })
+    }
+
+    fn connect(&mut self, connects: bool) {
+        self.connected = connects;
     }
 
     fn sense<'frame>(&mut self, frame: &'frame Frame) -> Option<&'frame Image> {
@@ -106,6 +124,7 @@ impl FieldDriver for SimulatedField {
     }
 
     fn patience(&self) -> Option<Duration> {
-        self.has_plant.then(|| PLANT_PATIENCE.max(self.agreement.schedule.period() * 3))
+        (self.has_plant && self.connected)
+            .then(|| PLANT_PATIENCE.max(self.agreement.schedule.period() * 3))
     }
 }
