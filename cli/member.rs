@@ -92,7 +92,7 @@ pub fn run_station(arguments: &Arguments) -> Result<Answer, Answer> {
 
 /// Runs one remote I/O as this process.
 pub fn run_remote_io(arguments: &Arguments) -> Result<Answer, Answer> {
-    let remote_io = |member: Member| matches!(member, Member::RemoteIo(_));
+    let remote_io = |member: Member| member.sampled_program().is_some();
     let wanted = (remote_io as fn(Member) -> bool, "remote I/O", "understudy remote-io");
     run(arguments, wanted, understudy_member::run_remote_io)
 }

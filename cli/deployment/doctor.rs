@@ -131,7 +131,7 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
 fn command_of(cluster: &Cluster, name: &str) -> Result<&'static str, Answer> {
     Ok(match crate::member::find(cluster, name)? {
         Member::Station(_) => "node",
-        Member::RemoteIo(_) => "remote-io",
+        Member::RemoteIo(_) | Member::Twin(_) => "remote-io",
         Member::Plant(_) => "plant",
     })
 }

@@ -248,7 +248,7 @@ fn place<'a>(
     let (name, value) = text.split_once('=').unwrap_or((text, ""));
     let bad = |message: String| Answer::failed(Status::BadInput, "U0556", message);
     let member = crate::member::find(cluster, &arguments.name)?;
-    let Member::RemoteIo(program) = member else {
+    let Some(program) = member.sampled_program() else {
         let message = format!("`{}` is not a remote I/O: signals are forced there", arguments.name);
         return Err(bad(message));
     };

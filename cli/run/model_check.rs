@@ -180,6 +180,7 @@ fn budget(arguments: &Arguments) -> Budget {
         duplicates: of(Kind::Duplicate),
         crashes: of(Kind::Crash),
         stops: of(Kind::Stop),
+        cuts: 0,
         total: arguments.faults,
         cycles: arguments.cycles,
     }

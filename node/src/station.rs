@@ -267,7 +267,7 @@ impl Station {
     }
 
     fn receive(&mut self, now: Time, frame: &Arc<Frame>) {
-        if matches!(frame.body, Body::Field(_) | Body::Actuation(_)) {
+        if matches!(frame.body, Body::Field(_) | Body::Actuation(_) | Body::Pair(_)) {
             return;
         }
         match self.member.arrival(now, frame) {
@@ -282,7 +282,7 @@ impl Station {
             }
         }
         match (&frame.body, frame.header.sender) {
-            (Body::Sample(sample), Member::RemoteIo(program)) => {
+            (Body::Sample(sample), Member::RemoteIo(program) | Member::Twin(program)) => {
                 self.cycle.direct.insert(program);
                 self.follow(program, frame, sample);
             }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 use understudy_cycle::{Notice, Outvoted, Refusal};
 use understudy_wire::{
-    ConfigurationHash, Configurations, Force, Image, Lineage, Member, Moment, OrderRefusal,
+    ConfigurationHash, Configurations, Force, Image, Lineage, Member, Moment, OrderRefusal, Part,
     ProgramHash, ProgramId, SignalPlace, Source, StationId, StationSet, Write, WriteId,
     WriteRefusal,
 };
@@ -342,6 +342,28 @@ pub enum Event {
         moment: Moment,
         /// Delay behind the time that it had asked for.
         late: Duration,
+    },
+    /// This one of two remote I/Os of the program has another part from now on.
+    PartChanged {
+        /// Current cycle.
+        moment: Moment,
+        /// Its part.
+        part: Part,
+    },
+    /// The other remote I/O of the program is not received any more.
+    PartnerLost {
+        /// Current cycle.
+        moment: Moment,
+    },
+    /// The other remote I/O of the program is received again.
+    PartnerReceived {
+        /// Current cycle.
+        moment: Moment,
+    },
+    /// The other remote I/O of the program reports that it is the author, as this one was until now.
+    SecondAuthor {
+        /// Current cycle.
+        moment: Moment,
     },
 }
 

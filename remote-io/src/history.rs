@@ -17,7 +17,7 @@
 use std::collections::VecDeque;
 
 use smallvec::SmallVec;
-use understudy_wire::{Image, Lineage, MAXIMUM_CHANGE_MARKS, Moment, ProgramHash, Step};
+use understudy_wire::{Image, Lineage, MAXIMUM_CHANGE_MARKS, Moment, ProgramHash, Sample, Step};
 
 /// The last samples of a program and their lineages.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -63,6 +63,19 @@ impl History {
     /// Whether all its states are of this program.
     pub(crate) fn is_of(&self, program: ProgramHash) -> bool {
         self.program == Some(program) && self.samples.iter().all(|(step, _)| step.change.is_none())
+    }
+
+    /// A program that continues from a lineage in the history of a sample that was received; nothing where it is not in there.
+    pub(crate) fn received(sample: &Sample, lineage: Lineage, capacity: usize) -> Option<Self> {
+        let mut history = Self::from(sample.born, (None, sample.base), capacity);
+        for step in sample.history.iter().take(capacity) {
+            if history.head() == lineage {
+                break;
+            }
+            history.push(step.clone());
+        }
+        history.confirmed = history.samples.len();
+        (history.head() == lineage).then_some(history)
     }
 
     pub(crate) fn born(&self) -> Moment {

@@ -156,15 +156,27 @@ impl Holders {
             let living = self.entries.iter().filter(|entry| self.lives(entry));
             living.filter_map(|entry| Some((entry.station, entry.recalled.as_ref()?)))
         };
-        let first_hand =
-            recalling().filter(|(_, recalled)| recalled.received == SamplesReceived::Later);
-        let accounted_for = first_hand.fold(StationSet::EMPTY, |all, (station, recalled)| {
-            all.or(StationSet::only(station)).or(recalled.accounted_for)
-        });
+        let accounted_for = self.accounted_for();
         let all = self.entries.iter();
         let newest = recalling().filter_map(|(_, recalled)| recalled.applied).max();
         all.map(|entry| entry.station).all(|station| accounted_for.contains(station))
             && newest.is_none_or(|applied| applied <= holding.stepped)
+    }
+
+    /// Stations that have received samples in this life, and those that they account for, as living stations recall.
+    pub(crate) fn accounted_for(&self) -> StationSet {
+        let living = self.entries.iter().filter(|entry| self.lives(entry));
+        let recalling = living.filter_map(|entry| Some((entry.station, entry.recalled.as_ref()?)));
+        let first_hand =
+            recalling.filter(|(_, recalled)| recalled.received == SamplesReceived::Later);
+        first_hand.fold(StationSet::EMPTY, |all, (station, recalled)| {
+            all.or(StationSet::only(station)).or(recalled.accounted_for)
+        })
+    }
+
+    /// Cycles of silence after which a station cannot come back without a state from another one.
+    pub(crate) fn gone_after(&self) -> u32 {
+        self.gone_after
     }
 
     /// Takes up which stations were gone before this remote I/O started.

@@ -23,7 +23,7 @@ pub use event::{Event, Lacking, LackingReason, Missing};
 pub use foresight::Foreseen;
 pub use ramp::Ramp;
 pub use remote_io::RemoteIo;
-pub use settings::{Release, Restart, Settings, StaleState, StopPoints, ValueFault};
+pub use settings::{PairSettings, Release, Restart, Settings, StaleState, StopPoints, ValueFault};
 pub use source::{
     OperatorInput, OperatorInputKind, PointPlace, SignalInput, SignalSource, ValueMismatch,
     in_order,

@@ -25,7 +25,9 @@
 mod changing;
 mod deadline;
 mod forcing;
+mod identity;
 mod knowledge;
+mod pairing;
 mod protection;
 mod recovery;
 mod sampling;
@@ -35,7 +37,6 @@ mod states;
 mod warm;
 mod writing;
 
-use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -55,6 +56,7 @@ use crate::trust::Trust;
 
 use forcing::Forcing;
 use knowledge::Knowledge;
+use pairing::Pairing;
 use protection::Protection;
 use signals::Signals;
 use warm::Noting;
@@ -88,6 +90,7 @@ pub struct RemoteIo {
     writing: Writing,
     signals: Signals,
     noting: Noting,
+    pairing: Option<Pairing>,
     /// The turns of this cycle, by rank.
     turns: Vec<Option<Arc<Frame>>>,
     deadline: Deadline,
@@ -179,15 +182,22 @@ impl RemoteIo {
     pub fn new(now: Time, settings: Settings) -> Self {
         let agreement = &settings.agreement;
         let stations = agreement.schedule.stations();
-        let mut member = Participant::new(Member::RemoteIo(settings.program), agreement);
+        let own = match settings.pair {
+            Some(pair) if pair.is_twin => Member::Twin(settings.program),
+            _ => Member::RemoteIo(settings.program),
+        };
+        let mut member = Participant::new(own, agreement);
         member.clock.start(now);
+        let holders = Holders::new(settings.program, agreement);
+        let pairing = settings.pair.map(|pair| Pairing::new(now, pair, holders.stations()));
         let mut remote_io = Self {
             member,
-            holders: Holders::new(settings.program, agreement),
+            holders,
+            pairing,
             knowledge: Knowledge::default(),
             question: None,
             authority: Authority::Proof,
-            sensors: Some(settings.undriven.clone()),
+            sensors: settings.pair.is_none().then(|| settings.undriven.clone()),
             field: settings.undriven.clone(),
             sampled_at: now,
             diagnosing: Diagnosing::new(settings.diagnosis.as_deref()),
@@ -235,10 +245,13 @@ impl RemoteIo {
     }
 
     fn receive(&mut self, now: Time, frame: &Arc<Frame>) {
+        if self.receive_partner(now, frame) {
+            return;
+        }
         let station = match (frame.header.sender, &frame.body) {
             (Member::Station(station), _) => station,
             // Samples of other programs start no cycle here: they only prove signals.
-            (Member::RemoteIo(program), Body::Sample(sample)) => {
+            (Member::RemoteIo(program) | Member::Twin(program), Body::Sample(sample)) => {
                 if self.member.admits(now, &frame.header) {
                     let sources = &self.settings.signal_sources;
                     let moment = frame.header.moment;
@@ -264,11 +277,16 @@ impl RemoteIo {
             Body::Turn(turn) if self.member.attendance.receive_turn(station) => {
                 self.note(station, &turn.holdings, &[], &turn.recalled, frame.header.alone);
                 self.holders.hear_of(turn.heard);
+                if turn.relayed.iter().any(|one| one.program == self.settings.program) {
+                    self.note_relayed();
+                }
+                self.note_sample_of(station, &turn.holdings, turn.lacks);
                 self.turns[station.index()] = Some(Arc::clone(frame));
             }
             Body::Join(join) => {
                 let Join { holdings, retained, recalled, .. } = join;
                 self.note(station, holdings, retained, recalled, frame.header.alone);
+                self.note_sample_of(station, holdings, join.lacks);
             }
             _ => {}
         }
@@ -353,6 +371,7 @@ impl RemoteIo {
         // A station has started this cycle, whether its turn is received or not.
         self.count_votes(now, self.own_stations().max(1));
         self.sample(now);
+        self.begin_pair_cycle(now);
     }
 
     /// Whether the current cycle took no time, and is one of those that this remote I/O finds in its buffers after it was suspended: its deadline is
@@ -374,6 +393,7 @@ impl RemoteIo {
         self.member.close_cycle();
         self.holders.close_cycle();
         self.writing.close_cycle();
+        self.close_pair_cycle();
         if let Some(run) = self.knowledge.run_mut() {
             run.sampled = false;
         }
@@ -402,6 +422,7 @@ impl RemoteIo {
         let passed = self.periods_late(now);
         self.deadline = Deadline::Passed { idle: idle.saturating_add(1).saturating_add(passed) };
         self.count_votes(now, self.own_stations());
+        self.end_pair_deadline(now);
     }
 
     /// Counts the stations with its configuration.
@@ -420,55 +441,12 @@ fn own_holding(body: &Body, program: ProgramId) -> Option<&Holding> {
     }
 }
 
-/// Two remote I/Os of equal settings that are drained and hash alike go on alike.
-impl Hash for RemoteIo {
-    fn hash<H: Hasher>(&self, hasher: &mut H) {
-        let Self {
-            settings: _,
-            member,
-            holders,
-            knowledge,
-            question,
-            authority,
-            sensors,
-            field,
-            // Only said with the outputs.
-            sampled_at: _,
-            diagnosing,
-            diagnosed,
-            looked,
-            protection,
-            resumed,
-            forcing,
-            writing,
-            signals,
-            noting,
-            turns,
-            deadline,
-            missed,
-            applied,
-            last_true,
-            descent,
-            program,
-            trust,
-            differed,
-            wanted,
-            prepared,
-        } = self;
-        (member, holders, knowledge, question, authority).hash(hasher);
-        (sensors, field, diagnosing, diagnosed, forcing).hash(hasher);
-        (writing, signals, noting).hash(hasher);
-        (looked, resumed, protection, turns, deadline, missed, applied).hash(hasher);
-        (last_true, descent, program, trust, differed).hash(hasher);
-        (wanted, prepared).hash(hasher);
-    }
-}
-
 impl Machine for RemoteIo {
     type Event = Event;
 
     fn handle_input(&mut self, now: Time, input: Input<'_>) {
         self.note_sleep(now);
+        self.tend_pair(now);
         self.member.note_time(now);
         self.end_forces(now);
         match input {

@@ -52,6 +52,17 @@ pub struct Settings {
     pub stale_state: StaleState,
     /// Start after a power failure; `None` of a program that has no retentive variables.
     pub restart: Option<Restart>,
+    /// Where the program has a second remote I/O.
+    pub pair: Option<PairSettings>,
+}
+
+/// Configuration of one of two remote I/Os of a program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct PairSettings {
+    /// Whether this is the twin; the other one goes first where neither is the author.
+    pub is_twin: bool,
+    /// Cycles without the author after which the other one takes over: at least 1.
+    pub take_over_after: u32,
 }
 
 impl Settings {

@@ -307,8 +307,11 @@ impl Account {
             (Happening::Station(event), Some(Member::Station(station))) => {
                 self.station(station, event);
             }
-            (Happening::RemoteIo(event), Some(Member::RemoteIo(program))) => {
-                self.remote_io(program, event);
+            (
+                Happening::RemoteIo(event),
+                Some(member @ (Member::RemoteIo(program) | Member::Twin(program))),
+            ) => {
+                self.remote_io(member, program, event);
                 if let RemoteIoEvent::Applied { moment, .. } = event
                     && let Some(number) = self.numbering.of(*moment)
                 {
@@ -325,7 +328,10 @@ impl Account {
             ) => {
                 self.timed.insert(program, (*sample_to_output, *wakeups));
             }
-            (Happening::Host(HostEvent::Ready { .. }), Some(Member::RemoteIo(program))) => {
+            (
+                Happening::Host(HostEvent::Ready { .. }),
+                Some(Member::RemoteIo(program) | Member::Twin(program)),
+            ) => {
                 if let Some(referee) = self.terms.referees.get_mut(program.index()) {
                     referee.starts_again();
                 }

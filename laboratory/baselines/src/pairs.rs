@@ -229,7 +229,10 @@ impl Pairs {
                             account.two_masters += u64::from(standby && deadline.drivers > 1);
                             account.differing += u64::from(deadline.differ);
                         }
-                        Output::Retain(_) | Output::Answer(_) | Output::Obeyed(_) => {}
+                        Output::Retain(_)
+                        | Output::Connect(_)
+                        | Output::Answer(_)
+                        | Output::Obeyed(_) => {}
                     }
                 }
             }
@@ -248,6 +251,7 @@ impl Pairs {
                         }
                         Output::Report(Event::SteppedDown)
                         | Output::Drive { .. }
+                        | Output::Connect(_)
                         | Output::Answer(_)
                         | Output::Obeyed(_)
                         | Output::Retain(_) => {}

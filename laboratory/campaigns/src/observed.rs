@@ -163,7 +163,7 @@ fn sign(record: &Record) -> Option<Sign> {
         | (Happening::RemoteIo(RemoteIo::Stalled { .. }), _) => Some(Sign::Stalled),
         (
             Happening::RemoteIo(RemoteIo::Applied { source, .. }),
-            Some(Member::RemoteIo(program)),
+            Some(Member::RemoteIo(program) | Member::Twin(program)),
         ) => Some(Sign::Applied(program, *source)),
         (Happening::Run(RunEvent::Fault { action, member: Member::Station(rank), .. }), _)
             if Process::after(*action).is_some_and(|process| !process.is_running()) =>

@@ -2,6 +2,7 @@
 
 mod never_back;
 mod nothing_wrong;
+mod one_author;
 mod one_station_costs_nothing;
 mod only_held_or_safe;
 mod protection_comes_back;
@@ -32,10 +33,11 @@ pub struct Property {
 }
 
 /// All of them.
-pub const ALL: [Property; 5] = [
+pub const ALL: [Property; 6] = [
     nothing_wrong::PROPERTY,
     only_held_or_safe::PROPERTY,
     never_back::PROPERTY,
+    one_author::PROPERTY,
     one_station_costs_nothing::PROPERTY,
     protection_comes_back::PROPERTY,
 ];

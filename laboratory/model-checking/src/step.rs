@@ -24,6 +24,8 @@ pub struct Budget {
     pub crashes: u8,
     /// Members that stand still; each may go on at any later slot.
     pub stops: u8,
+    /// Cuts of the network into two parts; each may be healed at any later slot.
+    pub cuts: u8,
     /// All of them together.
     pub total: u8,
     /// Cycles in which anything may be done.
@@ -67,6 +69,16 @@ pub enum Step {
     Stop(Member),
     /// It goes on.
     Continue(Member),
+    /// The network is cut into two parts, which do not receive each other.
+    Cut {
+        /// The members of one part, as bits in the order of the model.
+        side: u32,
+    },
+    /// The network is one again.
+    Heal {
+        /// The part that was cut off.
+        side: u32,
+    },
     /// The next slot begins.
     Wait,
 }
@@ -90,15 +102,38 @@ impl Place {
     }
 }
 
-/// Everybody who is down, and whether it has crashed, comes back at `place`.
-pub(crate) fn revivals(down: &[(Member, bool)], place: Place) -> Vec<Fault> {
+/// The pairs of members that are on different sides of a cut, in each direction.
+fn separated(side: u32, members: &[Member]) -> impl Iterator<Item = (Member, Member)> + '_ {
+    let is_in = move |place: usize| side >> place & 1 == 1;
+    let pairs = members
+        .iter()
+        .enumerate()
+        .flat_map(move |from| members.iter().enumerate().map(move |to| (from, to)));
+    let apart = pairs.filter(move |((from, _), (to, _))| is_in(*from) != is_in(*to));
+    apart.map(|((_, from), (_, to))| (*from, *to))
+}
+
+/// All members that are down, and whether they have crashed, come back at `place`, and a cut is healed.
+pub(crate) fn revivals(
+    down: &[(Member, bool)],
+    cut: Option<u32>,
+    place: Place,
+    members: &[Member],
+) -> Vec<Fault> {
     let back = |&(member, crashed): &(Member, bool)| Fault {
         at_cycle: place.cycle,
         phase: place.phase(),
         member,
         action: if crashed { Action::Restart } else { Action::Continue },
     };
-    down.iter().map(back).collect()
+    let heal = |(from, to): (Member, Member)| Fault {
+        at_cycle: place.cycle,
+        phase: place.phase(),
+        member: from,
+        action: Action::Heal { to },
+    };
+    let healed = cut.into_iter().flat_map(|side| separated(side, members).map(heal));
+    down.iter().map(back).chain(healed).collect()
 }
 
 /// The faults that a step at `place` is; nothing for waiting. `members` are all of the cluster.
@@ -131,6 +166,15 @@ pub(crate) fn faults(step: Step, place: Place, members: &[Member], period: Durat
         Step::Restart(member) => vec![fault(place, member, Action::Restart)],
         Step::Stop(member) => vec![fault(place, member, Action::Stop)],
         Step::Continue(member) => vec![fault(place, member, Action::Continue)],
+        Step::Cut { side } | Step::Heal { side } => {
+            let is_cut = matches!(step, Step::Cut { .. });
+            separated(side, members)
+                .map(|(from, to)| {
+                    let action = if is_cut { Action::Cut { to } } else { Action::Heal { to } };
+                    fault(place, from, action)
+                })
+                .collect()
+        }
         Step::Wait => Vec::new(),
     }
 }

@@ -37,6 +37,8 @@ pub struct World {
     pub(crate) down: Vec<(Member, bool)>,
     /// Who has been down.
     pub(crate) was_down: Vec<Member>,
+    /// One part of the network, where it is cut.
+    pub(crate) cut: Option<u32>,
     /// The last step since the slot began: things that are done at one time are done in one order only.
     last: Option<Step>,
 }
@@ -50,7 +52,9 @@ impl Model {
         let stations = (0..parts.stations.len()).map(|rank| Member::Station(StationId(rank as u8)));
         let programs = 0..parts.remote_ios.len();
         let remote_ios = programs.map(|program| Member::RemoteIo(ProgramId(program as u8)));
-        let members = stations.chain(remote_ios).collect();
+        let paired = parts.remote_ios.iter().filter(|settings| settings.pair.is_some());
+        let twins = paired.map(|settings| Member::Twin(settings.program));
+        let members = stations.chain(remote_ios).chain(twins).collect();
         let period = parts.stations[0].agreement.schedule.period();
         let mut origin = Simulation::new(parts, Self::network(period), 0);
         origin.run(1, PATIENCE_CYCLES, &mut |_, _, _, _| {})?;
@@ -79,6 +83,7 @@ impl Model {
 
     /// The faults that a path of steps is, in the order in which they have to be scheduled.
     pub fn faults(&self, steps: &[Step]) -> Vec<Fault> {
+        let mut cut = None;
         let mut place = self.first();
         let mut all = self.start.faults();
         let mut down: Vec<(Member, bool)> = Vec::new();
@@ -92,12 +97,14 @@ impl Model {
                 Step::Restart(member) | Step::Continue(member) => {
                     down.retain(|&(other, _)| other != member);
                 }
+                Step::Cut { side } => cut = Some(side),
+                Step::Heal { .. } => cut = None,
                 _ => {}
             }
         }
         // Who is still down where the run is over comes back, as for the property that protection does.
         if place.cycle >= self.last_cycle() {
-            all.extend(revivals(&down, place));
+            all.extend(revivals(&down, cut, place, &self.members));
         }
         all
     }
@@ -132,7 +139,8 @@ impl World {
             Step::Twice { .. } => &mut used.duplicates,
             Step::Crash(_) => &mut used.crashes,
             Step::Stop(_) => &mut used.stops,
-            Step::Restart(_) | Step::Continue(_) | Step::Wait => return,
+            Step::Cut { .. } => &mut used.cuts,
+            Step::Restart(_) | Step::Continue(_) | Step::Heal { .. } | Step::Wait => return,
         };
         *spent += 1;
         used.total += 1;
@@ -153,6 +161,7 @@ impl stateright::Model for Model {
             used: Budget::default(),
             down: Vec::new(),
             was_down: self.start.members().collect(),
+            cut: None,
             last: None,
         }]
     }
@@ -166,6 +175,7 @@ impl stateright::Model for Model {
         for &(member, crashed) in &world.down {
             steps.push(if crashed { Step::Restart(member) } else { Step::Continue(member) });
         }
+        steps.extend(world.cut.map(|side| Step::Heal { side }));
         if used.total < budget.total {
             let senders = self.senders(world);
             for &from in &senders {
@@ -187,6 +197,11 @@ impl stateright::Model for Model {
             }
             if used.duplicates < budget.duplicates {
                 steps.extend(self.members.iter().map(|&from| Step::Twice { from }));
+            }
+            if used.cuts < budget.cuts && world.cut.is_none() {
+                // A side and the other one are one cut.
+                let sides = 1..1_u32 << (self.members.len() - 1);
+                steps.extend(sides.map(|side| Step::Cut { side }));
             }
             for &member in self.members.iter().filter(|&&member| !is_down(member)) {
                 if used.crashes < budget.crashes {
@@ -216,6 +231,8 @@ impl stateright::Model for Model {
             Step::Restart(member) | Step::Continue(member) => {
                 next.down.retain(|&(down, _)| down != member);
             }
+            Step::Cut { side } => next.cut = Some(side),
+            Step::Heal { .. } => next.cut = None,
             Step::Wait => {
                 next.last = None;
                 next.place = world.place.next();
@@ -235,8 +252,9 @@ impl stateright::Model for Model {
 
 impl Hash for World {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
-        let Self { simulation, place, used, down, was_down, last } = self;
+        let Self { simulation, place, used, down, was_down, cut, last } = self;
         (simulation, place, used, down, was_down, last).hash(hasher);
+        cut.hash(hasher);
         let untrue = |tally: &understudy_simulator::Tally| tally.held + tally.fail_safe > 0;
         simulation.tallies().iter().any(untrue).hash(hasher);
     }

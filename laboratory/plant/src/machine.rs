@@ -134,8 +134,8 @@ impl PlantMachine {
             return;
         }
         match (&frame.body, header.sender) {
-            (Body::Actuation(actuation), Member::RemoteIo(program))
-                if program == self.settings.program =>
+            (Body::Actuation(actuation), sender)
+                if sender.sampled_program() == Some(self.settings.program) =>
             {
                 self.drive(now, header, &actuation.outputs);
             }

@@ -67,7 +67,7 @@ impl Laboratory<'_> {
         let still = process.is_some_and(Process::is_suspended);
         let already = |is| Refusal::Already { name: name(), is };
         let wrong = |needs| Refusal::WrongMember { name: name(), needs };
-        let remote_io = matches!(member, Member::RemoteIo(_));
+        let remote_io = member.sampled_program().is_some();
         match command {
             Command::Restart if running => Some(Refusal::Running(name())),
             Command::Restart => None,
@@ -145,10 +145,11 @@ impl Laboratory<'_> {
 
     async fn cut_all(&mut self, member: Member, cut: bool) -> Result<Done, Refusal> {
         let all: Vec<Member> = self.account.terms.members.iter().map(|(p, _)| p).collect();
-        let stations_only = matches!(member, Member::RemoteIo(_));
+        let stations_only = matches!(member, Member::RemoteIo(_))
+            && !all.iter().any(|it| Some(*it) == member.partner());
         let others = all.into_iter().filter(|&other| match other {
             Member::Station(_) => other != member,
-            Member::RemoteIo(_) => !stations_only,
+            Member::RemoteIo(_) | Member::Twin(_) => !stations_only && other != member,
             Member::Plant(_) => false,
         });
         for other in others {

@@ -29,7 +29,7 @@ impl Laboratory<'_> {
         command
             .arg(match member {
                 Member::Station(_) => "node",
-                Member::RemoteIo(_) => "remote-io",
+                Member::RemoteIo(_) | Member::Twin(_) => "remote-io",
                 Member::Plant(_) => "plant",
             })
             .arg(&self.settings.cluster_file)

@@ -344,7 +344,7 @@ fn hosts_of(members: &[Member]) -> BTreeMap<Member, usize> {
     for &member in members {
         let beside = match member {
             Member::Plant(program) => host_of.get(&Member::RemoteIo(program)).copied(),
-            Member::Station(_) | Member::RemoteIo(_) => None,
+            Member::Station(_) | Member::RemoteIo(_) | Member::Twin(_) => None,
         };
         let next = host_of.values().max().map_or(0, |last: &usize| last + 1);
         host_of.insert(member, beside.unwrap_or(next));

@@ -18,6 +18,7 @@ const RETAIN_EVERY: u32 = 8;
 pub(crate) struct Disks {
     stations: Vec<Vec<RetainedRun>>,
     remote_ios: Vec<Option<Note>>,
+    twins: Vec<Option<Note>>,
     /// Remote I/Os whose notes cannot be read.
     damaged: ProgramSet,
     /// The configurations of members that have loaded an online change.
@@ -29,6 +30,7 @@ impl Disks {
         Self {
             stations: vec![Vec::new(); stations],
             remote_ios: vec![None; remote_ios],
+            twins: vec![None; remote_ios],
             damaged: ProgramSet::EMPTY,
             changed: BTreeMap::new(),
         }
@@ -70,12 +72,16 @@ impl Disks {
         change: Option<&Arc<OnlineChange>>,
     ) -> RemoteIo {
         let program = settings.program;
-        let note = self.remote_ios[program.index()].clone();
+        let is_twin = settings.pair.is_some_and(|pair| pair.is_twin);
+        let notes = if is_twin { &self.twins } else { &self.remote_ios };
+        let note = notes[program.index()].clone();
+        let is_damaged = !is_twin && self.damaged.contains(program);
+        let member = if is_twin { Member::Twin(program) } else { Member::RemoteIo(program) };
         let mut machine = RemoteIo::new(now, settings);
-        if let Some((change, configurations)) = self.changed_of(Member::RemoteIo(program), change) {
+        if let Some((change, configurations)) = self.changed_of(member, change) {
             machine = machine.changed(change, configurations);
         }
-        machine.noting(note, self.damaged.contains(program))
+        machine.noting(note, is_damaged)
     }
 
     /// A member keeps a record.
@@ -101,6 +107,9 @@ impl Disks {
             (Member::RemoteIo(program), Retained::Note(note)) => {
                 self.remote_ios[program.index()] = Some(note);
                 self.damaged.remove(program);
+            }
+            (Member::Twin(program), Retained::Note(note)) => {
+                self.twins[program.index()] = Some(note);
             }
             _ => {}
         }

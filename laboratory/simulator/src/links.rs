@@ -12,8 +12,8 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use smallvec::SmallVec;
 use understudy_wire::{
-    Body, Frame, Image, Member, ProgramSet, Roster, StationId, StationSet, Time, Via, decode,
-    encode,
+    Audience, Body, Frame, Image, Member, ProgramSet, Roster, StationId, StationSet, Time, Via,
+    decode, encode,
 };
 
 use crate::fault::Action;
@@ -64,8 +64,7 @@ pub struct Metered {
 #[derive(Debug, Clone, Default)]
 struct Sender {
     /// Who does not hear it.
-    deaf_stations: StationSet,
-    deaf_remote_ios: ProgramSet,
+    deaf: Audience,
     /// Who hears it later, by place, and by how much.
     delays: Vec<(usize, Duration)>,
     corrupt: u16,
@@ -111,12 +110,12 @@ impl Links {
             queue: Queue::default(),
             stations: StationSet::first(stations),
             remote_ios: ProgramSet::first(remote_ios),
-            senders: vec![Sender::default(); stations + remote_ios],
+            senders: vec![Sender::default(); stations + 2 * remote_ios],
             intakes: vec![Flips::default(); stations],
-            late: vec![Duration::ZERO; stations + remote_ios],
+            late: vec![Duration::ZERO; stations + 2 * remote_ios],
             anybody_late: false,
             networks: if has_two_networks { &Via::BOTH } else { &[Via::First] },
-            unplugged: vec![[false; 2]; stations + remote_ios],
+            unplugged: vec![[false; 2]; stations + 2 * remote_ios],
             remembers: false,
             refused: 0,
             metered: None,
@@ -133,11 +132,7 @@ impl Links {
         let (Some(sender), Some(receiver)) = (self.place(from), self.place(to)) else {
             return false;
         };
-        let deaf = match to {
-            Member::Station(station) => self.senders[sender].deaf_stations.contains(station),
-            Member::RemoteIo(program) => self.senders[sender].deaf_remote_ios.contains(program),
-            Member::Plant(_) => true,
-        };
+        let deaf = self.senders[sender].deaf.contains(to);
         let delays = &self.senders[sender].delays;
         let late = delays.iter().any(|(place, _)| *place == receiver);
         let slow = |place: usize| !self.late[place].is_zero();
@@ -197,13 +192,9 @@ impl Links {
         match action {
             Action::Cut { to } | Action::Heal { to } => {
                 let sender = &mut self.senders[place];
-                let cut = matches!(action, Action::Cut { .. });
-                match to {
-                    Member::Station(station) if cut => sender.deaf_stations.insert(station),
-                    Member::Station(station) => sender.deaf_stations.remove(station),
-                    Member::RemoteIo(program) if cut => sender.deaf_remote_ios.insert(program),
-                    Member::RemoteIo(program) => sender.deaf_remote_ios.remove(program),
-                    Member::Plant(_) => {}
+                match action {
+                    Action::Cut { .. } => sender.deaf = sender.deaf.or(Audience::only(to)),
+                    _ => sender.deaf = sender.deaf.without(Audience::only(to)),
                 }
             }
             Action::Unplug { network } => self.unplugged[place][network.index()] = true,
@@ -290,6 +281,11 @@ impl Links {
                 let is_there = self.remote_ios.contains(program);
                 is_there.then(|| self.stations.len() + program.index())
             }
+            Member::Twin(program) => {
+                let is_there = self.remote_ios.contains(program);
+                let before = self.stations.len() + self.remote_ios.len();
+                is_there.then(|| before + program.index())
+            }
             Member::Plant(_) => None,
         }
     }
@@ -325,21 +321,20 @@ impl Links {
 
     fn carry(&mut self, now: Time, place: usize, frame: Arc<Frame>) {
         let sender = &self.senders[place];
-        let mut stations = self.stations.without(sender.deaf_stations);
-        let mut remote_ios = self.remote_ios.without(sender.deaf_remote_ios);
         let topic = self.roster.topic(&frame);
         let audience = self.roster.audience(topic, frame.header.sender);
-        stations = stations.and(audience.stations);
-        remote_ios = remote_ios.and(audience.remote_ios);
+        let mut to = audience.without(sender.deaf);
+        // Plants are not on the network.
+        to.plants = ProgramSet::EMPTY;
         if let Body::Transfer(transfer) = &frame.body {
-            stations = stations.and(StationSet::only(transfer.to));
-            remote_ios = ProgramSet::EMPTY;
+            let only = to.stations.and(StationSet::only(transfer.to));
+            to = Audience { stations: only, ..Audience::default() };
         }
         if let Some(metered) = &mut self.metered {
             let mut bytes = Vec::new();
             // What cannot be encoded is no frame of a member.
             let _ = encode(&frame, &mut bytes);
-            let receivers = (stations.len() + remote_ios.len()) as u64;
+            let receivers = to.members().count() as u64;
             metered.frames += receivers;
             metered.bytes += receivers * bytes.len() as u64;
         }
@@ -347,17 +342,13 @@ impl Links {
         let is_even = self.network.is_even() && self.network.over.is_none();
         if is_even && !self.anybody_late && sender.delays.is_empty() && all_plugged {
             let at = now + self.network.latency;
-            self.queue.push(at, frame, stations, remote_ios);
+            self.queue.push(at, frame, to);
             return;
         }
-        for station in stations.iter() {
-            let (only, none) = (StationSet::only(station), ProgramSet::EMPTY);
-            self.carry_to(now, (place, station.index()), &frame, only, none);
-        }
-        for program in remote_ios.iter() {
-            let (only, none) = (ProgramSet::only(program), StationSet::EMPTY);
-            let receiver = self.stations.len() + program.index();
-            self.carry_to(now, (place, receiver), &frame, none, only);
+        for member in to.members() {
+            if let Some(receiver) = self.place(member) {
+                self.carry_to(now, (place, receiver), &frame, Audience::only(member));
+            }
         }
     }
 
@@ -366,8 +357,7 @@ impl Links {
         now: Time,
         (sender, receiver): (usize, usize),
         frame: &Arc<Frame>,
-        stations: StationSet,
-        remote_ios: ProgramSet,
+        to: Audience,
     ) {
         let delays = self.senders[sender].delays.iter();
         let late = delays.filter(|(to, _)| *to == receiver).map(|(_, by)| *by);
@@ -391,7 +381,7 @@ impl Links {
             copies.truncate(1);
         }
         for (at, frame) in copies {
-            self.queue.push(at, frame, stations, remote_ios);
+            self.queue.push(at, frame, to);
         }
     }
 }
@@ -420,7 +410,7 @@ impl Hash for Links {
         } = self;
         (queue, intakes, late, unplugged).hash(hasher);
         for sender in senders {
-            (sender.deaf_stations, sender.deaf_remote_ios).hash(hasher);
+            sender.deaf.hash(hasher);
             (&sender.delays, sender.corrupt, sender.samples, sender.words).hash(hasher);
             sender.sent.hash(hasher);
         }

@@ -12,7 +12,7 @@ use understudy_wire::{Configurations, Epoch, Member, ProgramId, Roster, StationI
 pub struct Parts {
     /// By rank.
     pub stations: Vec<understudy_node::Settings>,
-    /// By program.
+    /// By program; a second one has the settings of the first.
     pub remote_ios: Vec<understudy_remote_io::Settings>,
     /// By program; one without a plant sees zeros.
     pub plants: Vec<Option<Plant>>,
@@ -41,7 +41,9 @@ impl Parts {
             let sources = reader.signals.iter().map(|signal| signal.from);
             sources.map(|source| (Member::RemoteIo(source), Member::RemoteIo(reader.program)))
         });
-        Roster::new(self.remote_ios.len(), self.stations.len(), pairs.collect())
+        let paired = self.remote_ios.iter().filter(|settings| settings.pair.is_some());
+        let twins = paired.map(|settings| settings.program).collect();
+        Roster::new(self.remote_ios.len(), self.stations.len(), pairs.collect()).with_twins(twins)
     }
 }
 

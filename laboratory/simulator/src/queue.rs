@@ -5,7 +5,7 @@ use std::collections::{BinaryHeap, VecDeque};
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
-use understudy_wire::{Frame, ProgramSet, StationSet, Time};
+use understudy_wire::{Audience, Frame, Time};
 
 /// A frame and all who hear it at one time.
 #[derive(Debug, Clone)]
@@ -13,8 +13,7 @@ pub(crate) struct Delivery {
     pub(crate) at: Time,
     order: u64,
     pub(crate) frame: Arc<Frame>,
-    pub(crate) stations: StationSet,
-    pub(crate) remote_ios: ProgramSet,
+    pub(crate) to: Audience,
 }
 
 /// Where every frame takes equally long, they arrive as they were sent and a plain queue serves; others are sorted.
@@ -26,15 +25,9 @@ pub(crate) struct Queue {
 }
 
 impl Queue {
-    pub(crate) fn push(
-        &mut self,
-        at: Time,
-        frame: Arc<Frame>,
-        stations: StationSet,
-        remote_ios: ProgramSet,
-    ) {
+    pub(crate) fn push(&mut self, at: Time, frame: Arc<Frame>, to: Audience) {
         self.sent += 1;
-        let delivery = Delivery { at, order: self.sent, frame, stations, remote_ios };
+        let delivery = Delivery { at, order: self.sent, frame, to };
         if self.even.back().is_none_or(|last| last.at <= at) {
             self.even.push_back(delivery);
         } else {
@@ -88,7 +81,7 @@ impl Hash for Queue {
         let mut deliveries: Vec<&Delivery> = self.even.iter().chain(&self.uneven).collect();
         deliveries.sort_unstable_by_key(|delivery| (delivery.at, delivery.order));
         for delivery in deliveries {
-            (delivery.at, &delivery.frame, delivery.stations, delivery.remote_ios).hash(hasher);
+            (delivery.at, &delivery.frame, delivery.to).hash(hasher);
         }
     }
 }
@@ -119,7 +112,7 @@ mod tests {
             let times: Vec<u64> = (0..5).map(|place| times / 4_u64.pow(place) % 4).collect();
             let mut queue = Queue::default();
             for &time in &times {
-                queue.push(Time(time), Arc::clone(&frame), StationSet::EMPTY, ProgramSet::EMPTY);
+                queue.push(Time(time), Arc::clone(&frame), Audience::default());
             }
             let mut expected: Vec<(u64, u64)> = times.iter().copied().zip(1..).collect();
             expected.sort_unstable();

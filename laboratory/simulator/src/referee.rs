@@ -21,6 +21,7 @@
 //! stations, reports one that was not necessary.
 
 mod descent;
+mod pair;
 mod steps;
 mod unrecorded;
 mod violation;
@@ -35,6 +36,7 @@ use understudy_remote_io::{Event, Ramp, Settings};
 use understudy_wire::{Image, Lineage, Moment, PointValue, ProgramHash, ProgramId, Source, Step};
 
 use descent::Descent;
+use pair::Pair;
 use unrecorded::Unrecorded;
 pub use violation::Violation;
 
@@ -80,6 +82,7 @@ pub struct Referee {
     /// How often the records of a remote I/O that was killed did not suffice.
     gaps: u64,
     unrecorded: Unrecorded,
+    pair: Pair,
     /// Samples for which the program may go on from a state that the operator has chosen.
     choice: u32,
     cold_starts: u64,
@@ -108,7 +111,7 @@ impl Hash for Referee {
         if !self.ramps.is_empty() {
             self.descent.hash(hasher);
         }
-        (self.held, self.blind, self.choice, self.applied).hash(hasher);
+        (self.held, self.blind, self.choice, self.applied, &self.pair).hash(hasher);
     }
 }
 
@@ -135,6 +138,7 @@ impl Referee {
             unjudged: None,
             gaps: 0,
             unrecorded: Unrecorded::new(settings.sourced_bits()),
+            pair: Pair::default(),
             choice: 0,
             cold_starts: 0,
             applied: false,

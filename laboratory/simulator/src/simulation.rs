@@ -6,6 +6,7 @@
 mod disturbance;
 mod identity;
 mod judging;
+mod pairs;
 mod spares;
 
 use std::sync::Arc;
@@ -16,12 +17,12 @@ use understudy_cycle::{Input, Machine, Output, RemoteIoInput};
 use understudy_node::Station;
 use understudy_remote_io::RemoteIo;
 use understudy_wire::{
-    Configurations, Epoch, Field, Frame, Header, Member, ProgramId, ProgramSet, StateChoice,
+    Audience, Configurations, Epoch, Field, Frame, Header, Member, ProgramId, ProgramSet,
     StationId, StationSet, Time, Write,
 };
 
 use crate::disk::Disks;
-use crate::fault::{Action, Fault};
+use crate::fault::Fault;
 use crate::field::Plants;
 use crate::links::{Links, Metered};
 use crate::network::{Disturbance, Network};
@@ -30,11 +31,12 @@ use crate::parts::Parts;
 use crate::queue::Delivery;
 use crate::referee::{Referee, Violation};
 use crate::signals::SignalReferee;
-use crate::slot::Slot;
+use crate::slot::{NEVER, Slot};
 use crate::spares::SpareBeside;
 use crate::tally::Tally;
 use crate::wakeups::Wakeups;
 use judging::{Misled, Synchronised};
+use pairs::twin_of;
 
 /// Something for the journal.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -75,6 +77,10 @@ pub struct Simulation {
     now: Time,
     stations: Vec<Slot<Station>>,
     remote_ios: Vec<Slot<RemoteIo>>,
+    /// The second remote I/O of each program that has one.
+    twins: Vec<Option<Slot<RemoteIo>>>,
+    /// For each program, which remote I/O drove its outputs last, and when.
+    driven_by: Vec<Option<(Member, Time)>>,
     wakeups: Wakeups,
     plants: Plants,
     disks: Disks,
@@ -138,7 +144,14 @@ impl Simulation {
             })
             .collect();
         let due = stations.iter().map(Slot::due);
-        let due = due.chain(remote_ios.iter().map(Slot::due)).collect();
+        let twins = parts.remote_ios.iter();
+        let twins = twins.map(|settings| {
+            Some(Slot::new(disks.remote_io(now, twin_of(settings)?, parts.change.as_ref())))
+        });
+        let twins: Vec<_> = twins.collect();
+        let due = due.chain(remote_ios.iter().map(Slot::due));
+        let due = due.chain(twins.iter().map(|twin| twin.as_ref().map_or(NEVER, Slot::due)));
+        let due = due.collect();
         let mut simulation = Self {
             links: Links::new(
                 (parts.stations.len(), parts.remote_ios.len()),
@@ -147,9 +160,11 @@ impl Simulation {
                 seed,
             ),
             now,
-            wakeups: Wakeups::new(stations.len(), due),
+            wakeups: Wakeups::new(stations.len(), remote_ios.len(), due),
             stations,
+            driven_by: vec![None; remote_ios.len()],
             remote_ios,
+            twins,
             plants: Plants::new(&parts),
             disks,
             referees,
@@ -300,28 +315,6 @@ impl Simulation {
         &self.tallies
     }
 
-    /// Programs of which the operator has to choose the state that they continue from.
-    pub fn asking(&self) -> ProgramSet {
-        let programs = (0..).map(ProgramId).zip(&self.remote_ios);
-        let asking =
-            programs.filter(|(_, slot)| slot.running().is_some_and(RemoteIo::asks_operator));
-        asking.map(|(program, _)| program).collect()
-    }
-
-    /// Lets the operator answer where a state is lost, now: the newest available state, or a cold start where no station holds one.
-    pub fn let_operator_choose(&mut self) {
-        let choices = [StateChoice::Newest { cycle: None }, StateChoice::Cold];
-        for (program, choice) in self.asking().iter().flat_map(|it| choices.map(|one| (it, one))) {
-            // The second one is refused where the first was taken.
-            self.schedule(Fault {
-                at_cycle: 0,
-                phase: 0.0,
-                member: Member::RemoteIo(program),
-                action: Action::Choose { choice },
-            });
-        }
-    }
-
     /// Everything that must never happen and did.
     pub fn violations(&self) -> &[Violation] {
         &self.violations
@@ -388,17 +381,20 @@ impl Simulation {
     }
 
     fn deliver(&mut self, delivery: &Delivery, observe: &mut Observe<'_>) {
-        for station in delivery.stations.iter() {
+        for station in delivery.to.stations.iter() {
             let changed = self.links.take_in(station, &delivery.frame);
             let frame = changed.as_ref().unwrap_or(&delivery.frame);
             self.give(Member::Station(station), Input::Frame(frame), observe);
         }
-        for program in delivery.remote_ios.iter() {
-            let is_running = self.remote_ios[program.index()].running().is_some();
-            if let (Member::Station(station), true) = (delivery.frame.header.sender, is_running) {
+        let remote_ios = Audience { stations: StationSet::EMPTY, ..delivery.to };
+        for member in remote_ios.members() {
+            if let (Member::Station(station), Some(program)) =
+                (delivery.frame.header.sender, member.sampled_program())
+                && self.author(program) == Some(member)
+            {
                 self.arrived[program.index()][0].insert(station);
             }
-            self.give(Member::RemoteIo(program), Input::Frame(&delivery.frame), observe);
+            self.give(member, Input::Frame(&delivery.frame), observe);
         }
     }
 
@@ -411,11 +407,15 @@ impl Simulation {
                     self.drain_station(station, observe);
                 }
             }
-            Member::RemoteIo(program) => {
-                let slot = &mut self.remote_ios[program.index()];
-                if slot.give(self.now, input) {
-                    self.wakeups.set(member, slot.due());
-                    self.drain_remote_io(program, observe);
+            Member::RemoteIo(program) | Member::Twin(program) => {
+                let now = self.now;
+                let Some(slot) = self.remote_io_slot(member) else {
+                    return;
+                };
+                if slot.give(now, input) {
+                    let due = slot.due();
+                    self.wakeups.set(member, due);
+                    self.drain_remote_io(member, program, observe);
                 }
             }
             Member::Plant(_) => {}
@@ -434,7 +434,10 @@ impl Simulation {
                     observe(self.now, self.pace.cycle(), member, Record::Station(&event));
                 }
                 Output::Retain(record) => self.disks.write(member, record),
-                Output::Drive { .. } | Output::Answer(_) | Output::Obeyed(_) => {}
+                Output::Drive { .. }
+                | Output::Connect(_)
+                | Output::Answer(_)
+                | Output::Obeyed(_) => {}
             }
         }
     }
@@ -443,12 +446,12 @@ impl Simulation {
         self.stations[station.index()].machine()?.poll_output()
     }
 
-    fn drain_remote_io(&mut self, program: ProgramId, observe: &mut Observe<'_>) {
-        let member = Member::RemoteIo(program);
-        while let Some(output) = self.poll_remote_io(program) {
+    fn drain_remote_io(&mut self, member: Member, program: ProgramId, observe: &mut Observe<'_>) {
+        while let Some(output) = self.poll_remote_io(member) {
             match output {
                 Output::Send(frame) => self.send(frame),
                 Output::Drive { outputs, .. } => {
+                    self.note_driver(member, program, observe);
                     self.plants.drive(program, &outputs);
                     if let Some(field) = self.plants.field(program) {
                         let plant = Member::Plant(program);
@@ -456,11 +459,13 @@ impl Simulation {
                     }
                     self.show_field(program);
                 }
+                Output::Connect(true) => self.show_field(program),
+                Output::Connect(false) => {}
                 Output::Report(event) => {
                     if let understudy_remote_io::Event::Configured(configurations) = event {
                         self.disks.configure(member, configurations);
                     }
-                    self.judge(program, &event, observe);
+                    self.judge(member, program, &event, observe);
                     self.show_spares(program, &event);
                     observe(self.now, self.pace.cycle(), member, Record::RemoteIo(&event));
                 }
@@ -471,11 +476,8 @@ impl Simulation {
         }
     }
 
-    fn poll_remote_io(
-        &mut self,
-        program: ProgramId,
-    ) -> Option<Output<understudy_remote_io::Event>> {
-        self.remote_ios[program.index()].machine()?.poll_output()
+    fn poll_remote_io(&mut self, member: Member) -> Option<Output<understudy_remote_io::Event>> {
+        self.remote_io_slot(member)?.machine()?.poll_output()
     }
 
     fn show_field(&mut self, program: ProgramId) {
@@ -484,6 +486,10 @@ impl Simulation {
             let sensors = RemoteIoInput::Field(&field.sensors);
             slot.give(self.now, Input::RemoteIo(sensors));
             self.wakeups.set(Member::RemoteIo(program), slot.due());
+            if let Some(twin) = &mut self.twins[program.index()] {
+                twin.give(self.now, Input::RemoteIo(sensors));
+                self.wakeups.set(Member::Twin(program), twin.due());
+            }
         }
     }
 

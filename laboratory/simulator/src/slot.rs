@@ -10,7 +10,7 @@ use understudy_wire::{Frame, Time};
 /// Frames that wait for a stopped member, at most, as in a socket's buffer; later ones are lost.
 const WAITING_FRAMES: usize = 256;
 
-const NEVER: Time = Time(u64::MAX);
+pub(crate) const NEVER: Time = Time(u64::MAX);
 
 #[derive(Debug, Clone, Hash)]
 pub(crate) struct Slot<M> {

@@ -26,6 +26,7 @@ fn member() -> impl Strategy<Value = Member> {
     prop_oneof![
         4 => (0..4_u8).prop_map(|rank| Member::Station(StationId(rank))),
         1 => (0..2_u8).prop_map(|program| Member::RemoteIo(ProgramId(program))),
+        1 => (0..2_u8).prop_map(|program| Member::Twin(ProgramId(program))),
     ]
 }
 
@@ -96,11 +97,20 @@ fn accuses(record: &Record<'_>) -> bool {
     }
 }
 
-fn check(mode: Mode, understudies: usize, troubles: &[Trouble], network: Network, seed: u64) {
+fn check(
+    (mode, understudies, twins): (Mode, usize, Option<u32>),
+    troubles: &[Trouble],
+    network: Network,
+    seed: u64,
+) {
     let quiet = Network { latency: network.latency, ..Network::default() };
     let ends = troubles.iter().map(|it| it.at_cycle + it.cycles + 50);
     let cycles = ends.fold(200, u64::max);
-    let mut simulation = Simulation::new(press_cell::parts(mode, understudies), quiet, seed);
+    let mut parts = press_cell::parts(mode, understudies);
+    if let Some(take_over_after) = twins {
+        press_cell::pair(&mut parts, take_over_after);
+    }
+    let mut simulation = Simulation::new(parts, quiet, seed);
     simulation.disturb(Disturbance { network, cycles: Some(0..200) });
     for trouble in troubles {
         let mut schedule = |at_cycle, action| {
@@ -147,10 +157,11 @@ proptest! {
         network in network(),
         understudies in 0..3_usize,
         paper in any::<bool>(),
+        twins in prop::option::of(1..4_u32),
         seed in any::<u64>(),
     ) {
         let mode = if paper { Mode::Paper } else { Mode::Full };
-        check(mode, understudies, &troubles, network, seed);
+        check((mode, understudies, twins), &troubles, network, seed);
     }
 }
 
@@ -184,5 +195,5 @@ fn a_state_whose_station_is_late_is_not_lost() {
         duplicate: 0.1218262537843947,
         ..Network::default()
     };
-    check(Mode::Full, 2, &troubles, network, 7891165348679592666);
+    check((Mode::Full, 2, None), &troubles, network, 7891165348679592666);
 }

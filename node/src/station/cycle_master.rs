@@ -6,7 +6,7 @@
 
 use std::time::Duration;
 
-use understudy_wire::{Body, Member, Moment, StationSet, Time};
+use understudy_wire::{Body, Moment, StationSet, Time};
 
 use super::{Company, CycleNotes, Role, Station, Token};
 use crate::event::Event;
@@ -64,7 +64,7 @@ impl Station {
         let bound = missing_after(agreement.schedule.period()).max(agreement.listen_cycles * 6);
         for (place, replica) in self.replicas.iter().enumerate() {
             let program = replica.id();
-            let is_sampled = self.has_sample(Member::RemoteIo(program));
+            let is_sampled = self.has_sample(program);
             let unsampled = &mut self.unsampled[place];
             if is_sampled {
                 if *unsampled >= bound {

@@ -13,7 +13,8 @@
 use std::sync::Arc;
 
 use understudy_wire::{
-    Body, Frame, Header, Holding, Member, ProgramSet, Recalled, Relayed, StationId, Turn, encode,
+    Body, Frame, Header, Holding, Member, ProgramId, ProgramSet, Recalled, Relayed, StationId,
+    Turn, encode,
 };
 
 use super::{Station, replica_mut};
@@ -21,9 +22,9 @@ use super::{Station, replica_mut};
 impl Station {
     /// Keeps a sample of this cycle for stations that lack it.
     pub(super) fn keep_sample(&mut self, frame: &Arc<Frame>) {
-        let is_new = !self.has_sample(frame.header.sender);
-        if let Body::Sample(sample) = &frame.body
-            && is_new
+        let program = frame.header.sender.sampled_program();
+        if let (Body::Sample(sample), Some(program)) = (&frame.body, program)
+            && !self.has_sample(program)
             && sample.is_intact()
         {
             self.cycle.samples.push(Arc::clone(frame));
@@ -35,11 +36,11 @@ impl Station {
         self.cycle.lacked = self.cycle.lacked.or(turn.lacks);
         for Relayed { program, sample } in &turn.relayed {
             self.cycle.relayed.insert(*program);
-            let sender = Member::RemoteIo(*program);
             let in_cluster = program.index() < self.settings.agreement.schedule.controllers();
-            if !in_cluster || self.has_sample(sender) {
+            if !in_cluster || self.has_sample(*program) {
                 continue;
             }
+            let sender = Member::RemoteIo(*program);
             let header = Header { sender, ..*header };
             let frame = Arc::new(Frame { header, body: Body::Sample(sample.clone()) });
             self.follow(*program, &frame, sample);
@@ -74,16 +75,14 @@ impl Station {
     pub(super) fn has_what_others_lack(&self) -> bool {
         let relayed_by_others = self.cycle.relayed;
         let mut awaited = self.awaited.without(relayed_by_others).iter();
-        awaited.all(|program| self.has_sample(Member::RemoteIo(program)))
+        awaited.all(|program| self.has_sample(program))
     }
 
     /// Ends a cycle: stations that lacked a sample in it are expected to lack it in the next one.
     pub(super) fn close_relay(&mut self) {
         self.lacked = self.cycle.lacked;
-        let had = self.cycle.samples.iter().filter_map(|frame| match frame.header.sender {
-            Member::RemoteIo(program) => Some(program),
-            _ => None,
-        });
+        let samples = self.cycle.samples.iter();
+        let had = samples.filter_map(|frame| frame.header.sender.sampled_program());
         self.awaited = self.lacked.and(had.collect());
     }
 
@@ -93,8 +92,8 @@ impl Station {
         let lacked = self.lacked.or(self.cycle.lacked).without(self.cycle.relayed);
         let samples = self.cycle.samples.iter();
         turn.relayed = samples
-            .filter_map(|frame| match (frame.header.sender, &frame.body) {
-                (Member::RemoteIo(program), Body::Sample(sample)) if lacked.contains(program) => {
+            .filter_map(|frame| match (frame.header.sender.sampled_program(), &frame.body) {
+                (Some(program), Body::Sample(sample)) if lacked.contains(program) => {
                     Some(Relayed { program, sample: sample.clone() })
                 }
                 _ => None,
@@ -117,8 +116,8 @@ impl Station {
         Body::Turn(turn)
     }
 
-    pub(super) fn has_sample(&self, sender: Member) -> bool {
+    pub(super) fn has_sample(&self, program: ProgramId) -> bool {
         let mut samples = self.cycle.samples.iter();
-        samples.any(|frame| frame.header.sender == sender)
+        samples.any(|frame| frame.header.sender.sampled_program() == Some(program))
     }
 }

@@ -312,9 +312,9 @@ impl Recorder {
                 return Err(elsewhere(PROCESS));
             }
         };
-        let Member::RemoteIo(_) = member else {
+        if member.sampled_program().is_none() {
             return Err(Refusal::WrongMember { name, needs: "it is for remote I/Os" });
-        };
+        }
         let Some(call) = self.calls.to(member) else {
             return Err(elsewhere("it takes no call now"));
         };

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use understudy_bus::HostEvent;
 use understudy_cluster::AlarmDeclaration;
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
-use understudy_wire::{Image, Member, ProgramId};
+use understudy_wire::{Image, Member, Part, ProgramId};
 
 use crate::record::{Happening, Record, RunEvent};
 use crate::rules::Process;
@@ -65,6 +65,8 @@ struct Track {
     begun: bool,
     /// Whether its remote I/O does not run or is not received.
     silent: bool,
+    /// Of two remote I/Os of a program: the author, where that is known.
+    author: Option<Member>,
 }
 
 /// The alarms of a cluster, evaluated record by record.
@@ -114,12 +116,14 @@ impl AlarmFold {
     /// Takes the next record, of a cycle of the run; answers with the alarms that it changes.
     pub fn take(&mut self, record: &Record, cycle: i64) -> Vec<AlarmChange> {
         match (&record.event, record.member) {
-            (Happening::RemoteIo(event), Some(Member::RemoteIo(program))) => {
-                self.remote_io(program, cycle, event)
-            }
-            (Happening::Host(HostEvent::JournalLost { .. }), Some(Member::RemoteIo(program))) => {
-                self.forget(program)
-            }
+            (
+                Happening::RemoteIo(event),
+                Some(member @ (Member::RemoteIo(program) | Member::Twin(program))),
+            ) => self.remote_io(member, program, cycle, event),
+            (
+                Happening::Host(HostEvent::JournalLost { .. }),
+                Some(Member::RemoteIo(program) | Member::Twin(program)),
+            ) => self.forget(program),
             (Happening::Run(event), _) => self.run(event),
             _ => Vec::new(),
         }
@@ -148,6 +152,7 @@ impl AlarmFold {
     /// Takes a report of a remote I/O, of a cycle of the run.
     pub fn remote_io(
         &mut self,
+        member: Member,
         program: ProgramId,
         cycle: i64,
         event: &RemoteIoEvent,
@@ -160,6 +165,11 @@ impl AlarmFold {
         };
         let (sampled, missing) = match event {
             RemoteIoEvent::Applied { sampled, missing, .. } => (sampled, missing),
+            RemoteIoEvent::PartChanged { part: Part::Author, .. } => {
+                track.author = Some(member);
+                track.silent = false;
+                return Vec::new();
+            }
             RemoteIoEvent::StartedCold { .. } | RemoteIoEvent::StartedWarm { .. }
                 if !track.begun =>
             {
@@ -201,24 +211,28 @@ impl AlarmFold {
             RunEvent::Ended { member, .. } | RunEvent::Detached { member, .. } => (member, true),
             // Its records from before are not in this journal.
             RunEvent::Attached { member } => {
-                if let Member::RemoteIo(program) = member
+                if let Some(program) = member.sampled_program()
                     && let Some(track) = self.tracks.get_mut(program.index())
                 {
                     track.silent = false;
-                    return self.forget(*program);
+                    return self.forget(program);
                 }
                 return Vec::new();
             }
             _ => return Vec::new(),
         };
-        let Member::RemoteIo(program) = member else {
+        let Some(program) = member.sampled_program() else {
             return Vec::new();
         };
         let Some(track) = self.tracks.get_mut(program.index()) else {
             return Vec::new();
         };
+        // The end of a follower changes nothing.
+        if track.author.unwrap_or(Member::RemoteIo(program)) != *member {
+            return Vec::new();
+        }
         track.silent = is_silent;
-        if is_silent { self.forget(*program) } else { Vec::new() }
+        if is_silent { self.forget(program) } else { Vec::new() }
     }
 
     /// The values of a program are unknown until the next ones.

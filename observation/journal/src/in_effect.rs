@@ -10,7 +10,7 @@ use understudy_node::Event as Station;
 use understudy_plant::Event as Plant;
 use understudy_remote_io::Event as RemoteIo;
 use understudy_simulator::Action;
-use understudy_wire::Member;
+use understudy_wire::{Member, Part};
 
 use crate::record::{Happening, Record, RunEvent};
 use crate::rules::Process;
@@ -197,6 +197,13 @@ fn of_remote_io(record: &Record, event: &RemoteIo) -> Option<Effect> {
         RemoteIo::RefusalEnded { member } => {
             return Some(Effect::Ends(about("refused", member)));
         }
+        // Of either remote I/O of the program, whichever process ends.
+        RemoteIo::PartChanged { part: Part::Author, .. } => {
+            let program = record.member.and_then(Member::sampled_program);
+            (None, "author", format!("{program:?}"))
+        }
+        RemoteIo::PartnerLost { .. } => of("partner"),
+        RemoteIo::PartnerReceived { .. } => return Some(Effect::Ends(of("partner"))),
         _ => return None,
     };
     Some(Effect::Replaces(replaces))

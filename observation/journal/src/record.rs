@@ -224,6 +224,10 @@ pub fn moment(event: &Happening) -> Option<Moment> {
             | RemoteIo::Disputed { moment, .. }
             | RemoteIo::ConfigurationDisputed { moment, .. }
             | RemoteIo::ProgramChanged { moment, .. }
+            | RemoteIo::PartChanged { moment, .. }
+            | RemoteIo::PartnerLost { moment }
+            | RemoteIo::PartnerReceived { moment }
+            | RemoteIo::SecondAuthor { moment }
             | RemoteIo::Stalled { moment, .. } => Some(*moment),
             RemoteIo::StartedCold { born, .. } | RemoteIo::StartedWarm { born, .. } => Some(*born),
             RemoteIo::Refused { .. }
@@ -268,7 +272,7 @@ fn happening(member: Option<Member>, event: &str) -> Result<Happening, serde_jso
     match member {
         None => serde_json::from_str(event).map(Happening::Run),
         Some(Member::Station(_)) => of_member(event, Happening::Station),
-        Some(Member::RemoteIo(_)) => of_member(event, Happening::RemoteIo),
+        Some(Member::RemoteIo(_) | Member::Twin(_)) => of_member(event, Happening::RemoteIo),
         Some(Member::Plant(_)) => of_member(event, Happening::Plant),
     }
 }

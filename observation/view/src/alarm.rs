@@ -189,7 +189,7 @@ impl Alarms {
     pub(crate) fn new(members: &Members, programs: usize) -> Self {
         let ids = (0..).map(ProgramId).take(programs);
         let of_member = ids.clone().flat_map(|program| {
-            let own = [Member::RemoteIo(program), Member::Plant(program)];
+            let own = [Member::RemoteIo(program), Member::Plant(program), Member::Twin(program)];
             own.map(|member| (members.name(member).to_owned(), program))
         });
         Self {

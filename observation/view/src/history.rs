@@ -15,7 +15,7 @@ use understudy_remote_io::{Event, Missing};
 use understudy_simulator::{Referee, Violation};
 use understudy_typed::{Fault, Program as TypedProgram};
 use understudy_wire::{
-    Image, Lineage, Moment, ProgramHash, ProgramId, Source, StationId, StationSet, Write,
+    Image, Lineage, Member, Moment, ProgramHash, ProgramId, Source, StationId, StationSet, Write,
 };
 
 use order::Order;
@@ -77,6 +77,8 @@ pub struct Step {
 #[derive(Debug, Clone)]
 pub struct History {
     program: ProgramId,
+    /// The remote I/O that has reported last.
+    by: Member,
     /// x(0).
     initial: Option<Image>,
     referee: Referee,
@@ -127,6 +129,7 @@ impl History {
         let reset = reset.filter(|_| controller.can_stop());
         Some(Self {
             program,
+            by: Member::RemoteIo(program),
             initial: Image::from_words(executable.state_count(), executable.initial()).ok(),
             referee: Referee::new(&settings, executable),
             steps: VecDeque::new(),
@@ -258,7 +261,7 @@ impl History {
         let later: Vec<Event> = self.unplaced.drain(..).skip(place + 1).collect();
         self.awaited = None;
         for event in later {
-            let (sampled, _) = self.sample(&event);
+            let (sampled, _) = self.sample(self.by, &event);
             let mut steps = self.steps.iter_mut().rev();
             if let Some(step) = steps.find(|step| is_of(&event, step.moment)) {
                 step.sampled = sampled;
@@ -267,8 +270,8 @@ impl History {
     }
 
     /// Takes a sample; what it did, where the state before it is known, and what is wrong with it.
-    fn sample(&mut self, event: &Event) -> (Option<Sampled>, Option<Violation>) {
-        let violation = self.referee.observe(event).err();
+    fn sample(&mut self, member: Member, event: &Event) -> (Option<Sampled>, Option<Violation>) {
+        let violation = self.referee.observe_from(member, event).err();
         let Event::Sampled { moment, inputs, before, change: None, .. } = event else {
             // The state before a change mark is one of another program than that which takes the sample.
             return (None, violation);
@@ -327,14 +330,15 @@ impl History {
     }
 
     /// A report of its remote I/O, of a cycle; the wrong thing that it is, if it is one.
-    pub(crate) fn note(&mut self, cycle: i64, event: &Event) -> Option<Violation> {
+    pub(crate) fn note(&mut self, cycle: i64, member: Member, event: &Event) -> Option<Violation> {
         if let Event::Voided { samples, .. } = event {
             let sampled = self.steps.iter_mut().rev();
             let sampled = sampled.filter(|step| step.sampled.is_some() && !step.void);
             sampled.take(*samples).for_each(|step| step.void = true);
         }
         self.order.note(event);
-        let (sampled, violation) = self.sample(event);
+        self.by = member;
+        let (sampled, violation) = self.sample(member, event);
         let violation = self.judged(event, violation);
         match event {
             Event::Sampled { moment, .. } => {

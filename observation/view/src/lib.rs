@@ -69,7 +69,7 @@ pub use shown_text::{NamedValue, ShownLine, Uses};
 pub use snapshot::{
     LinkSnapshot, MarginSnapshot, NetworkSnapshot, OutcomeSnapshot, PlantSnapshot, PlantState,
     ProgramSnapshot, RemoteIoSnapshot, RemoteIoState, RunState, Snapshot, SpareSnapshot,
-    StationSnapshot, TimingSnapshot, WordSnapshot,
+    StationSnapshot, TimingSnapshot, TwinSnapshot, WordSnapshot,
 };
 pub use source::{BEHIND, Feed, Progress, Reading, Source, Trouble};
 pub use state_signal::{StateKind, StateSignal};

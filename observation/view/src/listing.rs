@@ -100,7 +100,9 @@ impl Listing {
         }
         let of_program = |member: &Member| match member {
             Member::Station(station) => Some(station.index()),
-            Member::RemoteIo(program) | Member::Plant(program) => Some(program.index()),
+            Member::RemoteIo(program) | Member::Plant(program) | Member::Twin(program) => {
+                Some(program.index())
+            }
         };
         let wanted = members.iter().filter(|(member, _)| {
             let program = of_program(member).and_then(|place| programs.get(place));

@@ -7,6 +7,7 @@ mod cycle;
 mod driving;
 mod members;
 mod networks;
+mod pairs;
 mod past;
 mod process_alarms;
 mod programs;
@@ -199,7 +200,10 @@ impl Model {
             (Happening::Station(event), Some(Member::Station(station))) => {
                 self.station(record, station, event);
             }
-            (Happening::RemoteIo(event), Some(Member::RemoteIo(program))) => {
+            (
+                Happening::RemoteIo(event),
+                Some(Member::RemoteIo(program) | Member::Twin(program)),
+            ) => {
                 self.remote_io(record, program, event);
             }
             (Happening::Plant(event), Some(Member::Plant(program))) => {

@@ -230,12 +230,28 @@ pub struct RemoteIoSnapshot {
     pub name: String,
     /// Its state.
     pub state: RemoteIoState,
+    /// The second remote I/O of its program.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub twin: Option<TwinSnapshot>,
     /// Its links.
     pub link: LinkSnapshot,
     /// From its samples to the outputs that are proved for them, since it runs; in the newest cycle only.
     pub sample_to_output: Option<Quantiles>,
     /// How late the system woke it meanwhile.
     pub wakeups: Option<Quantiles>,
+}
+
+/// The second remote I/O of a program.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct TwinSnapshot {
+    /// Its name.
+    pub name: String,
+    /// Whether this one is the author, which samples and drives; otherwise the first one is, or neither.
+    pub drives: bool,
+    /// Its state: `serving` where its process executes.
+    pub process: RemoteIoState,
+    /// Its links.
+    pub link: LinkSnapshot,
 }
 
 /// State of a simulated plant.

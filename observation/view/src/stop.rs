@@ -6,7 +6,7 @@ use understudy_cluster::Cluster;
 use understudy_journal::{Happening, Record};
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_typed::Fault;
-use understudy_wire::{Member, ProgramId};
+use understudy_wire::ProgramId;
 
 use crate::describe::program_fault_text;
 use crate::history::{History, Sampled};
@@ -94,17 +94,17 @@ impl Stops {
 
     /// Takes the next record; the program fault that it shows, in words.
     pub(crate) fn take(&mut self, record: &Record) -> Option<String> {
-        let (Some(Member::RemoteIo(program)), Happening::RemoteIo(event)) =
-            (record.member, &record.event)
-        else {
+        let Happening::RemoteIo(event) = &record.event else {
             return None;
         };
+        let member = record.member?;
+        let program = member.sampled_program()?;
         let mut programs = self.programs.iter_mut();
         let (history, stop) = programs.find(|(history, _)| history.program() == program)?;
         if !fits(&self.cluster, program, event) {
             return None;
         }
-        let _ = history.note(0, event);
+        let _ = history.note(0, member, event);
         match event {
             RemoteIoEvent::Released { .. } => {
                 stop.released();

@@ -12,20 +12,17 @@ use crate::code::Code;
 use crate::device::FieldDevice;
 use crate::notify::Notify;
 use crate::source::{InputSource, OperatorDeclaration, SignalDeclaration};
-use crate::undriven::initial_image;
 use serde::{Deserialize, Serialize};
 use understudy_bits::Inexact;
-use understudy_cycle::{Agreement, Mode, Program};
+use understudy_cycle::{Agreement, Program};
 use understudy_executable::Interface;
 use understudy_ladder::Program as LadderProgram;
 use understudy_logic::Circuit;
 use understudy_parity::ParityController;
 use understudy_plant::{Followed, Plant};
-use understudy_remote_io::{
-    Diagnosis, PointPlace, Ramp, Release, Restart, SignalSource, StaleState, StopPoints, ValueFault,
-};
+use understudy_remote_io::{Diagnosis, Ramp, Release, Restart, StaleState, StopPoints, ValueFault};
 use understudy_typed::{Points, Program as TypedProgram};
-use understudy_wire::{Epoch, Image, Member, ProgramHash, ProgramId, Roster, StationId};
+use understudy_wire::{Image, Member, ProgramHash, ProgramId, ProgramSet, Roster, StationId};
 
 /// What carries the frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
@@ -95,7 +92,7 @@ impl Controller {
     }
 
     /// Where its program reports a program fault, of one that can stop by a fault.
-    fn stop_points(&self) -> Option<StopPoints> {
+    pub(crate) fn stop_points(&self) -> Option<StopPoints> {
         let Interface { inputs, outputs } = &self.interface;
         let implied = |points: &Points, name| {
             points.find(name).filter(|point| point.slot == 0).map(|point| point.bit as usize)
@@ -165,6 +162,19 @@ pub struct RemoteIo {
     pub restart: Restart,
     /// What finds failed channels that do not say so.
     pub diagnosis: Option<DiagnosisPlace>,
+    /// The second remote I/O of its program.
+    pub twin: Option<Twin>,
+    /// Where it listens, if the file says so.
+    pub addresses: Addresses,
+}
+
+/// The second remote I/O of a program, at one device with the first one, of which one at a time may write.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Twin {
+    /// Its name.
+    pub name: String,
+    /// Cycles without the author after which the other one takes over.
+    pub take_over_after: u32,
     /// Where it listens, if the file says so.
     pub addresses: Addresses,
 }
@@ -287,6 +297,13 @@ impl Cluster {
         &self.remote_ios
     }
 
+    /// The programs that have a second remote I/O.
+    pub fn twins(&self) -> ProgramSet {
+        let programs = (0..).map(ProgramId).zip(&self.remote_ios);
+        let paired = programs.filter(|(_, remote_io)| remote_io.twin.is_some());
+        paired.map(|(program, _)| program).collect()
+    }
+
     /// In the order of their programs; nothing where a program has no simulated plant.
     pub fn plants(&self) -> &[Option<PlantPlace>] {
         &self.plants
@@ -318,7 +335,7 @@ impl Cluster {
         let pairs: BTreeSet<_> = pairs.chain(signals).collect();
         let schedule = &self.agreement.schedule;
         let pairs = pairs.into_iter().collect();
-        Roster::new(schedule.controllers(), schedule.stations(), pairs)
+        Roster::new(schedule.controllers(), schedule.stations(), pairs).with_twins(self.twins())
     }
 
     /// Alarms on signals of the programs, in the order of the file.
@@ -353,7 +370,7 @@ impl Cluster {
         circuits.collect()
     }
 
-    /// Every member: stations by rank, then remote I/Os, then plants.
+    /// Every member: stations by rank, then remote I/Os, then plants, then twins.
     pub fn members(&self) -> impl Iterator<Item = Member> + '_ {
         let stations = 0..self.agreement.schedule.stations();
         let plants = self.plants.iter().enumerate();
@@ -362,6 +379,7 @@ impl Cluster {
             .map(|rank| Member::Station(StationId(rank as u8)))
             .chain((0..self.remote_ios.len()).map(|index| Member::RemoteIo(ProgramId(index as u8))))
             .chain(plants.map(|(index, _)| Member::Plant(ProgramId(index as u8))))
+            .chain(self.twins().iter().map(Member::Twin))
     }
 
     /// The name of a member; nothing where the cluster has no such member.
@@ -404,91 +422,10 @@ impl Cluster {
                 let found = self.plants.get(program.index())?.as_ref()?;
                 Some((&found.name, found.addresses))
             }
-        }
-    }
-
-    /// What a station is told when it starts; `epoch` is the one that it starts when nobody is there.
-    ///
-    /// Nothing where the cluster has no such station.
-    pub fn station_settings(
-        &self,
-        station: StationId,
-        epoch: Epoch,
-    ) -> Option<understudy_node::Settings> {
-        self.member_name(Member::Station(station))?;
-        let evaluates_generated =
-            self.agreement.mode == Mode::Paper && self.agreement.schedule.is_understudy(station);
-        Some(understudy_node::Settings {
-            station,
-            agreement: Arc::clone(&self.agreement),
-            programs: Arc::clone(&self.programs),
-            generated: self
-                .parity
-                .as_ref()
-                .filter(|_| evaluates_generated)
-                .map(|parity| Arc::new(parity.circuit().into())),
-            epoch,
-        })
-    }
-
-    /// What a remote I/O is told when it starts; nothing where the cluster has no such program.
-    pub fn remote_io_settings(&self, program: ProgramId) -> Option<understudy_remote_io::Settings> {
-        let remote_io = self.remote_ios.get(program.index())?;
-        let controller = &self.controllers[program.index()];
-        Some(understudy_remote_io::Settings {
-            program,
-            agreement: Arc::clone(&self.agreement),
-            hash: controller.hash,
-            undriven: initial_image(&controller.interface.inputs),
-            input_points: controller.interface.inputs.iter().map(PointPlace::of).collect(),
-            output_points: controller.interface.outputs.iter().map(PointPlace::of).collect(),
-            operator_inputs: remote_io.operator_inputs().map(|it| it.input).collect(),
-            signals: remote_io.signals().map(|signal| signal.input).collect(),
-            signal_sources: self.signal_sources(remote_io),
-            channels: understudy_remote_io::Channel::of_inputs(
-                &controller.interface.inputs.bit_names(),
-            ),
-            stop: controller.stop_points(),
-            diagnosis: remote_io.diagnosis.as_ref().map(|it| Arc::clone(&it.compiled)),
-            hold_cycles: remote_io.hold_cycles,
-            fail_safe: remote_io.fail_safe.clone(),
-            ramps: remote_io.ramps.clone(),
-            release: remote_io.release,
-            value_fault: remote_io.value_fault,
-            stale_state: remote_io.stale_state,
-            restart: self.programs[program.index()]
-                .executable
-                .is_retentive()
-                .then_some(remote_io.restart),
-        })
-    }
-
-    /// The programs whose signals a remote I/O reads.
-    fn signal_sources(&self, remote_io: &RemoteIo) -> Vec<SignalSource> {
-        let programs: BTreeSet<ProgramId> =
-            remote_io.signals().map(|signal| signal.input.from).collect();
-        let sources = programs.into_iter().map(|program| {
-            let controller = &self.controllers[program.index()];
-            SignalSource {
-                program,
-                outputs: controller.interface.outputs.width(),
-                stopped: controller.stop_points().map(|points| points.stopped),
+            Member::Twin(program) => {
+                let found = self.remote_ios.get(program.index())?.twin.as_ref()?;
+                Some((&found.name, found.addresses))
             }
-        });
-        sources.collect()
-    }
-
-    /// What a plant is told when it starts; nothing where the program has no simulated plant.
-    pub fn plant_settings(&self, program: ProgramId) -> Option<understudy_plant::Settings> {
-        let place = self.plants.get(program.index())?.as_ref()?;
-        Some(understudy_plant::Settings {
-            program,
-            agreement: Arc::clone(&self.agreement),
-            plant: place.plant.clone(),
-            fed_by: place.fed_by,
-            follows: place.follows.clone(),
-            fail_safe: self.remote_ios[program.index()].fail_safe.clone(),
-            watchdog_cycles: place.watchdog_cycles,
-        })
+        }
     }
 }

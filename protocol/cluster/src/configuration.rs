@@ -63,6 +63,10 @@ pub(crate) fn configuration_text(
         if program.executable.is_retentive() {
             line(format_args!("  restart {:?}", remote_io.restart));
         }
+        if let Some(twin) = &remote_io.twin {
+            let after = twin.take_over_after;
+            line(format_args!("  twin {} exclusive {after}", twin.name));
+        }
         for source in &remote_io.inputs {
             line(format_args!("  input {}", source_text(source)));
         }

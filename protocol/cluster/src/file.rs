@@ -16,7 +16,7 @@ use crate::device::{BAUD_RATES, Connection, Parity, SerialLine};
 use crate::fields::{CODES, ConnectionText, Fields, PlaceEntry, Placed, SourceEntry};
 use crate::format::{
     ALARM, CLUSTER, CONTROLLER, FIELD, LADDER_PARAMETERS, MODELS, NOTIFY, PLANT, PRESS_PARAMETERS,
-    REMOTE_IO, ROBOT_PARAMETERS, SECTIONS, Section, UNDERSTUDY,
+    REMOTE_IO, ROBOT_PARAMETERS, SECTIONS, Section, TWIN, UNDERSTUDY,
 };
 use crate::notify::Notify;
 
@@ -107,6 +107,16 @@ pub(crate) struct RemoteIoSection {
     pub(crate) diagnosis: Option<Placed<String>>,
     pub(crate) inputs: Vec<SourceEntry>,
     pub(crate) field: Option<FieldSection>,
+    pub(crate) twin: Option<TwinSection>,
+    pub(crate) addresses: Addresses<Placed<SocketAddr>>,
+}
+
+#[derive(Debug)]
+pub(crate) struct TwinSection {
+    pub(crate) span: Range<usize>,
+    pub(crate) name: Option<Placed<String>>,
+    pub(crate) take_over_after: u32,
+    pub(crate) owner_timeout: Duration,
     pub(crate) addresses: Addresses<Placed<SocketAddr>>,
 }
 
@@ -194,6 +204,7 @@ pub(crate) fn read(text: &str, diagnostics: &mut Vec<Diagnostic>) -> Option<Clus
             diagnosis: fields.text("diagnosis", diagnostics),
             inputs: fields.sources("inputs", diagnostics),
             field: field(fields, &empty, diagnostics),
+            twin: twin(fields, &empty, diagnostics),
             addresses: fields.addresses(diagnostics),
         })
         .collect();
@@ -314,6 +325,26 @@ fn field<'a, 't>(
         stale_after: fields.time("stale_after", diagnostics),
         inputs: fields.places("inputs", diagnostics),
         outputs: fields.places("outputs", diagnostics),
+    })
+}
+
+fn twin<'a, 't>(
+    fields: &Fields<'a, 't>,
+    empty: &'a DeTable<'t>,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Option<TwinSection> {
+    if !fields.has("twin") {
+        return None;
+    }
+    let fields = fields.table("twin", &TWIN, empty, diagnostics);
+    // `exclusive` is the only wiring; another word is reported.
+    fields.word("wiring", diagnostics);
+    Some(TwinSection {
+        span: fields.span.clone(),
+        name: fields.name("name", diagnostics),
+        take_over_after: fields.count("take_over_after", diagnostics),
+        owner_timeout: fields.time("owner_timeout", diagnostics),
+        addresses: fields.addresses(diagnostics),
     })
 }
 

@@ -59,6 +59,8 @@ pub(crate) enum Kind {
     Parameters,
     /// The table of a device.
     Device,
+    /// The table of a twin.
+    Twin,
     /// A table from signals to places in a device.
     Points,
     /// A table from inputs to their sources.
@@ -110,6 +112,8 @@ pub(crate) const MODES: [&str; 2] = ["full", "paper"];
 pub(crate) const SCHEDULES: [&str; 2] = ["token", "parallel"];
 pub(crate) const LINKS: [&str; 2] = ["udp", "zenoh"];
 pub(crate) const SECURITIES: [&str; 2] = ["keys", "off"];
+/// How the two remote I/Os of a program are connected to the plant.
+pub(crate) const WIRINGS: [&str; 1] = ["exclusive"];
 pub(crate) const RELEASES: [&str; 2] = ["automatic", "operator"];
 pub(crate) const VALUE_FAULTS: [&str; 3] = ["hold", "alarm", "fail-safe"];
 pub(crate) const STALE_STATES: [&str; 2] = ["operator", "cold"];
@@ -183,6 +187,21 @@ pub(crate) static REMOTE_IO: Section = Section {
         key diagnosis: Kind::Text, "the file of a ladder that detects failed input channels, relative to the cluster file, see [reconfiguration](reconfiguration.md)";
         key inputs: Kind::Sources, "inputs that do not come from the field: operators write them, or another program computes them, see below";
         key field: Kind::Device, "real equipment behind it, see below; without it its plant is simulated";
+        key twin: Kind::Twin, "a second remote I/O of the program, which takes over where this one fails, see below and [twin remote I/Os](../how-to/twin-remote-io.md)";
+        key address: Kind::Address, "as for a controller";
+        key second_address: Kind::Address, "as for a controller";
+    },
+};
+
+pub(crate) static TWIN: Section = Section {
+    name: "remote_io.twin",
+    repeated: false,
+    meaning: "a second remote I/O of the same program, on another machine, below its `[[remote_io]]`",
+    keys: keys! {
+        required name: Kind::Name, "names it";
+        required wiring: Kind::Word { words: &WIRINGS, default: false }, "how the two are connected to the plant: `exclusive`, both reach one device that lets one of them write at a time, and only the author connects to it";
+        key take_over_after: count(1, 100, 1), "cycles without the author after which the other one takes over";
+        key owner_timeout: time(Duration::ZERO, Duration::from_secs(60), Duration::ZERO), "time for which the device keeps a connection that has failed and lets no other one write; it must be over when the other one takes over";
         key address: Kind::Address, "as for a controller";
         key second_address: Kind::Address, "as for a controller";
     },
@@ -426,6 +445,7 @@ impl Kind {
             Self::Names => "a table from names to names in quotes".into(),
             Self::Parameters => "a table, [plant.parameters]".into(),
             Self::Device => "a table, [remote_io.field]".into(),
+            Self::Twin => "a table, [remote_io.twin]".into(),
             Self::Points => {
                 "a table from signals to places, such as { start = \"discrete:0\", level = \"input:10 real\" }".into()
             }
@@ -455,33 +475,4 @@ impl Kind {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Each row of the documentation, so that it cannot differ from what is read.
-    #[test]
-    fn the_documentation_has_every_key_with_its_bounds() {
-        let page = include_str!("../../../docs/reference/cluster-file.md");
-        let parameters =
-            [&ROBOT_PARAMETERS, &PRESS_PARAMETERS, &FIELD, &POINT, &OPERATOR_INPUT, &SIGNAL_INPUT];
-        for section in SECTIONS.into_iter().chain(parameters) {
-            has_rows(page, section);
-        }
-        let page = include_str!("../../../docs/reference/plant-file.md");
-        PLANT_FILE_SECTIONS.into_iter().for_each(|section| has_rows(page, section));
-    }
-
-    fn has_rows(page: &str, section: &Section) {
-        assert!(page.contains(&section.header()), "{}", section.header());
-        for key in section.keys {
-            let default = match (key.required, key.kind.default()) {
-                (true, _) => "required".into(),
-                (false, Some(default)) => format!("`{default}`"),
-                (false, None) => "—".into(),
-            };
-            let expected = key.kind.expected();
-            let row = format!("| `{}` | {expected} | {default} | {} |", key.name, key.meaning);
-            assert!(page.contains(&row), "docs/reference lacks the row\n{row}");
-        }
-    }
-}
+mod tests;

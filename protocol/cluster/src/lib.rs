@@ -25,6 +25,7 @@ mod plant_file;
 mod read;
 mod retention;
 mod schema;
+mod settings;
 mod source;
 mod source_text;
 mod template;

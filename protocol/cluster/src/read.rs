@@ -27,6 +27,7 @@
 //! | U0226 | an alarm whose condition does not fit its signal |
 //! | U0227 | a sender and a receiver of different types or ranges |
 //! | U0228 | a schedule that the mode does not have |
+//! | U0229 | a twin that takes over before its device lets it, or a twin of a device on a serial line |
 //! | U0240 | addresses that are not of two networks, or of one network only |
 //! | U0251 | warning: an input that no sensor drives |
 //! | U0252 | warning: an output that moves nothing |
@@ -34,6 +35,7 @@
 //! | U0254 | warning: parts that never come |
 //! | U0255 | warning: a mark of what is to be filled in |
 //! | U0256 | warning: inputs that nothing drives |
+//! | U0257 | warning: a watchdog of a simulated plant that runs out before the twin has taken over |
 
 mod alarms;
 mod devices;
@@ -46,6 +48,7 @@ mod limits;
 mod marks;
 mod names;
 mod plants;
+mod twins;
 mod undriven;
 
 use std::collections::BTreeMap;
@@ -169,6 +172,7 @@ fn build(
     devices::check_simulated(&simulated, &members, &remote_ios, diagnostics);
     let plants =
         plants::place(file.plants, period, &members, &remote_ios, ladders, &mut names, diagnostics);
+    twins::check_watchdogs(&remote_ios, &plants.places, &cluster.span, diagnostics);
     // What an error left out could be the source of an input.
     if !diagnostics.iter().any(is_error) {
         undriven::check(&members, &remote_ios, &simulated, diagnostics);
@@ -377,6 +381,9 @@ fn remote_ios(
                 .diagnosis
                 .as_ref()
                 .and_then(|file| diagnosis::read(file, period, member, ladders, diagnostics)),
+            twin: section.twin.and_then(|twin| {
+                twins::read(twin, section.field.as_ref(), period, names, diagnostics)
+            }),
             addresses: section.addresses.map(|address| address.value),
         };
         places.insert(index, remote_io);
@@ -403,6 +410,7 @@ fn remote_ios(
                 stale_state: StaleState::default(),
                 restart: Restart::default(),
                 diagnosis: None,
+                twin: None,
                 addresses: Addresses::default(),
             }
         })

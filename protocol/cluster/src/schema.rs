@@ -8,7 +8,7 @@ use crate::address::MAXIMUM_NAME_LENGTH;
 use crate::format::{
     CLUSTER, CONTROLLER, FIELD, Key, Kind, OPERATOR_INPUT, PLANT_FILE_REQUIRED,
     PLANT_FILE_SECTIONS, POINT, PRESS_PARAMETERS, ROBOT_PARAMETERS, SECTIONS, SIGNAL_INPUT,
-    Section,
+    Section, TWIN,
 };
 use crate::place::{ByteOrder, Registers};
 
@@ -93,6 +93,7 @@ fn property(key: &Key) -> Value {
             json!({ "type": "object", "additionalProperties": { "type": ["boolean", "number", "string"] } })
         }
         Kind::Device => table(&FIELD),
+        Kind::Twin => table(&TWIN),
         Kind::Points => json!({
             "type": "object",
             "additionalProperties": {

@@ -58,6 +58,8 @@ pub enum Output<Event> {
         /// When the sample was taken that they are proved for; none where they are held or fail-safe.
         sampled: Option<Time>,
     },
+    /// Whether the remote I/O is to be connected to its field; one that has no second one is from its start on.
+    Connect(bool),
     /// An event for the journal.
     Report(Event),
     /// A record for the disk, for the time after a power failure.

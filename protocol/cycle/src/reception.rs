@@ -73,7 +73,9 @@ impl Reception {
     ) -> Admission {
         let known = match header.sender {
             Member::Station(station) => station.index() < self.stations,
-            Member::RemoteIo(program) | Member::Plant(program) => program.index() < self.programs,
+            Member::RemoteIo(program) | Member::Plant(program) | Member::Twin(program) => {
+                program.index() < self.programs
+            }
         };
         if header.cluster != self.cluster || header.sender == self.own {
             return Admission::Dropped;

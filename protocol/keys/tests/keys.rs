@@ -82,7 +82,7 @@ fn datagram(cluster: &Cluster, keys: &MemberKeys, sender: Member) -> Vec<u8> {
         Member::RemoteIo(_) => {
             Body::Actuation(understudy_wire::Actuation { outputs: understudy_wire::Image::zero(1) })
         }
-        Member::Plant(_) => Body::Field(understudy_wire::Field {
+        Member::Plant(_) | Member::Twin(_) => Body::Field(understudy_wire::Field {
             sensors: understudy_wire::Image::zero(1),
             handed_over: 0,
             finished: 0,

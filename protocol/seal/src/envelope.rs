@@ -30,6 +30,7 @@ impl Envelope {
             Member::Station(station) => (0, station.0),
             Member::RemoteIo(program) => (1, program.0),
             Member::Plant(program) => (2, program.0),
+            Member::Twin(program) => (3, program.0),
         };
         let mut bytes = [0; HEADER_BYTES];
         bytes[..4].copy_from_slice(&MAGIC);
@@ -51,6 +52,7 @@ impl Envelope {
             0 => Member::Station(StationId(bytes[6])),
             1 => Member::RemoteIo(ProgramId(bytes[6])),
             2 => Member::Plant(ProgramId(bytes[6])),
+            3 => Member::Twin(ProgramId(bytes[6])),
             _ => return None,
         };
         let field = |from: usize, to: usize| &bytes[from..to];
@@ -81,6 +83,7 @@ mod tests {
             Member::Station(StationId(63)),
             Member::RemoteIo(ProgramId(0)),
             Member::Plant(ProgramId(7)),
+            Member::Twin(ProgramId(5)),
         ];
         for sender in senders {
             for to in [None, Some(StationId(0)), Some(StationId(63))] {
@@ -93,7 +96,7 @@ mod tests {
         assert_eq!(Envelope::read(&strange), None);
         strange[..4].copy_from_slice(&MAGIC);
         strange[4] = VERSION;
-        strange[5] = 3;
+        strange[5] = 4;
         assert_eq!(Envelope::read(&strange), None);
     }
 }

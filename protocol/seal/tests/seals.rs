@@ -64,7 +64,7 @@ fn frame(sender: Member, cycle: u64) -> Frame {
     let image = Image::from_words(4, &[0b1010]).expect("it fits");
     let body = match sender {
         Member::Station(_) => Body::Sync,
-        Member::RemoteIo(_) => Body::Actuation(Actuation { outputs: image }),
+        Member::RemoteIo(_) | Member::Twin(_) => Body::Actuation(Actuation { outputs: image }),
         Member::Plant(_) => Body::Field(Field {
             sensors: image,
             handed_over: 1,

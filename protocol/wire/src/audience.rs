@@ -8,6 +8,10 @@
 //! | sample | samples of remote I/O i | controller i, the understudies, the next controller, the remote I/Os of programs that read a signal of i |
 //! | field | sensors of plant i | remote I/O i, and the plants that it feeds or that follow it |
 //! | actuation | outputs of remote I/O i | plant i |
+//! | pair | what one of two remote I/Os of a program reports | the other one |
+//!
+//! A twin receives all that the remote I/O of its program receives, and what it sends goes to the same members; each of the two receives the
+//! samples of the other one.
 //!
 //! So what a controller receives does not grow with the number of controllers. "Next" goes around: the first controller follows the last.
 //!
@@ -40,16 +44,18 @@ pub enum Topic {
     Field,
     /// Outputs that a remote I/O drives.
     Actuation,
+    /// What one of two remote I/Os of a program reports to the other one.
+    Pair,
 }
 
 impl Topic {
     /// All topics; the place of each is `topic as usize`.
-    pub const ALL: [Self; 5] =
-        [Self::Cycle, Self::Turn, Self::Sample, Self::Field, Self::Actuation];
+    pub const ALL: [Self; 6] =
+        [Self::Cycle, Self::Turn, Self::Sample, Self::Field, Self::Actuation, Self::Pair];
 }
 
 /// The receivers of a frame.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub struct Audience {
     /// Stations.
     pub stations: StationSet,
@@ -57,6 +63,8 @@ pub struct Audience {
     pub remote_ios: ProgramSet,
     /// Plants, by their programs.
     pub plants: ProgramSet,
+    /// Twins, by their programs.
+    pub twins: ProgramSet,
 }
 
 impl Audience {
@@ -66,12 +74,58 @@ impl Audience {
             Member::Station(station) => self.stations.contains(station),
             Member::RemoteIo(program) => self.remote_ios.contains(program),
             Member::Plant(program) => self.plants.contains(program),
+            Member::Twin(program) => self.twins.contains(program),
         }
+    }
+
+    /// One member alone.
+    pub fn only(member: Member) -> Self {
+        let mut audience = Self::default();
+        match member {
+            Member::Station(station) => audience.stations.insert(station),
+            Member::RemoteIo(program) => audience.remote_ios.insert(program),
+            Member::Plant(program) => audience.plants.insert(program),
+            Member::Twin(program) => audience.twins.insert(program),
+        }
+        audience
+    }
+
+    /// The receivers in either.
+    #[must_use]
+    pub fn or(self, other: Self) -> Self {
+        Self {
+            stations: self.stations.or(other.stations),
+            remote_ios: self.remote_ios.or(other.remote_ios),
+            plants: self.plants.or(other.plants),
+            twins: self.twins.or(other.twins),
+        }
+    }
+
+    /// The receivers that are not in `other`.
+    #[must_use]
+    pub fn without(self, other: Self) -> Self {
+        Self {
+            stations: self.stations.without(other.stations),
+            remote_ios: self.remote_ios.without(other.remote_ios),
+            plants: self.plants.without(other.plants),
+            twins: self.twins.without(other.twins),
+        }
+    }
+
+    /// The receivers.
+    pub fn members(self) -> impl Iterator<Item = Member> {
+        let stations = self.stations.iter().map(Member::Station);
+        let remote_ios = self.remote_ios.iter().map(Member::RemoteIo);
+        let plants = self.plants.iter().map(Member::Plant);
+        stations.chain(remote_ios).chain(plants).chain(self.twins.iter().map(Member::Twin))
     }
 
     /// Whether nobody receives it.
     pub fn is_empty(&self) -> bool {
-        self.stations.is_empty() && self.remote_ios.is_empty() && self.plants.is_empty()
+        self.stations.is_empty()
+            && self.remote_ios.is_empty()
+            && self.plants.is_empty()
+            && self.twins.is_empty()
     }
 }
 
@@ -81,13 +135,20 @@ pub struct Roster {
     controllers: usize,
     stations: usize,
     neighbours: Vec<(Member, Member)>,
+    twins: ProgramSet,
 }
 
 impl Roster {
     /// A cluster of `controllers`, each with a remote I/O and a plant, among `stations`. A pair (i, j) in `neighbours` means that plant or
     /// remote I/O j also receives from plant or remote I/O i.
     pub fn new(controllers: usize, stations: usize, neighbours: Vec<(Member, Member)>) -> Self {
-        Self { controllers, stations, neighbours }
+        Self { controllers, stations, neighbours, twins: ProgramSet::EMPTY }
+    }
+
+    /// The same with a second remote I/O for each of these programs.
+    #[must_use]
+    pub fn with_twins(self, twins: ProgramSet) -> Self {
+        Self { twins, ..self }
     }
 
     /// Whether a member is an understudy.
@@ -106,6 +167,7 @@ impl Roster {
             (Body::Sample(_), _) => Topic::Sample,
             (Body::Field(_), _) => Topic::Field,
             (Body::Actuation(_), _) => Topic::Actuation,
+            (Body::Pair(_), _) => Topic::Pair,
         }
     }
 
@@ -114,7 +176,10 @@ impl Roster {
         let programs = ProgramSet::first(self.controllers);
         let stations = StationSet::first(self.stations);
         let understudies = stations.without(StationSet::first(self.controllers));
-        let mut audience = match (topic, sender) {
+        let pair = sender.sampled_program();
+        // What both remote I/Os of a program send goes to the same members.
+        let role = pair.map_or(sender, Member::RemoteIo);
+        let mut audience = match (topic, role) {
             (Topic::Cycle, Member::Station(_)) => {
                 Audience { stations, remote_ios: programs, ..Audience::default() }
             }
@@ -129,7 +194,7 @@ impl Roster {
                 stations: understudies
                     .or(StationSet::only(StationId(program.0)))
                     .or(self.following(program.index(), 1)),
-                remote_ios: self.neighbours_of(sender),
+                remote_ios: self.neighbours_of(role),
                 ..Audience::default()
             },
             (Topic::Field, Member::Plant(program)) => Audience {
@@ -142,10 +207,18 @@ impl Roster {
             }
             _ => Audience::default(),
         };
+        audience.twins = audience.remote_ios.and(self.twins);
+        if let (Some(program), Topic::Sample | Topic::Pair) = (pair, topic)
+            && self.twins.contains(program)
+        {
+            audience.remote_ios.insert(program);
+            audience.twins.insert(program);
+        }
         match sender {
             Member::Station(station) => audience.stations.remove(station),
             Member::RemoteIo(program) => audience.remote_ios.remove(program),
             Member::Plant(program) => audience.plants.remove(program),
+            Member::Twin(program) => audience.twins.remove(program),
         }
         audience
     }
@@ -231,6 +304,38 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// A twin receives what the remote I/O of its program receives, and the two receive each other.
+    #[test]
+    fn a_twin_receives_what_its_remote_io_receives() {
+        let [first, second] = [ProgramId(0), ProgramId(1)];
+        let pairs = vec![(Member::RemoteIo(second), Member::RemoteIo(first))];
+        let roster = Roster::new(2, 3, pairs).with_twins(ProgramSet::only(first));
+        let (own, twin) = (Member::RemoteIo(first), Member::Twin(first));
+        let senders = [
+            Member::Station(StationId(0)),
+            Member::Station(StationId(1)),
+            Member::Station(StationId(2)),
+            Member::RemoteIo(second),
+            Member::Plant(first),
+        ];
+        for (sender, topic) in
+            senders.into_iter().flat_map(|it| Topic::ALL.map(|topic| (it, topic)))
+        {
+            let audience = roster.audience(topic, sender);
+            assert_eq!(audience.contains(own), audience.contains(twin), "{sender:?} {topic:?}");
+            assert!(audience.twins.without(ProgramSet::only(first)).is_empty());
+        }
+        for topic in Topic::ALL {
+            let (ours, theirs) = (roster.audience(topic, own), roster.audience(topic, twin));
+            let receive_each_other = matches!(topic, Topic::Sample | Topic::Pair);
+            assert_eq!(ours.contains(twin), receive_each_other, "{topic:?}");
+            assert_eq!(theirs.contains(own), receive_each_other, "{topic:?}");
+            assert_eq!((ours.stations, ours.plants), (theirs.stations, theirs.plants), "{topic:?}");
+            assert!(!ours.contains(own) && !theirs.contains(twin));
+        }
+        assert!(!roster.is_received(Member::RemoteIo(second), Member::Twin(second)));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! ```text
 //! offset  size  what
 //!      0     4  magic "UNDR"
-//!      4     1  version of this layout, 8
+//!      4     1  version of this layout, 10
 //!      5     n  header and body, bincode 2 "standard": little-endian, integers as varints, enums by their index
 //!    5+n     4  CRC-32 (IEEE) of everything before it, little-endian
 //! ```
@@ -138,17 +138,18 @@ fn keeps_promises(frame: &Frame) -> Result<(), FrameError> {
     kept(
         match sender {
             Member::Station(station) => station.index() < MAXIMUM_STATIONS,
-            Member::RemoteIo(program) | Member::Plant(program) => {
+            Member::RemoteIo(program) | Member::Plant(program) | Member::Twin(program) => {
                 program.index() < MAXIMUM_PROGRAMS
             }
         },
         "the sender's index is below 64",
     )?;
     let station = matches!(sender, Member::Station(_));
+    let remote_io = sender.sampled_program().is_some();
     match &frame.body {
         Body::Sync => kept(station, "only a station paces"),
         Body::Sample(sample) => {
-            kept(matches!(sender, Member::RemoteIo(_)), "only a remote I/O samples")?;
+            kept(remote_io, "only a remote I/O samples")?;
             kept_sample(sample)
         }
         Body::Turn(turn) => {
@@ -188,9 +189,8 @@ fn keeps_promises(frame: &Frame) -> Result<(), FrameError> {
             kept(matches!(sender, Member::Plant(_)), "only a plant has a field")?;
             kept(field.positions.len() <= MAXIMUM_POSITIONS, "a plant shows at most 16 positions")
         }
-        Body::Actuation(_) => {
-            kept(matches!(sender, Member::RemoteIo(_)), "only a remote I/O drives")
-        }
+        Body::Actuation(_) => kept(remote_io, "only a remote I/O drives"),
+        Body::Pair(_) => kept(remote_io, "only a remote I/O has a second one"),
     }
 }
 

@@ -157,6 +157,9 @@ pub enum OrderRefusal {
     /// The signal is not forced.
     #[error("the signal is not forced")]
     NotForced,
+    /// The other remote I/O of the program is the author.
+    #[error("this remote I/O follows the other one of its program: give the order to that one")]
+    NotAuthor,
     /// The program continues, and no choice of a state is asked for.
     #[error("no choice of a state is asked for: the state of the program is not lost")]
     NoChoice,
@@ -209,6 +212,7 @@ impl OrderRefusal {
     pub fn code(self) -> &'static str {
         match self {
             Self::NoSignal | Self::Value { .. } | Self::Incomplete | Self::NotForced => "U0556",
+            Self::NotAuthor => "U0556",
             Self::NoChoice | Self::OtherState { .. } => "U0583",
             Self::AnotherChange
             | Self::OtherConfiguration { .. }

@@ -19,6 +19,7 @@ use crate::image::Image;
 use crate::lineage::{Digest, Lineage};
 use crate::segment::{Segment, SegmentMask};
 use crate::set::{ProgramSet, StationSet};
+use crate::time::Time;
 use crate::write::{Pulse, WriteId};
 
 /// Samples that one [`Sample`] may carry, this cycle's included.
@@ -97,6 +98,8 @@ pub enum Body {
     Field(Field),
     /// A remote I/O drives its simulated plant.
     Actuation(Actuation),
+    /// One of two remote I/Os of a program reports to the other one.
+    Pair(Pair),
 }
 
 /// u(i) of this and of the last few cycles, with the lineage before the oldest of them.
@@ -355,4 +358,32 @@ pub struct Field {
 pub struct Actuation {
     /// y(i).
     pub outputs: Image,
+}
+
+/// What one of two remote I/Os of a program reports to the other one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Pair {
+    /// Its part.
+    pub part: Part,
+    /// Whether it can become the author: its field device answered it when it was connected to it last.
+    pub able: bool,
+    /// Whether it receives a station that can hold the state of the program.
+    pub receives_stations: bool,
+    /// When it was sent, on the clock of the sender.
+    pub sent: Time,
+    /// The newest [`Self::sent`] of the other one by which this one is bound: it does not become the author for `take_over_after` deadlines after
+    /// it received that frame. `None` where it is not bound.
+    pub bound_by: Option<Time>,
+}
+
+/// The part of one of two remote I/Os of a program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Part {
+    /// It samples nothing and drives nothing.
+    Follower,
+    /// It connects to its field, and samples nothing and drives nothing yet.
+    TakingOver,
+    /// It makes u(i) and drives y(i).
+    Author,
 }

@@ -45,6 +45,27 @@ pub enum Member {
     RemoteIo(ProgramId),
     /// The simulated plant behind the remote I/O of a program.
     Plant(ProgramId),
+    /// The second remote I/O of a program.
+    Twin(ProgramId),
+}
+
+impl Member {
+    /// The program whose plant it samples and drives: that of a remote I/O or of a twin.
+    pub fn sampled_program(self) -> Option<ProgramId> {
+        match self {
+            Self::RemoteIo(program) | Self::Twin(program) => Some(program),
+            Self::Station(_) | Self::Plant(_) => None,
+        }
+    }
+
+    /// The other remote I/O of its program, of a remote I/O or of a twin.
+    pub fn partner(self) -> Option<Self> {
+        match self {
+            Self::RemoteIo(program) => Some(Self::Twin(program)),
+            Self::Twin(program) => Some(Self::RemoteIo(program)),
+            Self::Station(_) | Self::Plant(_) => None,
+        }
+    }
 }
 
 /// One life of the cluster from a common start; raised by a cold start.

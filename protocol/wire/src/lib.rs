@@ -28,8 +28,8 @@ pub use force::{
 };
 pub use frame::{
     Actuation, Body, Configurations, Field, Frame, Header, Holding, Join, Kept,
-    MAXIMUM_CHANGE_MARKS, MAXIMUM_HISTORY, Partial, Recalled, Relayed, Sample, SamplesReceived,
-    Source, Step, Transfer, Turn, Word,
+    MAXIMUM_CHANGE_MARKS, MAXIMUM_HISTORY, Pair, Part, Partial, Recalled, Relayed, Sample,
+    SamplesReceived, Source, Step, Transfer, Turn, Word,
 };
 pub use identifier::{
     ClusterHash, ConfigurationHash, Cycle, Epoch, MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, Member,

@@ -72,6 +72,7 @@ impl RemoteIo {
         }
         self.apply(selection, sampled, self.member.published());
         self.watch_protection();
+        self.end_pair_deadline(now);
     }
 
     /// Periods that have passed since the deadline which is decided now.
@@ -146,6 +147,9 @@ impl RemoteIo {
         sampled: Option<Image>,
         heard: StationSet,
     ) {
+        if !self.may_drive() {
+            return;
+        }
         let (outputs, source, word_of, missing) = match selection {
             Selection::Direct(outputs) => (outputs, Source::Direct, None, None),
             Selection::Reconstructed(outputs, understudy) => {

@@ -90,6 +90,9 @@ impl Forcing {
 impl RemoteIo {
     /// Why a force cannot be done: every client forces a signal as a whole, to a value that the signal can have.
     fn force_refusal(&self, force: &Force) -> Option<OrderRefusal> {
+        if !self.is_author() {
+            return Some(OrderRefusal::NotAuthor);
+        }
         if force.check().is_err() {
             return Some(OrderRefusal::Incomplete);
         }
@@ -134,6 +137,13 @@ impl RemoteIo {
     pub(super) fn end_forces(&mut self, now: Time) {
         while let Some(signal) = self.forcing.take_expired(now) {
             self.report_unforced(signal, true);
+        }
+    }
+
+    /// Ends all forces: a force ends with the remote I/O that was given it.
+    pub(super) fn end_all_forces(&mut self) {
+        for active in std::mem::take(&mut self.forcing).active {
+            self.report_unforced(active.signal, false);
         }
     }
 

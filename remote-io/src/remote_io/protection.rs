@@ -50,6 +50,9 @@ impl RemoteIo {
     /// A deadline without a cycle: no station proves an output.
     pub(super) fn note_idle(&mut self) {
         let reason = LackingReason::NotReceived;
+        if !self.is_author() {
+            return;
+        }
         let all = self.holders.stations();
         self.note_protection(all.map(|station| Lacking { station, reason }).collect());
     }

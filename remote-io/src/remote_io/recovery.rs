@@ -83,7 +83,10 @@ impl RemoteIo {
         // A missing station that could hold the state gets longer: it may be the only one that does.
         let patience = if self.holders.all_living() { 1 } else { 5 };
         // A history without a sample is one that no station can follow.
-        if waited < listen_cycles * patience || waited == 0 || self.sensors.is_none() {
+        if waited < listen_cycles * patience || waited == 0 || !self.may_begin(moment) {
+            return;
+        }
+        if self.sensors.is_none() {
             return;
         }
         let verdict = self.verdict();
@@ -220,8 +223,31 @@ impl RemoteIo {
     fn start(&mut self, moment: Moment, (from, holding): (StationId, Holding)) {
         let lineage = holding.lineage;
         self.report(Event::AdoptedLineage { moment, lineage, from });
-        let history = History::from(holding.born, (None, lineage), self.settings.agreement.history);
+        let capacity = self.settings.agreement.history;
+        let sent = self.pairing.as_ref().and_then(|pairing| pairing.received());
+        // Proven outputs that the other remote I/O was not allowed to drive are not released by its failure.
+        if self.settings.release == Release::Operator {
+            let drives = match sent {
+                Some(sample) => sample.drives,
+                None => self.was_released(from, &holding),
+            };
+            self.authority = if drives { Authority::Proof } else { Authority::Operator };
+        }
+        // With the samples that the other one has sent, a station that lacks some of them follows at once.
+        let known = sent.and_then(|sample| History::received(sample, lineage, capacity));
+        let history =
+            known.unwrap_or_else(|| History::from(holding.born, (None, lineage), capacity));
         self.sample_from(moment, history, Some((from, holding)));
+    }
+
+    /// Whether the operator has released the program since the start that a state comes from: an output of it was applied, as this remote I/O knows, has
+    /// noted, or as the station recalls. A restart of this remote I/O releases nothing.
+    fn was_released(&self, from: StationId, holding: &Holding) -> bool {
+        let knows = !matches!(self.knowledge, Knowledge::Listening { .. });
+        let recalled = self.holders.recalled_at(from, holding.stepped);
+        let applied = self.newest_applied().max(recalled.and_then(|recalled| recalled.applied));
+        knows && self.authority == Authority::Proof
+            || applied.is_some_and(|applied| applied >= holding.born)
     }
 
     /// Starts to sample from the initial state; with the newest applied output, where the state that it came from is lost and no person has chosen so.
@@ -240,6 +266,7 @@ impl RemoteIo {
         history: History,
         state: Option<(StationId, Holding)>,
     ) {
+        self.become_author(moment);
         self.protection.starts(state.is_none());
         if self.knowledge.floor().is_none() {
             self.remember(moment, state);

@@ -40,7 +40,7 @@ impl RemoteIo {
     /// Takes u(i)(t) and sends it. Where the sensors are not known no sample is sent, so that no station steps the
     /// program: it continues from its state when the sensors are known again.
     pub(super) fn sample(&mut self, now: Time) {
-        if self.knowledge.run().is_none() {
+        if self.knowledge.run().is_none() || !self.may_sample() {
             return;
         }
         let Some(sensors) = self.sensors.clone() else {
@@ -82,6 +82,7 @@ impl RemoteIo {
         let change = self.wanted.filter(|wanted| before_change != Some(*wanted) && !is_full);
         history.push(Step { change, inputs: inputs.clone() });
         run.sampled = true;
+
         let forced = |input| self.forcing.refuses_write(input, now);
         void_writes.extend(self.writing.sampled(operator_inputs, moment, history, &forced));
         self.writing.put_forced(operator_inputs, &forced, &mut unforced);
@@ -114,6 +115,7 @@ impl RemoteIo {
         if let Some(to) = change {
             self.report(Event::ProgramChanged { moment, from: before_change, to });
         }
+        self.note_own_sample();
         self.report(Event::Sampled { moment, inputs, born, before, change });
         self.report_void(&void_writes);
         self.report_validity(&validity);

@@ -102,6 +102,7 @@ impl Bench {
             value_fault: ValueFault::FailSafe,
             stale_state: StaleState::Operator,
             restart: None,
+            pair: None,
         };
         Self { remote_io: RemoteIo::new(Time(0), settings), cycle: 100 }
     }

@@ -92,7 +92,8 @@ impl RemoteIo {
     /// The cycle of the newest applied output, of an earlier life too.
     pub(super) fn newest_applied(&self) -> Option<Moment> {
         let floor = self.knowledge.floor().map(|floor| floor.moment);
-        floor.max(self.noted().map(Note::applied))
+        let paired = self.pairing.as_ref().and_then(|pairing| pairing.applied());
+        floor.max(self.noted().map(Note::applied)).max(paired)
     }
 
     /// The newest applied output whose state a cold start loses. A program that retains nothing loses nothing with the power of the whole plant.

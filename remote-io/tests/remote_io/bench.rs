@@ -53,6 +53,7 @@ pub(crate) fn settings(understudies: usize) -> Settings {
         value_fault: ValueFault::Hold,
         stale_state: StaleState::Operator,
         restart: None,
+        pair: None,
     }
 }
 

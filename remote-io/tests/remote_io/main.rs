@@ -5,4 +5,5 @@ mod changed;
 mod field;
 mod forced_writes;
 mod gone;
+mod pair;
 mod restart;

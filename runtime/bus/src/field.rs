@@ -16,6 +16,11 @@ pub trait FieldDriver: Send {
     /// field is reached over the link.
     fn drive(&mut self, moment: Moment, outputs: &Image, age: Duration) -> Option<Frame>;
 
+    /// Connects the field or lets it go: of two remote I/Os of a program, the author only is connected. Nothing is written when it is let go.
+    fn connect(&mut self, connects: bool) {
+        let _ = connects;
+    }
+
     /// u(i), where `frame` comes from this field.
     fn sense<'frame>(&mut self, frame: &'frame Frame) -> Option<&'frame Image>;
 
@@ -67,17 +72,26 @@ const PLANT_PATIENCE: Duration = Duration::from_secs(1);
 /// Of a remote I/O whose plant is a process of its own and is reached over the link.
 #[derive(Debug, Clone)]
 pub struct SimulatedField {
+    own: Member,
     program: ProgramId,
     agreement: Arc<Agreement>,
     configurations: Configurations,
     has_plant: bool,
+    connected: bool,
 }
 
 impl SimulatedField {
     /// The field of the remote I/O of `program`.
     pub fn new(program: ProgramId, agreement: Arc<Agreement>) -> Self {
+        let own = Member::RemoteIo(program);
         let configurations = Configurations { own: agreement.configuration, prepared: None };
-        Self { program, agreement, configurations, has_plant: false }
+        Self { own, program, agreement, configurations, has_plant: false, connected: true }
+    }
+
+    /// Of `own`, one of two remote I/Os of the program: it is connected when it is told to.
+    #[must_use]
+    pub fn of_pair(self, own: Member) -> Self {
+        Self { own, connected: false, ..self }
     }
 
     /// The cluster has a plant there, whose silence is reported.
@@ -95,11 +109,15 @@ impl FieldDriver for SimulatedField {
                 configuration: self.configurations.own,
                 prepared: self.configurations.prepared,
                 moment,
-                sender: Member::RemoteIo(self.program),
+                sender: self.own,
                 alone: false,
             },
             body: Body::Actuation(Actuation { outputs: outputs.clone() }),
         })
+    }
+
+    fn connect(&mut self, connects: bool) {
+        self.connected = connects;
     }
 
     fn sense<'frame>(&mut self, frame: &'frame Frame) -> Option<&'frame Image> {
@@ -118,6 +136,7 @@ impl FieldDriver for SimulatedField {
     }
 
     fn patience(&self) -> Option<Duration> {
-        self.has_plant.then(|| PLANT_PATIENCE.max(self.agreement.schedule.period() * 3))
+        (self.has_plant && self.connected)
+            .then(|| PLANT_PATIENCE.max(self.agreement.schedule.period() * 3))
     }
 }

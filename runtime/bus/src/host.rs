@@ -136,6 +136,7 @@ fn kind(body: &Body) -> &'static str {
         Body::Transfer(_) => "transfer",
         Body::Field(_) => "field",
         Body::Actuation(_) => "actuation",
+        Body::Pair(_) => "pair",
     }
 }
 
@@ -398,6 +399,7 @@ impl<M: Machine> Host<'_, M> {
                         round.timing.driven(sampled, self.clock.now());
                     }
                 }
+                Output::Connect(connects) => self.field.connect(connects),
                 Output::Report(event) => self.sink.record(now, Noted::Member(event)),
                 Output::Retain(record) => {
                     if let Some(retainer) = &self.retainer {

@@ -39,13 +39,13 @@ const PROBE_PATIENCE: Duration = Duration::from_millis(200);
 fn group_of(topic: Topic, sender: Member) -> Option<u8> {
     let index = match sender {
         Member::Station(station) => station.0,
-        Member::RemoteIo(program) | Member::Plant(program) => program.0,
+        Member::RemoteIo(program) | Member::Plant(program) | Member::Twin(program) => program.0,
     };
     match topic {
         Topic::Cycle => Some(0),
         Topic::Turn => Some(1 + index % CLASSES),
         Topic::Sample => Some(FIRST_OF_SAMPLES + index % CLASSES),
-        Topic::Field | Topic::Actuation => None,
+        Topic::Field | Topic::Actuation | Topic::Pair => None,
     }
 }
 

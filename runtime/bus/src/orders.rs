@@ -75,8 +75,14 @@ pub(crate) enum Unknown {
 pub struct Cuts {
     stations: StationSet,
     remote_ios: ProgramSet,
+    #[serde(default, skip_serializing_if = "is_none")]
+    twins: ProgramSet,
     #[serde(default, skip_serializing_if = "is_plugged")]
     unplugged: [bool; 2],
+}
+
+fn is_none(twins: &ProgramSet) -> bool {
+    twins.is_empty()
 }
 
 fn is_plugged(unplugged: &[bool; 2]) -> bool {
@@ -96,6 +102,8 @@ impl Cuts {
             (Member::Station(station), false) => self.stations.remove(station),
             (Member::RemoteIo(program), true) => self.remote_ios.insert(program),
             (Member::RemoteIo(program), false) => self.remote_ios.remove(program),
+            (Member::Twin(program), true) => self.twins.insert(program),
+            (Member::Twin(program), false) => self.twins.remove(program),
             (Member::Plant(_), _) => {}
         }
     }
@@ -104,6 +112,7 @@ impl Cuts {
         match member {
             Member::Station(station) => self.stations.contains(station),
             Member::RemoteIo(program) => self.remote_ios.contains(program),
+            Member::Twin(program) => self.twins.contains(program),
             Member::Plant(_) => false,
         }
     }

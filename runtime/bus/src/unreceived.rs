@@ -39,6 +39,13 @@ impl Unreceived {
     pub(crate) fn shown_by(&mut self, now: Time, frame: &Frame) -> bool {
         let sender = frame.header.sender;
         let unreceived = match (self.own, &frame.body) {
+            // The other one of two remote I/Os may be received in its place.
+            (Member::Twin(own), Body::Turn(turn)) => {
+                turn.recalled.iter().any(|recalled| recalled.program == own)
+            }
+            (Member::Twin(own), Body::Join(join)) => {
+                join.recalled.iter().any(|recalled| recalled.program == own)
+            }
             (Member::Station(own), Body::Sample(sample)) => sample.gone.contains(own),
             (Member::RemoteIo(own), Body::Turn(turn)) => {
                 turn.recalled.iter().any(|recalled| recalled.program == own)

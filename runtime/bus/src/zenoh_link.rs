@@ -403,6 +403,7 @@ fn name(member: Member) -> String {
         Member::Station(station) => ("station", station.0),
         Member::RemoteIo(program) => ("remote-io", program.0),
         Member::Plant(program) => ("plant", program.0),
+        Member::Twin(program) => ("twin", program.0),
     };
     format!("{kind}-{number}")
 }
@@ -414,6 +415,7 @@ fn prefix(cluster: ClusterHash, topic: Topic) -> String {
         Topic::Sample => "sample",
         Topic::Field => "field",
         Topic::Actuation => "actuation",
+        Topic::Pair => "pair",
     };
     format!("understudy/{cluster}/{topic}")
 }
@@ -425,7 +427,7 @@ fn subscriptions(endpoints: &Endpoints) -> BTreeSet<String> {
     let mut all = BTreeSet::new();
     for topic in Topic::ALL {
         let hears_all = match (topic, endpoints.own().member) {
-            (Topic::Cycle, _) | (Topic::Turn, Member::RemoteIo(_)) => true,
+            (Topic::Cycle, _) | (Topic::Turn, Member::RemoteIo(_) | Member::Twin(_)) => true,
             (Topic::Turn | Topic::Sample, own) => endpoints.roster().is_understudy(own),
             _ => false,
         };

@@ -69,6 +69,7 @@ pub struct Device {
     stale: bool,
     /// What was told of it.
     contested: bool,
+    connected: bool,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -89,6 +90,8 @@ struct State {
     outputs: Option<(Image, Instant)>,
     /// Another master writes its outputs too.
     contested: bool,
+    /// Whether a connection is wanted: of two remote I/Os of a program, by the author only.
+    connected: bool,
     ending: bool,
 }
 
@@ -104,6 +107,29 @@ impl Device {
         period: Duration,
         real_time: bool,
     ) -> std::io::Result<Self> {
+        Self::start_as(settings, Some(fail_safe), period, real_time)
+    }
+
+    /// The same of one of two remote I/Os of a program: it connects when it is told to ([`Self::connect`]), and drives nothing when it ends, since the
+    /// other one continues.
+    ///
+    /// # Errors
+    /// As [`Self::start`].
+    pub fn start_in_pair(
+        settings: FieldDevice,
+        period: Duration,
+        real_time: bool,
+    ) -> std::io::Result<Self> {
+        Self::start_as(settings, None, period, real_time)
+    }
+
+    fn start_as(
+        settings: FieldDevice,
+        fail_safe: Option<Image>,
+        period: Duration,
+        real_time: bool,
+    ) -> std::io::Result<Self> {
+        let connected = fail_safe.is_some();
         let shared = Arc::new(Shared {
             state: Mutex::new(State {
                 number: 1,
@@ -111,6 +137,7 @@ impl Device {
                 seen_at: Instant::now(),
                 outputs: None,
                 contested: false,
+                connected,
                 ending: false,
             }),
             changed: Notify::new(),
@@ -139,6 +166,7 @@ impl Device {
             looked_at: 0,
             stale: false,
             contested: false,
+            connected,
             thread: Some(thread),
         })
     }
@@ -151,8 +179,26 @@ impl Device {
         self.shared.changed.notify_one();
     }
 
+    /// Connects to the device, or ends the connection without another request.
+    pub fn connect(&mut self, connects: bool) {
+        self.connected = connects;
+        self.stale = false;
+        let mut state = self.shared.lock();
+        state.connected = connects;
+        state.outputs = None;
+        // What was seen before says nothing of now, and is no news.
+        state.number += 1;
+        state.seen = Look::Lost("no answer yet".into());
+        self.looked_at = state.number;
+        drop(state);
+        self.shared.changed.notify_one();
+    }
+
     /// What is new since the last look; never waits for the device.
     pub fn look(&mut self) -> Option<Look> {
+        if !self.connected {
+            return None;
+        }
         let state = self.shared.lock();
         let is_new = state.number != std::mem::replace(&mut self.looked_at, state.number);
         let age = state.seen_at.elapsed();
@@ -225,7 +271,8 @@ struct Worker {
     settings: FieldDevice,
     inputs: Plan,
     outputs: Plan,
-    fail_safe: Image,
+    /// What the device is driven to in the end; nothing of one of two remote I/Os.
+    fail_safe: Option<Image>,
     period: Duration,
     /// How often in a row its outputs could not be read; [`UNREAD`] where it does not let them be read.
     unread: Cell<u8>,
@@ -235,13 +282,18 @@ struct Worker {
 impl Worker {
     async fn run(self) {
         let address = &self.settings.connection;
-        let mut pause = FIRST_PAUSE;
+        let mut pause = self.first_pause();
         while !self.shared.lock().ending {
+            if !self.shared.lock().connected {
+                self.shared.changed.notified().await;
+                pause = self.first_pause();
+                continue;
+            }
             let patience = self.settings.timeout;
             match timeout(patience, Link::connect(address, self.settings.unit)).await {
                 Ok(Ok(device)) => {
                     if self.serve(device).await {
-                        pause = FIRST_PAUSE;
+                        pause = self.first_pause();
                     }
                 }
                 Ok(Err(error)) => {
@@ -251,9 +303,18 @@ impl Worker {
             }
             if !self.shared.lock().ending {
                 sleep(pause).await;
-                pause = (2 * pause).min(LONGEST_PAUSE);
+                pause = (2 * pause).min(self.longest_pause());
             }
         }
+    }
+
+    /// One of two remote I/Os tries at each cycle: the device lets it write when the other one's connection is over.
+    fn first_pause(&self) -> Duration {
+        if self.fail_safe.is_some() { FIRST_PAUSE } else { self.period.min(FIRST_PAUSE) }
+    }
+
+    fn longest_pause(&self) -> Duration {
+        if self.fail_safe.is_some() { LONGEST_PAUSE } else { self.first_pause() }
     }
 
     /// Exchanges until the connection is of no use, or it is over; whether it was of use before.
@@ -293,8 +354,11 @@ impl Worker {
             let begun = Instant::now();
             let (outputs, ending) = {
                 let state = self.shared.lock();
-                if state.ending {
-                    (Some((self.fail_safe.clone(), Instant::now())), true)
+                if !state.connected || state.ending && self.fail_safe.is_none() {
+                    return was_of_use;
+                }
+                if let (true, Some(fail_safe)) = (state.ending, &self.fail_safe) {
+                    (Some((fail_safe.clone(), Instant::now())), true)
                 } else {
                     (state.outputs.clone(), false)
                 }

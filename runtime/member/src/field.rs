@@ -19,12 +19,25 @@ impl Equipment {
     ) -> std::io::Result<Self> {
         Device::start(device, fail_safe, period, real_time).map(Self)
     }
+
+    /// Of one of two remote I/Os of a program.
+    pub(crate) fn start_in_pair(
+        device: FieldDevice,
+        period: Duration,
+        real_time: bool,
+    ) -> std::io::Result<Self> {
+        Device::start_in_pair(device, period, real_time).map(Self)
+    }
 }
 
 impl FieldDriver for Equipment {
     fn drive(&mut self, _moment: Moment, outputs: &Image, age: Duration) -> Option<Frame> {
         self.0.drive(outputs, age);
         None
+    }
+
+    fn connect(&mut self, connects: bool) {
+        self.0.connect(connects);
     }
 
     fn sense<'frame>(&mut self, _frame: &'frame Frame) -> Option<&'frame Image> {

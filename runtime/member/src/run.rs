@@ -18,7 +18,7 @@ use understudy_journal::Segments;
 use understudy_node::Station;
 use understudy_plant::PlantMachine;
 use understudy_remote_io::RemoteIo;
-use understudy_wire::{Epoch, Image, Member, ProgramId, Time};
+use understudy_wire::{Epoch, Member, Time};
 
 use crate::changes::{StartedChange, started_change};
 use crate::error::MemberError;
@@ -84,13 +84,15 @@ pub fn run_station(cluster: &Cluster, options: &MemberOptions) -> Result<(), Mem
 pub fn run_remote_io(cluster: &Cluster, options: &MemberOptions) -> Result<(), MemberError> {
     let wrong = || wrong_kind(options, "remote I/O", "understudy remote-io");
     let member = find_member(cluster, &options.name)?;
-    let Member::RemoteIo(program) = member else {
-        return Err(wrong());
-    };
     let started = started_change(cluster, options);
     let cluster = &started.cluster.clone();
-    let settings = cluster.remote_io_settings(program).ok_or_else(wrong)?;
-    let field = field_of(options, cluster, program, settings.fail_safe.clone())?;
+    let settings = match member {
+        Member::RemoteIo(program) => cluster.remote_io_settings(program),
+        Member::Twin(program) => cluster.twin_settings(program),
+        Member::Station(_) | Member::Plant(_) => None,
+    };
+    let settings = settings.ok_or_else(wrong)?;
+    let field = field_of(options, cluster, member, &settings)?;
     let is_retentive = settings.restart.is_some();
     let mut machine = RemoteIo::new(Time::default(), settings.clone());
     if let Some((change, configurations)) = &started.restored {
@@ -136,18 +138,25 @@ fn wrong_kind(options: &MemberOptions, wanted: &'static str, command: &'static s
 fn field_of(
     options: &MemberOptions,
     cluster: &Cluster,
-    program: ProgramId,
-    fail_safe: Image,
+    member: Member,
+    settings: &understudy_remote_io::Settings,
 ) -> Result<Box<dyn FieldDriver>, MemberError> {
-    let agreement = cluster.agreement();
+    let (agreement, program) = (cluster.agreement(), settings.program);
+    let is_paired = settings.pair.is_some();
     let remote_io = cluster.remote_ios().get(program.index());
     let Some(device) = remote_io.and_then(|remote_io| remote_io.field.clone()) else {
         let field = SimulatedField::new(program, agreement.clone());
+        let field = if is_paired { field.of_pair(member) } else { field };
         let has_plant = cluster.member_name(Member::Plant(program)).is_some();
         return Ok(Box::new(if has_plant { field.with_plant() } else { field }));
     };
     let period = agreement.schedule.period();
-    let equipment = Equipment::start(device, fail_safe, period, options.real_time);
+    let equipment = if is_paired {
+        Equipment::start_in_pair(device, period, options.real_time)
+    } else {
+        let fail_safe = settings.fail_safe.clone();
+        Equipment::start(device, fail_safe, period, options.real_time)
+    };
     Ok(Box::new(equipment.map_err(MemberError::Device)?))
 }
 

@@ -5,7 +5,7 @@ use understudy_node::Event as StationEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Missing};
 use understudy_simulator::Action;
 use understudy_wire::{
-    Force, Image, Member, Moment, OrderRefusal, ProgramId, ProgramSet, Source, StationId,
+    Force, Image, Member, Moment, OrderRefusal, Part, ProgramId, ProgramSet, Source, StationId,
 };
 
 use super::service::Outcome;
@@ -48,17 +48,23 @@ impl Account {
         }
     }
 
-    pub(super) fn remote_io(&mut self, program: ProgramId, event: &RemoteIoEvent) {
+    pub(super) fn remote_io(&mut self, member: Member, program: ProgramId, event: &RemoteIoEvent) {
         let violation = self
             .terms
             .referees
             .get_mut(program.index())
-            .and_then(|referee| referee.observe(event).err());
+            .and_then(|referee| referee.observe_from(member, event).err());
+        // The records of the last samples of the other one may be missing, as after a restart.
+        if let RemoteIoEvent::PartChanged { part: Part::Author, .. } = event
+            && let Some(referee) = self.terms.referees.get_mut(program.index())
+        {
+            referee.starts_again();
+        }
         if let RemoteIoEvent::Sampled { moment, inputs, .. } = event {
             self.sampled(program, *moment, inputs);
         }
         let RemoteIoEvent::Applied { moment, source, missing, heard, .. } = event else {
-            let changes = self.alarms.fold.remote_io(program, 0, event);
+            let changes = self.alarms.fold.remote_io(member, program, 0, event);
             self.alarms_changed(&changes, None);
             self.order_decided(program, event);
             if let RemoteIoEvent::Refused { member, theirs, ours } = event {
@@ -71,7 +77,7 @@ impl Account {
         };
         let idle = *missing == Some(Missing::NoCycle);
         let number = self.numbering.deadline(program, *moment, idle);
-        let changes = self.alarms.fold.remote_io(program, number, event);
+        let changes = self.alarms.fold.remote_io(member, program, number, event);
         self.alarms_changed(&changes, Some(number));
         let outcome = Outcome { source: *source, wrong: violation.is_some() };
         if let Some(violation) = violation {
@@ -99,9 +105,9 @@ impl Account {
         let next = self.next_cycle();
         match event {
             RemoteIoEvent::ChoiceRefused { newest, .. } => {
-                let member = Member::RemoteIo(program);
                 let asked = self.steps.iter_mut().rev().find(|step| {
-                    step.member == member && matches!(step.action, Action::Choose { .. })
+                    step.member.sampled_program() == Some(program)
+                        && matches!(step.action, Action::Choose { .. })
                 });
                 if let Some(step) = asked {
                     step.refused = Some(OrderRefusal::of_choice(*newest));
@@ -141,7 +147,7 @@ impl Account {
         if action == Action::Crash {
             self.networks.is_new(member, Some(cycle));
         }
-        if let (Member::RemoteIo(program), Action::Crash) = (member, action) {
+        if let (Some(program), Action::Crash) = (member.sampled_program(), action) {
             self.end_forces(Some(cycle), |of| of.program == program);
         }
     }
@@ -194,8 +200,10 @@ impl Account {
     pub(super) fn run(&mut self, event: &RunEvent) {
         match event {
             RunEvent::Fault { action, member, asked } => {
-                if let (Member::RemoteIo(program), Action::Release | Action::Choose { .. }) =
-                    (*member, *action)
+                if let (
+                    Member::RemoteIo(program) | Member::Twin(program),
+                    Action::Release | Action::Choose { .. },
+                ) = (*member, *action)
                     && let Some(referee) = self.terms.referees.get_mut(program.index())
                 {
                     referee.operator_chooses();
@@ -224,7 +232,7 @@ impl Account {
                 }
             }
             RunEvent::Commanded {
-                member: Member::RemoteIo(program),
+                member: Member::RemoteIo(program) | Member::Twin(program),
                 command: Command::Write(write),
                 ..
             } => {

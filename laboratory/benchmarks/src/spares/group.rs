@@ -193,7 +193,7 @@ impl Group {
         let name = self.cluster.member_name(member).unwrap_or_default().to_owned();
         let kind = match member {
             Member::Station(_) => "node",
-            Member::RemoteIo(_) => "remote-io",
+            Member::RemoteIo(_) | Member::Twin(_) => "remote-io",
             Member::Plant(_) => "plant",
         };
         let mut command = Command::new(&self.program);

@@ -227,7 +227,7 @@ fn play(part: Part) -> Result<(), Answer> {
             let observed = Observed::new(machine, own, understudy, window);
             understudy_bus::run_member(observed, settings, io::stdout())
         }
-        Member::Plant(_) => return Err(missing()),
+        Member::Plant(_) | Member::Twin(_) => return Err(missing()),
     };
     ran?;
     Ok(())

@@ -181,9 +181,10 @@ impl<'a> Fates<'a> {
             (Happening::Station(event), Some(Member::Station(station))) => {
                 of_station(station, event)
             }
-            (Happening::RemoteIo(event), Some(Member::RemoteIo(program))) => {
-                self.deadlines.look(now, program, event)
-            }
+            (
+                Happening::RemoteIo(event),
+                Some(Member::RemoteIo(program) | Member::Twin(program)),
+            ) => self.deadlines.look(now, program, event),
             (Happening::Run(RunEvent::Fault { action, member, .. }), _) => match (member, action) {
                 (Member::Station(station), Action::Crash) => Some(Seen::Crashed(*station)),
                 (Member::Station(station), Action::Restart) => Some(Seen::Restarted(*station)),

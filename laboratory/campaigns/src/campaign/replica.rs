@@ -78,7 +78,9 @@ pub(super) fn look(
         },
         (_, Record::Violation(violation)) => Some(Seen::Violation(violation.to_string())),
         (Member::Station(station), Record::Station(event)) => of_station(station, event),
-        (Member::RemoteIo(program), Record::RemoteIo(event)) => deadlines.look(now, program, event),
+        (Member::RemoteIo(program) | Member::Twin(program), Record::RemoteIo(event)) => {
+            deadlines.look(now, program, event)
+        }
         _ => None,
     }
 }

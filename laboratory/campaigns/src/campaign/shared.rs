@@ -323,7 +323,8 @@ impl Group<'_> {
         let mut observe = |now: Time, _: Option<u64>, member: Member, record: Record<'_>| {
             last.set(now);
             let mut found = found.borrow_mut();
-            if let (Member::RemoteIo(program), Record::RemoteIo(event)) = (member, record)
+            if let (Member::RemoteIo(program) | Member::Twin(program), Record::RemoteIo(event)) =
+                (member, record)
                 && matches!(event, RemoteIoEvent::Applied { .. })
             {
                 found.1.push((program, event.clone()));

@@ -13,7 +13,7 @@ use understudy_cluster::Cluster;
 use understudy_cycle::Schedule;
 use understudy_remote_io::{OperatorInput, OperatorInputKind};
 use understudy_simulator::{Action, Disturbance, Fault, Network};
-use understudy_wire::{Member, PointValue, ProgramId, StationId, Via};
+use understudy_wire::{Member, PointValue, ProgramId, ProgramSet, StationId, Via};
 
 use super::faultload::{Faultload, Injection};
 use super::kind::{Kind, Role};
@@ -33,6 +33,8 @@ pub(super) struct Target<'a> {
     /// Inputs that operators write.
     inputs: Vec<(ProgramId, OperatorInput)>,
     has_two_networks: bool,
+    /// Programs with a second remote I/O.
+    twins: ProgramSet,
 }
 
 impl<'a> Target<'a> {
@@ -46,6 +48,7 @@ impl<'a> Target<'a> {
             schedule: &cluster.agreement().schedule,
             inputs: inputs.collect(),
             has_two_networks: cluster.has_two_networks(),
+            twins: cluster.twins(),
         }
     }
 
@@ -68,8 +71,13 @@ pub(super) fn draw(
     kinds: &[Kind],
     cycles: &Range<u64>,
 ) -> Faultload {
-    let mut drawn =
-        Draw { random, schedule: target.schedule, inputs: &target.inputs, cycles: cycles.clone() };
+    let mut drawn = Draw {
+        random,
+        schedule: target.schedule,
+        inputs: &target.inputs,
+        twins: target.twins,
+        cycles: cycles.clone(),
+    };
     let mut faultload = Faultload::default();
     let (of_values, kinds): (Vec<Kind>, Vec<Kind>) =
         kinds.iter().partition(|kind| kind.is_value_fault());
@@ -102,6 +110,7 @@ struct Draw<'a> {
     random: &'a mut Pcg64,
     schedule: &'a Schedule,
     inputs: &'a [(ProgramId, OperatorInput)],
+    twins: ProgramSet,
     cycles: Range<u64>,
 }
 
@@ -119,6 +128,19 @@ impl Draw<'_> {
         (from..(from + cycles).min(self.cycles.end - 1), phase)
     }
 
+    /// A remote I/O, or the second one of its program as often; operators write to the first one, and a wrong program is given to it.
+    fn or_its_twin(&mut self, member: Member, kind: Kind) -> Member {
+        match member {
+            Member::RemoteIo(program)
+                if self.twins.contains(program)
+                    && !matches!(kind, Kind::Write | Kind::WrongProgram) =>
+            {
+                self.one_of(&[member, Member::Twin(program)])
+            }
+            _ => member,
+        }
+    }
+
     /// Nothing where the cluster has nobody of the role.
     fn injection(&mut self, kind: Kind) -> Option<Injection> {
         let schedule = self.schedule;
@@ -128,6 +150,7 @@ impl Draw<'_> {
             return None;
         }
         let member = self.one_of(&members);
+        let member = self.or_its_twin(member, kind);
         let (span, phase) = self.span();
         let step = |at_cycle: u64, action: Action| Fault { at_cycle, phase, member, action };
         let (from, to) = (span.start, span.end);

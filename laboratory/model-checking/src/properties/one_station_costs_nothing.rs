@@ -11,7 +11,7 @@ pub(super) const PROPERTY: Property = Property {
     promise: Promise::NothingHeld,
     holds: |model, world| {
         let used = &world.used;
-        let quiet = used.losses + used.delays + used.duplicates == 0;
+        let quiet = used.losses + used.delays + used.duplicates + used.cuts == 0;
         let one_station = matches!(world.was_down.as_slice(), [] | [Member::Station(_)]);
         let untrue = |tally: &Tally| tally.held + tally.fail_safe > 0;
         let links = model.start.broken.len() <= 1;

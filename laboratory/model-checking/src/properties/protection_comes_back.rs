@@ -16,7 +16,7 @@ pub(super) const PROPERTY: Property = Property {
             return true;
         }
         let mut simulation = world.simulation.clone();
-        for fault in revivals(&world.down, world.place) {
+        for fault in revivals(&world.down, world.cut, world.place, &model.members) {
             simulation.schedule(fault);
         }
         let mut back = simulation.run(1, RECOVERY_CYCLES, &mut |_, _, _, _| {});

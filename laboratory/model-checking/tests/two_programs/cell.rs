@@ -8,7 +8,7 @@ use understudy_cycle::{
 };
 use understudy_logic::{Circuit, CircuitBuilder};
 use understudy_plant::{ModelKind, Plant, Signals};
-use understudy_remote_io::{Release, StaleState, ValueFault};
+use understudy_remote_io::{PairSettings, Release, StaleState, ValueFault};
 use understudy_simulator::Parts;
 use understudy_wire::{
     ClusterHash, ConfigurationHash, Epoch, Image, ProgramHash, ProgramId, StationId,
@@ -80,9 +80,22 @@ fn plant() -> Circuit {
     builder.finish().expect("a circuit")
 }
 
-/// The limits of the protocol are as low as they can be, so that a few cycles pass all of them.
+/// One program with two remote I/Os, a controller and an understudy.
+pub(crate) fn paired(take_over_after: u32) -> Parts {
+    let mut parts = cell(&[program(false)], 1, Turns::Token);
+    for remote_io in &mut parts.remote_ios {
+        remote_io.pair = Some(PairSettings { is_twin: false, take_over_after });
+    }
+    parts
+}
+
+/// Two programs.
 pub(crate) fn parts(understudies: usize, turns: Turns) -> Parts {
-    let circuits = [program(false), program(true)];
+    cell(&[program(false), program(true)], understudies, turns)
+}
+
+/// The limits of the protocol are as low as they can be, so that a few cycles pass all of them.
+fn cell(circuits: &[Circuit], understudies: usize, turns: Turns) -> Parts {
     let agreement = Arc::new(Agreement {
         cluster: ClusterHash(1),
         configuration: ConfigurationHash(2),
@@ -128,6 +141,7 @@ pub(crate) fn parts(understudies: usize, turns: Turns) -> Parts {
         value_fault: ValueFault::Hold,
         stale_state: StaleState::Operator,
         restart: None,
+        pair: None,
     });
     let plants = circuits.iter().map(|circuit| {
         let kind = ModelKind::Program(Box::new((&plant()).into()));

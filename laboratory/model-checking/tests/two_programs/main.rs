@@ -3,18 +3,35 @@
 mod cell;
 mod changes;
 mod starts;
+mod twins;
 
 use understudy_cycle::Turns;
 use understudy_model_checking::{Budget, Model, Start, Step, check};
 use understudy_simulator::Tally;
 
-use cell::parts;
+use cell::{paired, parts};
 
 /// All that can be done once, and nothing of anything.
-const ONE: Budget =
-    Budget { losses: 1, delays: 1, duplicates: 1, crashes: 1, stops: 1, total: 1, cycles: 4 };
-const NONE: Budget =
-    Budget { losses: 0, delays: 0, duplicates: 0, crashes: 0, stops: 0, total: 0, cycles: 0 };
+const ONE: Budget = Budget {
+    losses: 1,
+    delays: 1,
+    duplicates: 1,
+    crashes: 1,
+    stops: 1,
+    total: 1,
+    cycles: 4,
+    ..NONE
+};
+const NONE: Budget = Budget {
+    losses: 0,
+    delays: 0,
+    duplicates: 0,
+    crashes: 0,
+    stops: 0,
+    cuts: 0,
+    total: 0,
+    cycles: 0,
+};
 
 /// Everything within the budget holds with each kind of turns, in so many states.
 fn check_all(understudies: usize, budget: Budget, states: [usize; 2]) {

@@ -50,6 +50,7 @@ fn referee() -> Referee {
         value_fault: ValueFault::Hold,
         stale_state: StaleState::Operator,
         restart: None,
+        pair: None,
     };
     Referee::new(&settings, (&circuit).into())
 }

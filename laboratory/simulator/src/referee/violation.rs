@@ -71,6 +71,12 @@ pub enum Violation {
         /// The station.
         station: StationId,
     },
+    /// Both remote I/Os of a program drove its outputs within one cycle.
+    #[error("in cycle {moment} both remote I/Os of the program drove its outputs")]
+    TwoWriters {
+        /// In this cycle.
+        moment: Moment,
+    },
     /// A signal of another program was sampled with a value that the other program did not compute.
     #[error(
         "in cycle {moment} the signal at input bit {input} was sampled as {value:#x}, which the other program did not compute"

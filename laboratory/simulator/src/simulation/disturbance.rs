@@ -8,6 +8,7 @@ use understudy_wire::{
     ConfigurationHash, Epoch, Frame, Member, ProgramHash, ProgramId, SignalPlace, StationId,
 };
 
+use super::pairs::twin_of;
 use super::{Observe, Record, Simulation};
 use crate::fault::{Action, ChangeStep, Fault};
 use crate::slot::Slot;
@@ -22,6 +23,7 @@ impl Simulation {
             Member::RemoteIo(program) | Member::Plant(program) => {
                 program.index() < self.remote_ios.len()
             }
+            Member::Twin(_) => self.remote_io_slot(member).is_some(),
         };
         match (member, action) {
             _ if !is_there => {}
@@ -41,25 +43,25 @@ impl Simulation {
                 }
             }
             (_, Action::Change { step }) => self.change(member, step, observe),
-            (Member::RemoteIo(program), Action::Release) => {
+            (Member::RemoteIo(program) | Member::Twin(program), Action::Release) => {
                 self.referees[program.index()].operator_chooses();
                 self.give(member, Input::RemoteIo(RemoteIoInput::Release), observe);
             }
-            (Member::RemoteIo(program), Action::Choose { choice }) => {
+            (Member::RemoteIo(program) | Member::Twin(program), Action::Choose { choice }) => {
                 self.referees[program.index()].operator_chooses();
                 self.give(member, Input::RemoteIo(RemoteIoInput::Choose(choice)), observe);
             }
-            (Member::RemoteIo(_), Action::Set { .. }) => {
+            (Member::RemoteIo(_) | Member::Twin(_), Action::Set { .. }) => {
                 if let Some(force) = action.force() {
                     let force = RemoteIoInput::Force(&force);
                     self.give(member, Input::RemoteIo(force), observe);
                 }
             }
-            (Member::RemoteIo(_), Action::Unset { input }) => {
+            (Member::RemoteIo(_) | Member::Twin(_), Action::Unset { input }) => {
                 let unforce = RemoteIoInput::Unforce(SignalPlace::Input(input));
                 self.give(member, Input::RemoteIo(unforce), observe);
             }
-            (Member::RemoteIo(_), Action::Write { .. }) => {
+            (Member::RemoteIo(_) | Member::Twin(_), Action::Write { .. }) => {
                 if let Some(write) = fault.write() {
                     self.give(member, Input::RemoteIo(RemoteIoInput::Write(&write)), observe);
                 }
@@ -74,10 +76,13 @@ impl Simulation {
                 self.wakeups.set(member, slot.due());
                 self.catch_up(member, waiting, observe);
             }
-            (Member::RemoteIo(program), _) => {
-                let slot = &mut self.remote_ios[program.index()];
+            (Member::RemoteIo(_) | Member::Twin(_), _) => {
+                let Some(slot) = self.remote_io_slot(member) else {
+                    return;
+                };
                 let waiting = disturb(slot, action);
-                self.wakeups.set(member, slot.due());
+                let due = slot.due();
+                self.wakeups.set(member, due);
                 self.catch_up(member, waiting, observe);
             }
         }
@@ -151,8 +156,11 @@ impl Simulation {
                 slot.restart(self.disks.station(self.now, settings, self.parts.change.as_ref()));
                 self.wakeups.set(member, slot.due());
             }
-            Member::RemoteIo(program) => {
+            Member::RemoteIo(program) | Member::Twin(program) => {
                 let mut settings = self.parts.remote_ios[program.index()].clone();
+                if let (Member::Twin(_), Some(twin)) = (member, twin_of(&settings)) {
+                    settings = twin;
+                }
                 settings.agreement = agreed(&settings.agreement);
                 if has_wrong_programs {
                     settings.hash = wrong_hash(settings.hash);
@@ -160,9 +168,13 @@ impl Simulation {
                 let misled = &mut self.misled[program.index()];
                 // It may go on with what its stations have started with it before.
                 *misled = has_wrong_programs.then(|| misled.unwrap_or_default());
-                let slot = &mut self.remote_ios[program.index()];
-                slot.restart(self.disks.remote_io(self.now, settings, self.parts.change.as_ref()));
-                self.wakeups.set(member, slot.due());
+                let change = self.parts.change.clone();
+                let machine = self.disks.remote_io(self.now, settings, change.as_ref());
+                if let Some(slot) = self.remote_io_slot(member) {
+                    slot.restart(machine);
+                    let due = slot.due();
+                    self.wakeups.set(member, due);
+                }
                 self.show_field(program);
             }
             Member::Plant(program) => self.plants.restart(program),
@@ -187,6 +199,7 @@ fn number(member: Member) -> u64 {
     match member {
         Member::Station(station) => (u64::from(station.0) + 1) << 8,
         Member::RemoteIo(program) | Member::Plant(program) => u64::from(program.0) + 1,
+        Member::Twin(program) => u64::from(program.0) + 128,
     }
 }
 

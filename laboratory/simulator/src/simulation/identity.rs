@@ -13,6 +13,8 @@ impl Hash for Simulation {
             now: _,
             stations,
             remote_ios,
+            twins,
+            driven_by,
             // It is what the slots say.
             wakeups: _,
             plants,
@@ -33,6 +35,7 @@ impl Hash for Simulation {
             pace,
             founded,
         } = self;
+        (twins, driven_by).hash(hasher);
         (links, stations, remote_ios, plants, disks, referees).hash(hasher);
         (ready, arrived, holders, misled, unannounced).hash(hasher);
         (violations.len(), spares, pace, founded).hash(hasher);

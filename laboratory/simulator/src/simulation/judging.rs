@@ -68,14 +68,21 @@ impl Synchronised {
 }
 
 impl Simulation {
-    pub(super) fn judge(&mut self, program: ProgramId, event: &Event, observe: &mut Observe<'_>) {
+    pub(super) fn judge(
+        &mut self,
+        member: Member,
+        program: ProgramId,
+        event: &Event,
+        observe: &mut Observe<'_>,
+    ) {
         if self.may_be_misled(program, event) {
             self.ready.remove(program);
             self.tallies[program.index()].count(event);
             return;
         }
         let mut holder = None;
-        if let Event::Sampled { moment, before, .. } = event {
+        let counts = self.referees[program.index()].counts(member);
+        if let (Event::Sampled { moment, before, .. }, true) = (event, counts) {
             let found = self.holder_before(program, *before);
             holder = found.map(|station| (*moment, station));
         }
@@ -95,7 +102,7 @@ impl Simulation {
         }
         let referee = &mut self.referees[program.index()];
         let (chosen, started) = (referee.operator_may_choose(), referee.cold_starts());
-        let mut found = referee.observe(event).err();
+        let mut found = referee.observe_from(member, event).err();
         if let (Some((moment, station)), false) = (holder, chosen)
             && referee.cold_starts() > started
         {
@@ -106,7 +113,7 @@ impl Simulation {
         {
             found = Some(Violation::NeedlessQuestion { moment: *moment, station });
         }
-        if let Event::Sampled { moment, inputs, .. } = event {
+        if let (Event::Sampled { moment, inputs, .. }, true) = (event, counts) {
             let settings = &self.parts.remote_ios[program.index()];
             let wrong = self.signals.judge(settings, *moment, inputs);
             found = found.or(wrong);
@@ -114,7 +121,6 @@ impl Simulation {
             self.signals.note(program, referee.truth());
         }
         if let Some(violation) = found {
-            let member = Member::RemoteIo(program);
             observe(self.now, self.pace.cycle(), member, Record::Violation(&violation));
             self.violations.push(violation);
         }
@@ -155,12 +161,13 @@ impl Simulation {
 
     /// Stations that run and that the remote I/O of a program can receive: those with its configuration, and the others.
     fn received_by(&self, program: ProgramId) -> (StationSet, StationSet) {
-        let remote_io = self.remote_ios[program.index()].running();
+        let member = self.author(program).unwrap_or(Member::RemoteIo(program));
+        let remote_io = self.running_remote_io(member);
         let own = remote_io.map(RemoteIo::configurations);
         let (mut equal, mut others) = (StationSet::EMPTY, StationSet::EMPTY);
         for (rank, slot) in (0..).zip(&self.stations) {
             let station = StationId(rank);
-            let reaches = self.links.reaches(Member::Station(station), Member::RemoteIo(program));
+            let reaches = self.links.reaches(Member::Station(station), member);
             if let (Some(running), true) = (slot.running(), reaches) {
                 let agrees = own.is_some_and(|own| own.agree(&running.configurations()));
                 let set = if agrees { &mut equal } else { &mut others };
@@ -214,8 +221,8 @@ impl Simulation {
     /// Those of `stations` that the remote I/O of a program can receive and that can receive it; none while it is down or has another
     /// configuration, since they refuse each other then.
     fn received_both_ways(&self, program: ProgramId, stations: StationSet) -> StationSet {
-        let remote_io = Member::RemoteIo(program);
-        let running = self.remote_ios[program.index()].running();
+        let remote_io = self.author(program).unwrap_or(Member::RemoteIo(program));
+        let running = self.running_remote_io(remote_io);
         if running.is_none_or(|it| !self.parts.are_right(it.configurations())) {
             return StationSet::EMPTY;
         }

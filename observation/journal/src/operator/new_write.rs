@@ -101,7 +101,9 @@ pub fn new_write(
 ) -> Result<Write, WriteProblem> {
     let input = request.input;
     let remote_io = match member {
-        Member::RemoteIo(program) => cluster.remote_ios().get(program.index()),
+        Member::RemoteIo(program) | Member::Twin(program) => {
+            cluster.remote_ios().get(program.index())
+        }
         Member::Station(_) | Member::Plant(_) => None,
     };
     let sources = remote_io.map_or(&[][..], |remote_io| &remote_io.inputs);

@@ -5,7 +5,7 @@ use understudy_node::Event as StationEvent;
 use understudy_plant::Event as PlantEvent;
 use understudy_remote_io::{Event as RemoteIoEvent, Lacking, LackingReason, ValueFault};
 use understudy_wire::{
-    Configurations, Member, Moment, ProgramSet, SignalPlace, StationId, StationSet, Word,
+    Configurations, Member, Moment, Part, ProgramSet, SignalPlace, StationId, StationSet, Word,
 };
 
 use super::signals::Names;
@@ -128,6 +128,18 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
     ProgramChanged { to, .. } => "program-changed" Notice format!("its program is {to} from this cycle on");
     Outvoted { theirs, stations, others } => "outvoted" Alarm outvoted_text(theirs, *stations, *others);
     Stalled { late, .. } => "stalled" Notice format!("host stall: woken {late:.1?} late");
+    PartChanged { part: Part::Follower, .. } => "part-changed" Notice
+        "follows the other remote I/O of its program: it samples nothing and drives nothing";
+    PartChanged { part: Part::TakingOver, .. } => "part-changed" Notice
+        "takes over from the other remote I/O of its program: it connects to the field";
+    PartChanged { part: Part::Author, .. } => "part-changed" Notice
+        "is the author of its program: it samples the inputs and drives the outputs";
+    PartnerLost { .. } => "partner-lost" Alarm
+        "does not receive the other remote I/O of its program: its own failure would not be masked";
+    PartnerReceived { .. } => "partner-received" Notice
+        "receives the other remote I/O of its program again";
+    SecondAuthor { .. } => "second-author" Alarm
+        "received the other remote I/O of its program as a second author, and has stopped to drive the outputs";
     Forced { force, .. } => "forced" Alarm members.force(force);
     ForceRefused { force, refusal, .. } => "force-refused" Warning {
         let (signal, value) = (members.place(force.signal), members.value(force.signal, force.value));

@@ -285,7 +285,7 @@ impl Model {
     fn is_blocked(&self, standing: &Standing, program: ProgramId, cycle: i64) -> bool {
         let deadline = self.deadline(program, cycle);
         match deadline.and_then(|step| step.driven.as_ref()) {
-            Some(driven) if !standing.is_down(Member::RemoteIo(program)) => {
+            Some(driven) if !standing.is_down(standing.driver(program)) => {
                 driven.missing.is_some_and(is_blocked)
             }
             _ => true,

@@ -32,7 +32,7 @@ impl Model {
             }
         }
         for program in samples.iter() {
-            let process = self.changes.now().process(Member::RemoteIo(program));
+            let process = self.changes.now().process(self.changes.now().driver(program));
             if process.is_none_or(|process| process.is_running()) {
                 let name = self.members.name(Member::RemoteIo(program)).to_owned();
                 // One that was suspended passes the deadline first that it missed.
@@ -78,10 +78,16 @@ impl Model {
     fn gives_no_sign(&mut self, record: &Record, program: ProgramId, cycle: i64) {
         let name = self.members.name(Member::RemoteIo(program)).to_owned();
         let process = self.changes.now().process(Member::RemoteIo(program));
-        if process.is_some_and(|process| !process.is_running()) {
+        let is_paired = self.is_paired(program);
+        if !is_paired && process.is_some_and(|process| !process.is_running()) {
             return;
         }
-        let reason = format!("{name} reports nothing, and no station receives its samples");
+        let reason = if is_paired {
+            let twin = self.members.name(Member::Twin(program));
+            format!("neither {name} nor {twin} samples, as far as stations receive them")
+        } else {
+            format!("{name} reports nothing, and no station receives its samples")
+        };
         let text = self.not_driven(program, cycle, &reason);
         self.tell(Event {
             number: 0,

@@ -201,7 +201,7 @@ impl Model {
         match event {
             HostEvent::Ready { .. } => self.ready(member, cycle),
             HostEvent::JournalLost { .. } => {
-                if let Member::RemoteIo(program) = member {
+                if let Some(program) = member.sampled_program() {
                     self.misses_records(program);
                 }
             }
@@ -225,15 +225,15 @@ impl Model {
         if !self.changes.now().is_down(member) {
             let change = Change::Process(member, Process::Running);
             self.changes.process(member, cycle, change);
-            if let Member::RemoteIo(program) = member {
-                self.remote_io_is_new(program);
+            if let Some(program) = member.sampled_program() {
+                self.remote_io_is_new(member, program);
             }
         }
     }
 
     fn host_alarm(&mut self, record: &Record, member: Member, cycle: i64, event: &HostEvent) {
         let own = |alarm| (record.name.clone(), alarm);
-        let is_remote_io = matches!(member, Member::RemoteIo(_));
+        let is_remote_io = member.sampled_program().is_some();
         match event {
             HostEvent::FieldLost { .. } | HostEvent::FieldContested if is_remote_io => {
                 let described = describe(record, &self.members, &self.writes);

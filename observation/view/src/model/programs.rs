@@ -68,6 +68,10 @@ impl Model {
             self.left_out += 1;
             return;
         }
+        let member = record.member.unwrap_or(Member::RemoteIo(program));
+        if self.is_of_follower(member, program, event) {
+            return;
+        }
         let cycle = match event {
             RemoteIoEvent::Applied { moment, missing, .. } => {
                 let idle = *missing == Some(Missing::NoCycle);
@@ -88,7 +92,7 @@ impl Model {
             _ => self.cycles.of(moment(&record.event)),
         };
         if !self.cycles.is_fixed()
-            && let Some(violation) = self.histories[place].note(cycle, event)
+            && let Some(violation) = self.histories[place].note(cycle, member, event)
         {
             self.violated(record, cycle, &violation.to_string());
         }
@@ -104,6 +108,7 @@ impl Model {
             }
             _ => {}
         }
+        self.pair_changed(record, member, program, cycle, event);
         self.protection_changed(record, program, cycle, event);
         self.changed(record, program, cycle, event);
         let cause = match event {
@@ -190,7 +195,8 @@ impl Model {
             _ => None,
         };
         if let Some(change) = change {
-            self.changes.reported(Member::RemoteIo(program), cycle, change);
+            let by = record.member.unwrap_or(Member::RemoteIo(program));
+            self.changes.reported(by, cycle, change);
         }
         self.alarm_of_forces(record, program, cycle, event);
         if let Some(alarm) = alarm {

@@ -7,6 +7,7 @@ use understudy_remote_io::{Event as RemoteIoEvent, Lacking, LackingReason};
 use understudy_wire::{Member, ProgramId, ProgramSet, StationId, StationSet};
 
 use super::Model;
+use super::pairs::PARTNER_LOST;
 use super::silence::{NOT_RECEIVED, Silence};
 use super::standing::{Change, ProgramChange, Standing};
 use crate::alarm::{Subject, UNPROTECTED};
@@ -56,9 +57,9 @@ const JOINING: &str = "joining";
 impl Model {
     /// The process of a remote I/O begins or ends: the alarms about its reports and its commands are over. A new one says so if its field
     /// fails.
-    pub(super) fn remote_io_is_new(&mut self, program: ProgramId) {
-        let name = self.members.name(Member::RemoteIo(program)).to_owned();
-        let over = [STATE_LOST, "forced", "field-lost", "field-contested"];
+    pub(super) fn remote_io_is_new(&mut self, member: Member, program: ProgramId) {
+        let name = self.members.name(member).to_owned();
+        let over = [STATE_LOST, PARTNER_LOST, "forced", "field-lost", "field-contested"];
         self.alarms.all_over(&name, &over, self.cycles.of(None));
         if let Some(history) = self.histories.get_mut(program.index()) {
             history.starts_again();
@@ -200,12 +201,14 @@ impl Model {
     fn protection_is(&mut self, program: ProgramId, cycle: i64, protection: Protection) {
         let change = ProgramChange::Protection(Box::new(protection));
         let change = Change::Program(program, change);
-        self.changes.reported(Member::RemoteIo(program), cycle, change);
+        let by = self.changes.now().driver(program);
+        self.changes.reported(by, cycle, change);
     }
 
     fn lost_is(&mut self, program: ProgramId, cycle: i64, lost: Option<LostState>) {
         let change = Change::Program(program, ProgramChange::Lost(lost.map(Box::new)));
-        self.changes.reported(Member::RemoteIo(program), cycle, change);
+        let by = self.changes.now().driver(program);
+        self.changes.reported(by, cycle, change);
     }
 
     /// Protection of a program in a cycle: what its remote I/O reported, without causes that the deadlines and turns of this cycle refute, and with the

@@ -40,12 +40,16 @@ impl Model {
                 self.process_is(*member, Process::Ended, cycle);
                 self.done(*member, text.clone(), Some(true), cycle);
                 match member {
-                    Member::RemoteIo(program) => drop(self.not_driven(*program, cycle, &text)),
+                    Member::RemoteIo(program) if !self.is_paired(*program) => {
+                        drop(self.not_driven(*program, cycle, &text));
+                    }
                     // Of a station it is the cause of what its programs lack.
                     Member::Station(_) => {
                         self.alarms.concerns(&(name, UNPROTECTED), None, cycle, text);
                     }
-                    Member::Plant(_) => self.alarms.raise((name, ENDED), cycle, text),
+                    Member::Plant(_) | Member::RemoteIo(_) | Member::Twin(_) => {
+                        self.alarms.raise((name, ENDED), cycle, text);
+                    }
                 }
             }
             RunEvent::Origin { moment, cycle } => {
@@ -65,15 +69,15 @@ impl Model {
             RunEvent::Attached { member } => {
                 self.changes.push(cycle, Change::Attached(*member));
                 // Its records from before are not in this journal.
-                if let Member::RemoteIo(program) = member {
-                    self.misses_records(*program);
+                if let Some(program) = member.sampled_program() {
+                    self.misses_records(program);
                 }
             }
             RunEvent::Detached { member, .. } => {
                 self.changes.push(cycle, Change::Detached(*member));
             }
             RunEvent::Commanded {
-                member: Member::RemoteIo(program),
+                member: Member::RemoteIo(program) | Member::Twin(program),
                 command: Command::Write(write),
                 ..
             } => {
@@ -112,7 +116,9 @@ impl Model {
             Some(Process::Suspended) => Some("is suspended"),
             _ => None,
         };
-        if let (Member::RemoteIo(program), Some(what)) = (member, what) {
+        if let (Member::RemoteIo(program), Some(what)) = (member, what)
+            && !self.is_paired(program)
+        {
             let reason = format!("{} {what}", self.members.name(member));
             self.not_driven(program, cycle, &reason);
         }
@@ -130,11 +136,11 @@ impl Model {
         self.changes.process(member, cycle, change);
         if !process.is_running() {
             self.network_forgets(member, cycle);
-            self.reports.down(member);
+            self.reports.down(self.reported_as(member));
             self.find_complete();
         }
-        if let (Member::RemoteIo(program), false) = (member, process == Process::Suspended) {
-            self.remote_io_is_new(program);
+        if let (Some(program), false) = (member.sampled_program(), process == Process::Suspended) {
+            self.remote_io_is_new(member, program);
         }
     }
 

@@ -42,6 +42,8 @@ pub(crate) struct Standing {
     detached: BTreeSet<Member>,
     /// Members that have reported nothing for a while, whatever their processes do.
     silent: BTreeSet<Member>,
+    /// Of programs with two remote I/Os: the one that drives, where that is known.
+    authors: BTreeMap<ProgramId, Member>,
     stations: Vec<StationStanding>,
     programs: Vec<ProgramStanding>,
     /// What the scenario came to, where it is over and the cluster stays up.
@@ -85,8 +87,17 @@ impl Standing {
 
     /// Whether a member executes, as far as is known, and is received here.
     pub(crate) fn reports(&self, member: Member) -> bool {
-        let executes = self.process(member).is_none_or(Process::is_running);
-        executes && !self.is_silent(member) && !self.is_detached(member)
+        let driver = match member {
+            Member::RemoteIo(program) => self.driver(program),
+            other => other,
+        };
+        let executes = self.process(driver).is_none_or(Process::is_running);
+        executes && !self.is_silent(member) && !self.is_detached(driver)
+    }
+
+    /// The remote I/O that drives the outputs of a program, as far as is known.
+    pub(crate) fn driver(&self, program: ProgramId) -> Member {
+        self.authors.get(&program).copied().unwrap_or(Member::RemoteIo(program))
     }
 
     /// Whether a member has ceased to report.
@@ -138,6 +149,9 @@ impl Standing {
             Change::Reports(member) => {
                 self.silent.remove(member);
             }
+            Change::Author(program, member) => {
+                self.authors.insert(*program, *member);
+            }
             Change::BecameCycleMaster(station) => {
                 self.cycle_masters.insert(*station);
             }
@@ -168,7 +182,9 @@ impl Standing {
                     own.begin();
                 }
             }
-            Member::RemoteIo(program) if process != Process::Suspended => {
+            Member::RemoteIo(program) | Member::Twin(program)
+                if process != Process::Suspended && self.driver(program) == member =>
+            {
                 if let Some(own) = self.programs.get_mut(program.index()) {
                     *own = ProgramStanding { plant: own.plant, ..ProgramStanding::default() };
                 }
@@ -218,6 +234,8 @@ pub(super) enum Change {
     /// It reports again.
     Reports(Member),
     BecameCycleMaster(StationId),
+    /// One of two remote I/Os drives from now on.
+    Author(ProgramId, Member),
     ScenarioOver(String),
     Station(StationId, StationChange),
     Program(ProgramId, ProgramChange),
@@ -237,9 +255,11 @@ impl Change {
             | Self::Reports(_)
             | Self::ScenarioOver(_)
             | Self::Station(_, StationChange::Done { .. }) => false,
-            Self::Alive(_) | Self::BecameCycleMaster(_) | Self::Station(..) | Self::Program(..) => {
-                true
-            }
+            Self::Alive(_)
+            | Self::BecameCycleMaster(_)
+            | Self::Author(..)
+            | Self::Station(..)
+            | Self::Program(..) => true,
         }
     }
 }

@@ -12,7 +12,7 @@ use understudy_wire::{Member, ProgramId, ProgramSet, StationId};
 use super::{
     LinkSnapshot, MarginSnapshot, OutcomeSnapshot, PlantSnapshot, PlantState, ProgramSnapshot,
     RemoteIoSnapshot, RemoteIoState, RunState, Snapshot, StationSnapshot, TimingSnapshot,
-    WordSnapshot,
+    TwinSnapshot, WordSnapshot,
 };
 use crate::alarm::{Alarm, AlarmState, PROCESS};
 use crate::describe::{missing_text, program_fault_text};
@@ -183,7 +183,7 @@ impl Picture<'_> {
             && process.is_none_or(Process::is_running)
             && match member {
                 Member::Station(station) => is_received(station),
-                Member::RemoteIo(_) => true,
+                Member::RemoteIo(_) | Member::Twin(_) => true,
                 Member::Plant(_) => false,
             }
     }
@@ -236,7 +236,7 @@ impl Picture<'_> {
 
     /// The deadline of the cycle, as its remote I/O reported it. A remote I/O without a process drives nothing.
     fn driven(&self, program: ProgramId) -> Option<&Driven> {
-        if self.standing.is_down(Member::RemoteIo(program)) {
+        if self.standing.is_down(self.standing.driver(program)) {
             return None;
         }
         let step = self.model.deadline(program, self.cycle?)?;
@@ -345,10 +345,27 @@ impl Picture<'_> {
         RemoteIoSnapshot {
             name: self.name(member),
             state,
+            twin: self.twin(program),
             link: self.link(member),
             sample_to_output: timed.map(|(taken, _)| taken),
             wakeups: timed.map(|(_, late)| late),
         }
+    }
+
+    fn twin(&self, program: ProgramId) -> Option<TwinSnapshot> {
+        let member = Member::Twin(program);
+        self.model.cluster().member_name(member)?;
+        Some(TwinSnapshot {
+            name: self.name(member),
+            drives: self.standing.driver(program) == member,
+            process: match self.standing.process(member) {
+                Some(Process::Killed) => RemoteIoState::Killed,
+                Some(Process::Ended) => RemoteIoState::Ended,
+                Some(Process::Suspended) => RemoteIoState::Suspended,
+                Some(Process::Running) | None => RemoteIoState::Serving,
+            },
+            link: self.link(member),
+        })
     }
 
     fn plant(&self, program: ProgramId) -> Option<PlantSnapshot> {

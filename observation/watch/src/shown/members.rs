@@ -3,7 +3,7 @@
 use serde::Serialize;
 use understudy_view::{
     LinkSnapshot, PlantSnapshot, PlantState, RemoteIoSnapshot, RemoteIoState, Snapshot,
-    StationSnapshot, StationState, WordSnapshot,
+    StationSnapshot, StationState, TwinSnapshot, WordSnapshot,
 };
 
 #[derive(Debug, Serialize)]
@@ -27,10 +27,13 @@ pub(super) struct ShownMember {
 pub(super) fn members(snapshot: &Snapshot) -> Vec<ShownMember> {
     let stations = snapshot.stations.iter();
     let remote_ios = snapshot.remote_ios.iter().enumerate();
+    let twins = remote_ios.clone();
+    let twins = twins.filter_map(|(program, of)| Some(twin(program, of.twin.as_ref()?)));
     let plants = snapshot.plants.iter();
     stations
         .map(|station| self::station(snapshot, station))
         .chain(remote_ios.map(|(program, remote_io)| self::remote_io(snapshot, program, remote_io)))
+        .chain(twins)
         .chain(plants.map(|plant| self::plant(snapshot, plant)))
         .collect()
 }
@@ -57,7 +60,11 @@ fn remote_io(snapshot: &Snapshot, program: usize, remote_io: &RemoteIoSnapshot) 
     ShownMember {
         name: remote_io.name.clone(),
         kind: "remote-io",
-        state: remote_io.state.word(),
+        state: match (&remote_io.twin, remote_io.state) {
+            (Some(twin), RemoteIoState::Serving) if twin.drives => "follower",
+            (Some(_), RemoteIoState::Serving) => "author",
+            (_, state) => state.word(),
+        },
         down: matches!(remote_io.state, RemoteIoState::Killed | RemoteIoState::Ended),
         is_cycle_master: false,
         cut: remote_io.link.isolated,
@@ -66,6 +73,26 @@ fn remote_io(snapshot: &Snapshot, program: usize, remote_io: &RemoteIoSnapshot) 
             cut(&remote_io.link),
             detached(&remote_io.link),
         ]),
+        program: Some(program),
+        parity_words: Vec::new(),
+    }
+}
+
+fn twin(program: usize, twin: &TwinSnapshot) -> ShownMember {
+    let down = matches!(twin.process, RemoteIoState::Killed | RemoteIoState::Ended);
+    let is_suspended = twin.process == RemoteIoState::Suspended;
+    ShownMember {
+        name: twin.name.clone(),
+        kind: "remote-io",
+        state: match (down || is_suspended, twin.drives) {
+            (true, _) => twin.process.word(),
+            (false, true) => "author",
+            (false, false) => "follower",
+        },
+        down,
+        is_cycle_master: false,
+        cut: twin.link.isolated,
+        note: note([None, cut(&twin.link), detached(&twin.link)]),
         program: Some(program),
         parity_words: Vec::new(),
     }

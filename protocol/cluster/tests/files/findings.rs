@@ -524,3 +524,40 @@ fn addresses_of_two_networks() {
     let found = check(two, &at("127.0.0.1", "127.0.0.2"), &understudy);
     assert!(!found.contains("U0240"), "the loopback interface is for tests: {found}");
 }
+
+/// What a twin needs of its device and of its plant, in addresses and names.
+#[test]
+fn twins() {
+    let check = |twin: &str, field: &str, plant: &str| {
+        check(&format!(
+            "[cluster]\nname = \"cell\"\nperiod = \"10ms\"\n\
+             [[controller]]\nname = \"robot\"\nladder = \"robot.ladder\"\naddress = \"10.0.1.11:7450\"\n\
+             [[remote_io]]\nname = \"robot-io\"\ncontroller = \"robot\"\ntwin = {{ {twin} }}\n{field}{plant}"
+        ))
+    };
+    let field = |device: &str| format!("[remote_io.field]\nmodbus = \"{device}\"\n");
+    let (tcp, serial) = (field("10.0.1.60:502"), field("rtu:/dev/ttyUSB0"));
+    let named = |more: &str| format!("name = \"robot-io-2\", wiring = \"exclusive\"{more}");
+    assert!(!check(&named(""), &tcp, "").contains("error"));
+    let late = ", owner_timeout = \"25ms\", take_over_after";
+    assert!(!check(&named(&format!("{late} = 3")), &tcp, "").contains("error"));
+    let found = check(&named(&format!("{late} = 2")), &tcp, "");
+    assert!(found.contains("U0229") && found.contains("take_over_after = 3"), "{found}");
+    assert!(check(&named(""), &serial, "").contains("U0229"));
+    assert!(check("wiring = \"exclusive\"", &tcp, "").contains("U0203"), "it has no name");
+    assert!(check("name = \"robot-io-2\"", &tcp, "").contains("U0203"), "it has no wiring");
+    let parallel = "name = \"robot-io-2\", wiring = \"parallel\"";
+    assert!(check(parallel, &tcp, "").contains("U0207"), "it is not built");
+    let taken = "name = \"robot-io\", wiring = \"exclusive\"";
+    assert!(check(taken, &tcp, "").contains("U0208"));
+    let address = named(", address = \"10.0.1.11:7450\"");
+    assert!(check(&address, &tcp, "").contains("U0210"));
+    let plant = |cycles: u32| {
+        format!(
+            "[[plant]]\ncontroller = \"robot\"\nmodel = \"robot\"\nwatchdog_cycles = {cycles}\n"
+        )
+    };
+    let found = check(&named(", take_over_after = 2"), "", &plant(4));
+    assert!(found.contains("U0257") && found.contains("watchdog_cycles = 5"), "{found}");
+    assert!(!check(&named(", take_over_after = 2"), "", &plant(5)).contains("U0257"));
+}

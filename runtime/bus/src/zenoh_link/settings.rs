@@ -24,6 +24,7 @@ pub(super) fn identity(cluster: ClusterHash, member: Member) -> String {
         Member::Station(station) => (1, station.0),
         Member::RemoteIo(program) => (2, program.0),
         Member::Plant(program) => (3, program.0),
+        Member::Twin(program) => (4, program.0),
     };
     format!("{kind}{number:02x}{:016x}", cluster.0)
 }

@@ -63,7 +63,7 @@ impl Machine for Chatter {
                 let body = match self.own {
                     Member::Station(_) => Body::Sync,
                     Member::RemoteIo(_) => Body::Sample(sample()),
-                    Member::Plant(_) => Body::Field(field()),
+                    Member::Plant(_) | Member::Twin(_) => Body::Field(field()),
                 };
                 let agreement = agreement();
                 self.said.push_back(Output::Send(Arc::new(Frame {

@@ -232,6 +232,7 @@ fn an_answer_that_is_taken_up_late_is_old() {
             seen_at: arrived,
             outputs: None,
             contested: false,
+            connected: true,
             ending: false,
         };
         let shared = Arc::new(Shared { state: Mutex::new(state), changed: Notify::new() });
@@ -242,9 +243,35 @@ fn an_answer_that_is_taken_up_late_is_old() {
             looked_at: 1,
             stale: false,
             contested: false,
+            connected: true,
             thread: None,
         };
         seen.see(Look::Sensors(Image::zero(1)), arrived);
         assert_eq!(matches!(device.look(), Some(Look::Lost(_))), is_lost, "{age:?}");
     }
+}
+
+/// A device of one of two remote I/Os is connected by the author only, and is written to by none that has let it go, nor by one that ends.
+#[test]
+fn a_device_of_two_remote_ios_is_written_to_by_the_author() {
+    let (address, held) = serve(Ends::After(u64::MAX));
+    let period = Duration::from_millis(2);
+    let start = || Device::start_in_pair(settings(address), period, false).expect("a thread");
+    let (mut author, mut follower) = (start(), start());
+    let connections = || held.connections.load(Ordering::SeqCst);
+    author.connect(true);
+    looks(&mut author, period, 5);
+    follower.drive(&Image::from_bits([false, false]), Duration::ZERO);
+    assert_eq!((connections(), follower.look()), (1, None));
+    let coils = || held.coils.lock().expect("no panic").clone();
+    let driven = BTreeMap::from([(3, true), (800, true)]);
+    assert_eq!(coils(), driven);
+    author.connect(false);
+    author.drive(&Image::from_bits([false, false]), Duration::ZERO);
+    follower.connect(true);
+    looks(&mut follower, period, 5);
+    assert_eq!((coils(), author.look()), (driven.clone(), None));
+    drop(author);
+    drop(follower);
+    assert_eq!(coils(), driven, "neither drives the fail-safe values when it ends");
 }

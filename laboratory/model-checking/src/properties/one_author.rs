@@ -1,0 +1,14 @@
+//! Invariant *One author*: the two remote I/Os of a program never drive its outputs at one time.
+
+use understudy_simulator::Violation;
+
+use super::{Promise, Property};
+
+pub(super) const PROPERTY: Property = Property {
+    name: "one remote I/O at a time drives the outputs of a program",
+    promise: Promise::NothingWrong,
+    holds: |_, world| {
+        let two = |violation: &Violation| matches!(violation, Violation::TwoWriters { .. });
+        !world.simulation.violations().iter().any(two)
+    },
+};

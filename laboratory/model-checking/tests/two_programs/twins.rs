@@ -1,0 +1,42 @@
+//! One program with two remote I/Os, a controller and an understudy: every schedule of two faults.
+
+use super::*;
+
+/// Everything within the budget holds where the other remote I/O takes over after one cycle, in this number of states.
+fn check_pair(budget: Budget, states: usize) {
+    let model = Model::new(paired(1), Start::default(), budget);
+    let verdict = check(model.expect("it synchronises"), 2);
+    assert_eq!(verdict.counterexamples, []);
+    assert_eq!(verdict.states, states, "a protocol that has changed has other states");
+}
+
+#[test]
+fn one_fault_in_four_cycles() {
+    check_pair(Budget { cuts: 1, ..ONE }, 40_820);
+}
+
+/// All that is not a loss, in two cycles.
+const TWO: Budget = Budget { crashes: 2, stops: 2, cuts: 1, total: 2, cycles: 2, ..NONE };
+
+#[test]
+fn two_faults_in_one_cycle() {
+    check_pair(Budget { losses: 2, cycles: 1, ..TWO }, 162_755);
+}
+
+#[test]
+#[ignore = "it takes a minute"]
+fn two_crashes_or_stops_in_two_cycles() {
+    check_pair(Budget { cuts: 0, ..TWO }, 629_596);
+}
+
+#[test]
+#[ignore = "it takes two minutes"]
+fn a_cut_and_a_crash_or_a_stop_in_two_cycles() {
+    check_pair(Budget { crashes: 1, stops: 1, ..TWO }, 1_193_208);
+}
+
+#[test]
+#[ignore = "it takes two minutes"]
+fn a_loss_and_another_fault_in_two_cycles() {
+    check_pair(Budget { losses: 2, crashes: 1, stops: 1, ..TWO }, 1_409_406);
+}

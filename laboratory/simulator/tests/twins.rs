@@ -1,0 +1,140 @@
+//! Two remote I/Os of each program: one of them fails, and the other one takes over; two never drive at one time.
+
+mod press_cell;
+
+use std::time::Duration;
+
+use understudy_cycle::Mode;
+use understudy_simulator::{Action, Fault, Network, Parts, Record, Simulation};
+use understudy_wire::{Member, ProgramId, StationId, Time};
+
+const ROBOT: ProgramId = ProgramId(0);
+const FIRST: Member = Member::RemoteIo(ROBOT);
+const TWIN: Member = Member::Twin(ROBOT);
+
+/// The cell with twins that take over after this number of cycles.
+fn parts(take_over_after: u32) -> Parts {
+    let mut parts = press_cell::parts(Mode::Full, 1);
+    press_cell::pair(&mut parts, take_over_after);
+    parts
+}
+
+/// What came of a run.
+struct Outcome {
+    simulation: Simulation,
+    /// Cycles in a row in which the outputs of the robot were not driven, at most.
+    gap: u32,
+    /// Deadlines at which nothing was proved.
+    missed: u64,
+}
+
+fn run(parts: Parts, faults: &[Fault], cycles: u64) -> Outcome {
+    let mut simulation = Simulation::new(parts, Network::default(), 1);
+    for fault in faults {
+        simulation.schedule(*fault);
+    }
+    let mut last: Option<Time> = None;
+    let mut longest = Duration::ZERO;
+    let outcome = simulation.run(cycles, 200, &mut |now, cycle, member, record| {
+        if cycle.is_some() && member == Member::Plant(ROBOT) && matches!(record, Record::Plant(_)) {
+            if let Some(last) = last {
+                longest = longest.max(now.since(last));
+            }
+            last = Some(now);
+        }
+    });
+    outcome.expect("the cluster gets ready");
+    assert_eq!(simulation.violations(), []);
+    let end = last.map_or(Duration::MAX, |last| simulation.now().since(last));
+    let longest = longest.max(end.saturating_sub(press_cell::PERIOD));
+    let gap = longest.as_secs_f64() / press_cell::PERIOD.as_secs_f64();
+    let tally = &simulation.tallies()[ROBOT.index()];
+    let missed = tally.held + tally.fail_safe;
+    Outcome { gap: gap.round() as u32 - 1, missed, simulation }
+}
+
+fn fault(at_cycle: u64, phase: f64, member: Member, action: Action) -> Fault {
+    Fault { at_cycle, phase, member, action }
+}
+
+/// At each tenth of a cycle and for each `take_over_after`: the outputs stay for as many cycles and one more, and nothing wrong is driven.
+#[test]
+fn the_twin_takes_over_from_an_author_that_has_ended() {
+    for after in 1..=3 {
+        for tenth in 0..10 {
+            for cycle in 100..102 {
+                let phase = f64::from(tenth) / 10.0;
+                let faults = [fault(cycle, phase, FIRST, Action::Crash)];
+                let outcome = run(parts(after), &faults, 200);
+                assert_eq!(outcome.simulation.author(ROBOT), Some(TWIN), "{after} {cycle} {phase}");
+                let held = outcome.gap as u64 + outcome.missed;
+                assert!(held <= u64::from(after) + 1, "{after} {cycle} {phase}: {held}");
+            }
+        }
+    }
+}
+
+/// The first one is back as a follower, and takes over again where the twin ends.
+#[test]
+fn one_that_returns_follows() {
+    let faults = [
+        fault(100, 0.3, FIRST, Action::Crash),
+        fault(150, 0.3, FIRST, Action::Restart),
+        fault(250, 0.3, TWIN, Action::Crash),
+    ];
+    let mut simulation = run(parts(1), &faults[..2], 240).simulation;
+    assert_eq!(simulation.author(ROBOT), Some(TWIN));
+    assert_eq!(simulation.tallies()[ROBOT.index()].fail_safe, 0);
+    simulation.schedule(faults[2]);
+    simulation.go_to(300, 0.0, &mut |_, _, _, _| {});
+    assert_eq!((simulation.author(ROBOT), simulation.violations()), (Some(FIRST), &[][..]));
+}
+
+/// The loss of a follower, of one station, or of a station and the follower costs no cycle.
+#[test]
+fn a_follower_costs_no_cycle() {
+    let station = Member::Station(StationId(0));
+    let understudy = Member::Station(StationId(2));
+    for lost in [&[TWIN][..], &[station], &[understudy], &[station, TWIN], &[understudy, TWIN]] {
+        for tenth in 0..10 {
+            let phase = f64::from(tenth) / 10.0;
+            let crash = |member: &Member| fault(100, phase, *member, Action::Crash);
+            let faults: Vec<Fault> = lost.iter().map(crash).collect();
+            let outcome = run(parts(1), &faults, 200);
+            assert_eq!((outcome.gap, outcome.missed), (0, 0), "{lost:?} {phase}");
+            assert_eq!(outcome.simulation.author(ROBOT), Some(FIRST));
+        }
+    }
+}
+
+/// An author that was suspended drives nothing when it continues, and follows.
+#[test]
+fn a_suspended_author_drives_nothing_when_it_goes_on() {
+    for after in 1..=2 {
+        for cycles in 1..12 {
+            for tenth in 0..10 {
+                let phase = f64::from(tenth) / 10.0;
+                let faults = [
+                    fault(100, phase, FIRST, Action::Stop),
+                    fault(100 + cycles, phase, FIRST, Action::Continue),
+                ];
+                let outcome = run(parts(after), &faults, 200);
+                let held = u64::from(outcome.gap) + outcome.missed;
+                assert!(held <= u64::from(after) + 2, "{after} {cycles} {phase}: {held}");
+                assert!(outcome.simulation.author(ROBOT).is_some(), "{after} {cycles} {phase}");
+            }
+        }
+    }
+}
+
+/// The two do not receive each other, and the stations receive both: nothing happens.
+#[test]
+fn a_cut_between_the_two_changes_nothing() {
+    let faults = [
+        fault(100, 0.4, FIRST, Action::Cut { to: TWIN }),
+        fault(100, 0.4, TWIN, Action::Cut { to: FIRST }),
+    ];
+    let outcome = run(parts(1), &faults, 200);
+    assert_eq!((outcome.gap, outcome.missed), (0, 0));
+    assert_eq!(outcome.simulation.author(ROBOT), Some(FIRST));
+}

@@ -1,0 +1,83 @@
+//! Programs with two remote I/Os: which one drives, and whether the other one is there.
+
+use understudy_journal::Record;
+use understudy_remote_io::Event as RemoteIoEvent;
+use understudy_wire::{Member, Part, ProgramId};
+
+use super::Model;
+use super::standing::Change;
+use crate::describe::describe;
+
+/// Alarm of an author whose partner is not received.
+pub(super) const PARTNER_LOST: &str = "partner-lost";
+
+impl Model {
+    /// Whether a program has two remote I/Os.
+    pub(super) fn is_paired(&self, program: ProgramId) -> bool {
+        self.cluster.twins().contains(program)
+    }
+
+    /// The member as which it reports: both remote I/Os of a program report as one.
+    pub(super) fn reported_as(&self, member: Member) -> Member {
+        match member.sampled_program() {
+            Some(program) if self.changes.now().driver(program) == member => {
+                Member::RemoteIo(program)
+            }
+            _ => member,
+        }
+    }
+
+    /// Whether an event is one of a follower that says nothing of the program: what it receives, and that it proves nothing.
+    pub(super) fn is_of_follower(
+        &self,
+        member: Member,
+        program: ProgramId,
+        event: &RemoteIoEvent,
+    ) -> bool {
+        let is_of_author = matches!(
+            event,
+            RemoteIoEvent::Flagged { .. }
+                | RemoteIoEvent::Cleared { .. }
+                | RemoteIoEvent::PartnerLost { .. }
+                | RemoteIoEvent::PartnerReceived { .. }
+        );
+        is_of_author && self.is_paired(program) && self.changes.now().driver(program) != member
+    }
+
+    pub(super) fn pair_changed(
+        &mut self,
+        record: &Record,
+        member: Member,
+        program: ProgramId,
+        cycle: i64,
+        event: &RemoteIoEvent,
+    ) {
+        match event {
+            RemoteIoEvent::PartChanged { part: Part::Author, .. } => {
+                let both = [member.partner(), Some(member)].into_iter().flatten();
+                let names: Vec<String> =
+                    both.map(|one| self.members.name(one).to_owned()).collect();
+                for name in names {
+                    self.alarms.all_over(&name, &[PARTNER_LOST], cycle);
+                }
+                self.changes.push(cycle, Change::Author(program, member));
+                // Records of the last samples of the other one may be missing.
+                if let Some(history) = self.histories.get_mut(program.index()) {
+                    history.starts_again();
+                }
+            }
+            RemoteIoEvent::PartnerLost { .. } => {
+                let text = describe(record, &self.members, &self.writes).text;
+                self.alarms.raise((record.name.clone(), PARTNER_LOST), cycle, text);
+            }
+            RemoteIoEvent::PartnerReceived { .. } => {
+                self.alarms.all_over(&record.name, &[PARTNER_LOST], cycle);
+            }
+            RemoteIoEvent::SecondAuthor { .. } => {
+                let text = describe(record, &self.members, &self.writes).text;
+                self.alarms.occurred((record.name.clone(), "second-author"), cycle, text);
+            }
+            _ => {}
+        }
+    }
+}

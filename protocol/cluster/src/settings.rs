@@ -1,0 +1,109 @@
+//! What each member is told when it starts.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use understudy_cycle::Mode;
+use understudy_remote_io::{PairSettings, PointPlace, SignalSource};
+use understudy_wire::{Epoch, Member, ProgramId, StationId};
+
+use crate::cluster::{Cluster, RemoteIo};
+use crate::undriven::initial_image;
+
+impl Cluster {
+    /// What a station is told when it starts; `epoch` is the one that it starts when nobody is there.
+    ///
+    /// Nothing where the cluster has no such station.
+    pub fn station_settings(
+        &self,
+        station: StationId,
+        epoch: Epoch,
+    ) -> Option<understudy_node::Settings> {
+        self.member_name(Member::Station(station))?;
+        let evaluates_generated =
+            self.agreement.mode == Mode::Paper && self.agreement.schedule.is_understudy(station);
+        Some(understudy_node::Settings {
+            station,
+            agreement: Arc::clone(&self.agreement),
+            programs: Arc::clone(&self.programs),
+            generated: self
+                .parity
+                .as_ref()
+                .filter(|_| evaluates_generated)
+                .map(|parity| Arc::new(parity.circuit().into())),
+            epoch,
+        })
+    }
+
+    /// What a remote I/O is told when it starts; nothing where the cluster has no such program.
+    pub fn remote_io_settings(&self, program: ProgramId) -> Option<understudy_remote_io::Settings> {
+        let remote_io = self.remote_ios.get(program.index())?;
+        let controller = &self.controllers[program.index()];
+        Some(understudy_remote_io::Settings {
+            program,
+            agreement: Arc::clone(&self.agreement),
+            hash: controller.hash,
+            undriven: initial_image(&controller.interface.inputs),
+            input_points: controller.interface.inputs.iter().map(PointPlace::of).collect(),
+            output_points: controller.interface.outputs.iter().map(PointPlace::of).collect(),
+            operator_inputs: remote_io.operator_inputs().map(|it| it.input).collect(),
+            signals: remote_io.signals().map(|signal| signal.input).collect(),
+            signal_sources: self.signal_sources(remote_io),
+            channels: understudy_remote_io::Channel::of_inputs(
+                &controller.interface.inputs.bit_names(),
+            ),
+            stop: controller.stop_points(),
+            diagnosis: remote_io.diagnosis.as_ref().map(|it| Arc::clone(&it.compiled)),
+            hold_cycles: remote_io.hold_cycles,
+            fail_safe: remote_io.fail_safe.clone(),
+            ramps: remote_io.ramps.clone(),
+            release: remote_io.release,
+            value_fault: remote_io.value_fault,
+            stale_state: remote_io.stale_state,
+            restart: self.programs[program.index()]
+                .executable
+                .is_retentive()
+                .then_some(remote_io.restart),
+            pair: remote_io
+                .twin
+                .as_ref()
+                .map(|twin| PairSettings { is_twin: false, take_over_after: twin.take_over_after }),
+        })
+    }
+
+    /// What the second remote I/O of a program is told when it starts; nothing where the program has none.
+    pub fn twin_settings(&self, program: ProgramId) -> Option<understudy_remote_io::Settings> {
+        let settings = self.remote_io_settings(program)?;
+        let pair = PairSettings { is_twin: true, ..settings.pair? };
+        Some(understudy_remote_io::Settings { pair: Some(pair), ..settings })
+    }
+
+    /// The programs whose signals a remote I/O reads.
+    fn signal_sources(&self, remote_io: &RemoteIo) -> Vec<SignalSource> {
+        let programs: BTreeSet<ProgramId> =
+            remote_io.signals().map(|signal| signal.input.from).collect();
+        let sources = programs.into_iter().map(|program| {
+            let controller = &self.controllers[program.index()];
+            SignalSource {
+                program,
+                outputs: controller.interface.outputs.width(),
+                stopped: controller.stop_points().map(|points| points.stopped),
+            }
+        });
+        sources.collect()
+    }
+
+    /// What a plant is told when it starts; nothing where the program has no simulated plant.
+    pub fn plant_settings(&self, program: ProgramId) -> Option<understudy_plant::Settings> {
+        let place = self.plants.get(program.index())?.as_ref()?;
+        Some(understudy_plant::Settings {
+            program,
+            agreement: Arc::clone(&self.agreement),
+            plant: place.plant.clone(),
+            fed_by: place.fed_by,
+            follows: place.follows.clone(),
+            fail_safe: self.remote_ios[program.index()].fail_safe.clone(),
+            watchdog_cycles: place.watchdog_cycles,
+        })
+    }
+}

@@ -1,0 +1,122 @@
+//! When one of two remote I/Os of a program takes over, and when it gives the outputs to the other one.
+
+use understudy_cycle::Output;
+use understudy_wire::{Part, Time};
+
+use super::super::{Deadline, Question, RemoteIo};
+use super::{FIRST_LOSS_TIME, IDLE_PATIENCE, LOSS_PATIENCE, LOSS_TIME, Pairing, Report};
+use crate::event::Event;
+
+impl RemoteIo {
+    /// A cycle has begun: asks the other one for the promise that it does not begin.
+    pub(in crate::remote_io) fn begin_pair_cycle(&mut self, now: Time) {
+        if self.is_author() && !self.may_sample() && !self.may_drive() {
+            self.step_aside(now);
+        }
+        let asks = |pairing: &Pairing| pairing.part != Part::Follower || pairing.is_first();
+        if self.pairing.as_ref().is_some_and(asks) {
+            self.send_pair();
+        }
+    }
+
+    /// A deadline is over: counts it, reports to the other one, and begins to take over.
+    pub(in crate::remote_io) fn end_pair_deadline(&mut self, now: Time) {
+        let Some(pairing) = &mut self.pairing else {
+            return;
+        };
+        let after = pairing.settings.take_over_after;
+        let moment = self.member.moment();
+        let is_idle = matches!(self.deadline, Deadline::Passed { idle: 1.. });
+        let mut reports = pairing.reports.iter();
+        pairing.receives_stations = !is_idle && reports.any(|report| report.lacks.is_some());
+        let is_followed = pairing.followed.is_some_and(|(followed, _)| followed == moment);
+        pairing.idle = match pairing.part {
+            Part::TakingOver | Part::Author if !is_followed => pairing.idle.saturating_add(1),
+            _ => 0,
+        };
+        // What the operator has chosen waits for the field device.
+        if self.sensors.is_none() && pairing.followed.is_none() {
+            pairing.since.0 = now;
+        }
+        let patience = after.saturating_mul(IDLE_PATIENCE);
+        let is_idle = pairing.idle > patience.max(self.settings.agreement.listen_cycles * 8);
+        let period = self.settings.agreement.schedule.period();
+        let least = if pairing.partner.is_known { LOSS_TIME } else { FIRST_LOSS_TIME };
+        let patience = least.max(period * after.saturating_mul(LOSS_PATIENCE));
+        let loses = !pairing.partner.is_lost && now.since(pairing.partner.at) > patience;
+        pairing.partner.is_lost |= loses;
+        if loses {
+            self.report(Event::PartnerLost { moment });
+        }
+        self.hand_over(now, is_idle);
+        self.begin_to_take_over(now);
+        self.send_pair();
+    }
+
+    /// The outputs are given to the other one where the field device of this one does not answer, or no station follows it.
+    fn hand_over(&mut self, now: Time, is_idle: bool) {
+        let can_take_over = |pairing: &Pairing| {
+            let reported = pairing.theirs.filter(|theirs| theirs.able && theirs.receives_stations);
+            reported.is_some() && self.is_promised(pairing)
+        };
+        let has_partner = self.pairing.as_ref().is_some_and(can_take_over);
+        if !is_idle || !has_partner || self.question.is_some() {
+            return;
+        }
+        if let Some(pairing) = &mut self.pairing {
+            pairing.able = false;
+        }
+        match self.is_author() {
+            true => self.step_aside(now),
+            false => self.follow_again(now),
+        }
+    }
+
+    fn begin_to_take_over(&mut self, now: Time) {
+        let Some(pairing) = &self.pairing else {
+            return;
+        };
+        let waits = self.period() * pairing.settings.take_over_after - self.period() / 4;
+        let is_silent = now.since(pairing.heard_at) >= waits;
+        if pairing.part == Part::Author || !is_silent {
+            return;
+        }
+        let may = self.is_promised(pairing)
+            || self.unfollowed_for(pairing, Report::lacked_for_now)
+                >= pairing.settings.take_over_after;
+        let is_taking_over = pairing.part == Part::TakingOver;
+        let Some(pairing) = &mut self.pairing else {
+            return;
+        };
+        let receives = pairing.receives_stations;
+        match (may, is_taking_over) {
+            (true, false) => {
+                pairing.part = Part::TakingOver;
+                pairing.idle = 0;
+                pairing.refused = 0;
+                self.member.put(Output::Connect(true));
+                self.report_part();
+            }
+            (true, true) => pairing.refused = 0,
+            (false, _) => {
+                pairing.refused = pairing.refused.saturating_add(u32::from(receives));
+                let refused = pairing.refused;
+                self.ask_who_begins(refused);
+            }
+        }
+    }
+
+    /// Stations are received, but one that is not might follow an author that is not received either: the operator decides.
+    fn ask_who_begins(&mut self, refused: u32) {
+        let patience = self.settings.agreement.listen_cycles.saturating_mul(5);
+        let gone = self.holders.gone_after().max(patience);
+        if refused <= gone || self.question.is_some() {
+            return;
+        }
+        self.question = Some(Question::StateLost);
+        let (moment, applied) = (self.moment(), self.newest_applied());
+        let newest = self.holders.newest().map(|(from, holding)| (from, holding.stepped));
+        let (holder, newest) = newest.unzip();
+        self.report(Event::StateLost { moment, applied, newest, holder, asks: true });
+    }
+}
