@@ -9,6 +9,7 @@
 
 mod error;
 mod field;
+mod former;
 mod held;
 mod peers;
 mod retained;
