@@ -156,7 +156,7 @@ fn start(arguments: &Arguments, cluster: &Cluster) -> Result<Start, Answer> {
         }
     }
     if unknown.is_empty() {
-        return Ok(Start { restarted, misled, behind, broken });
+        return Ok(Start { restarted, misled, behind, broken, down: Vec::new() });
     }
     let known: Vec<&str> =
         cluster.members().filter(plays).filter_map(|member| cluster.member_name(member)).collect();

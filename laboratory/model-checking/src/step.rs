@@ -91,14 +91,17 @@ impl Place {
 }
 
 /// Everybody who is down, and whether it has crashed, comes back at `place`.
-pub(crate) fn revivals(down: &[(Member, bool)], place: Place) -> Vec<Fault> {
+pub(crate) fn revivals<'d>(
+    down: impl Iterator<Item = &'d (Member, bool)>,
+    place: Place,
+) -> Vec<Fault> {
     let back = |&(member, crashed): &(Member, bool)| Fault {
         at_cycle: place.cycle,
         phase: place.phase(),
         member,
         action: if crashed { Action::Restart } else { Action::Continue },
     };
-    down.iter().map(back).collect()
+    down.map(back).collect()
 }
 
 /// The faults that a step at `place` is; nothing for waiting. `members` are all of the cluster.

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use stateright::Property as Checked;
 use understudy_simulator::{Fault, Network, NotReady, Parts, Simulation};
-use understudy_wire::{Member, ProgramId, StationId};
+use understudy_wire::{Member, ProgramId, StationId, StationSet};
 
 use crate::properties::{Property, RECOVERY_CYCLES};
 use crate::start::Start;
@@ -21,6 +21,8 @@ pub struct Model {
     origin: Simulation,
     pub(crate) start: Start,
     pub(crate) members: Vec<Member>,
+    /// Slots of spares: empty until they wake, at any time and for any reason.
+    slots: StationSet,
     period: Duration,
     pub(crate) budget: Budget,
     properties: Vec<Property>,
@@ -51,11 +53,12 @@ impl Model {
         let programs = 0..parts.remote_ios.len();
         let remote_ios = programs.map(|program| Member::RemoteIo(ProgramId(program as u8)));
         let members = stations.chain(remote_ios).collect();
-        let period = parts.stations[0].agreement.schedule.period();
+        let schedule = &parts.stations[0].agreement.schedule;
+        let (period, slots) = (schedule.period(), schedule.spare_slots());
         let mut origin = Simulation::new(parts, Self::network(period), 0);
         origin.run(1, PATIENCE_CYCLES, &mut |_, _, _, _| {})?;
         let properties = start.properties();
-        Ok(Self { origin, start, members, period, budget, properties })
+        Ok(Self { origin, start, members, slots, period, budget, properties })
     }
 
     /// On which each frame takes T/20, and nothing is left to chance.
@@ -72,6 +75,19 @@ impl Model {
         simulation
     }
 
+    /// Who is down where the run begins, and whether it has crashed.
+    fn down(&self) -> Vec<(Member, bool)> {
+        let slots = self.slots.iter().map(Member::Station);
+        self.start.down.iter().copied().chain(slots).map(|member| (member, true)).collect()
+    }
+
+    /// What brings back all who are down at a place; an empty slot is in order.
+    pub(crate) fn revivals(&self, down: &[(Member, bool)], place: Place) -> Vec<Fault> {
+        let is_slot = |member| matches!(member, Member::Station(it) if self.slots.contains(it));
+        let missed = down.iter().filter(|(member, _)| !is_slot(*member));
+        revivals(missed, place)
+    }
+
     /// Where the first thing is done.
     fn first(&self) -> Place {
         self.start.first()
@@ -81,7 +97,7 @@ impl Model {
     pub fn faults(&self, steps: &[Step]) -> Vec<Fault> {
         let mut place = self.first();
         let mut all = self.start.faults();
-        let mut down: Vec<(Member, bool)> = Vec::new();
+        let mut down = self.down();
         for &step in steps {
             all.extend(faults(step, place, &self.members, self.period));
             match step {
@@ -97,7 +113,7 @@ impl Model {
         }
         // Who is still down where the run is over comes back, as for the property that protection does.
         if place.cycle >= self.last_cycle() {
-            all.extend(revivals(&down, place));
+            all.extend(self.revivals(&down, place));
         }
         all
     }
@@ -151,7 +167,7 @@ impl stateright::Model for Model {
             simulation,
             place,
             used: Budget::default(),
-            down: Vec::new(),
+            down: self.down(),
             was_down: self.start.members().collect(),
             last: None,
         }]

@@ -41,13 +41,22 @@ fn plant() -> Circuit {
 
 /// The limits of the protocol are as low as they can be, so that a few cycles pass all of them.
 pub(crate) fn parts(understudies: usize, turns: Turns) -> Parts {
+    parts_with_spares(understudies, 0, turns)
+}
+
+/// The same with slots of spares, which are understudies of the last ranks.
+pub(crate) fn parts_with_spares(understudies: usize, spares: usize, turns: Turns) -> Parts {
     let circuits = [program(false), program(true)];
+    let first_slot = circuits.len() + understudies;
+    let stations = first_slot + spares;
+    let slots = (first_slot..stations).map(|rank| StationId(rank as u8)).collect();
     let agreement = Arc::new(Agreement {
         cluster: ClusterHash(1),
         configuration: ConfigurationHash(2),
-        schedule: Schedule::new(PERIOD, circuits.len(), understudies, 1)
+        schedule: Schedule::new(PERIOD, circuits.len(), understudies + spares, 1)
             .expect("within bounds")
-            .with_turns(turns),
+            .with_turns(turns)
+            .with_spare_slots(slots),
         mode: Mode::Full,
         history: 2,
         flag_after: 1,
@@ -62,7 +71,7 @@ pub(crate) fn parts(understudies: usize, turns: Turns) -> Parts {
             executable: circuit.into(),
         })
         .collect();
-    let stations = (0..circuits.len() + understudies).map(|rank| understudy_node::Settings {
+    let stations = (0..stations).map(|rank| understudy_node::Settings {
         station: StationId(rank as u8),
         agreement: Arc::clone(&agreement),
         programs: Arc::clone(&programs),

@@ -1,11 +1,12 @@
 //! Two programs, one understudy, two remote I/Os: every schedule of a few faults over a few cycles.
 
 mod cell;
+mod spares;
 mod starts;
 
 use understudy_cycle::Turns;
 use understudy_model_checking::{Budget, Model, Start, Step, check};
-use understudy_simulator::Tally;
+use understudy_simulator::{Parts, Tally};
 
 use cell::parts;
 
@@ -27,7 +28,10 @@ fn check_from(start: Start, understudies: usize, budget: Budget, states: usize) 
 }
 
 fn check_turns(turns: Turns, start: Start, understudies: usize, budget: Budget, states: usize) {
-    let parts = parts(understudies, turns);
+    check_parts(parts(understudies, turns), start, budget, states);
+}
+
+fn check_parts(parts: Parts, start: Start, budget: Budget, states: usize) {
     let model = Model::new(parts, start, budget).expect("it comes into step");
     let verdict = check(model, 2);
     assert_eq!(verdict.counterexamples, []);
