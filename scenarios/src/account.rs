@@ -8,6 +8,7 @@
 mod alarms;
 mod closing;
 mod events;
+mod outages;
 mod presence;
 mod service;
 mod stalls;
@@ -35,11 +36,13 @@ use crate::scenario::{During, Scenario};
 
 pub(crate) use alarms::AlarmFinding;
 use alarms::Alarms;
+pub(crate) use outages::{Outage, Start};
 pub use presence::{Interval, Presence};
 pub use service::{Counts, Service};
 pub use stalls::Stall;
 pub(crate) use traces::{PlantTrace, TRACED_CYCLES, Trace, Traces};
 
+use outages::Outages;
 use presence::Presences;
 use service::{Outcome, ServiceTrack};
 use stalls::Stalls;
@@ -158,6 +161,7 @@ pub struct Account {
     /// Simulated plants that have not made a step yet: a process that still starts takes the processor from the cycles.
     starting_plants: ProgramSet,
     presences: Presences,
+    pub(crate) outages: Outages,
     pub(crate) services: Vec<ServiceTrack>,
     stalls: Stalls,
     times: TimesOfDay,
@@ -192,6 +196,8 @@ impl Account {
         for slot in schedule.spare_slots().iter() {
             presences.step(0, Member::Station(slot), Action::Crash);
         }
+        let slots = schedule.spare_slots().iter().map(Member::Station);
+        let outages = Outages::new(schedule.stations() + programs, slots);
         Self {
             cycles: scenario.cycles,
             numbering: Numbering::default(),
@@ -201,6 +207,7 @@ impl Account {
             origin_rule,
             starting_plants: terms.plants,
             presences,
+            outages,
             services: vec![ServiceTrack::default(); programs],
             stalls: Stalls::default(),
             times: TimesOfDay::new(terms.agreement.schedule.period()),
@@ -344,6 +351,7 @@ impl Account {
         self.stalls.step(number, member, action);
         let measured = self.since_origin(number);
         self.presences.step(measured.unwrap_or(0), member, action);
+        self.outages.step(measured, member, action);
         measured
     }
 

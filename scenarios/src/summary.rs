@@ -1,6 +1,7 @@
 //! `summary.json`: what a run came to, for machines; the table, the report and the command line read nothing else.
 
 mod expectations;
+mod outages;
 
 use std::fmt;
 
@@ -13,6 +14,8 @@ use understudy_wire::{Member, ProgramId};
 
 use crate::account::{Account, Counts, DoneForce, Interval, Presence, Service, Stall};
 use crate::scenario::{Scenario, action_text};
+
+pub use outages::{OutageSummary, StartSummary};
 
 /// The whole of `summary.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -53,6 +56,10 @@ pub struct Summary {
     pub deaths: Vec<DeathSummary>,
     /// How many there were.
     pub death_count: u64,
+    /// Times in which no station and no remote I/O ran, at most 100 of them.
+    pub outages: Vec<OutageSummary>,
+    /// How many there were.
+    pub outage_count: u64,
     /// What must never happen and did, at most 100 of them.
     pub violations: Vec<ViolationSummary>,
     /// How many there were.
@@ -387,6 +394,13 @@ impl Summary {
                 })
                 .collect(),
             death_count: account.death_count,
+            outages: account
+                .outages
+                .listed()
+                .iter()
+                .map(|outage| OutageSummary::new(outage, members))
+                .collect(),
+            outage_count: account.outages.count,
             violations: violations
                 .map(|(cycle, program, violation)| ViolationSummary {
                     cycle: *cycle,
