@@ -9,7 +9,7 @@ use understudy_wire::{ConfigurationHash, Member, ProgramId, ProgramSet, StationI
 
 use super::Model;
 use super::standing::{Change, ProgramChange, StationChange};
-use crate::describe::{describe, odd_configuration_text};
+use crate::describe::odd_configuration_text;
 
 /// A member that drops the frames of another one, since their configurations differ.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -140,7 +140,7 @@ impl Model {
         let subject = (record.name.clone(), "excluded");
         match event {
             StationEvent::Excluded { .. } => {
-                let text = describe(record, &self.members, &self.writes).text;
+                let text = self.described(record).text;
                 self.alarms.raise(subject, cycle, text);
             }
             StationEvent::Readmitted { .. }
@@ -227,7 +227,7 @@ impl Model {
         let is_remote_io = matches!(member, Member::RemoteIo(_));
         match event {
             HostEvent::FieldLost { .. } | HostEvent::FieldContested if is_remote_io => {
-                let described = describe(record, &self.members, &self.writes);
+                let described = self.described(record);
                 self.alarms.raise(own(described.event), cycle, described.text);
             }
             HostEvent::FieldRegained if is_remote_io => {
@@ -237,7 +237,7 @@ impl Model {
                 self.alarms.over(&own("field-contested"), cycle);
             }
             HostEvent::DuplicateFound { member } => {
-                let text = describe(record, &self.members, &self.writes).text;
+                let text = self.described(record).text;
                 let subject = (self.members.name(*member).to_owned(), "duplicate");
                 self.alarms.raise(subject, cycle, text);
             }
@@ -246,7 +246,7 @@ impl Model {
                 self.alarms.over(&subject, cycle);
             }
             HostEvent::LinkFailed { .. } => {
-                let text = describe(record, &self.members, &self.writes).text;
+                let text = self.described(record).text;
                 self.alarms.raise(own("link-failed"), cycle, text);
             }
             HostEvent::RetainFailed { reason } => {
@@ -256,7 +256,7 @@ impl Model {
                 self.alarms.occurred(own("retained-refused"), cycle, format!("{file}: {reason}"));
             }
             HostEvent::RetainedDropped { .. } => {
-                let text = describe(record, &self.members, &self.writes).text;
+                let text = self.described(record).text;
                 self.alarms.occurred(own("retained-dropped"), cycle, text);
             }
             HostEvent::Ready { .. } | HostEvent::RetainRegained => {
