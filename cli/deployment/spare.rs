@@ -1,5 +1,6 @@
 //! `understudy spare`: a machine without a role that serves several groups.
 
+use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
@@ -8,9 +9,10 @@ use serde_json::json;
 use understudy_attach::AttachError;
 use understudy_bus::interruption;
 use understudy_cluster::{PlantFile, PlantGroup, PlantSpare, Security, Serves};
-use understudy_keys::{Date, OperatorKeys};
+use understudy_keys::{Date, KeysError, MemberKeys, OperatorKeys};
 use understudy_member::{restart_for_zenoh, tls_keys};
 use understudy_spare::{Duty, SpareSettings};
+use understudy_wire::Member;
 
 use crate::answer::{Answer, Status};
 use crate::console::Console;
@@ -53,8 +55,8 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
-    // It does not know its groups yet, of which one may have two networks.
-    restart_for_zenoh(understudy_bus::LinkKind::Zenoh, true);
+    // One thread for all groups: what it waits for comes once a second, and each further thread is woken in vain.
+    restart_for_zenoh(understudy_bus::LinkKind::Zenoh, false);
     if arguments.ends_with_parent {
         understudy_bus::end_with_parent()
             .map_err(|error| Answer::failed(Status::Failed, error.code(), error))?;
@@ -69,9 +71,19 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     if let Some(journals) = &arguments.journals {
         files::make_folder(journals)?;
     }
-    let duties = spare.serves.iter().map(|serves| arguments.duty(&plant, spare, serves));
+    let _claimed = claim(&arguments.keys)?;
+    let (mut duties, mut wrong) = (Vec::new(), Answer::bad_files(Vec::new()));
+    for serves in &spare.serves {
+        match arguments.duty(&plant, spare, serves) {
+            Ok(duty) => duties.push(duty),
+            Err(answer) => wrong.failures.extend(answer.failures),
+        }
+    }
+    if !wrong.failures.is_empty() {
+        return Err(wrong);
+    }
     let settings = SpareSettings {
-        duties: duties.collect::<Result<_, _>>()?,
+        duties,
         spare: spare.clone(),
         program: std::env::current_exe().map_err(|error| {
             let message = format!("cannot find the executable of this program: {error}");
@@ -88,6 +100,23 @@ pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer
     Ok(Answer::done(format!("{name}: woke {woke} times"), json!({ "spare": name, "woke": woke })))
 }
 
+/// Takes the folder of keys for this process, as long as the answer lives: a machine runs one spare at a time.
+fn claim(keys: &Path) -> Result<Option<File>, Answer> {
+    // A folder that is not there is reported for each group.
+    let Ok(folder) = File::open(keys) else {
+        return Ok(None);
+    };
+    match folder.try_lock() {
+        Err(TryLockError::WouldBlock) => {
+            let keys = keys.display();
+            let message = format!("another process of a spare uses the keys in {keys}");
+            Err(Answer::failed(Status::BadInput, "U0627", message))
+        }
+        // Where the file system has no locks, no process is refused.
+        Ok(()) | Err(TryLockError::Error(_)) => Ok(Some(folder)),
+    }
+}
+
 impl Arguments {
     fn duty(&self, plant: &PlantFile, spare: &PlantSpare, serves: &Serves) -> Result<Duty, Answer> {
         let PlantGroup { name, file, cluster, .. } = &plant.groups[serves.group];
@@ -96,9 +125,24 @@ impl Arguments {
             return Err(Answer::failed(Status::BadInput, error.code(), error));
         }
         let folder = self.keys.join(name);
-        let viewer = folder.join(&spare.name);
-        let keys = OperatorKeys::load(&viewer, cluster, Date::of(SystemTime::now()));
-        let keys = keys.map_err(|errors| super::keys::failed(&errors))?;
+        let (viewer, slot_keys) = (folder.join(&spare.name), folder.join(&serves.name));
+        let today = Date::of(SystemTime::now());
+        // A spare that cannot run its station must not be taken for one that waits.
+        let slot = MemberKeys::load(&slot_keys, cluster, Member::Station(serves.station), today);
+        let mut errors = slot.err().unwrap_or_default();
+        let keys = OperatorKeys::load(&viewer, cluster, today).and_then(|keys| {
+            // Members take its reports under the name of its certificate only.
+            let others = |keys: OperatorKeys| KeysError::Others {
+                folder: viewer.clone(),
+                found: keys.name,
+                wanted: spare.name.clone(),
+            };
+            if keys.name == spare.name { Ok(keys) } else { Err(vec![others(keys)]) }
+        });
+        let keys = keys.map_err(|wrong| errors.extend(wrong)).ok().filter(|_| errors.is_empty());
+        let Some(keys) = keys else {
+            return Err(super::keys::failed(&errors));
+        };
         Ok(Duty {
             group: name.clone(),
             cluster: cluster.clone(),
@@ -106,7 +150,7 @@ impl Arguments {
             slot: serves.station,
             slot_name: serves.name.clone(),
             fits: serves.fits,
-            slot_keys: folder.join(&serves.name),
+            slot_keys,
             viewer_keys: tls_keys(&keys.tls),
             peers: peers(cluster, None)?,
             journal: self.journals.as_ref().map(|folder| folder.join(format!("{name}.jsonl"))),

@@ -106,6 +106,12 @@ fn text(summary: &Summary, directory: Option<&Path>) -> String {
     if summary.death_count > summary.deaths.len() as u64 {
         let _ = writeln!(text, "ENDED UNEXPECTEDLY: {} in all", summary.death_count);
     }
+    for outage in summary.outages.iter().take(5) {
+        let _ = writeln!(text, "{outage}");
+    }
+    if summary.outage_count > 5 {
+        let _ = writeln!(text, "failures of the whole plant: {} in all", summary.outage_count);
+    }
     for violation in summary.violations.iter().take(5) {
         let _ = writeln!(text, "VIOLATION at {}: {}", violation.name, violation.what);
     }

@@ -205,9 +205,10 @@ impl Holders {
         self.entries.iter().any(|entry| self.lives(entry))
     }
 
-    /// Whether all stations that could hold the state live.
-    pub(crate) fn all_living(&self) -> bool {
-        self.entries.iter().all(|entry| self.lives(entry))
+    /// Stations that could hold the state and do not live.
+    pub(crate) fn missing(&self) -> StationSet {
+        let missing = self.entries.iter().filter(|entry| !self.lives(entry));
+        missing.map(|entry| entry.station).collect()
     }
 
     /// Stations that this remote I/O had excluded, as living stations recall them.

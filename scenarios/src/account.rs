@@ -9,6 +9,7 @@ mod alarms;
 mod closing;
 mod events;
 mod networks;
+mod outages;
 mod presence;
 mod service;
 mod stalls;
@@ -38,11 +39,13 @@ pub(crate) use alarms::AlarmFinding;
 use alarms::Alarms;
 use networks::Networks;
 pub(crate) use networks::{NetworkFault, NetworkSubject};
+pub(crate) use outages::{Outage, Start};
 pub use presence::{Interval, Presence};
 pub use service::{Counts, Service};
 pub use stalls::Stall;
 pub(crate) use traces::{PlantTrace, TRACED_CYCLES, Trace, Traces};
 
+use outages::Outages;
 use presence::Presences;
 use service::{Outcome, ServiceTrack};
 use stalls::Stalls;
@@ -163,6 +166,7 @@ pub struct Account {
     /// Simulated plants that have not made a step yet: a process that still starts takes the processor from the cycles.
     starting_plants: ProgramSet,
     presences: Presences,
+    pub(crate) outages: Outages,
     pub(crate) services: Vec<ServiceTrack>,
     stalls: Stalls,
     times: TimesOfDay,
@@ -198,6 +202,8 @@ impl Account {
         for slot in schedule.spare_slots().iter() {
             presences.step(0, Member::Station(slot), Action::Crash);
         }
+        let slots = schedule.spare_slots().iter().map(Member::Station);
+        let outages = Outages::new(schedule.stations() + programs, slots);
         Self {
             cycles: scenario.cycles,
             numbering: Numbering::default(),
@@ -207,6 +213,7 @@ impl Account {
             origin_rule,
             starting_plants: terms.plants,
             presences,
+            outages,
             services: vec![ServiceTrack::default(); programs],
             stalls: Stalls::default(),
             times: TimesOfDay::new(terms.agreement.schedule.period()),
@@ -370,6 +377,7 @@ impl Account {
         self.stalls.step(number, member, action);
         let measured = self.since_origin(number);
         self.presences.step(measured.unwrap_or(0), member, action);
+        self.outages.step(measured, member, action);
         measured
     }
 

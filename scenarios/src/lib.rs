@@ -24,8 +24,9 @@ pub use scenario::{ACTIONS, During, Expectation, Scenario, TABLE_TWO, action_wor
 pub use schema::scenario_schema;
 pub use simulation::{NotInStep, simulate};
 pub use summary::{
-    Circumstances, DeathSummary, ExpectationSummary, NetworkFaultSummary, PlantSummary,
-    RefusedSummary, RemoteIoSummary, StationSummary, StepSummary, Summary, ViolationSummary, World,
+    Circumstances, DeathSummary, ExpectationSummary, NetworkFaultSummary, OutageSummary,
+    PlantSummary, RefusedSummary, RemoteIoSummary, StartSummary, StationSummary, StepSummary,
+    Summary, ViolationSummary, World,
 };
 pub use table::{Cell, Row, Table};
 pub use terms::parts;

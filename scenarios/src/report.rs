@@ -48,11 +48,13 @@ pub fn report(summary: &Summary, figure: &str) -> Result<String, ReportError> {
         Some((remote_io.name.clone(), taken.count, [times(taken), times(late)].concat()))
     });
     let timed: Vec<_> = timed.collect();
+    let outages: Vec<String> = summary.outages.iter().map(ToString::to_string).collect();
     Ok(template.render(context! {
         summary => Value::from(Serde(summary)),
         table => Value::from(Serde(Table::new(summary))),
         counts => counts,
         timed => timed,
+        outages => outages,
         period_ms => summary.circumstances.period_us as f64 / 1000.0,
         // The figure is this program's own and must not be escaped.
         figure => Value::from_safe_string(figure.to_owned()),

@@ -2,6 +2,7 @@
 
 mod expectations;
 mod networks;
+mod outages;
 
 use std::fmt;
 
@@ -15,6 +16,8 @@ use understudy_wire::{Member, ProgramId};
 use crate::account::{Account, Counts, DoneForce, Interval, Presence, Service, Stall};
 use crate::scenario::{Scenario, action_text};
 pub use networks::NetworkFaultSummary;
+
+pub use outages::{OutageSummary, StartSummary};
 
 /// The whole of `summary.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -55,6 +58,10 @@ pub struct Summary {
     pub deaths: Vec<DeathSummary>,
     /// How many there were.
     pub death_count: u64,
+    /// Times in which no station and no remote I/O ran, at most 100 of them.
+    pub outages: Vec<OutageSummary>,
+    /// How many there were.
+    pub outage_count: u64,
     /// What must never happen and did, at most 100 of them.
     pub violations: Vec<ViolationSummary>,
     /// How many there were.
@@ -395,6 +402,13 @@ impl Summary {
                 })
                 .collect(),
             death_count: account.death_count,
+            outages: account
+                .outages
+                .listed()
+                .iter()
+                .map(|outage| OutageSummary::new(outage, members))
+                .collect(),
+            outage_count: account.outages.count,
             violations: violations
                 .map(|(cycle, program, violation)| ViolationSummary {
                     cycle: *cycle,

@@ -1,41 +1,61 @@
 //! A program is changed while the power is off: every process is killed, and the next ones run another text.
 
 use std::fs::{self, File};
-use std::io::Write;
+use std::io::Write as _;
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
-use understudy_bus::free_addresses;
+use understudy_bus::{RetainedFiles, free_addresses};
+use understudy_wire::{PointValue, Retained, Role, Write, WriteId};
 
 use super::shared::deployed::{Running, text};
-use super::shared::{DEADLINE, empty_folder, some_at_a_time, understudy};
+use super::shared::{DEADLINE, answer, empty_folder, some_at_a_time, understudy};
 
-const MEMBERS: [(&str, &str); 3] =
-    [("counter", "node"), ("understudy", "node"), ("counter-io", "remote-io")];
+/// The controller, an understudy and the remote I/O, as they are called until one is renamed.
+const NAMES: [&str; 3] = ["counter", "understudy", "counter-io"];
 
-/// A cluster of three processes whose program changes from life to life.
+/// A cluster of three processes whose program, or whose names, change from life to life.
 struct Plant {
     folder: PathBuf,
     file: &'static str,
+    name: &'static str,
+    names: [&'static str; 3],
+    /// Controllers before this one.
+    before: String,
+    inputs: String,
+    addresses: Vec<SocketAddr>,
     life: u32,
     members: Vec<Running>,
 }
 
 impl Plant {
     fn new(name: &str, file: &'static str, inputs: &str) -> Self {
-        let folder = empty_folder(name);
-        let addresses = free_addresses(3).expect("three free ports");
-        let cluster = format!(
-            "[cluster]\nname = \"change\"\nsecurity = \"off\"\nlink = \"udp\"\nperiod = \"50ms\"\nretain_every = \"20s\"\n\n\
-             [[controller]]\nname = \"counter\"\nladder = \"{file}\"\naddress = \"{}\"\n\n\
-             [[understudy]]\nname = \"understudy\"\naddress = \"{}\"\n\n\
-             [[remote_io]]\ncontroller = \"counter\"\naddress = \"{}\"\n{inputs}",
-            addresses[0], addresses[1], addresses[2]
-        );
-        fs::write(folder.join("cluster.toml"), cluster).expect("it is ours");
-        Self { folder, file, life: 0, members: Vec::new() }
+        Self {
+            folder: empty_folder(name),
+            file,
+            name: "change",
+            names: NAMES,
+            before: String::new(),
+            inputs: inputs.to_owned(),
+            addresses: free_addresses(3).expect("three free ports"),
+            life: 0,
+            members: Vec::new(),
+        }
+    }
+
+    fn cluster_text(&self) -> String {
+        let Self { name, file, before, names: [controller, understudy, remote_io], inputs, .. } =
+            self;
+        let [first, second, third] = &self.addresses[..] else { unreachable!("three addresses") };
+        format!(
+            "[cluster]\nname = \"{name}\"\nsecurity = \"off\"\nlink = \"udp\"\nperiod = \"50ms\"\nretain_every = \"20s\"\n\n\
+             {before}[[controller]]\nname = \"{controller}\"\nladder = \"{file}\"\naddress = \"{first}\"\n\n\
+             [[understudy]]\nname = \"{understudy}\"\naddress = \"{second}\"\n\n\
+             [[remote_io]]\nname = \"{remote_io}\"\ncontroller = \"{controller}\"\naddress = \"{third}\"\n{inputs}"
+        )
     }
 
     /// Starts all members with a program.
@@ -43,8 +63,9 @@ impl Plant {
         self.life += 1;
         fs::write(self.folder.join(self.file), program).expect("it is ours");
         let cluster = self.folder.join("cluster.toml");
+        fs::write(&cluster, self.cluster_text()).expect("it is ours");
         let kept = self.folder.join("kept");
-        for (name, command) in MEMBERS {
+        for (name, command) in self.names.into_iter().zip(["node", "node", "remote-io"]) {
             let member = [command, text(&cluster), "--name", name, "--no-real-time"];
             let child = understudy(&member)
                 .args(["--retain", text(&kept), "--journal", text(&self.journal(name))])
@@ -89,11 +110,22 @@ impl Plant {
             let word = event["outputs"]["words"][0].as_u64().unwrap_or_default();
             word & (u64::MAX >> (64 - bits))
         };
-        let found = self.wait_for("counter-io", |event| {
+        let found = self.wait_for(self.names[2], |event| {
             let is_proved = event["source"] == "direct" || event["source"] == "reconstructed";
             event["event"] == "applied" && is_proved && fits(number(event))
         });
         number(&found)
+    }
+
+    /// Until the newest note of the remote I/O on the disk is of a program that keeps values, or of one that does not.
+    fn noted(&self, keeps: bool) {
+        let name = format!("{}.{}", self.name, self.names[2]);
+        let files = RetainedFiles::new(&self.folder.join("kept"), name);
+        let deadline = Instant::now() + DEADLINE;
+        while files.notes(None).was_retentive != Some(keeps) {
+            assert!(Instant::now() < deadline, "{:?}", files.notes(None));
+            std::thread::sleep(Duration::from_millis(20));
+        }
     }
 
     /// The power fails.
@@ -103,7 +135,7 @@ impl Plant {
 
     /// A line on standard input of a member.
     fn order(&mut self, name: &str, line: &str) {
-        let place = MEMBERS.iter().position(|(member, _)| *member == name).expect("a member");
+        let place = self.names.iter().position(|member| *member == name).expect("a member");
         let input = self.members[place].0.stdin.as_mut().expect("it is piped");
         writeln!(input, "{line}").expect("it reads");
     }
@@ -224,4 +256,170 @@ fn a_latch_goes_on_when_the_rungs_have_changed() {
     assert_eq!(plant.applied(1, |_| true), 1);
     let carried = plant.wait_for("counter", is("retained-carried"));
     assert_eq!(carried["kept"], 1, "{carried}");
+}
+
+/// A member that was renamed has nothing under its own name. What is there under its old one is offered to the operator, and nothing starts without that.
+#[test]
+fn a_renamed_member_is_a_question() {
+    let _one = some_at_a_time();
+    let program = counter("VAR_OUTPUT RETAIN total : INT; END_VAR");
+    let renamed = [
+        ("controller", ["meter", "understudy", "meter-io"]),
+        ("everything", ["meter", "deputy", "meter-io"]),
+        ("remote-io", ["counter", "understudy", "terminal"]),
+    ];
+    for (what, names) in renamed {
+        let mut plant = Plant::new(&format!("change-name-{what}"), "counter.st", "");
+        plant.start(&program);
+        plant.applied(16, |total| total > 20);
+        plant.kill();
+        plant.names = names;
+        plant.start(&program);
+        let [_, _, remote_io] = names;
+        let asked = plant.wait_for(remote_io, is("state-lost"));
+        assert!(asked["asks"] == true && asked["newest"] != Value::Null, "{what}: {asked}");
+        let told = plant.wait_for(remote_io, is("retained-refused"));
+        assert!(told["reason"].as_str().is_some_and(|it| it.contains("counter-io")), "{told}");
+        assert!(!plant.events(remote_io).iter().any(is("started-cold")), "{what}");
+        plant.order(remote_io, r#"choose {"newest":{"cycle":null}}"#);
+        plant.wait_for(remote_io, is("started-warm"));
+        assert!(plant.applied(16, |_| true) > 20, "{what}");
+        // From now on it has files of its own.
+        plant.kill();
+        plant.start(&program);
+        assert_eq!(plant.wait_for(remote_io, is("started-warm"))["lost"], 0, "{what}");
+    }
+}
+
+/// The understudy alone has another name: the controller has kept the state, and nothing is asked.
+#[test]
+fn a_renamed_understudy_changes_nothing() {
+    let _one = some_at_a_time();
+    let program = counter("VAR_OUTPUT RETAIN total : INT; END_VAR");
+    let mut plant = Plant::new("change-name-understudy", "counter.st", "");
+    plant.start(&program);
+    plant.applied(16, |total| total > 20);
+    plant.kill();
+    plant.names[1] = "deputy";
+    plant.start(&program);
+    assert_eq!(plant.wait_for("counter-io", is("started-warm"))["lost"], 0);
+    assert!(plant.applied(16, |_| true) > 20);
+}
+
+/// A cluster with another name, or a program without retentive variables: what was kept is not given up without a question.
+#[test]
+fn what_the_plant_kept_is_not_given_up_without_a_question() {
+    let _one = some_at_a_time();
+    let retentive = counter("VAR_OUTPUT RETAIN total : INT; END_VAR");
+    let plain = counter("VAR_OUTPUT total : INT; END_VAR");
+    for (what, name, second, reason) in [
+        ("cluster", "moved", &retentive, "of the cluster change"),
+        ("plain", "change", &plain, "has no retentive variables"),
+    ] {
+        let mut plant = Plant::new(&format!("change-given-up-{what}"), "counter.st", "");
+        plant.start(&retentive);
+        plant.applied(16, |total| total > 20);
+        plant.kill();
+        plant.name = name;
+        plant.start(second);
+        let asked = plant.wait_for("counter-io", is("state-lost"));
+        assert!(asked["asks"] == true && asked["newest"] == Value::Null, "{what}: {asked}");
+        let told = plant.wait_for("counter-io", is("retained-refused"));
+        assert!(told["reason"].as_str().is_some_and(|it| it.contains(reason)), "{told}");
+        plant.order("counter-io", r#"choose "cold""#);
+        plant.wait_for("counter-io", is("started-cold"));
+        plant.applied(16, |total| total > 0);
+        // The answer is given once.
+        plant.noted(second == &retentive);
+        plant.kill();
+        plant.start(second);
+        let wanted = if second == &plain { "started-cold" } else { "started-warm" };
+        plant.wait_for("counter-io", is(wanted));
+        assert!(!plant.events("counter-io").iter().any(is("state-lost")), "{what}");
+    }
+}
+
+/// With a controller before it, a program has another number, and its files are its own as before.
+#[test]
+fn a_controller_with_another_number_has_its_files() {
+    let _one = some_at_a_time();
+    let program = counter("VAR_OUTPUT RETAIN total : INT; END_VAR");
+    let mut plant = Plant::new("change-number", "counter.st", "");
+    plant.start(&program);
+    plant.applied(16, |total| total > 20);
+    plant.kill();
+    let addresses = free_addresses(2).expect("two free ports");
+    plant.before = format!(
+        "[[controller]]\nname = \"first\"\nladder = \"counter.st\"\naddress = \"{}\"\n\n\
+         [[remote_io]]\ncontroller = \"first\"\naddress = \"{}\"\n\n",
+        addresses[0], addresses[1]
+    );
+    plant.start(&program);
+    assert_eq!(plant.wait_for("counter-io", is("started-warm"))["lost"], 0);
+    assert!(plant.applied(16, |_| true) > 20);
+}
+
+/// A setpoint keeps its value where its input has another place in the changed program, and a new one has its initial value.
+#[test]
+fn a_setpoint_keeps_its_value_when_the_program_has_changed() {
+    let _one = some_at_a_time();
+    let setpoint = |name: &str, initial: u8| {
+        format!(
+            "{name} = {{ operator = \"setpoint\", low = 1, high = 100, initial = {initial}, retain = true }}\n"
+        )
+    };
+    let inputs = |lines: &str| format!("\n[remote_io.inputs]\n{lines}");
+    let program = |inputs: &str, shown: &str| {
+        format!(
+            "PROGRAM counter VAR_INPUT {inputs} : INT; END_VAR VAR_OUTPUT shown : INT; END_VAR\n\
+             VAR_OUTPUT RETAIN total : INT; END_VAR shown := {shown}; total := total + 1; END_PROGRAM\n"
+        )
+    };
+    let mut plant = Plant::new("change-setpoint", "counter.st", &inputs(&setpoint("limit", 5)));
+    plant.start(&program("limit", "limit"));
+    plant.applied(16, |shown| shown == 5);
+    let write = Write {
+        id: WriteId { session: 1, number: 1 },
+        input: 0,
+        value: PointValue::new(16, 42),
+        role: Role::Operator,
+        owner: "anna".to_owned(),
+        reason: "a test".to_owned(),
+    };
+    plant.order("counter-io", &format!("write {}", serde_json::to_string(&write).expect("JSON")));
+    plant.applied(16, |shown| shown == 42);
+    plant.kill();
+    plant.inputs = inputs(&(setpoint("offset", 3) + &setpoint("limit", 5)));
+    plant.start(&program("offset, limit", "limit + 100 * offset"));
+    plant.wait_for("counter-io", is("started-warm"));
+    assert_eq!(plant.applied(16, |_| true), 342);
+}
+
+/// What `check` says of the bytes that a station writes in a day is what it writes, at most.
+#[test]
+fn the_bytes_of_a_day_are_what_a_station_writes() {
+    let _one = some_at_a_time();
+    let mut plant = Plant::new("change-budget", "counter.st", "");
+    plant.start(&counter("VAR_OUTPUT RETAIN total : INT; END_VAR"));
+    plant.applied(16, |total| total > 60);
+    plant.kill();
+    let files = fs::read(plant.folder.join("kept/change.counter.counter.1.retained"));
+    let files = files.expect("it has kept something");
+    let (records, _) = Retained::read(&files);
+    let mut first = Vec::new();
+    records.first().expect("a state").write(&mut first);
+    let steps = (records.len() - 1) as f64;
+    let bytes_a_step = (files.len() - first.len()) as f64 / steps;
+    assert!(steps > 20.0);
+    let check = answer(&["check", text(&plant.folder.join("cluster.toml"))]).1;
+    let all = check["result"]["files"].as_array().expect("files");
+    let said = all.iter().find_map(|file| file["retained"]["bytes_a_day"].as_f64());
+    let said = said.unwrap_or_else(|| panic!("{check}"));
+    // At 50 ms, with a whole state in 400 steps.
+    let limit = said / (86_400.0 / 0.05);
+    let state = first.len() as f64 / 400.0;
+    assert!(
+        (limit / 4.0..=limit).contains(&(bytes_a_step + state)),
+        "{bytes_a_step} and {state} of {limit}"
+    );
 }

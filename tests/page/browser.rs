@@ -18,7 +18,7 @@ fn is_there(program: &str) -> bool {
 }
 
 /// The browser, where this machine has one.
-fn browser() -> Option<String> {
+pub(crate) fn browser() -> Option<String> {
     let browser = std::env::var("UNDERSTUDY_BROWSER").unwrap_or_default();
     if browser.is_empty() || !is_there("node") || !is_there(&browser) {
         skip("UNDERSTUDY_BROWSER names no Chromium, or Node is not installed");
@@ -53,7 +53,13 @@ fn drive(name: &str, cluster: &str, script: &str, more: impl Fn(&Page) -> Vec<St
 }
 
 /// Drives a page by a script in this folder.
-fn drive_page(browser: &str, page: &Page, folder: &Path, script: &str, more: Vec<String>) {
+pub(crate) fn drive_page(
+    browser: &str,
+    page: &Page,
+    folder: &Path,
+    script: &str,
+    more: Vec<String>,
+) {
     let output = Command::new("node")
         .arg(format!("tests/page/{script}"))
         .arg(format!("http://{}/", page.address))

@@ -12,6 +12,7 @@ mod demo;
 mod elsewhere;
 mod notify;
 mod paths;
+mod plant;
 mod present;
 #[allow(dead_code, reason = "each test uses its part")]
 #[path = "../shared/mod.rs"]

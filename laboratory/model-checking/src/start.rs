@@ -14,6 +14,8 @@ use crate::step::Place;
 pub struct Start {
     /// Who starts again as the run begins, and knows nothing.
     pub restarted: Vec<Member>,
+    /// Who crashes as the run begins, and may start again at any later slot.
+    pub down: Vec<Member>,
     /// Who starts again as the run begins with a wrong program, one and the same configuration for all of them.
     pub misled: Vec<Member>,
     /// Who stood still for a cycle.
@@ -69,7 +71,8 @@ impl Start {
     /// All to whom something has happened, in the order of the schedule.
     pub(crate) fn members(&self) -> impl Iterator<Item = Member> + '_ {
         let changing = self.change.steps.iter().map(|(member, _)| member);
-        self.behind.iter().chain(&self.restarted).chain(&self.misled).chain(changing).copied()
+        let restarted = self.behind.iter().chain(&self.restarted);
+        restarted.chain(&self.down).chain(&self.misled).chain(changing).copied()
     }
 
     /// What has happened, in the order in which it has to be scheduled.
@@ -88,6 +91,7 @@ impl Start {
         let restarts = self.restarted.iter().flat_map(|&member| {
             [Action::Crash, Action::Restart].map(|action| fault(first, member, action))
         });
+        let down = self.down.iter().map(|&member| fault(first, member, Action::Crash));
         let misled = self.misled.iter().flat_map(|&member| {
             [Action::Crash, Action::RestartWrongProgram].map(|action| fault(first, member, action))
         });
@@ -100,7 +104,7 @@ impl Start {
         let broken = self.broken.iter().flat_map(|&(from, to)| {
             [fault(SYNCHRONISED, from, Action::Cut { to }), fault(first, from, Action::Heal { to })]
         });
-        let others = stops.chain(goes_on).chain(restarts).chain(misled).chain(broken);
+        let others = stops.chain(goes_on).chain(restarts).chain(down).chain(misled).chain(broken);
         others.chain(prepared).chain(steps).collect()
     }
 }

@@ -113,9 +113,9 @@ fn separated(side: u32, members: &[Member]) -> impl Iterator<Item = (Member, Mem
     apart.map(|((_, from), (_, to))| (*from, *to))
 }
 
-/// All members that are down, and whether they have crashed, come back at `place`, and a cut is healed.
-pub(crate) fn revivals(
-    down: &[(Member, bool)],
+/// Everybody who is down, and whether it has crashed, comes back at `place`, and a cut is healed.
+pub(crate) fn revivals<'d>(
+    down: impl Iterator<Item = &'d (Member, bool)>,
     cut: Option<u32>,
     place: Place,
     members: &[Member],
@@ -133,7 +133,7 @@ pub(crate) fn revivals(
         action: Action::Heal { to },
     };
     let healed = cut.into_iter().flat_map(|side| separated(side, members).map(heal));
-    down.iter().map(back).chain(healed).collect()
+    down.map(back).chain(healed).collect()
 }
 
 /// The faults that a step at `place` is; nothing for waiting. `members` are all of the cluster.

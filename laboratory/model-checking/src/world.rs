@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use stateright::Property as Checked;
 use understudy_simulator::{Fault, Network, NotReady, Parts, Simulation};
-use understudy_wire::{Member, ProgramId, StationId};
+use understudy_wire::{Member, ProgramId, StationId, StationSet};
 
 use crate::properties::{Property, RECOVERY_CYCLES};
 use crate::start::Start;
@@ -21,6 +21,8 @@ pub struct Model {
     origin: Simulation,
     pub(crate) start: Start,
     pub(crate) members: Vec<Member>,
+    /// Slots of spares: empty until they wake, at any time and for any reason.
+    slots: StationSet,
     period: Duration,
     pub(crate) budget: Budget,
     properties: Vec<Property>,
@@ -55,11 +57,12 @@ impl Model {
         let paired = parts.remote_ios.iter().filter(|settings| settings.pair.is_some());
         let twins = paired.map(|settings| Member::Twin(settings.program));
         let members = stations.chain(remote_ios).chain(twins).collect();
-        let period = parts.stations[0].agreement.schedule.period();
+        let schedule = &parts.stations[0].agreement.schedule;
+        let (period, slots) = (schedule.period(), schedule.spare_slots());
         let mut origin = Simulation::new(parts, Self::network(period), 0);
         origin.run(1, PATIENCE_CYCLES, &mut |_, _, _, _| {})?;
         let properties = start.properties();
-        Ok(Self { origin, start, members, period, budget, properties })
+        Ok(Self { origin, start, members, slots, period, budget, properties })
     }
 
     /// On which each frame takes T/20, and nothing is left to chance.
@@ -76,6 +79,24 @@ impl Model {
         simulation
     }
 
+    /// Who is down where the run begins, and whether it has crashed.
+    fn down(&self) -> Vec<(Member, bool)> {
+        let slots = self.slots.iter().map(Member::Station);
+        self.start.down.iter().copied().chain(slots).map(|member| (member, true)).collect()
+    }
+
+    /// What brings back all who are down at a place; an empty slot is in order.
+    pub(crate) fn revivals(
+        &self,
+        down: &[(Member, bool)],
+        cut: Option<u32>,
+        place: Place,
+    ) -> Vec<Fault> {
+        let is_slot = |member| matches!(member, Member::Station(it) if self.slots.contains(it));
+        let missed = down.iter().filter(|(member, _)| !is_slot(*member));
+        revivals(missed, cut, place, &self.members)
+    }
+
     /// Where the first thing is done.
     fn first(&self) -> Place {
         self.start.first()
@@ -86,7 +107,7 @@ impl Model {
         let mut cut = None;
         let mut place = self.first();
         let mut all = self.start.faults();
-        let mut down: Vec<(Member, bool)> = Vec::new();
+        let mut down = self.down();
         for &step in steps {
             all.extend(faults(step, place, &self.members, self.period));
             match step {
@@ -104,7 +125,7 @@ impl Model {
         }
         // Who is still down where the run is over comes back, as for the property that protection does.
         if place.cycle >= self.last_cycle() {
-            all.extend(revivals(&down, cut, place, &self.members));
+            all.extend(self.revivals(&down, cut, place));
         }
         all
     }
@@ -159,7 +180,7 @@ impl stateright::Model for Model {
             simulation,
             place,
             used: Budget::default(),
-            down: Vec::new(),
+            down: self.down(),
             was_down: self.start.members().collect(),
             cut: None,
             last: None,

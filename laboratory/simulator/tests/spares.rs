@@ -52,6 +52,15 @@ fn an_empty_slot_is_neither_waited_for_nor_an_alarm() {
     assert_eq!(outcome, Outcome { missed: 0, protection: Vec::new() });
 }
 
+/// A remote I/O that restarts waits for the stations of its group, and not for an empty slot.
+#[test]
+fn a_remote_io_that_restarts_does_not_wait_for_an_empty_slot() {
+    let remote_io = Member::RemoteIo(ProgramId(0));
+    let steps = [(50, remote_io, Action::Crash), (50, remote_io, Action::Restart)];
+    let outcome = check(&steps, 200);
+    assert!((1..=8).contains(&outcome.missed), "{outcome:?}");
+}
+
 /// Without the spare the second failure ends the proof of the robot's outputs; with it no output is held.
 #[test]
 fn a_spare_that_is_awake_masks_the_second_failure() {

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use understudy_cluster::{AlarmDeclaration, Cluster};
-use understudy_journal::{AlarmTransition, Happening, Members, Record, source_word};
+use understudy_journal::{AlarmTransition, Cycles, Happening, Members, Record, source_word};
 use understudy_remote_io::Missing;
 use understudy_typed::Fault;
 use understudy_wire::{Element, Member, ProgramId, ProgramSet, Set, Source, StationId, StationSet};
@@ -66,12 +66,17 @@ pub(crate) fn event_names() -> BTreeSet<&'static str> {
     names.collect()
 }
 
-/// Describes a record with the names of its cluster, and with the writes of the records before it.
-pub(crate) fn describe(record: &Record, names: &Members, writes: &Writes) -> Description {
+/// Describes a record with the names of its cluster, and with the writes and the count of cycles of the records before it.
+pub(crate) fn describe(
+    record: &Record,
+    names: &Members,
+    writes: &Writes,
+    cycles: &Cycles,
+) -> Description {
     let (event, level, text) = match &record.event {
         Happening::Station(event) => members::station(event, names),
         Happening::RemoteIo(event) => {
-            let names = signals::Names { members: names, writes, by: record.member };
+            let names = signals::Names { members: names, writes, cycles, by: record.member };
             members::remote_io(event, &names)
         }
         Happening::Plant(event) => members::plant(event, names),

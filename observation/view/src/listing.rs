@@ -207,7 +207,7 @@ impl Listing {
         if !self.is_wanted(record, cycle) {
             return None;
         }
-        let mut description = describe(record, &self.members, &self.writes);
+        let mut description = describe(record, &self.members, &self.writes, &self.cycles);
         let wants_source = self.filter.events.is_empty() || self.wants("source");
         if changed && wants_source && !self.filter.ordinary && !self.wants("applied") {
             description.event = "source";

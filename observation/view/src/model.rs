@@ -30,7 +30,7 @@ use understudy_typed::Interpreter;
 use understudy_wire::{Member, Moment, ProgramId};
 
 use crate::alarm::Alarms;
-use crate::describe::{Writes, describe};
+use crate::describe::{Description, Writes, describe};
 use crate::event::{Event, Events, Level};
 use crate::history::History;
 use crate::process_alarm::ProcessAlarms;
@@ -294,9 +294,14 @@ impl Model {
         self.times = times;
     }
 
+    /// A record as a sentence.
+    pub(super) fn described(&self, record: &Record) -> Description {
+        describe(record, &self.members, &self.writes, &self.cycles)
+    }
+
     /// A record that is an event.
     fn happened(&mut self, record: &Record, cycle: i64, cause: Option<String>) {
-        let description = describe(record, &self.members, &self.writes);
+        let description = self.described(record);
         self.tell(Event {
             number: 0,
             at: None,

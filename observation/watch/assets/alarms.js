@@ -58,7 +58,7 @@ let unseen = [];
 
 const acknowledge = (alarms, what) => act(async () => {
   if (hasName()) {
-    await tell("/api/alarms/acknowledge", { alarms, owner: owner() });
+    await tell("api/alarms/acknowledge", { alarms, owner: owner() });
     toast(`✓ ${what} acknowledged, by ${owner()}`);
   }
 });
@@ -94,7 +94,7 @@ function ask(name, row, ends) {
     event.preventDefault();
     if (hasName()) {
       const body = { name, owner: owner(), reason: reason.value };
-      const done = ends ? tell("/api/alarms/unshelve", body) : tell("/api/alarms/shelve", { ...body, seconds: Math.round(Number(minutes.value) * 60) });
+      const done = ends ? tell("api/alarms/unshelve", body) : tell("api/alarms/shelve", { ...body, seconds: Math.round(Number(minutes.value) * 60) });
       act(async () => {
         await done;
         close();

@@ -79,7 +79,7 @@ function giver(member) {
     busy = true;
     setText(answer, "");
     try {
-      await tell("/api/command", { member: member.name, command, owner: owner(), reason: reason.value });
+      await tell("api/command", { member: member.name, command, owner: owner(), reason: reason.value });
       dialog.close();
       toast(`✓ ${member.name}: ${done}, by ${owner()} at cycle ${state().newest}`);
     } catch (error) {

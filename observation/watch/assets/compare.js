@@ -41,7 +41,7 @@ async function compare(name) {
   changed();
   const place = document.getElementById("compare-answer");
   place.replaceChildren(el("p", { role: "status" }, "reading both runs"));
-  const answer = await act(() => ask(`/api/compare?with=${encodeURIComponent(name)}`));
+  const answer = await act(() => ask(`api/compare?with=${encodeURIComponent(name)}`));
   if (!answer) {
     compared = "";
     changed();

@@ -144,7 +144,7 @@ async function refresh(cycle) {
     if (cycle !== undefined) {
       keys.until = cycle;
     }
-    const answer = await act(() => ask(`/api/events?${new URLSearchParams(keys)}`));
+    const answer = await act(() => ask(`api/events?${new URLSearchParams(keys)}`));
     if (answer && !wanted) {
       fill(answer);
     }

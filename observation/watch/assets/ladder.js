@@ -172,7 +172,7 @@ async function refresh(now) {
 async function picture() {
   const before = choices;
   const place = rung === null ? `page=${page}` : `rung=${rung}`;
-  const question = `/api/ladder/${program}?names=${names}&view=${view}&find=${encodeURIComponent(find)}&${place}&${cycleParameter()}`;
+  const question = `api/ladder/${program}?names=${names}&view=${view}&find=${encodeURIComponent(find)}&${place}&${cycleParameter()}`;
   const answer = await act(() => ask(question));
   if (!answer || choices !== before) {
     return;
@@ -357,7 +357,7 @@ async function cross() {
     return;
   }
   place.hidden = false;
-  const answer = await act(() => ask(`/api/cross-reference/${program}`));
+  const answer = await act(() => ask(`api/cross-reference/${program}`));
   if (!answer) {
     return;
   }

@@ -102,7 +102,7 @@ function makeControl(program, input, index) {
     refresh();
     try {
       const body = { member: program.remote_io, command: { command: "write", input: input.name, value: text }, owner: owner(), reason: id("operate-reason").value };
-      const done = await tell("/api/command", body);
+      const done = await tell("api/command", body);
       const cycle = done.run_cycle ?? done.cycle;
       say("done", `✓ ${kind === "pulse" ? "" : `${wordsOf(input, text)} `}in effect since cycle ${cycle}`);
       setter.written?.();

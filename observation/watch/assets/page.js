@@ -111,7 +111,7 @@ function showStale() {
 async function facts() {
   for (;;) {
     try {
-      return await ask("/api/run");
+      return await ask("api/run");
     } catch (error) {
       setText(document.getElementById("status"), `waiting: ${error.message}`);
       await new Promise((resolve) => setTimeout(resolve, 1000));
@@ -128,7 +128,7 @@ async function begin() {
   logOut.hidden = !run.logged_in;
   logOut.addEventListener("click", () =>
     act(async () => {
-      await tell("/api/logout", {});
+      await tell("api/logout", {});
       location.assign("/login.html");
     }),
   );

@@ -22,15 +22,15 @@ function survives(count) {
 }
 
 function show(plant) {
-  const cell = (text) => el("td", {}, text);
+  const cell = (label, text) => el("td", { "data-label": label }, text);
   const names = (list) => (list.length === 0 ? "–" : list.join(", "));
   id("alarms").replaceChildren(...(plant.alarms.length === 0
     ? [el("li", { class: "soft" }, "No alarm")]
     : plant.alarms.map((alarm) => el("li", { class: "bad", "data-alarm": alarm.alarm }, `✗ ${alarm.text}`))));
   id("groups").replaceChildren(...plant.groups.map((group) => el("tr", { "data-group": group.name },
-    el("th", { scope: "row" }, group.name), state(group.state), cell(survives(group.survives)), cell(names(group.failed)), cell(names(group.spares)), cell(group.reason ?? "–"))));
+    el("th", { scope: "row" }, group.state === "not-observed" ? group.name : el("a", { href: `group/${group.name}/` }, group.name)), state(group.state), cell("Remaining redundancy", survives(group.survives)), cell("Failed", names(group.failed)), cell("Spare", names(group.spares)), cell("Reason", group.reason ?? "–"))));
   id("spares").replaceChildren(...plant.spares.map((spare) => el("tr", { "data-spare": spare.name },
-    el("th", { scope: "row" }, spare.name), state(spare.state), cell(spare.group ?? "–"))));
+    el("th", { scope: "row" }, spare.name), state(spare.state), cell("Group", spare.group ?? "–"))));
   const lacking = plant.groups.filter((group) => group.state === "unprotected" || group.state === "not-observed");
   id("status").textContent = lacking.length === 0 ? "all groups are protected" : `not protected, or not observed: ${lacking.map((group) => group.name).join(", ")}`;
   id("status").classList.toggle("lost", lacking.length > 0);
@@ -50,7 +50,7 @@ let problem = "";
 
 async function look() {
   try {
-    show(await ask("/api/plant"));
+    show(await ask("api/plant"));
     confirmed = performance.now();
     problem = "";
   } catch (error) {

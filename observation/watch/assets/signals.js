@@ -26,7 +26,7 @@ function take(signals) {
 // The signals in the states are asked for once, when a view needs them; says whether they are known. After a failure, a view may ask again a
 // second later.
 export function load() {
-  loading ??= act(() => ask("/api/signals")).then((signals) => {
+  loading ??= act(() => ask("api/signals")).then((signals) => {
     if (signals) {
       take(signals);
     } else {

@@ -151,7 +151,7 @@ async function fetchWanted() {
   asking = true;
   while (wanted !== null) {
     const cycle = wanted;
-    const next = await act(() => ask(`/api/state?cycle=${cycle}`));
+    const next = await act(() => ask(`api/state?cycle=${cycle}`));
     if (wanted === cycle) {
       wanted = null;
     }
@@ -243,7 +243,7 @@ export function start(run) {
 }
 
 function follow() {
-  const stream = new EventSource("/api/live");
+  const stream = new EventSource("api/live");
   stream.addEventListener("state", (event) => {
     hear();
     reading = null;

@@ -221,7 +221,7 @@ async function refresh(now) {
   last = performance.now();
   drawn = question;
   const ids = [...chosen];
-  const found = await act(() => ask(`/api/trends?${question}`));
+  const found = await act(() => ask(`api/trends?${question}`));
   asking = false;
   if (found && !dragging) {
     answer = { ...found, ids };

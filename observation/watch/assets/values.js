@@ -100,7 +100,7 @@ async function refresh(now) {
     again = false;
     last = performance.now();
     const asked = [...chosen];
-    const answer = await act(() => ask(`/api/values?signals=${encodeURIComponent(asked.join(","))}&${cycleParameter()}`));
+    const answer = await act(() => ask(`api/values?signals=${encodeURIComponent(asked.join(","))}&${cycleParameter()}`));
     if (answer) {
       fill(new Map(asked.map((signal, place) => [signal, answer.values[place]])), answer.cycle);
     }

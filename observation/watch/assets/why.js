@@ -48,7 +48,7 @@ function hide() {
 export const openWhy = (program, output) => explain(program, output, cycleParameter(), true);
 
 async function explain(program, output, cycle, takesFocus) {
-  const answer = await act(() => ask(`/api/why/${program}/${encodeURIComponent(output)}?${cycle}`));
+  const answer = await act(() => ask(`api/why/${program}/${encodeURIComponent(output)}?${cycle}`));
   if (!answer) {
     return;
   }

@@ -65,7 +65,7 @@ impl App {
         model: Arc<RwLock<Model>>,
         newest: watch::Receiver<Newest>,
         commanding: Commanding,
-        gate: Gate,
+        gate: Arc<Gate>,
         run: PathBuf,
     ) -> Self {
         Self {
@@ -73,7 +73,7 @@ impl App {
             newest,
             writes: WriteSessions::new(commanding.commander.clone()),
             commanding,
-            gate: Arc::new(gate),
+            gate,
             run,
             viewers: Arc::new(Semaphore::new(MAXIMUM_VIEWERS)),
             reader: Semaphore::new(1),

@@ -146,22 +146,42 @@ pub fn serve(settings: Settings) -> Result<Served, WatchError> {
     let Settings { run, place, commanding } = settings;
     let Taken { listener, address, tls, fingerprint, gate } =
         place.take(commanding.person.clone())?;
-    let model = Arc::new(RwLock::new(Model::new(&run)));
-    let (newest, taken) = watch::channel(Newest::default());
-    let (ending, ends) = watch::channel(false);
-    let follower = {
-        let (run, model) = (run.clone(), Arc::clone(&model));
-        std::thread::Builder::new()
+    let RunPage { pages, follower, ending } = RunPage::start(run, commanding, Arc::new(gate))?;
+    let (stop, server) = start(listener, tls, pages)?;
+    Ok(Served { address, fingerprint, stop: Some(stop), threads: vec![server, follower], ending })
+}
+
+/// The pages of a run, and the thread that follows its journal until it is told to end.
+pub(crate) struct RunPage {
+    pub(crate) pages: Router,
+    pub(crate) follower: JoinHandle<()>,
+    pub(crate) ending: watch::Sender<bool>,
+}
+
+impl RunPage {
+    /// Starts to follow a run.
+    ///
+    /// # Errors
+    /// [`WatchError::System`] without a thread.
+    pub(crate) fn start(
+        run: PathBuf,
+        commanding: Commanding,
+        gate: Arc<Gate>,
+    ) -> Result<Self, WatchError> {
+        let model = Arc::new(RwLock::new(Model::new(&run)));
+        let (newest, taken) = watch::channel(Newest::default());
+        let (ending, ends) = watch::channel(false);
+        let (path, followed) = (run.clone(), Arc::clone(&model));
+        let follower = std::thread::Builder::new()
             .name("watch-follower".to_owned())
             .spawn(move || {
                 step_back();
-                follower::follow(&run, &model, &newest, &ends);
+                follower::follow(&path, &followed, &newest, &ends);
             })
-            .map_err(system("a thread that follows the journal"))?
-    };
-    let app = Arc::new(App::new(model, taken, commanding, gate, run));
-    let (stop, server) = start(listener, tls, router(app))?;
-    Ok(Served { address, fingerprint, stop: Some(stop), threads: vec![server, follower], ending })
+            .map_err(system("a thread that follows the journal"))?;
+        let pages = router(Arc::new(App::new(model, taken, commanding, gate, run)));
+        Ok(Self { pages, follower, ending })
+    }
 }
 
 /// Serves the page of a plant: all groups of a plant file, each as the process records it that writes its run below `runs`.

@@ -11,6 +11,7 @@
 //! | U0233 | a spare whose capacity fits none of its groups |
 //! | U0234 | two spares in one slot |
 //! | U0235 | a machine without a failure domain that other machines have |
+//! | U0236 | a spare that serves no group |
 //! | U0257 | warning: a group that no spare serves, that its spare cannot serve, or that it serves from the same failure domain |
 
 mod machines;
@@ -248,7 +249,15 @@ fn spare(
     let domain = fields.text("failure_domain", diagnostics).map(|domain| domain.value);
     let mut serves = Vec::new();
     let mut too_large = Vec::new();
-    for (group, (place, slot)) in fields.names("groups", diagnostics) {
+    let errors = diagnostics.len();
+    let named = fields.names("groups", diagnostics);
+    if named.is_empty() && diagnostics.len() == errors {
+        let message = format!("spare `{name}` serves no group");
+        let help = "name its groups, each with the slot that it takes there, or leave it out";
+        let diagnostic = Diagnostic::error("U0236", message, fields.span.clone());
+        diagnostics.push(diagnostic.with_help(help));
+    }
+    for (group, (place, slot)) in named {
         let Some(index) = groups.iter().position(|(known, _)| *known == group) else {
             let help = suggestion(&group, groups.iter().map(|(known, _)| known.as_str()));
             let message = format!("there is no group `{group}`");

@@ -80,16 +80,24 @@ impl RemoteIo {
                 *cycles
             }
         };
-        // A missing station that could hold the state gets longer: it may be the only one that does.
-        let patience = if self.holders.all_living() { 1 } else { 5 };
         // A history without a sample is one that no station can follow.
-        if waited < listen_cycles * patience || waited == 0 || !self.may_begin(moment) {
-            return;
-        }
-        if self.sensors.is_none() {
+        if waited < listen_cycles || waited == 0 {
             return;
         }
         let verdict = self.verdict();
+        let missing = self.holders.missing();
+        // The slot of a spare is empty in general: a proved state does not wait for it.
+        let is_whole = match verdict {
+            Verdict::Adopt(..) => {
+                missing.without(self.settings.agreement.schedule.spare_slots()).is_empty()
+            }
+            _ => missing.is_empty(),
+        };
+        // A missing station that could hold the state gets longer: it may be the only one that does.
+        let patience = if is_whole { 1 } else { 5 };
+        if waited < listen_cycles * patience || !self.may_begin(moment) || self.sensors.is_none() {
+            return;
+        }
         if let Knowledge::Listening { unproved, .. } = &mut self.knowledge {
             match verdict {
                 Verdict::Stale(..) | Verdict::Lost => {

@@ -34,7 +34,7 @@ pub(super) struct Noting {
     number: u64,
     /// The newest note of an earlier life.
     found: Option<Note>,
-    /// Whether there was one that cannot be read.
+    /// Whether there may have been another one, which cannot be read.
     is_damaged: bool,
     /// Of the newest sample, for the case that outputs of it are applied.
     next: Option<Note>,
@@ -49,7 +49,7 @@ impl Noting {
 
 impl RemoteIo {
     /// Notes the newest sample whose outputs it applies ([`Output::Retain`]); `found` is what it has noted before it was started, where that can be
-    /// read, and `is_damaged` tells where it cannot.
+    /// read, and `is_damaged` tells where it cannot, and values that were kept may be lost without it.
     #[must_use]
     pub fn noting(mut self, found: Option<Note>, is_damaged: bool) -> Self {
         let number = found.as_ref().map_or(0, |note| note.number.saturating_add(1));
@@ -153,14 +153,26 @@ impl RemoteIo {
         self.holders.newest_retained(self.noted_exclusions(), epoch)
     }
 
+    /// Stations that were excluded when the power failed. In another configuration, their numbers may be those of other stations.
     fn noted_exclusions(&self) -> StationSet {
-        self.noting.found.as_ref().map_or(StationSet::EMPTY, |note| note.recalled.excluded)
+        let found = self.noting.found.as_ref().filter(|_| !self.has_unknown_exclusions());
+        found.map_or(StationSet::EMPTY, |note| note.recalled.excluded)
+    }
+
+    /// Whether stations were excluded in another configuration: what they have kept is not told from what others have.
+    fn has_unknown_exclusions(&self) -> bool {
+        let configuration = self.settings.agreement.configuration;
+        let found = self.noting.found.as_ref().filter(|note| note.configuration != configuration);
+        found.is_some_and(|note| !note.recalled.excluded.is_empty())
     }
 
     /// What the retained states of the stations allow, where no living station holds a state.
     pub(super) fn warm_verdict(&self) -> Verdict {
         let Some(restart) = self.settings.restart else {
-            return Verdict::Cold;
+            // What the program before has kept is not given up without a question.
+            let was_retentive = self.noting.found.as_ref().is_some_and(|note| note.is_retentive);
+            let may_lose = self.noting.is_damaged || was_retentive;
+            return if may_lose { Verdict::Lost } else { Verdict::Cold };
         };
         let excluded = self.noted_exclusions();
         let retained = self.newest_retained();
@@ -193,7 +205,8 @@ impl RemoteIo {
     fn is_before_applied(&self, kept: &Kept) -> bool {
         let state = &kept.holding;
         // Without a note of its program, it is not known what was applied.
-        let Some((applied, _)) = self.newest_applied_of(kept.of).filter(|_| kept.is_whole) else {
+        let is_known = kept.is_whole && !self.has_unknown_exclusions();
+        let Some((applied, _)) = self.newest_applied_of(kept.of).filter(|_| is_known) else {
             return true;
         };
         if self.holders.newest_recalled().is_some_and(|recalled| recalled > state.stepped) {

@@ -60,7 +60,18 @@ fn run(
     kept: [Option<Kept>; 2],
     choice: Option<StateChoice>,
 ) -> Vec<Event> {
-    let settings = Settings { restart: Some(Restart::Warm), ..settings(1) };
+    run_with(Some(Restart::Warm), found, is_damaged, kept, choice)
+}
+
+/// The same with another kind of restart; none of a program without retentive variables.
+fn run_with(
+    restart: Option<Restart>,
+    found: Option<Note>,
+    is_damaged: bool,
+    kept: [Option<Kept>; 2],
+    choice: Option<StateChoice>,
+) -> Vec<Event> {
+    let settings = Settings { restart, ..settings(1) };
     let mut bench = Bench::new(settings, 1000);
     bench.epoch = 2;
     bench.remote_io = bench.remote_io.noting(found, is_damaged);
@@ -149,13 +160,40 @@ fn a_person_can_use_what_is_not_proved() {
     assert_eq!(started(&run(found, false, older, Some(StateChoice::Cold))), "asked, cold");
 }
 
-/// A station that was excluded for a value fault is not believed by the next program either.
+/// A station that was excluded for a value fault does not count after the power failure either. In another configuration, its number may be that of
+/// another station, so the operator is asked.
 #[test]
 fn what_an_excluded_station_has_kept_is_not_used() {
-    let mut found = note(BEFORE, 50, 33);
-    found.recalled.excluded = StationSet::only(StationId(0));
-    let newer = Some(kept(BEFORE, 55, 40, true));
-    assert_eq!(started(&run(Some(found.clone()), false, [newer, None], None)), "asked");
-    let right = Some(kept(BEFORE, 50, 33, true));
-    assert_eq!(started(&run(Some(found), false, [newer, right], None)), "warm 0");
+    let excluding = |program, configuration| {
+        let mut found = note(program, 50, 33);
+        found.configuration = ConfigurationHash(configuration);
+        found.recalled.excluded = StationSet::only(StationId(0));
+        Some(found)
+    };
+    let newer = |program| Some(kept(program, 55, 40, true));
+    let right = |program| Some(kept(program, 50, 33, true));
+    let cases = [
+        ("it alone has a state", excluding(NOW, 2), [newer(NOW), None], "asked"),
+        ("another one has the right one", excluding(NOW, 2), [newer(NOW), right(NOW)], "warm 0"),
+        ("other stations", excluding(NOW, 9), [newer(NOW), right(NOW)], "asked"),
+        ("another program", excluding(BEFORE, 9), [right(BEFORE), newer(BEFORE)], "asked"),
+    ];
+    for (what, found, kept, wanted) in cases {
+        assert_eq!(started(&run(found, false, kept, None)), wanted, "{what}");
+    }
+}
+
+/// The program before kept values, and this one has no retentive variables: they are not given up without a question.
+#[test]
+fn a_program_that_keeps_nothing_any_more_asks_before_it_starts() {
+    let started_with =
+        |found, is_damaged, choice| started(&run_with(None, found, is_damaged, [None; 2], choice));
+    let before = || Some(note(BEFORE, 50, 33));
+    assert_eq!(started_with(before(), false, None), "asked");
+    assert_eq!(started_with(None, true, None), "asked");
+    assert_eq!(started_with(before(), false, Some(StateChoice::Cold)), "asked, cold");
+    let kept_nothing = |hash| Note { is_retentive: false, ..note(hash, 50, 33) };
+    for found in [Some(kept_nothing(BEFORE)), Some(kept_nothing(NOW)), None] {
+        assert_eq!(started_with(found, false, None), "cold");
+    }
 }

@@ -12,7 +12,7 @@
 //! | `write/operator`, `write/engineer` | asked with a write as JSON: its outcome | operators; engineers | no |
 //! | `command/force`, `command/unforce` | asked with a force or a signal as JSON: done, or why not | engineers | no |
 //! | `refused` | asked with a refused order of a person as JSON: it is recorded | all | no |
-//! | `spare` | asked with the report of a spare as JSON: changes are recorded | all | no |
+//! | `spare/NAME` | asked with the report of the spare NAME as JSON: changes are recorded | NAME | no |
 //! | `attendance` | told by a remote I/O, once a second and at once while a station is missed: the stations that it misses; with its configuration | all | no |
 //! | `journal` | told: the lines of its journal, those of a moment at once; twice a second those in effect again; with its configuration | all | no |
 //!

@@ -1,5 +1,6 @@
 //! The operator's end of the channel.
 
+use std::borrow::Cow;
 use std::io;
 use std::net::{SocketAddr, TcpStream};
 use std::time::Duration;
@@ -77,6 +78,15 @@ impl Request {
             Self::Prepare(_) => "command/prepare",
             Self::Change(_) => "command/change",
             Self::Stop => "command/stop",
+        }
+    }
+
+    /// Where it is asked for, below the keys of a member.
+    fn place(&self) -> Cow<'static, str> {
+        match self {
+            // A spare reports under the name in its certificate.
+            Self::Spare(report) => format!("{SPARE_KEY}/{}", report.spare).into(),
+            _ => self.key().into(),
         }
     }
 
@@ -247,7 +257,7 @@ impl Call {
             .session
             .get(match request {
                 Request::Cluster => hash_key(&self.name),
-                _ => format!("{}/{}", self.prefix, request.key()),
+                _ => format!("{}/{}", self.prefix, request.place()),
             })
             .payload(request.payload())
             .attachment(
@@ -282,7 +292,7 @@ impl Call {
 
     /// Sends a request without waiting for its answer; whether it was sent.
     pub fn tell(&self, request: &Request) -> bool {
-        let asked = self.session.get(format!("{}/{}", self.prefix, request.key()));
+        let asked = self.session.get(format!("{}/{}", self.prefix, request.place()));
         // Without its receiver the answer is dropped.
         asked.payload(request.payload()).timeout(PATIENCE).wait().is_ok()
     }

@@ -57,6 +57,8 @@ pub struct FoundNotes {
     pub newest: Option<Note>,
     /// Whether a file may lack a note.
     pub is_damaged: bool,
+    /// Whether the newest note that can be read is of a program with retentive variables, of another cluster too; nothing where none can be read.
+    pub was_retentive: Option<bool>,
     /// The files.
     pub files: Vec<FoundFile>,
 }
@@ -105,12 +107,15 @@ impl RetainedFiles {
 
     /// The notes that a remote I/O has made; those of every cluster where none is given.
     pub fn notes(&self, cluster: Option<ClusterHash>) -> FoundNotes {
+        let mut readable = None;
         let of_file = |records: Vec<Retained>| {
             let notes = records.into_iter().filter_map(|record| match record {
                 Retained::Note(note) => Some(note),
                 Retained::State(_) | Retained::Step(_) => None,
             });
             let newest = notes.max_by_key(|note| note.number);
+            let read = newest.as_ref().map(|note| (note.number, note.is_retentive));
+            readable = readable.max(read);
             let is_own = |note: &Note| cluster.is_none_or(|cluster| note.cluster == cluster);
             let foreign = newest.as_ref().is_some_and(|note| !is_own(note));
             let newest = newest.filter(|_| !foreign);
@@ -124,12 +129,13 @@ impl RetainedFiles {
         let (notes, files) = self.read(of_file);
         let is_damaged = files.iter().any(|file| file.problem.is_some());
         let newest = notes.into_iter().max_by_key(|note: &Note| note.number);
-        FoundNotes { newest: newest.filter(|_| !is_damaged), is_damaged, files }
+        let was_retentive = readable.map(|(_, was_retentive)| was_retentive);
+        FoundNotes { newest: newest.filter(|_| !is_damaged), is_damaged, was_retentive, files }
     }
 
     fn read<T>(
         &self,
-        of_file: impl Fn(Vec<Retained>) -> (Vec<T>, Option<Moment>, Option<String>),
+        mut of_file: impl FnMut(Vec<Retained>) -> (Vec<T>, Option<Moment>, Option<String>),
     ) -> (Vec<T>, Vec<FoundFile>) {
         let (mut all, mut files) = (Vec::new(), Vec::new());
         for path in self.paths() {

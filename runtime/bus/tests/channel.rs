@@ -19,8 +19,8 @@ use members::{Chatter, endpoints, peers, station};
 use serde_json::json;
 use understudy_bus::{
     Admitted, BusError, Call, Changes, ChannelSettings, Commands, DONE, Documents, Endpoints,
-    Guard, LinesInEffect, LinkKind, MemberSettings, NoField, Peer, Request, Summary, TlsKeys,
-    Validity, run_member,
+    Guard, LinesInEffect, LinkKind, MemberSettings, NoField, Peer, Request, SpareReport, Summary,
+    TlsKeys, Validity, run_member,
 };
 use understudy_cycle::Mode;
 use understudy_keys::{Authority, Date, People};
@@ -47,23 +47,16 @@ impl LinesInEffect for NothingInEffect {
     }
 }
 
-/// Keys of the robot, of the router, and of two who call through it.
-fn issued() -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("channel");
+/// Keys of the robot and of some people, in a folder of this name.
+fn issued(name: &str, people: &[(&str, Role)]) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     if folder.exists() {
         fs::remove_dir_all(&folder).expect("an old folder goes");
     }
     let now = Date::of(SystemTime::now());
     let cluster = press_cell(Mode::Full);
     let mut authority = Authority::init(&folder, &cluster, now).expect("an empty folder");
-    let people = [
-        ("site-router", Role::Engineer),
-        ("control-room", Role::Viewer),
-        ("shift-leader", Role::Engineer),
-        ("line-operator", Role::Operator),
-        ("passer-by", Role::Viewer),
-    ];
-    let people = people.map(|(name, role)| (name.to_owned(), role));
+    let people: Vec<_> = people.iter().map(|(name, role)| ((*name).to_owned(), *role)).collect();
     let people = People::from(&people[..]);
     authority.issue(&cluster, &["robot".to_owned()], people, 1, now).expect("names of the cluster");
     folder.join("members")
@@ -147,7 +140,14 @@ fn until<T>(what: &str, mut ask: impl FnMut() -> Result<T, BusError>) -> T {
 
 #[test]
 fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
-    let folder = issued();
+    let people = [
+        ("site-router", Role::Engineer),
+        ("control-room", Role::Viewer),
+        ("shift-leader", Role::Engineer),
+        ("line-operator", Role::Operator),
+        ("passer-by", Role::Viewer),
+    ];
+    let folder = issued("channel", &people);
     let mut peers = peers(&[station(0)]);
     peers[0].name = "robot".into();
     let endpoint = endpoints(station(0), &peers);
@@ -223,6 +223,48 @@ fn a_control_room_reads_through_the_router_of_its_site_and_a_leader_commands() {
     let ended = running.join().expect("no panic");
     ended.expect("it ends as it is told to");
     router.close().wait().expect("it is open");
+}
+
+/// A spare of one name cannot report for another one, and neither can a viewer or an operator.
+#[test]
+fn a_member_takes_the_report_of_a_spare_from_the_holder_of_its_name() {
+    let people = ["spare-1", "spare-2", "leader"];
+    let roles = [Role::Viewer, Role::Viewer, Role::Engineer];
+    let issued_to: Vec<_> = people.into_iter().zip(roles).collect();
+    let folder = issued("channel-spares", &issued_to);
+    let mut peers = peers(&[station(0)]);
+    peers[0].name = "robot".into();
+    let endpoint = endpoints(station(0), &peers);
+    let (member, hash) = (endpoint.own().address, endpoint.cluster());
+    let running = member_with(endpoint, keys(&folder, "robot"), || Admitted {
+        engineers: vec!["leader.1".into()],
+        viewers: vec!["spare-1.1".into(), "spare-2.1".into()],
+        ..Admitted::default()
+    });
+    let asked = |who: &str, request: Request| {
+        Call::to(member, hash, "robot", &keys(&folder, who))?.ask(&request)
+    };
+    until("the member", || asked("leader", Request::Configuration));
+    let report = |spare: &str| SpareReport { spare: spare.to_owned(), serves: None };
+    for who in people {
+        for spare in ["spare-1", "spare-2"] {
+            let answer = asked(who, Request::Spare(report(spare)));
+            if who == spare {
+                assert_eq!(answer.as_deref().ok(), Some(DONE), "{who}: {answer:?}");
+            } else {
+                assert!(
+                    matches!(answer, Err(BusError::Unanswered { .. })),
+                    "{who} for {spare}: {answer:?}"
+                );
+            }
+        }
+    }
+    let started = Instant::now();
+    while !running.is_finished() {
+        let _ = asked("leader", Request::Stop);
+        assert!(started.elapsed() < DEADLINE, "the leader is not obeyed");
+    }
+    running.join().expect("no panic").expect("it ends as it is told to");
 }
 
 /// Keys whose certificates name `address`.

@@ -10,6 +10,7 @@
 mod changes;
 mod error;
 mod field;
+mod former;
 mod held;
 mod peers;
 mod retained;

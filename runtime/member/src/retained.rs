@@ -12,6 +12,7 @@ use understudy_wire::{
     RetainedState,
 };
 
+use crate::former;
 use crate::run::MemberOptions;
 
 /// What a station has kept of each program with retentive variables that it runs, and the files. `is_loaded` says whether it has loaded a program
@@ -32,7 +33,21 @@ pub(crate) fn retained_runs(
     };
     for program in retentive {
         let files = station_files(cluster, folder, &options.name, program);
+        let hash = settings.programs[program.index()].hash;
         let (mut of_program, found) = files.runs(Some(cluster.agreement().cluster));
+        let mut former = None;
+        if found.is_empty() {
+            let all = former::states(cluster, folder, program);
+            retention.found.extend(all.iter().map(|it| it.found.clone()));
+            former = former::candidate(all, hash);
+        }
+        let read = match &mut former {
+            Some(former) => {
+                of_program = std::mem::take(&mut former.runs);
+                &former.files
+            }
+            None => &files,
+        };
         for run in &mut of_program {
             // The files have the name of its controller: with other controllers before it, it had another number.
             run.state.program = program;
@@ -45,14 +60,19 @@ pub(crate) fn retained_runs(
         };
         if let Some(newest) = newest.filter(is_other) {
             let controller = &cluster.controllers()[program.index()];
-            match carried_run(&controller.code, hash, &files, newest) {
+            match carried_run(&controller.code, hash, read, newest) {
                 Ok((run, state)) => {
                     retention.carried.push(carried_over(&controller.name, &state));
-                    runs.push(run);
+                    of_program.push(run);
                 }
-                Err(FoundFile { path, problem }) => {
-                    retention.found.push(FoundFile { path, problem })
-                }
+                Err(refused) => retention.found.push(refused),
+            }
+        }
+        if former.is_some() {
+            for run in &mut of_program {
+                // The operator decides.
+                let from = run.carried.map_or(run.state.hash, |carried| carried.from);
+                run.carried = Some(Carried { from, is_whole: false });
             }
         }
         runs.extend(of_program);
@@ -92,6 +112,13 @@ pub(crate) fn retained_notes(
     let kept = RetainedProgram { inputs: retained.collect(), ..code.source().kept(hash) };
     let files = RetainedFiles::new(folder, format!("{}.{name}", cluster.name())).with_program(kept);
     let mut notes = files.notes(Some(cluster.agreement().cluster));
+    let is_retentive = settings.restart.is_some();
+    // A program without retentive variables only waits for what the one before it has kept.
+    notes.is_damaged &= notes.was_retentive.unwrap_or(is_retentive) || is_retentive;
+    if notes.files.is_empty() {
+        notes.files = former::notes(cluster, folder, name, is_retentive);
+        notes.is_damaged = !notes.files.is_empty();
+    }
     if let Some(note) = &mut notes.newest {
         // The file has the name of this remote I/O: with other controllers before it, its program had another number.
         note.recalled.program = program;
@@ -99,6 +126,10 @@ pub(crate) fn retained_notes(
     if let Some(note) =
         notes.newest.as_mut().filter(|note| note.hash != hash && !is_loaded(program, note.hash))
     {
+        if note.is_retentive && !is_retentive {
+            let problem = "the program before kept values, and this one has no retentive variables";
+            notes.files.push(problem_of(&files, note.hash, problem.to_owned()));
+        }
         match files.program(note.hash).and_then(of_this_release) {
             Ok((kept, before)) => {
                 let old = before.interface().inputs;

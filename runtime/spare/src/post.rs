@@ -5,6 +5,8 @@ use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
+use understudy_bus::zenoh_runtime;
+
 use crate::run::Duty;
 
 /// Time in which the station ends by itself after its input has closed.
@@ -31,6 +33,8 @@ impl Post {
         if let Some(retain) = &duty.retain {
             command.arg("--retain").arg(retain);
         }
+        // The station sets up the threads of its own link.
+        command.env_remove(zenoh_runtime(false).0);
         // Its input is closed when the spare ends, however that ends.
         command.stdin(Stdio::piped()).stdout(Stdio::null());
         command.spawn().map(Self)

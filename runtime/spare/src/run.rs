@@ -15,7 +15,7 @@ use crate::post::Post;
 use crate::watch::{Seen, Watch, Whereabouts};
 
 /// How often the end of the process is looked for when nothing happens.
-const TICK: Duration = Duration::from_millis(100);
+const TICK: Duration = Duration::from_millis(500);
 
 /// After the station of a slot has ended unexpectedly, the spare wakes again after this time.
 const START_AGAIN_AFTER: Duration = Duration::from_secs(10);

@@ -9,7 +9,9 @@ use understudy_wire::{
 };
 
 use super::service::Outcome;
-use super::{Account, Death, DoneForce, DoneStep, LAG_CYCLES, MAXIMUM_DEATHS, MAXIMUM_FORCES};
+use super::{
+    Account, Death, DoneForce, DoneStep, LAG_CYCLES, MAXIMUM_DEATHS, MAXIMUM_FORCES, Start,
+};
 
 impl Account {
     pub(super) fn station(&mut self, station: StationId, event: &StationEvent) {
@@ -67,6 +69,7 @@ impl Account {
             let changes = self.alarms.fold.remote_io(member, program, 0, event);
             self.alarms_changed(&changes, None);
             self.order_decided(program, event);
+            self.started(program, event);
             if let RemoteIoEvent::Refused { member, theirs, ours } = event {
                 self.refuse(*member, theirs.to_string(), ours.to_string());
             }
@@ -98,6 +101,18 @@ impl Account {
         while self.open.len() > LAG_CYCLES && self.oldest_is_told() {
             self.close_oldest();
         }
+    }
+
+    /// The start of a program, after an outage among others.
+    fn started(&mut self, program: ProgramId, event: &RemoteIoEvent) {
+        let (born, warm) = match event {
+            RemoteIoEvent::StartedWarm { born, lost, .. } => (*born, Some(*lost)),
+            RemoteIoEvent::StartedCold { born, .. } => (*born, None),
+            _ => return,
+        };
+        let number = self.numbering.of(born).or_else(|| self.numbering.latest());
+        let cycle = number.and_then(|number| self.since_origin(number));
+        self.outages.started(Start { program, cycle, warm });
     }
 
     /// Forces, and orders that were refused.

@@ -1,8 +1,6 @@
 //! Once all members are back and the network delivers, all are synchronised again: without help, or after the operator's choice where
 //! the state of a program was lost.
 
-use crate::step::revivals;
-
 use super::{Promise, Property};
 
 /// Within so many cycles.
@@ -16,7 +14,7 @@ pub(super) const PROPERTY: Property = Property {
             return true;
         }
         let mut simulation = world.simulation.clone();
-        for fault in revivals(&world.down, world.cut, world.place, &model.members) {
+        for fault in model.revivals(&world.down, world.cut, world.place) {
             simulation.schedule(fault);
         }
         let mut back = simulation.run(1, RECOVERY_CYCLES, &mut |_, _, _, _| {});

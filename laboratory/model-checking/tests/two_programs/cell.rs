@@ -82,7 +82,7 @@ fn plant() -> Circuit {
 
 /// One program with two remote I/Os, a controller and an understudy.
 pub(crate) fn paired(take_over_after: u32) -> Parts {
-    let mut parts = cell(&[program(false)], 1, Turns::Token);
+    let mut parts = cell(&[program(false)], (1, 0), Turns::Token);
     for remote_io in &mut parts.remote_ios {
         remote_io.pair = Some(PairSettings { is_twin: false, take_over_after });
     }
@@ -91,17 +91,26 @@ pub(crate) fn paired(take_over_after: u32) -> Parts {
 
 /// Two programs.
 pub(crate) fn parts(understudies: usize, turns: Turns) -> Parts {
-    cell(&[program(false), program(true)], understudies, turns)
+    parts_with_spares(understudies, 0, turns)
+}
+
+/// The same with slots of spares, which are understudies of the last ranks.
+pub(crate) fn parts_with_spares(understudies: usize, spares: usize, turns: Turns) -> Parts {
+    cell(&[program(false), program(true)], (understudies, spares), turns)
 }
 
 /// The limits of the protocol are as low as they can be, so that a few cycles pass all of them.
-fn cell(circuits: &[Circuit], understudies: usize, turns: Turns) -> Parts {
+fn cell(circuits: &[Circuit], (understudies, spares): (usize, usize), turns: Turns) -> Parts {
+    let first_slot = circuits.len() + understudies;
+    let stations = first_slot + spares;
+    let slots = (first_slot..stations).map(|rank| StationId(rank as u8)).collect();
     let agreement = Arc::new(Agreement {
         cluster: ClusterHash(1),
         configuration: ConfigurationHash(2),
-        schedule: Schedule::new(PERIOD, circuits.len(), understudies, 1)
+        schedule: Schedule::new(PERIOD, circuits.len(), understudies + spares, 1)
             .expect("within bounds")
-            .with_turns(turns),
+            .with_turns(turns)
+            .with_spare_slots(slots),
         mode: Mode::Full,
         history: 2,
         flag_after: 1,
@@ -113,7 +122,7 @@ fn cell(circuits: &[Circuit], understudies: usize, turns: Turns) -> Parts {
         .zip(1..)
         .map(|(circuit, hash)| Program { hash: ProgramHash(hash), executable: circuit.into() })
         .collect();
-    let stations = (0..circuits.len() + understudies).map(|rank| understudy_node::Settings {
+    let stations = (0..stations).map(|rank| understudy_node::Settings {
         station: StationId(rank as u8),
         agreement: Arc::clone(&agreement),
         programs: Arc::clone(&programs),

@@ -2,12 +2,13 @@
 
 mod cell;
 mod changes;
+mod spares;
 mod starts;
 mod twins;
 
 use understudy_cycle::Turns;
 use understudy_model_checking::{Budget, Model, Start, Step, check};
-use understudy_simulator::Tally;
+use understudy_simulator::{Parts, Tally};
 
 use cell::{paired, parts};
 
@@ -45,7 +46,10 @@ fn check_from(start: Start, understudies: usize, budget: Budget, states: usize) 
 }
 
 fn check_turns(turns: Turns, start: Start, understudies: usize, budget: Budget, states: usize) {
-    let parts = parts(understudies, turns);
+    check_parts(parts(understudies, turns), start, budget, states);
+}
+
+fn check_parts(parts: Parts, start: Start, budget: Budget, states: usize) {
     let model = Model::new(parts, start, budget).expect("it comes into step");
     let verdict = check(model, 2);
     assert_eq!(verdict.counterexamples, []);

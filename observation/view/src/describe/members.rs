@@ -73,9 +73,9 @@ descriptions! { remote_io: RemoteIoEvent, members: Names<'_>;
         )
     };
     StartedWarm { from, retained, lost: Some(0), awaits_release, .. } => "started-warm" Notice
-        started_warm_text(name(*from, members), *retained, Some(0), *awaits_release);
+        started_warm_text(members, *from, *retained, Some(0), *awaits_release);
     StartedWarm { from, retained, lost, awaits_release, .. } => "started-warm" Alarm
-        started_warm_text(name(*from, members), *retained, *lost, *awaits_release);
+        started_warm_text(members, *from, *retained, *lost, *awaits_release);
     AdoptedLineage { lineage, from, .. } => "adopted-lineage" Notice
         format!("continues from the state of {}, at lineage {lineage}", name(*from, members));
     Disputed { stations: who, .. } => "disputed" Alarm format!(
@@ -201,12 +201,18 @@ fn joins_text(wants: ProgramSet, members: &Members) -> String {
 
 /// How a program starts after a power failure, and what it lost.
 fn started_warm_text(
-    from: &str,
+    names: &Names<'_>,
+    from: StationId,
     retained: Moment,
     lost: Option<u64>,
     awaits_release: bool,
 ) -> String {
-    let kept = retained.cycle.0;
+    let from = name(from, names);
+    let kept = match names.cycles.of_known(retained) {
+        Some(cycle) => format!("cycle {cycle}"),
+        // It is from before the run.
+        None => format!("cycle {} of the cluster", retained.cycle.0),
+    };
     let lost = match lost {
         Some(0) => "no cycle with applied outputs is lost".to_owned(),
         Some(1) => "the retentive values of 1 cycle with applied outputs are lost".to_owned(),
@@ -217,7 +223,7 @@ fn started_warm_text(
     };
     let release = if awaits_release { "; the operator has to release its outputs" } else { "" };
     format!(
-        "starts its program warm, with the retentive values of cycle {kept} of the cluster that {from} has kept; {lost}{release}"
+        "starts its program warm, with the retentive values of {kept} that {from} has kept; {lost}{release}"
     )
 }
 

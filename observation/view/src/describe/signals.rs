@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::ops::Deref;
 
-use understudy_journal::{Happening, Members, NamedSignal, Record};
+use understudy_journal::{Cycles, Happening, Members, NamedSignal, Record};
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_typed::Elementary;
 use understudy_wire::{Force, Image, Member, PointValue, SignalPlace, Write, WriteId};
@@ -37,6 +37,8 @@ impl Writes {
 pub(super) struct Names<'a> {
     pub(super) members: &'a Members,
     pub(super) writes: &'a Writes,
+    /// Counts cycles from the origin of the run.
+    pub(super) cycles: &'a Cycles,
     /// The member that reports the event.
     pub(super) by: Option<Member>,
 }

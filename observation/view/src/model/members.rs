@@ -9,7 +9,7 @@ use understudy_wire::{ConfigurationHash, Member, ProgramId, ProgramSet, StationI
 
 use super::Model;
 use super::standing::{Change, ProgramChange, StationChange};
-use crate::describe::{describe, odd_configuration_text};
+use crate::describe::odd_configuration_text;
 
 /// A member that drops the frames of another one, since their configurations differ.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -56,7 +56,7 @@ impl Model {
                 self.refusal_ends(&record.name, *member, cycle);
             }
             StationEvent::NotPrepared { .. } => {
-                let text = describe(record, &self.members, &self.writes).text;
+                let text = self.described(record).text;
                 self.alarms.raise((record.name.clone(), "not-prepared"), cycle, text);
             }
             StationEvent::Adopted { .. } | StationEvent::Synchronised { .. } => {
@@ -147,7 +147,7 @@ impl Model {
         let subject = (record.name.clone(), "excluded");
         match event {
             StationEvent::Excluded { .. } => {
-                let text = describe(record, &self.members, &self.writes).text;
+                let text = self.described(record).text;
                 self.alarms.raise(subject, cycle, text);
             }
             StationEvent::Readmitted { .. }
@@ -236,7 +236,7 @@ impl Model {
         let is_remote_io = member.sampled_program().is_some();
         match event {
             HostEvent::FieldLost { .. } | HostEvent::FieldContested if is_remote_io => {
-                let described = describe(record, &self.members, &self.writes);
+                let described = self.described(record);
                 self.alarms.raise(own(described.event), cycle, described.text);
             }
             HostEvent::FieldRegained if is_remote_io => {
@@ -246,7 +246,7 @@ impl Model {
                 self.alarms.over(&own("field-contested"), cycle);
             }
             HostEvent::DuplicateFound { member } => {
-                let text = describe(record, &self.members, &self.writes).text;
+                let text = self.described(record).text;
                 let subject = (self.members.name(*member).to_owned(), "duplicate");
                 self.alarms.raise(subject, cycle, text);
             }
@@ -255,7 +255,7 @@ impl Model {
                 self.alarms.over(&subject, cycle);
             }
             HostEvent::LinkFailed { network, .. } => {
-                let text = describe(record, &self.members, &self.writes).text;
+                let text = self.described(record).text;
                 self.link_failed(member, *network, text, cycle);
             }
             HostEvent::RetainFailed { reason } => {
@@ -265,7 +265,7 @@ impl Model {
                 self.alarms.occurred(own("retained-refused"), cycle, format!("{file}: {reason}"));
             }
             HostEvent::RetainedDropped { .. } => {
-                let text = describe(record, &self.members, &self.writes).text;
+                let text = self.described(record).text;
                 self.alarms.occurred(own("retained-dropped"), cycle, text);
             }
             HostEvent::Ready { .. } | HostEvent::RetainRegained => {

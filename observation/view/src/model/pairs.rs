@@ -6,7 +6,6 @@ use understudy_wire::{Member, Part, ProgramId};
 
 use super::Model;
 use super::standing::Change;
-use crate::describe::describe;
 
 /// Alarm of an author whose partner is not received.
 pub(super) const PARTNER_LOST: &str = "partner-lost";
@@ -67,14 +66,14 @@ impl Model {
                 }
             }
             RemoteIoEvent::PartnerLost { .. } => {
-                let text = describe(record, &self.members, &self.writes).text;
+                let text = self.described(record).text;
                 self.alarms.raise((record.name.clone(), PARTNER_LOST), cycle, text);
             }
             RemoteIoEvent::PartnerReceived { .. } => {
                 self.alarms.all_over(&record.name, &[PARTNER_LOST], cycle);
             }
             RemoteIoEvent::SecondAuthor { .. } => {
-                let text = describe(record, &self.members, &self.writes).text;
+                let text = self.described(record).text;
                 self.alarms.occurred((record.name.clone(), "second-author"), cycle, text);
             }
             _ => {}

@@ -11,8 +11,7 @@ use super::Model;
 use super::standing::{Change, ProgramChange, StationChange};
 use crate::alarm::VALUE_FAULT;
 use crate::describe::{
-    PROGRAM_FAULT, describe, force_text, missing_text, program_fault_text, program_name,
-    source_text,
+    PROGRAM_FAULT, force_text, missing_text, program_fault_text, program_name, source_text,
 };
 use crate::event::{Event, Level};
 use crate::stop::{self, Stop};
@@ -130,7 +129,7 @@ impl Model {
             RemoteIoEvent::StartedCold { awaits_release, lost, .. } => {
                 self.alarms.all_over(&record.name, &QUESTIONS, cycle);
                 if lost.is_some() {
-                    let text = describe(record, &self.members, &self.writes).text;
+                    let text = self.described(record).text;
                     self.alarms.occurred(subject(STARTED_COLD), cycle, text);
                 }
                 own(ProgramChange::Started { awaits_release: *awaits_release })
@@ -138,7 +137,7 @@ impl Model {
             RemoteIoEvent::StartedWarm { awaits_release, lost, .. } => {
                 self.alarms.all_over(&record.name, &QUESTIONS, cycle);
                 if *lost != Some(0) {
-                    let text = describe(record, &self.members, &self.writes).text;
+                    let text = self.described(record).text;
                     self.alarms.occurred(subject(STARTED_WARM), cycle, text);
                 }
                 own(ProgramChange::Started { awaits_release: *awaits_release })
@@ -200,7 +199,7 @@ impl Model {
         }
         self.alarm_of_forces(record, program, cycle, event);
         if let Some(alarm) = alarm {
-            let text = describe(record, &self.members, &self.writes).text;
+            let text = self.described(record).text;
             self.alarms.raise(subject(alarm), cycle, text);
         }
     }
@@ -209,7 +208,7 @@ impl Model {
     fn accused(&mut self, record: &Record, program: ProgramId, accused: StationSet, cycle: i64) {
         let names = accused.iter().map(|station| self.members.name(Member::Station(station)));
         let subject = (names.collect::<Vec<_>>().join(" and "), VALUE_FAULT);
-        let text = describe(record, &self.members, &self.writes).text;
+        let text = self.described(record).text;
         self.alarms.concerns(&subject, Some(program), cycle, text);
     }
 

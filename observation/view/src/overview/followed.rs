@@ -47,6 +47,11 @@ impl FollowedPlant {
         &self.plant
     }
 
+    /// The run of a group, where one was found.
+    pub fn run_of(&self, group: usize) -> Option<&Run> {
+        Some(&self.groups.get(group)?.as_ref()?.run)
+    }
+
     /// Follows a group in this run.
     pub fn follow(&mut self, group: usize, run: Run) {
         let (model, following) = Following::of(&run, BOUNDS);

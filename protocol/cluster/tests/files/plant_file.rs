@@ -60,6 +60,7 @@ fn one_run_finds_everything_that_is_wrong() {
     };
     let spare = |name: &str, rest: &str| format!("[[spare]]\nname = \"{name}\"\n{rest}\n");
     check("", &["U0203 there is no [[group]]", "U0203 there is no [[spare]]"]);
+    check(&format!("{GROUPS}{}", spare("x", "groups = {}")), &["U0236 spare `x` serves no group"]);
     let wrong = [
         "[[group]]\nname = \"a\"\ncluster = \"one.toml\"\n",
         "[[group]]\nname = \"a\"\ncluster = \"two.toml\"\n",

@@ -61,7 +61,10 @@ pub(super) fn answer(
     session
         .declare_queryable(key.clone())
         .callback(move |query: Query| {
-            if let Err(error) = query.reply(key.clone(), say(&query)).wait() {
+            // A key for many names is answered under the one that was asked for.
+            let asked = query.key_expr().as_str();
+            let answered = if key.contains('*') { asked.to_owned() } else { key.clone() };
+            if let Err(error) = query.reply(answered, say(&query)).wait() {
                 tracing::debug!(%error, "an answer was not sent");
             }
         })

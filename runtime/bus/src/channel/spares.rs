@@ -120,16 +120,18 @@ impl<E: Send + 'static> Channel<E> {
         }
     }
 
-    /// Takes reports of spares. One that finds no room is repeated by its spare.
+    /// Takes reports of spares, each under its own name: the access control admits no other one. A report that finds no room is repeated by its spare.
     pub(super) fn answer_spares(&self, session: &zenoh::Session) -> zenoh::Result<Queryable<()>> {
         let sender = self.spares.sender.clone();
-        answer(session, format!("{}/{SPARE_KEY}", self.prefix), move |query| {
+        answer(session, format!("{}/{SPARE_KEY}/*", self.prefix), move |query| {
             let bytes = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
             let report = match bytes.len() {
                 ..=REPORT_BYTES => serde_json::from_slice::<SpareReport>(&bytes).ok(),
                 _ => None,
             };
-            match report.filter(SpareReport::is_bounded) {
+            let name = query.key_expr().as_str().rsplit('/').next();
+            let is_own = |report: &SpareReport| name == Some(report.spare.as_str());
+            match report.filter(|report| report.is_bounded() && is_own(report)) {
                 Some(report) => {
                     let _ = sender.try_send(report);
                     DONE.to_owned()

@@ -79,8 +79,13 @@ pub(crate) const JOURNAL_KEY: &str = "journal";
 /// Where a remote I/O tells which stations it misses.
 pub(crate) const ATTENDANCE_KEY: &str = "attendance";
 
-/// Where a spare reports.
+/// Where spares report, each below it under its own name.
 pub(crate) const SPARE_KEY: &str = "spare";
+
+/// Whom a certificate names: its common name without the generation.
+fn holder(common_name: &str) -> &str {
+    common_name.rsplit_once('.').map_or(common_name, |(name, _)| name)
+}
 
 /// Where a member's keys begin.
 pub(crate) fn prefix(cluster: ClusterHash, name: &str) -> String {
@@ -140,7 +145,8 @@ pub(super) fn access_control(prefix: &str, hash: &str, admitted: &Admitted) -> s
     let commands = vec![format!("{prefix}/command/*")];
     let writes = WRITE_KEYS.map(|(_, key)| vec![format!("{prefix}/{key}")]);
     let told = [JOURNAL_KEY, ATTENDANCE_KEY].map(|what| format!("{prefix}/{what}"));
-    let refused = [REFUSED_KEY, SPARE_KEY].map(|what| format!("{prefix}/{what}"));
+    let refused = [format!("{prefix}/{REFUSED_KEY}")];
+    let spares = [format!("{prefix}/{SPARE_KEY}/*")];
     let rule = |id: &str, messages: &[&str], flow: &str, keys: &[String]| {
         json!({
             "id": id,
@@ -151,13 +157,14 @@ pub(super) fn access_control(prefix: &str, hash: &str, admitted: &Admitted) -> s
         })
     };
     let answers = ["reply", "declare_queryable"];
-    let rules = [
+    let mut rules = vec![
         rule("ask", &["query"], "ingress", &asked),
         rule("ask-answer", &answers, "egress", &asked),
         rule("follow", &["declare_subscriber"], "ingress", &told),
         rule("follow-lines", &["put"], "egress", &told),
         rule("refused", &["query"], "ingress", &refused),
         rule("refused-answer", &answers, "egress", &refused),
+        rule("spare-answer", &answers, "egress", &spares),
         rule("write", &["query"], "ingress", &writes[0]),
         rule("write-answer", &answers, "egress", &writes[0]),
         rule("engineer-write", &["query"], "ingress", &writes[1]),
@@ -165,22 +172,28 @@ pub(super) fn access_control(prefix: &str, hash: &str, admitted: &Admitted) -> s
         rule("command", &["query"], "ingress", &commands),
         rule("command-answer", &answers, "egress", &commands),
     ];
-    let all: Vec<&serde_json::Value> = rules.iter().map(|rule| &rule["id"]).collect();
+    let all: Vec<serde_json::Value> = rules.iter().map(|rule| rule["id"].clone()).collect();
     // Each may do what the one before it may.
     let groups = [
         ("members", &admitted.members, &all[..2]),
-        ("viewers", &admitted.viewers, &all[..6]),
-        ("operators", &admitted.operators, &all[..8]),
+        ("viewers", &admitted.viewers, &all[..7]),
+        ("operators", &admitted.operators, &all[..9]),
         ("engineers", &admitted.engineers, &all[..]),
     ];
     // A group of nobody would be one of everybody: Zenoh takes a missing list for a wildcard, and refuses an empty one.
     let groups = groups.iter().filter(|(_, names, _)| !names.is_empty());
-    let subjects: Vec<serde_json::Value> = groups
-        .clone()
-        .map(|(id, names, _)| json!({"id": id, "cert_common_names": names, "link_protocols": ["tls"]}))
-        .collect();
-    let policies: Vec<serde_json::Value> =
-        groups.map(|(id, _, rules)| json!({"subjects": [id], "rules": rules})).collect();
+    let subject = |id: &str, names: &[String]| json!({"id": id, "cert_common_names": names, "link_protocols": ["tls"]});
+    let policy = |id: &str, rules: &[serde_json::Value]| json!({"subjects": [id], "rules": rules});
+    let mut subjects: Vec<_> = groups.clone().map(|(id, names, _)| subject(id, names)).collect();
+    let mut policies: Vec<_> = groups.map(|(id, _, rules)| policy(id, rules)).collect();
+    // Each person may report as the spare that the own certificate names, and as no other one.
+    for name in admitted.people() {
+        let id = format!("spare {name}");
+        let own = [format!("{prefix}/{SPARE_KEY}/{}", holder(name))];
+        rules.push(rule(&id, &["query"], "ingress", &own));
+        subjects.push(subject(&id, std::slice::from_ref(name)));
+        policies.push(policy(&id, &[json!(id)]));
+    }
     json!({
         "enabled": true,
         "default_permission": "deny",
@@ -200,6 +213,32 @@ mod tests {
         let config = zenoh::Config::from_json5(text).expect("Zenoh reads it");
         let rules = config.get_json("access_control/default_permission");
         assert_eq!(rules.expect("it is set"), "\"deny\"");
+    }
+
+    /// A report of a spare is taken from the holder of its name only.
+    #[test]
+    fn a_spare_reports_under_the_name_of_its_certificate() {
+        let admitted = Admitted {
+            viewers: vec!["spare-1.1".into(), "spare-1.2".into(), "desk.1".into()],
+            ..Admitted::default()
+        };
+        let rules = access_control("understudy/1/io", &hash_key("io"), &admitted);
+        let all = rules["rules"].as_array().expect("rules");
+        for (name, own) in [("spare-1.1", "spare-1"), ("spare-1.2", "spare-1"), ("desk.1", "desk")]
+        {
+            let id = format!("spare {name}");
+            let rule = all.iter().find(|rule| rule["id"] == *id).expect("it has one");
+            assert_eq!(rule["key_exprs"], json!([format!("understudy/1/io/spare/{own}")]));
+            assert_eq!(
+                (&rule["messages"], &rule["flows"]),
+                (&json!(["query"]), &json!(["ingress"]))
+            );
+        }
+        let may_all = |rule: &serde_json::Value| {
+            let keys = rule["key_exprs"].to_string();
+            keys.contains("/spare/*") && rule["flows"] == json!(["ingress"])
+        };
+        assert!(!all.iter().any(may_all));
     }
 
     #[test]

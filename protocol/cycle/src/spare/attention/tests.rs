@@ -180,6 +180,18 @@ fn a_group_without_a_living_station_wakes_nobody() {
     assert!(!bench.is_wanted());
 }
 
+/// In the paper's mode, one more understudy masks nothing.
+#[test]
+fn a_group_in_the_mode_of_the_paper_wakes_nobody() {
+    let agreement = Agreement { mode: Mode::Paper, ..agreement(3, 1, 2) };
+    let attention = Attention::new(&agreement, StationId(4), SPARE_AFTER);
+    let mut bench = Bench { attention };
+    bench.pass(100, &ALL);
+    bench.pass(200, &[0, 1, 3]);
+    assert!(bench.attention.failed().next().is_some());
+    assert!(!bench.is_wanted());
+}
+
 #[test]
 fn an_empty_slot_wakes_nobody() {
     let mut bench = Bench::new(4);
