@@ -17,6 +17,8 @@
 //! cd ../nusmv && ./configure --disable-minisat --disable-zchaff CFLAGS="-O3 -std=gnu89 -fcommon -w" && make
 //! ```
 
+#![expect(clippy::print_stdout, reason = "a benchmark prints its table")]
+
 mod programs;
 
 use std::ops::Range;

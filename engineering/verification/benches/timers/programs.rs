@@ -3,23 +3,23 @@
 use std::fmt::Write as _;
 
 /// A ladder, by its name.
-pub struct Written {
+pub(crate) struct Written {
     /// For a table.
-    pub name: String,
+    pub(crate) name: String,
     /// The ladder text.
-    pub text: String,
+    pub(crate) text: String,
 }
 
 /// Presets of a family, in scans.
 #[derive(Debug, Clone, Copy)]
-pub enum Presets {
+pub(crate) enum Presets {
     Equal,
     Short,
     Mixed,
 }
 
 impl Presets {
-    pub const ALL: [(Self, &str); 3] =
+    pub(crate) const ALL: [(Self, &str); 3] =
         [(Self::Short, "short"), (Self::Mixed, "mixed"), (Self::Equal, "equal")];
 
     fn of(self, timer: usize) -> u32 {
@@ -33,7 +33,7 @@ impl Presets {
 }
 
 /// On-delays in a row: each begins when the one before it is over.
-pub fn chain(timers: usize, presets: Presets) -> String {
+pub(crate) fn chain(timers: usize, presets: Presets) -> String {
     let mut text = String::from("program chain\n\ninput start\ninput stop\n\n");
     (0..timers).for_each(|timer| line(&mut text, format_args!("output y{timer}")));
     line(&mut text, format_args!("memory y\n\nrung\n    [ start | y ] /stop ( y )"));
@@ -50,7 +50,7 @@ pub fn chain(timers: usize, presets: Presets) -> String {
 }
 
 /// Independent on-delays and off-delays, and outputs that need all of them.
-pub fn product(timers: usize, presets: Presets) -> String {
+pub(crate) fn product(timers: usize, presets: Presets) -> String {
     let mut text = String::from("program product\n\n");
     for timer in 0..timers {
         line(&mut text, format_args!("input u{timer}\nmemory m{timer}"));
@@ -78,12 +78,12 @@ pub fn product(timers: usize, presets: Presets) -> String {
 }
 
 /// Three off-delays of four seconds in parallel, and an alarm that needs them all.
-pub const ALARM: &str = "program alarm\n\ninput left\ninput middle\ninput right\ninput reset\n\noutput gate\noutput lamp\noutput horn\n\nmemory alarm\n\
+pub(crate) const ALARM: &str = "program alarm\n\ninput left\ninput middle\ninput right\ninput reset\n\noutput gate\noutput lamp\noutput horn\n\nmemory alarm\n\
 rung\n    [ left {TOF a 4s} | middle {TOF b 4s} | right {TOF c 4s} ] ( gate )\nrung\n    a.Q b.Q c.Q ( S alarm )\n\
 rung\n    reset /gate ( R alarm )\nrung\n    alarm gate ( lamp )\nrung\n    alarm /left ( horn )\n";
 
 /// Three delays of `scans` scans, each begun by the edge of the one before.
-pub fn edges(kind: &str, scans: u32, by_edges: bool) -> String {
+pub(crate) fn edges(kind: &str, scans: u32, by_edges: bool) -> String {
     let edge =
         |number: usize| if by_edges { format!(" {{R_TRIG e{number}}}") } else { String::new() };
     let (one, two) = (edge(1), edge(2));
@@ -120,7 +120,7 @@ impl Random {
 
 /// A random program of `timers` timers with presets from `least` to `most` scans: on-delays, off-delays and pulses that begin by inputs, by each other,
 /// by edges, that reset each other, and counters between them.
-pub fn random(seed: u64, timers: usize, least: u32, most: u32) -> String {
+pub(crate) fn random(seed: u64, timers: usize, least: u32, most: u32) -> String {
     let mut random = Random(seed);
     let inputs = 1 + random.below(3);
     let equal = random.one_in(3).then(|| random.preset(least, most));
