@@ -72,13 +72,21 @@ pub enum Verdict {
 /// Steps of a search that are single scans.
 const SINGLE: usize = 64;
 
+/// When the order of variables changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Order {
+    Fixed,
+    Early,
+    ByNeed,
+}
+
 /// Decides properties of one circuit.
 pub struct Checker<'c> {
     circuit: &'c Circuit,
     fair: Vec<Resolved>,
     nodes: usize,
     go_on: GoOn<'c>,
-    reorders: bool,
+    order: Order,
     single: usize,
     /// That of the last property, for the next one that depends on the same part of the circuit.
     model: Option<model::Model<'c>>,
@@ -104,7 +112,7 @@ impl<'c> Checker<'c> {
             fair,
             nodes,
             go_on: ALWAYS,
-            reorders: true,
+            order: Order::ByNeed,
             single: SINGLE,
             model: None,
             too_large: None,
@@ -120,7 +128,14 @@ impl<'c> Checker<'c> {
     /// The same, in the order of the circuit: what needs another one is soon too large.
     #[must_use]
     pub fn in_fixed_order(self) -> Self {
-        Self { reorders: false, ..self }
+        Self { order: Order::Fixed, ..self }
+    }
+
+    /// The same, but the order is changed as soon as diagrams have some thousand nodes: the times of timers that begin each other need another order
+    /// than that of the program.
+    #[must_use]
+    pub fn reordered_early(self) -> Self {
+        Self { order: Order::Early, ..self }
     }
 
     /// The same, but after this number of steps a search goes through many scans at once where only timers count. Verdicts are the same; runs
@@ -158,10 +173,14 @@ impl<'c> Checker<'c> {
     }
 
     fn model_of(&self, cone: &Cone) -> Result<model::Model<'c>, Stopped> {
-        let (nodes, reorders) = (self.nodes, self.reorders);
+        let (nodes, changes) = (self.nodes, self.order);
         let diagrams = |order| {
             let diagrams = Diagrams::new(order, nodes);
-            if reorders { diagrams.reordered_by_need() } else { diagrams }
+            match changes {
+                Order::Fixed => diagrams,
+                Order::Early => diagrams.reordered_early(),
+                Order::ByNeed => diagrams.reordered_by_need(),
+            }
         };
         let (cone, fair) = (cone.clone(), &self.fair);
         model::Model::new(self.circuit, cone, fair, diagrams, self.single, self.go_on)

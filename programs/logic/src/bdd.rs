@@ -94,11 +94,20 @@ impl Diagrams {
     /// without; sizes, and which of several assignments is found, are not.
     #[must_use]
     pub fn reordered_by_need(self) -> Self {
+        self.reordered(Need::new)
+    }
+
+    /// As [`Self::reordered_by_need`], but each time that the diagrams have doubled from a few thousand nodes on: for sets that stay small in a good
+    /// order, and are given up where they do not.
+    #[must_use]
+    pub fn reordered_early(self) -> Self {
+        self.reordered(Need::early)
+    }
+
+    fn reordered(self, need: impl FnOnce(usize) -> Need) -> Self {
         let limit = self.limit;
-        Self {
-            need: Some(Need::new(limit)),
-            ..Self::with_room(self.variables, limit, Need::room(limit))
-        }
+        let room = Need::room(limit);
+        Self { need: Some(need(limit)), ..Self::with_room(self.variables, limit, room) }
     }
 
     /// Diagrams over the variables that `roots` depend on, in the order of [`depth_first_order`].

@@ -134,13 +134,13 @@ impl<'s, 'b> Stages<'s, 'b> {
         self.answers[place] = Some(answer);
     }
 
-    /// With fewer nodes than allowed the order of variables stays as it is.
+    /// With fewer nodes than allowed the order of variables changes early, and not at the bound.
     fn diagrams(&mut self, nodes: usize) {
         let circuit = &self.subject.circuit;
         let go_on = self.bounds.go_on;
         let mut checker = Checker::new(circuit, self.fair.clone(), nodes).while_wanted(go_on);
         if nodes < self.bounds.nodes {
-            checker = checker.in_fixed_order();
+            checker = checker.reordered_early();
         }
         let mut failures = 0;
         for place in self.left() {

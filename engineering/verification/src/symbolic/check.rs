@@ -10,6 +10,16 @@ use super::trace::Tracer;
 use super::{Resolved, Verdict};
 use crate::effort::Stopped;
 
+/// Nodes of a set that is simple, whatever it is compared with.
+const SMALL: usize = 100;
+
+/// How many times fewer nodes the states have that no step has gone back from, so that a step goes back from them alone.
+const SMALLER: usize = 4;
+
+fn is_much_smaller(set: &Diagram, other: &Diagram) -> bool {
+    set.node_count() * SMALLER < other.node_count()
+}
+
 /// States of a search, and how they lead to those found before.
 pub(super) struct Ring {
     pub(super) states: Diagram,
@@ -74,8 +84,7 @@ impl Model<'_> {
         }
     }
 
-    /// E[hold U end]. Each step goes back from all that was found, not only from what came last: that is mostly the simpler set, and most of the step is
-    /// remembered from the one before.
+    /// E[hold U end].
     fn until(&self, hold: &Diagram, end: Diagram) -> Result<Diagram, Stopped> {
         let mut found = end.clone();
         self.search(hold, &end, &mut |_, states| found = states.clone())?;
@@ -93,6 +102,9 @@ impl Model<'_> {
 
     /// Shows `found` the states of E[hold U end] each time that there are more, and the scans that lead to those before: one with any
     /// inputs, or several with unchanged inputs.
+    ///
+    /// A step goes back from all that was found, of which most is remembered from the step before, or from the states that no step has gone back from
+    /// yet, where these are a much simpler set: with each scan that timers count, all that was found has one more time for each of them.
     fn search(
         &self,
         hold: &Diagram,
@@ -100,11 +112,16 @@ impl Model<'_> {
         found: &mut dyn FnMut(usize, &Diagram),
     ) -> Result<(), Stopped> {
         let mut known = end.clone();
+        let mut fresh = Some(end.clone());
         let mut ways = None;
         for step in 0.. {
-            let next = self.enter(&known, hold, &self.before(&known)?)?;
+            let from = fresh.as_ref().filter(|fresh| is_much_smaller(fresh, &known));
+            let next = self.enter(&known, hold, &self.before(from.unwrap_or(&known))?)?;
             if next == known {
                 break;
+            }
+            if fresh.is_some() {
+                fresh = self.fresh(None, &next, &known)?;
             }
             known = next;
             found(1, &known);
@@ -114,17 +131,39 @@ impl Model<'_> {
             if ways.is_none() {
                 ways = Some(self.ways(hold)?);
             }
-            for (jump, way) in self.jumps()?.iter().zip(ways.iter().flatten()) {
+            // The longest first: after it most timers are over, so what it adds is simple and has most of what shorter ones add.
+            let jumps = self.jumps()?.iter().zip(ways.as_deref().unwrap_or_default()).rev();
+            for (jump, way) in jumps {
                 self.goes_on()?;
                 let before = self.diagrams.substitute(&known, &jump.step)?;
                 let next = self.enter(&known, way, &before)?;
                 if next != known {
+                    if fresh.is_some() {
+                        fresh = self.fresh(fresh, &next, &known)?;
+                    }
                     known = next;
                     found(jump.scans, &known);
                 }
             }
         }
         Ok(())
+    }
+
+    /// `before`, and the states of `next` that are not in `known`; nothing where these are no simpler set than `known`, as in lines of stations that
+    /// work at the same time, because the next ones would be less simple still.
+    fn fresh(
+        &self,
+        before: Option<Diagram>,
+        next: &Diagram,
+        known: &Diagram,
+    ) -> Result<Option<Diagram>, Stopped> {
+        let diagrams = &self.diagrams;
+        let mut fresh = diagrams.and(next, &diagrams.not(known)?)?;
+        if let Some(before) = before {
+            fresh = diagrams.or(&before, &fresh)?;
+        }
+        let is_simple = fresh.node_count() <= 2 * known.node_count() + SMALL;
+        Ok(is_simple.then_some(fresh))
     }
 
     /// `known`, and what of `hold` comes `before` it.

@@ -7,14 +7,19 @@ use proptest::prelude::*;
 use understudy_ladder::parse;
 use understudy_logic::Circuit;
 use understudy_logic::bdd::Diagrams;
+use understudy_verification::Work;
 use understudy_verification::explicit::Explicit;
-use understudy_verification::program::Subject;
-use understudy_verification::property::Asked;
+use understudy_verification::program::{Answer, Bounds, Subject};
+use understudy_verification::property::{Asked, Formula};
 use understudy_verification::symbolic::{Checker, Resolved, Trace, Verdict};
 
 use crate::naive::Naive;
 use crate::random::{formula, one_scan};
 use crate::replay::replays;
+
+#[path = "../../benches/timers/programs.rs"]
+#[expect(dead_code, reason = "the benchmark writes other families too")]
+mod programs;
 
 /// What contacts ask for.
 const OPERANDS: [&str; 6] = ["u0", "u1", "y0", "y1", "t0.Q", "t1.Q"];
@@ -59,6 +64,50 @@ fn check(
         Ok(Verdict::Fails(trace)) => (false, trace),
         Err(stopped) => panic!("{stopped}"),
     }
+}
+
+/// `AG (EF y & EF !y)` for each output y.
+fn switched(text: &str) -> (Subject, Vec<Resolved>) {
+    let program = parse(text).program;
+    let period = Duration::from_millis(1);
+    let subject = Subject::new(&program, period, &Asked::default()).expect("a right program");
+    let outputs = subject.outputs().map(Formula::Signal);
+    let again = |signal: Resolved| signal.reachable();
+    let asked = outputs.map(|on| again(on.clone()).and(again(on.negated())).always()).collect();
+    (subject, asked)
+}
+
+/// Timers that begin each other and count on at the same time: in the order of the program the sets need more than 100,000 nodes from 40 scans on.
+#[test]
+fn delays_that_follow_each_other_stay_small() {
+    for kind in ["TOF", "TP"] {
+        let (subject, asked) = switched(&programs::edges(kind, 100, true));
+        let is_small = |work| !matches!(work, Work::Diagrams { nodes, .. } if nodes > 100_000);
+        let bounds = Bounds { go_on: &is_small, ..Bounds::default() };
+        let answers = subject.check(&asked, Vec::new(), bounds, &mut |_, _| {});
+        let held = answers.iter().filter(|answer| matches!(answer, Answer::Holds(_))).count();
+        assert_eq!(held, 6, "{kind}: {answers:?}");
+    }
+}
+
+/// Random programs of timers, edges, mutual resets and counters: the verdicts of a list of all states, after any number of single scans.
+#[test]
+fn programs_of_timers_agree_with_a_list_of_states() {
+    let mut compared = [0; 2];
+    for seed in 1000..1060 {
+        let text = programs::random(seed, 2 + (seed % 3) as usize, 2, 9);
+        let (subject, asked) = switched(&text);
+        let Ok(listed) = Explicit::new(subject.circuit(), 1 << 18) else {
+            continue;
+        };
+        for (property, (expected, _)) in asked.iter().zip(listed.check(&asked)) {
+            let (holds, trace) = check(subject.circuit(), Vec::new(), property, seed as usize % 4);
+            assert_eq!(holds, expected, "seed {seed}: {property:?} of\n{text}");
+            assert!(trace.is_none_or(|trace| replays(subject.circuit(), &trace)));
+            compared[usize::from(holds)] += 1;
+        }
+    }
+    assert!(compared[0] > 10 && compared[1] > 50, "{compared:?}");
 }
 
 proptest! {
@@ -113,7 +162,6 @@ proptest! {
 
 /// Whether a formula of one scan holds in the only scan of a run.
 fn holds_in_last(formula: &Resolved, run: &Trace) -> bool {
-    use understudy_verification::property::Formula;
     match formula {
         Formula::Constant(value) => *value,
         Formula::Signal(signal) => run.value(*signal, 0),

@@ -17,9 +17,14 @@ const MOVES: usize = 40;
 /// Variables that one reordering moves, those with the most nodes.
 const VARIABLES: usize = 500;
 
+/// Living nodes at which an early change begins.
+const EARLY: usize = 10_000;
+
 /// When to look for a better order.
 pub(super) struct Need {
     limit: usize,
+    /// Whether the order is changed where there is no node left.
+    at_bound: bool,
     /// Nodes, dead ones included, at which the living ones are counted.
     count_at: AtomicUsize,
     /// Living nodes at which the order is changed.
@@ -30,7 +35,17 @@ impl Need {
     pub(super) fn new(limit: usize) -> Self {
         // A good order is left alone as long as there is room.
         let first = limit / 4 * 3;
-        Self { limit, count_at: AtomicUsize::new(first), change_at: AtomicUsize::new(first) }
+        Self::at(first, limit, true)
+    }
+
+    /// Each time that the diagrams have doubled, and not at the bound, where it takes longest and helps least.
+    pub(super) fn early(limit: usize) -> Self {
+        Self::at(EARLY.min(limit / 4 * 3), limit, false)
+    }
+
+    fn at(first: usize, limit: usize, at_bound: bool) -> Self {
+        let [count_at, change_at] = [first; 2].map(AtomicUsize::new);
+        Self { limit, at_bound, count_at, change_at }
     }
 
     /// Nodes that there are in all: swaps need room.
@@ -62,6 +77,9 @@ impl Need {
     /// After an operation that found no free node: whether a new order made room, so that another try is worth while.
     pub(super) fn make_room(&self, manager: &BDDManagerRef) -> bool {
         let before = alive(manager);
+        if !self.at_bound {
+            return before < self.limit / 8 * 7;
+        }
         self.change(manager);
         let left = alive_now(manager);
         self.change_at.store(2 * left, Ordering::Relaxed);
