@@ -121,7 +121,14 @@ fn switch(members: &Members<'_>, texts: &ChangeTexts, is_forward: bool) -> Asked
     let mut asked = Asked::default();
     for changed in &texts.programs {
         let to = if is_forward { changed.after.hash } else { changed.before.hash };
-        members.ask(Member::RemoteIo(changed.program), &ChangeRequest::Switch { to }, &mut asked);
+        // Of two remote I/Os the author makes the change mark.
+        let pair = [Member::RemoteIo(changed.program), Member::Twin(changed.program)];
+        let mut of_pair = Asked::default();
+        for member in pair.into_iter().filter(|member| members.all().contains(member)) {
+            members.ask(member, &ChangeRequest::Switch { to }, &mut of_pair);
+        }
+        of_pair.keep_done();
+        asked.0.append(&mut of_pair.0);
     }
     asked
 }
@@ -185,6 +192,13 @@ fn needs_stop(reasons: &[NeedsStop]) -> Answer {
 struct Asked(Vec<(Member, String, Result<(), String>)>);
 
 impl Asked {
+    /// Leaves out what was refused where another one has done it.
+    fn keep_done(&mut self) {
+        if self.0.iter().any(|(.., said)| said.is_ok()) {
+            self.0.retain(|(.., said)| said.is_ok());
+        }
+    }
+
     fn is_done(&self) -> bool {
         self.0.iter().all(|(.., said)| said.is_ok())
     }
