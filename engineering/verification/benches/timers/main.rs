@@ -140,9 +140,15 @@ impl Bench {
             Some(60.0 * minutes.parse::<f64>().ok()? + seconds.parse::<f64>().ok()?)
         });
         let told = String::from_utf8_lossy(&ended.stdout);
+        // The last line of one that was ended is not whole.
         let told = told.lines().filter(|line| line.starts_with("-- specification"));
-        let mut verdicts: Vec<Option<bool>> =
-            told.map(|line| Some(line.ends_with("is true"))).collect();
+        let mut verdicts: Vec<Option<bool>> = told
+            .map(|line| {
+                line.ends_with("is true")
+                    .then_some(true)
+                    .or(line.ends_with("is false").then_some(false))
+            })
+            .collect();
         verdicts.resize(count, None);
         Some(Proved { seconds: seconds.sum(), verdicts })
     }

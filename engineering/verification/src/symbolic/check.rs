@@ -131,8 +131,8 @@ impl Model<'_> {
             if ways.is_none() {
                 ways = Some(self.ways(hold)?);
             }
-            // The longest first: after it most timers are over, so what it adds is simple and has most of what shorter ones add.
-            let jumps = self.jumps()?.iter().zip(ways.as_deref().unwrap_or_default()).rev();
+            // The shortest first: a run that is shown waits no longer than needed.
+            let jumps = self.jumps()?.iter().zip(ways.as_deref().unwrap_or_default());
             for (jump, way) in jumps {
                 self.goes_on()?;
                 let before = self.diagrams.substitute(&known, &jump.step)?;
