@@ -106,10 +106,22 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
             Ok(asked.answer("changes its program with its next sample", plan.json()))
         }
         Step::Accept => {
+            let ended = end(&members, texts.after);
+            if ended.is_done() {
+                return Ok(ended.answer("runs the new configuration", plan.json()));
+            }
             let asked = switch(&members, &texts, true);
             finish(&members, asked, texts.after, "runs the new configuration", plan.json())
         }
         Step::Cancel => {
+            let back = Plan::back(&before, &after, &texts);
+            if back.drops() && !arguments.drop {
+                let message = format!(
+                    "the old program does not have all values that the new one can have, so these begin with their initial values; with --drop it continues\n{}",
+                    back.text()
+                );
+                return Err(Answer::failed(Status::BadInput, "U0635", message));
+            }
             let asked = switch(&members, &texts, false);
             finish(&members, asked, texts.before, "runs the old configuration", plan.json())
         }
@@ -129,6 +141,15 @@ fn switch(members: &Members<'_>, texts: &ChangeTexts, is_forward: bool) -> Asked
         }
         of_pair.keep_done();
         asked.0.append(&mut of_pair.0);
+    }
+    asked
+}
+
+/// Asks all members whether the change is over with a configuration; those that wait for nothing more end it.
+fn end(members: &Members<'_>, configuration: understudy_wire::ConfigurationHash) -> Asked {
+    let mut asked = Asked::default();
+    for member in members.all() {
+        members.ask(member, &ChangeRequest::Forget { configuration }, &mut asked);
     }
     asked
 }
@@ -271,8 +292,18 @@ impl Plan {
         Self { programs: programs.collect() }
     }
 
+    /// The way back, without the variables that only the new program has.
+    fn back(before: &Cluster, after: &Cluster, texts: &ChangeTexts) -> Self {
+        let mut plan = Self::of(after, before, texts);
+        for (_, state) in &mut plan.programs {
+            state.paths.retain(|path| path.now.is_some());
+        }
+        plan
+    }
+
     fn drops(&self) -> bool {
-        self.programs.iter().any(|(_, state)| state.dropped().next().is_some())
+        let is_lost = |fate| matches!(fate, Fate::Dropped | Fate::Narrowed);
+        self.programs.iter().any(|(_, state)| state.paths.iter().any(|path| is_lost(path.fate)))
     }
 
     fn text(&self) -> String {
@@ -281,9 +312,10 @@ impl Plan {
             let count = |fate| state.paths.iter().filter(|path| path.fate == fate).count();
             let _ = writeln!(
                 text,
-                "{name}: {} variables kept, {} converted, {} new, {} dropped",
+                "{name}: {} variables kept, {} converted, {} narrowed, {} new, {} dropped",
                 count(Fate::Kept),
                 count(Fate::Converted),
+                count(Fate::Narrowed),
                 count(Fate::New),
                 count(Fate::Dropped)
             );

@@ -398,6 +398,9 @@ impl Laboratory<'_> {
                 self.note(event);
                 self.show_journal();
             }
+            if let Some(request) = decided.change() {
+                self.note_change(&request.clone());
+            }
             decided.answer();
         }
         self.conductor.hear(record, Instant::now());

@@ -121,7 +121,6 @@ impl Laboratory<'_> {
                 return self.tell(member, line("write", serde_json::to_string(write))).await;
             }
             Command::Change { request } => {
-                self.note_change(request);
                 return self.tell(member, line("change", serde_json::to_string(request))).await;
             }
             Command::Unforce { signal } => {
@@ -161,8 +160,8 @@ impl Laboratory<'_> {
         Ok(Done::default())
     }
 
-    /// Records the texts of a change that a member is asked to load, once.
-    fn note_change(&mut self, request: &ChangeRequest) {
+    /// Records the texts of a change that a member has loaded, once.
+    pub(super) fn note_change(&mut self, request: &ChangeRequest) {
         let ChangeRequest::Prepare { file } = request else {
             return;
         };

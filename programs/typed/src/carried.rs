@@ -71,6 +71,8 @@ pub enum Fate {
     Kept,
     /// The new program has the value, in another type.
     Converted,
+    /// The new program has the value, in a type that does not have all values: another one is dropped.
+    Narrowed,
     /// The new program has its initial value.
     New,
     /// The new program does not have the value.
@@ -83,6 +85,7 @@ impl Fate {
         match self {
             Self::Kept => "kept",
             Self::Converted => "converted",
+            Self::Narrowed => "narrowed",
             Self::New => "new",
             Self::Dropped => "dropped",
         }
@@ -200,6 +203,15 @@ impl Points {
 struct Spot<'p> {
     of: &'p Type,
     slot: u32,
+}
+
+/// What has become of a value that is taken over by a conversion.
+fn taken(conversion: &Conversion) -> Fate {
+    match conversion {
+        Conversion::Same => Fate::Kept,
+        Conversion::Narrower(..) => Fate::Narrowed,
+        Conversion::Wider(..) | Conversion::ByName(_) => Fate::Converted,
+    }
 }
 
 /// For each variable of the new program the one of the old program that it takes over: of its name, or else of the same name in another case.
@@ -349,10 +361,7 @@ impl<'p> Walk<'p> {
             return Fate::Dropped;
         };
         self.state[second] = value;
-        match conversion {
-            Conversion::Same => Fate::Kept,
-            _ => Fate::Converted,
-        }
+        taken(&conversion)
     }
 
     /// The parts of a path, or the path alone where all of it has the same fate.

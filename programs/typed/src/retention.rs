@@ -40,6 +40,15 @@ impl Program {
         whole
     }
 
+    /// Whether each slot of the state is one of a variable that has a name, but for the program's own; what has none cannot be found in a changed
+    /// program.
+    pub fn has_names_for_all(&self) -> bool {
+        let mut whole = self.clone();
+        whole.retained.clear();
+        whole.retain(Self::HEADER..self.state);
+        !whole.has_unnamed_retentive()
+    }
+
     /// Whether a restart keeps anything.
     pub fn is_retentive(&self) -> bool {
         !self.retained.is_empty()

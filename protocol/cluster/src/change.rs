@@ -97,6 +97,14 @@ pub enum NeedsStop {
         /// The first point that differs.
         point: String,
     },
+    /// States of the program before or after cannot be converted.
+    #[error("`{program}` cannot change while it runs: one of the two programs {why}")]
+    Memory {
+        /// Name of the controller.
+        program: String,
+        /// Why, in words.
+        why: &'static str,
+    },
     /// Something else than a program differs.
     #[error("the two files differ in `{before}` and `{after}`")]
     Settings {
@@ -128,6 +136,9 @@ impl ChangeTexts {
                 reasons.push(NeedsStop::Points { program: old.name.clone(), point });
             }
             if old.hash != new.hash {
+                let why = old.code.why_not_changed().or_else(|| new.code.why_not_changed());
+                let program = old.name.clone();
+                reasons.extend(why.map(|why| NeedsStop::Memory { program, why }));
                 programs.push(ChangedText {
                     program: ProgramId(place),
                     before: ProgramText::of(&old.code, old.hash),
@@ -186,6 +197,9 @@ impl ChangeTexts {
                 .or_else(|| different_point(&controller.code, &after))
             {
                 return Err(ChangeError::Points { program: controller.name.clone(), point });
+            }
+            if let Some(why) = before.why_not_changed().or_else(|| after.why_not_changed()) {
+                return Err(ChangeError::Memory { program: controller.name.clone(), why });
             }
             let of_file = if own == self.before { &changed.before } else { &changed.after };
             if of_file.hash != controller.hash {
@@ -306,6 +320,14 @@ pub enum ChangeError {
         /// The first point that differs.
         point: String,
     },
+    /// States of the program before or after cannot be converted.
+    #[error("`{program}` cannot change while it runs: one of the two programs {why}")]
+    Memory {
+        /// Name of the controller.
+        program: String,
+        /// Why, in words.
+        why: &'static str,
+    },
 }
 
 /// The way from one program to another one: by the names and types of its variables.
@@ -389,5 +411,56 @@ fn first_difference(before: &str, after: &str) -> Option<(String, String)> {
             }
             _ => {}
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FILE: &str = "[cluster]\nname = \"one\"\nsecurity = \"off\"\n\n[[controller]]\nname = \"one\"\nladder = \"FILE\"\n\n[[remote_io]]\ncontroller = \"one\"\n";
+
+    fn cluster(file: &str, text: &str) -> Cluster {
+        let cluster = FILE.replace("FILE", file);
+        let loaded = crate::read("cluster.toml", &cluster, &mut |_| Ok(text.to_owned()));
+        loaded.cluster.unwrap_or_else(|| panic!("{:?}", loaded.reports))
+    }
+
+    fn program(input: &str, body: &str) -> String {
+        format!(
+            "PROGRAM one\nVAR_INPUT {input}; END_VAR\nVAR_OUTPUT y : BOOL; END_VAR\nVAR t : TON; e : R_TRIG; n : INT; END_VAR\n{body}\nEND_PROGRAM"
+        )
+    }
+
+    /// What cannot be found by a name in the new program would begin anew without a word: a latch falls, and an edge is seen again.
+    #[test]
+    fn programs_with_memory_without_a_name_need_a_stop() {
+        let between = |file: &str, before: &str, after: &str| {
+            ChangeTexts::between(&cluster(file, before), &cluster(file, after))
+        };
+        let rungs = [
+            "program one\ninput a\noutput y\na -> y\n",
+            "program one\ninput a\noutput y\n!a -> y\n",
+        ];
+        let rungs = rungs.map(|text| {
+            crate::read("cluster.toml", &FILE.replace("FILE", "one.ladder"), &mut |_| {
+                Ok(text.to_owned())
+            })
+        });
+        if let [Some(before), Some(after)] = rungs.map(|loaded| loaded.cluster) {
+            assert!(matches!(
+                ChangeTexts::between(&before, &after).as_ref().map_err(Vec::as_slice),
+                Err([NeedsStop::Memory { .. }])
+            ));
+        }
+        let [one, other] = ["y := a;", "y := NOT a;"].map(|body| program("a : BOOL R_EDGE", body));
+        assert!(matches!(
+            between("one.st", &one, &other).as_ref().map_err(Vec::as_slice),
+            Err([NeedsStop::Memory { .. }])
+        ));
+        let [one, other] =
+            ["y := a;", "t(IN := a); e(CLK := t.Q); IF e.Q THEN n := n + 1; END_IF; y := t.Q;"]
+                .map(|body| program("a : BOOL", body));
+        assert!(between("one.st", &one, &other).is_ok());
     }
 }

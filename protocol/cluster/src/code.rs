@@ -168,6 +168,21 @@ impl Code {
         carried
     }
 
+    /// Why the states of this program cannot be those of a changed one; nothing where they can.
+    pub(crate) fn why_not_changed(&self) -> Option<&'static str> {
+        if self.ladder().is_some() {
+            return Some("is written in rungs");
+        }
+        // Parts of a chart have names that stay where other parts change.
+        let stays = |name: &str| {
+            let parts = ["begun.", "timer.", "stored.", "fires."];
+            !name.contains('.') || parts.iter().any(|part| name.starts_with(part))
+        };
+        let has_names = self.typed.variables.iter().all(|variable| stays(&variable.name));
+        let is_named = has_names && self.typed.has_names_for_all();
+        (!is_named).then_some("has memory without a name, such as that of an edge of an input")
+    }
+
     /// A state of the program in the order of its variables, for one as stations hold it.
     ///
     /// # Panics

@@ -226,7 +226,7 @@ fn carried_over(program: &str, state: &CarriedState) -> CarriedOver {
     CarriedOver {
         program: program.to_owned(),
         kept: count(Fate::Kept),
-        converted: count(Fate::Converted),
+        converted: count(Fate::Converted) + count(Fate::Narrowed),
         new: count(Fate::New),
         dropped: state.dropped().map(|path| path.path.clone()).collect(),
     }

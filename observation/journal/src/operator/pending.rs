@@ -3,7 +3,9 @@
 use understudy_bus::HostEvent;
 use understudy_remote_io::Event as RemoteIoEvent;
 use understudy_simulator::Action;
-use understudy_wire::{Member, OrderRefusal, StateChoice, WriteAnswer, WriteOutcome, WriteRefusal};
+use understudy_wire::{
+    ChangeRequest, Member, OrderRefusal, StateChoice, WriteAnswer, WriteOutcome, WriteRefusal,
+};
 
 use super::{Command, Commanded, Done, OperatorAction, Refusal};
 use crate::record::{Happening, Record, RunEvent};
@@ -69,6 +71,16 @@ pub struct DecidedOrder {
 }
 
 impl DecidedOrder {
+    /// The step of an online change that it was, where that was done.
+    pub fn change(&self) -> Option<&ChangeRequest> {
+        match &self.commanded.action {
+            OperatorAction::Command { command: Command::Change { request }, .. } => {
+                self.done.as_ref().ok().map(|_| request)
+            }
+            _ => None,
+        }
+    }
+
     /// Its record, which says why it was refused; nothing for a write, which is recorded when it is sent.
     pub fn record(&self) -> Option<RunEvent> {
         if self.commanded.is_write() {

@@ -99,9 +99,7 @@ impl<'p> Walk<'p> {
         let Some(conversion) = conversion else {
             return vec![elements(Fate::Dropped)];
         };
-        let taken =
-            if conversion == super::Conversion::Same { Fate::Kept } else { Fate::Converted };
-        let mut parts = vec![elements(taken)];
+        let mut parts = vec![elements(super::taken(&conversion))];
         let at = |first: Spot<'_>, bits: u64| {
             let address = 64 * u64::from(first.slot) + bits;
             ((address / 64) as usize, address % 64)
