@@ -15,7 +15,7 @@ fn the_press_cell_survives_every_crash_in_a_cycle() {
     let result = &answer.json()["result"];
     assert!(result["states"].as_u64() > Some(100), "{result}");
     let properties = result["properties"].as_array().expect("properties");
-    assert_eq!(properties.len(), 5);
+    assert_eq!(properties.len(), 6);
     for property in properties {
         assert_eq!(property["holds"], json!(true), "{property}");
     }

@@ -35,7 +35,7 @@
 //! | U0254 | warning: parts that never come |
 //! | U0255 | warning: a mark of what is to be filled in |
 //! | U0256 | warning: inputs that nothing drives |
-//! | U0257 | warning: a watchdog of a simulated plant that runs out before the twin has taken over |
+//! | U0258 | warning: a watchdog of a simulated plant that runs out before the twin has taken over |
 
 mod alarms;
 mod devices;

@@ -67,7 +67,7 @@ pub(crate) fn check_watchdogs(
                 plant.name, plant.watchdog_cycles, twin.name
             );
             diagnostics.push(
-                Diagnostic::warning("U0257", message, cluster.clone())
+                Diagnostic::warning("U0258", message, cluster.clone())
                     .with_help(format!("add `watchdog_cycles = {needed}` to its [[plant]]")),
             );
         }

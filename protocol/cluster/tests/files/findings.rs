@@ -558,6 +558,6 @@ fn twins() {
         )
     };
     let found = check(&named(", take_over_after = 2"), "", &plant(4));
-    assert!(found.contains("U0257") && found.contains("watchdog_cycles = 5"), "{found}");
-    assert!(!check(&named(", take_over_after = 2"), "", &plant(5)).contains("U0257"));
+    assert!(found.contains("U0258") && found.contains("watchdog_cycles = 5"), "{found}");
+    assert!(!check(&named(", take_over_after = 2"), "", &plant(5)).contains("U0258"));
 }
