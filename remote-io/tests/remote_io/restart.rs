@@ -112,6 +112,17 @@ fn where_nobody_holds_a_state_the_program_starts_cold_and_the_operator_releases_
     }
 }
 
+/// Where no output of the program was applied since it started cold, the operator has not released it, and a restart of the remote I/O does not either.
+#[test]
+fn a_restart_releases_no_outputs() {
+    for release in [Release::Automatic, Release::Operator] {
+        let events = run([Some((9, 60)); 3], release, 20, 40);
+        assert!(matches!(chosen(&events), Some((9, Some(_)))), "{events:?}");
+        let released = events.iter().any(|event| matches!(event, Event::Released { .. }));
+        assert_eq!(released, release == Release::Operator);
+    }
+}
+
 /// A failed channel keeps the last good value, and not one that was forced: the force ends with the process.
 #[test]
 fn a_failed_channel_keeps_no_forced_value_over_a_restart() {
