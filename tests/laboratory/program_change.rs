@@ -291,7 +291,7 @@ fn a_renamed_member_is_a_question() {
     }
 }
 
-/// The understudy alone has another name: the controller has kept the state, and nothing is asked.
+/// The understudy alone has another name: the controller has kept the state.
 #[test]
 fn a_renamed_understudy_changes_nothing() {
     let _one = some_at_a_time();
@@ -302,7 +302,16 @@ fn a_renamed_understudy_changes_nothing() {
     plant.kill();
     plant.names[1] = "deputy";
     plant.start(&program);
-    assert_eq!(plant.wait_for("counter-io", is("started-warm"))["lost"], 0);
+    let started = plant.wait_for("counter-io", |event| {
+        event["event"] == "started-warm" || event["event"] == "state-lost"
+    });
+    // Where the controller was killed a step before the understudy, what that one had kept as well is asked for.
+    if started["event"] == "state-lost" {
+        plant.order("counter-io", r#"choose {"newest":{"cycle":null}}"#);
+        plant.wait_for("counter-io", is("started-warm"));
+    } else {
+        assert_eq!(started["lost"], 0);
+    }
     assert!(plant.applied(16, |_| true) > 20);
 }
 

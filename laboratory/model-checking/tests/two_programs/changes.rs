@@ -26,7 +26,7 @@ const SWITCH: (Member, ChangeStep) = (remote_io(0), ChangeStep::Switch);
 fn changes_from(start: Start) -> u32 {
     let model = Model::new(parts(1, Turns::Token), start, ONE).expect("it comes into step");
     let mut changes = 0;
-    model.replay(&[]).go_to(8, 0.0, &mut |_, _, _, record| {
+    model.replay(&model.faults(&[])).go_to(8, 0.0, &mut |_, _, _, record| {
         changes += u32::from(matches!(record, Record::RemoteIo(Event::ProgramChanged { .. })));
     });
     changes
