@@ -251,11 +251,12 @@ impl RemoteIo {
     /// Whether the operator has released the program since the start that a state comes from: an output of it was applied, as this remote I/O knows, has
     /// noted, or as the station recalls. A restart of this remote I/O releases nothing.
     fn was_released(&self, from: StationId, holding: &Holding) -> bool {
-        let knows = !matches!(self.knowledge, Knowledge::Listening { .. });
+        if !matches!(self.knowledge, Knowledge::Listening { .. }) {
+            return self.authority == Authority::Proof;
+        }
         let recalled = self.holders.recalled_at(from, holding.stepped);
         let applied = self.newest_applied().max(recalled.and_then(|recalled| recalled.applied));
-        knows && self.authority == Authority::Proof
-            || applied.is_some_and(|applied| applied >= holding.born)
+        applied.is_some_and(|applied| applied >= holding.born)
     }
 
     /// Starts to sample from the initial state; with the newest applied output, where the state that it came from is lost and no person has chosen so.
