@@ -552,12 +552,4 @@ fn twins() {
     assert!(check(taken, &tcp, "").contains("U0208"));
     let address = named(", address = \"10.0.1.11:7450\"");
     assert!(check(&address, &tcp, "").contains("U0210"));
-    let plant = |cycles: u32| {
-        format!(
-            "[[plant]]\ncontroller = \"robot\"\nmodel = \"robot\"\nwatchdog_cycles = {cycles}\n"
-        )
-    };
-    let found = check(&named(", take_over_after = 2"), "", &plant(4));
-    assert!(found.contains("U0258") && found.contains("watchdog_cycles = 5"), "{found}");
-    assert!(!check(&named(", take_over_after = 2"), "", &plant(5)).contains("U0258"));
 }

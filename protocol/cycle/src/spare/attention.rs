@@ -26,6 +26,8 @@ const FIRST_TIME: u32 = 10;
 #[derive(Debug, Clone, Hash)]
 pub struct Attention {
     controllers: usize,
+    /// Whether one more understudy masks anything: not in the paper's mode.
+    takes_spares: bool,
     /// Understudies that are no slots of spares.
     understudies: StationSet,
     slots: StationSet,
@@ -78,6 +80,7 @@ impl Attention {
         let understudies = schedule.expected().without(StationSet::first(controllers));
         Self {
             controllers,
+            takes_spares,
             understudies,
             slots: if takes_spares { slots } else { StationSet::EMPTY },
             own,
@@ -161,7 +164,7 @@ impl Attention {
         let masked = if followed == 0 { None } else { self.masked(others, present) };
         Standing {
             seen: followed > 0 && followed >= self.witnesses.len().div_ceil(2),
-            served: masked.is_some(),
+            served: masked.is_some() && self.takes_spares,
             full: self.full(),
             redundancy: masked.unwrap_or(0),
             complete: self.followed().map(|witness| witness.complete).min().unwrap_or(0),
