@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use understudy_cluster::{ChangeTexts, Cluster, NeedsStop, Overrides, fates};
 use understudy_typed::Fate;
 use understudy_view::Run;
-use understudy_wire::{ChangeRequest, Member};
+use understudy_wire::{ChangeRequest, ConfigurationHash, Member};
 
 use self::members::Members;
 use crate::answer::{Answer, Status};
@@ -91,13 +91,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
     let members = Members::of(arguments, &before)?;
     match arguments.step {
         Step::Plan | Step::Prepare => {
-            if plan.drops() && !arguments.drop {
-                let message = format!(
-                    "values are dropped, so the new program begins with their initial values; with --drop it continues\n{}",
-                    plan.text()
-                );
-                return Err(Answer::failed(Status::BadInput, "U0635", message));
-            }
+            plan.permit(
+                arguments.drop,
+                "values are dropped, so the new program begins with their initial values",
+            )?;
             let asked = members.prepare(&texts)?;
             Ok(asked.answer("loaded the change", plan.json()))
         }
@@ -106,7 +103,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
             Ok(asked.answer("changes its program with its next sample", plan.json()))
         }
         Step::Accept => {
-            let ended = end(&members, texts.after);
+            // Where the change is over already, as on a second run of this step, all members say so.
+            let ended = members.ask_all(&ChangeRequest::Forget { configuration: texts.after });
             if ended.is_done() {
                 return Ok(ended.answer("runs the new configuration", plan.json()));
             }
@@ -115,13 +113,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         }
         Step::Cancel => {
             let back = Plan::back(&before, &after, &texts);
-            if back.drops() && !arguments.drop {
-                let message = format!(
-                    "the old program does not have all values that the new one can have, so these begin with their initial values; with --drop it continues\n{}",
-                    back.text()
-                );
-                return Err(Answer::failed(Status::BadInput, "U0635", message));
-            }
+            back.permit(
+                arguments.drop,
+                "the old program does not have all values that the new one can have, so these begin with their initial values",
+            )?;
             let asked = switch(&members, &texts, false);
             finish(&members, asked, texts.before, "runs the old configuration", plan.json())
         }
@@ -145,31 +140,18 @@ fn switch(members: &Members<'_>, texts: &ChangeTexts, is_forward: bool) -> Asked
     asked
 }
 
-/// Asks all members whether the change is over with a configuration; those that wait for nothing more end it.
-fn end(members: &Members<'_>, configuration: understudy_wire::ConfigurationHash) -> Asked {
-    let mut asked = Asked::default();
-    for member in members.all() {
-        members.ask(member, &ChangeRequest::Forget { configuration }, &mut asked);
-    }
-    asked
-}
-
-/// Makes a configuration that of all members, and ends the change.
+/// Makes a configuration that of all members, and ends the change; `switched` is what the remote I/Os said to its programs.
 fn finish(
     members: &Members<'_>,
-    mut asked: Asked,
-    configuration: understudy_wire::ConfigurationHash,
+    switched: Asked,
+    configuration: ConfigurationHash,
     done: &str,
     plan: Value,
 ) -> Result<Answer, Answer> {
-    let is_forward = asked.is_done();
-    if !is_forward {
-        return Ok(asked.answer(done, plan));
+    if !switched.is_done() {
+        return Ok(switched.answer(done, plan));
     }
-    asked = Asked::default();
-    for member in members.all() {
-        members.ask(member, &ChangeRequest::Run { configuration }, &mut asked);
-    }
+    let mut asked = members.ask_all(&ChangeRequest::Run { configuration });
     if !asked.is_done() {
         return Ok(asked.answer(done, plan));
     }
@@ -287,7 +269,7 @@ impl Plan {
         let programs = texts.programs.iter().map(|changed| {
             let place = changed.program.index();
             let (old, new) = (&before.controllers()[place], &after.controllers()[place]);
-            (new.name.clone(), fates(&old.code, &new.code, None))
+            (new.name.clone(), fates(&old.code, &new.code))
         });
         Self { programs: programs.collect() }
     }
@@ -304,6 +286,15 @@ impl Plan {
     fn drops(&self) -> bool {
         let is_lost = |fate| matches!(fate, Fate::Dropped | Fate::Narrowed);
         self.programs.iter().any(|(_, state)| state.paths.iter().any(|path| is_lost(path.fate)))
+    }
+
+    /// Refuses a change that drops values, unless the engineer says that it may; `what` says which values, and what becomes of them.
+    fn permit(&self, may_drop: bool, what: &str) -> Result<(), Answer> {
+        if may_drop || !self.drops() {
+            return Ok(());
+        }
+        let message = format!("{what}; with --drop it continues\n{}", self.text());
+        Err(Answer::failed(Status::BadInput, "U0635", message))
     }
 
     fn text(&self) -> String {

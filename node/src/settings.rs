@@ -39,9 +39,9 @@ impl Settings {
     /// Takes the programs of one of the configurations of a change for its own.
     pub(crate) fn adopt(&mut self, change: &OnlineChange, own: ConfigurationHash) {
         let mut programs = self.programs.to_vec();
-        for of in &change.programs {
-            if let Some(program) = programs.get_mut(of.program.index()) {
-                *program = if own == change.after { &of.after } else { &of.before }.clone();
+        for (place, program) in (0..).map(ProgramId).zip(&mut programs) {
+            if let Some(changed) = change.program_in(own, place) {
+                program.clone_from(changed);
             }
         }
         // It was generated from the programs before.

@@ -224,7 +224,7 @@ impl Station {
         }
     }
 
-    /// It had loaded a change before it was started, with these configurations; before [`Self::retaining`]. Without effect where the change is none of
+    /// It had loaded a change before it was started, with these configurations; before [`Self::retaining`]. Without effect where the change is not of
     /// its configuration.
     #[must_use]
     pub fn changed(mut self, change: &Arc<OnlineChange>, configurations: Configurations) -> Self {

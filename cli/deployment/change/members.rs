@@ -86,6 +86,15 @@ impl<'a> Members<'a> {
         Ok(asked)
     }
 
+    /// Asks all members that are not left out.
+    pub(super) fn ask_all(&self, request: &ChangeRequest) -> Asked {
+        let mut asked = Asked::default();
+        for member in self.all() {
+            self.ask(member, request, &mut asked);
+        }
+        asked
+    }
+
     /// Asks one member, and notes what it says.
     pub(super) fn ask(&self, member: Member, request: &ChangeRequest, asked: &mut Asked) {
         let said = match &self.way {

@@ -199,7 +199,7 @@ impl PlantMachine {
         self.endpoint.report(Event::Stepped { moment, pace, outputs, field });
     }
 
-    /// It had loaded a change before it was started, with these configurations; without effect where that is none of its own.
+    /// It had loaded a change before it was started, with these configurations; without effect where neither is its own.
     #[must_use]
     pub fn changed(mut self, change: &Arc<OnlineChange>, configurations: Configurations) -> Self {
         // One that is refused is of another cluster file, and its members say so.

@@ -106,7 +106,7 @@ pub enum Progress {
     },
     /// A step of the scenario was done.
     Step {
-        /// In this cycle.
+        /// The cycle in which it was done.
         cycle: u64,
         /// What and to whom.
         what: String,

@@ -67,7 +67,7 @@ pub struct Alarm {
     /// The effects of a cause that concerns several programs.
     #[serde(skip)]
     concerns: Concerns,
-    /// Of an alarm that was told anew.
+    /// The texts that it had before, where it was told anew.
     #[serde(skip)]
     texts: Texts,
 }

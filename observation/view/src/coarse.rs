@@ -16,7 +16,7 @@ use crate::value::real_of;
 /// Cycles of the shortest range.
 const SHORTEST: i64 = 32;
 
-/// Each length of ranges is so many times the one before it.
+/// The length of a range, as a multiple of the next shorter length.
 const RATIO: i64 = 4;
 
 /// Lengths of ranges.

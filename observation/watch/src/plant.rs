@@ -85,7 +85,7 @@ async fn with_slash(Path(name): Path<String>) -> Redirect {
 /// Answers as the page of the run that a process records of a group.
 async fn group(State(page): State<Arc<PlantPage>>, request: Request) -> Response {
     let (mut parts, body) = request.into_parts();
-    // The parts of this path are none of the paths of the group's page.
+    // The page of the group has no path with the parts of this one.
     parts.extensions.clear();
     let path = parts.uri.path_and_query().map_or("/", |path| path.as_str()).to_owned();
     let rest = path.strip_prefix("/group/").unwrap_or_default();

@@ -88,7 +88,7 @@ pub(crate) fn configuration_text(
     text
 }
 
-/// In the place of a program.
+/// What stands for a program in a text of which only the rest counts.
 pub(crate) const PROGRAM: &str = "the program";
 
 /// A text that has [`PROGRAM`] in the place of each program, with the programs that `next` gives one after another.

@@ -37,7 +37,7 @@ pub use address::{
 };
 pub use alarm::{AlarmCondition, AlarmDeclaration, MAXIMUM_ALARMS, Priority};
 pub use change::{
-    ChangeError, ChangeTexts, ChangedText, NeedsStop, OnlineChanges, ProgramText, fates,
+    ChangeError, ChangeTexts, ChangedText, NeedsStop, OnlineChanges, ProgramText, Unfit, fates,
 };
 pub use cluster::{Cluster, Controller, Link, PlantPlace, RemoteIo, Security, Understudy};
 pub use code::Code;

@@ -54,7 +54,7 @@ pub struct OnlineChange {
     pub before: ConfigurationHash,
     /// The configuration after.
     pub after: ConfigurationHash,
-    /// In the order of programs.
+    /// The programs that it replaces, in the order of the cluster.
     pub programs: Vec<ProgramChange>,
 }
 
@@ -62,6 +62,16 @@ impl OnlineChange {
     /// What it does to a program; none where that stays.
     pub fn of(&self, program: ProgramId) -> Option<&ProgramChange> {
         self.programs.iter().find(|change| change.program == program)
+    }
+
+    /// The program in one of the two configurations; none where the change does not replace it.
+    pub fn program_in(
+        &self,
+        configuration: ConfigurationHash,
+        program: ProgramId,
+    ) -> Option<&Program> {
+        let of = self.of(program)?;
+        Some(if configuration == self.after { &of.after } else { &of.before })
     }
 }
 
@@ -163,11 +173,8 @@ impl Changing {
 
     /// The hash that a program has in the member's own configuration; `first` is that of the configuration with which it started.
     pub fn hash_of(&self, program: ProgramId, first: ProgramHash) -> ProgramHash {
-        let Some((change, of)) = self.change.as_ref().and_then(|it| Some((it, it.of(program)?)))
-        else {
-            return first;
-        };
-        if change.before == self.own { of.before.hash } else { of.after.hash }
+        let changed = self.change.as_ref().and_then(|it| it.program_in(self.own, program));
+        changed.map_or(first, |changed| changed.hash)
     }
 
     /// Takes an order; `may_forget` says whether nothing needs the other configuration any more.

@@ -11,7 +11,7 @@ use understudy_wire::{
 use super::RemoteIo;
 
 impl RemoteIo {
-    /// It had loaded a change before it was started, with these configurations; before [`Self::noting`]. Without effect where the change is none of
+    /// It had loaded a change before it was started, with these configurations; before [`Self::noting`]. Without effect where the change is not of
     /// its configuration.
     #[must_use]
     pub fn changed(mut self, change: &Arc<OnlineChange>, configurations: Configurations) -> Self {
@@ -81,8 +81,8 @@ impl RemoteIo {
 
     /// Takes the program of one of the configurations of a change for its own.
     pub(super) fn adopt(&mut self, change: &OnlineChange, own: ConfigurationHash) {
-        if let Some(of) = change.of(self.settings.program) {
-            self.settings.hash = if own == change.after { of.after.hash } else { of.before.hash };
+        if let Some(program) = change.program_in(own, self.settings.program) {
+            self.settings.hash = program.hash;
         }
     }
 

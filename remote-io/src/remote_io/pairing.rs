@@ -62,7 +62,7 @@ pub(super) struct Pairing {
     now: Time,
     /// When the author was received last, or one that goes first.
     heard_at: Time,
-    /// By what this one is bound.
+    /// When the frame of the other one was sent by which this one is bound; none where nothing binds it.
     bound_by: Option<Time>,
     /// When the last frames to the other one were sent.
     sent: SmallVec<[Time; AWAITED_ANSWERS]>,

@@ -13,7 +13,7 @@ pub trait ChangeKeeper: Send {
     /// Loads the change of these texts, as JSON.
     ///
     /// # Errors
-    /// Why they are none of this cluster, with a code.
+    /// Why they are not a change of this cluster, with a code.
     fn load(&mut self, texts: &str) -> Result<Arc<OnlineChange>, String>;
 
     /// Reads the texts of a change from a file.

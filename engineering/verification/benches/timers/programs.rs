@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 /// A ladder, by its name.
 pub(crate) struct Written {
-    /// For a table.
+    /// Its name, for the table of results.
     pub(crate) name: String,
     /// The ladder text.
     pub(crate) text: String,

@@ -10,7 +10,7 @@ pub enum Violation {
     /// An output was driven as true and is not.
     #[error("{source_:?} output {driven} in cycle {moment}, where the reference run has {}", text(.truth))]
     Wrong {
-        /// In this cycle.
+        /// The cycle in which it happened.
         moment: Moment,
         /// As what it was driven.
         #[serde(rename = "source")]
@@ -23,7 +23,7 @@ pub enum Violation {
     /// An output was held that was not the last true one, or for longer than configured.
     #[error("held output {driven} in cycle {moment}, for {cycles} cycles, where the last true one was {}", text(.last_true))]
     WronglyHeld {
-        /// In this cycle.
+        /// The cycle in which it happened.
         moment: Moment,
         /// What was driven.
         driven: Image,
@@ -35,7 +35,7 @@ pub enum Violation {
     /// Something else than the configured values was driven as fail-safe.
     #[error("fail-safe output {driven} in cycle {moment}, where {configured} is configured")]
     NotTheFailSafe {
-        /// In this cycle.
+        /// The cycle in which it happened.
         moment: Moment,
         /// What was driven.
         driven: Image,
@@ -47,7 +47,7 @@ pub enum Violation {
         "in cycle {moment} the program continued from its state of cycle {from}, although outputs of cycle {applied} were applied"
     )]
     WentBack {
-        /// In this cycle.
+        /// The cycle in which it happened.
         moment: Moment,
         /// The cycle of the newest sample in the state that it continued from.
         from: Moment,
@@ -57,7 +57,7 @@ pub enum Violation {
     /// The program started from its initial state although a living station had a state to continue from.
     #[error("in cycle {moment} the program started cold although station {} had its state", station.0)]
     NeedlessColdStart {
-        /// In this cycle.
+        /// The cycle in which it happened.
         moment: Moment,
         /// The station.
         station: StationId,
@@ -66,7 +66,7 @@ pub enum Violation {
     /// its memory.
     #[error("in cycle {moment} the operator was asked although station {} had the state", station.0)]
     NeedlessQuestion {
-        /// In this cycle.
+        /// The cycle in which it happened.
         moment: Moment,
         /// The station.
         station: StationId,
@@ -74,7 +74,7 @@ pub enum Violation {
     /// Both remote I/Os of a program drove its outputs within one cycle.
     #[error("in cycle {moment} both remote I/Os of the program drove its outputs")]
     TwoWriters {
-        /// In this cycle.
+        /// The cycle in which it happened.
         moment: Moment,
     },
     /// A signal of another program was sampled with a value that the other program did not compute.
@@ -82,7 +82,7 @@ pub enum Violation {
         "in cycle {moment} the signal at input bit {input} was sampled as {value:#x}, which the other program did not compute"
     )]
     WrongSignal {
-        /// In this cycle.
+        /// The cycle in which it happened.
         moment: Moment,
         /// First bit in u(i), counted from 0.
         input: u16,
@@ -94,7 +94,7 @@ pub enum Violation {
         "in cycle {moment} the program continued from lineage {lineage}, which none of its samples led to"
     )]
     UnknownHistory {
-        /// In this cycle.
+        /// The cycle in which it happened.
         moment: Moment,
         /// The lineage.
         lineage: Lineage,

@@ -404,7 +404,7 @@ fn a_program_that_was_never_protected_is_an_alarm() {
     }
 }
 
-/// A remote I/O and the understudy that fail together leave the controller with the newest state, and nobody who can prove that it is.
+/// A remote I/O and the understudy that fail together leave the controller with the newest state, which no other member can confirm.
 #[test]
 fn a_state_that_is_as_new_as_all_that_is_known_is_not_called_0_cycles_old() {
     let cluster = cell();
