@@ -362,7 +362,9 @@ impl RemoteIo {
                 Deadline::Ahead => self.decide(now),
                 Deadline::Passed { .. } => self.note_lateness(now),
             }
+            let skipped = moment != self.moment().plus(1);
             self.close_cycle();
+            self.close_pair_cycle(skipped);
         }
         self.member.clock.begin(now, moment, anchor);
         self.deadline = Deadline::Ahead;
@@ -393,7 +395,6 @@ impl RemoteIo {
         self.member.close_cycle();
         self.holders.close_cycle();
         self.writing.close_cycle();
-        self.close_pair_cycle();
         if let Some(run) = self.knowledge.run_mut() {
             run.sampled = false;
         }

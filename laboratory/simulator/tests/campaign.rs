@@ -57,9 +57,14 @@ fn action() -> impl Strategy<Value = (Action, Option<Action>)> {
     ]
 }
 
-fn trouble() -> impl Strategy<Value = Trouble> {
+/// One of the two remote I/Os of the first program.
+fn one_of_two() -> impl Strategy<Value = Member> {
+    prop_oneof![Just(Member::RemoteIo(ProgramId(0))), Just(Member::Twin(ProgramId(0)))]
+}
+
+fn trouble(member: impl Strategy<Value = Member>) -> impl Strategy<Value = Trouble> {
     let cycles = prop_oneof![4 => 0..3_u64, 4 => 3..40_u64, 1 => 40..500_u64];
-    (member(), action(), 0..150_u64, 0.0..1.0_f64, cycles).prop_map(
+    (member, action(), 0..150_u64, 0.0..1.0_f64, cycles).prop_map(
         |(member, (begins, ends), at_cycle, phase, cycles)| Trouble {
             member,
             begins,
@@ -153,7 +158,7 @@ proptest! {
 
     #[test]
     fn nothing_wrong_is_driven(
-        troubles in prop::collection::vec(trouble(), 0..8),
+        troubles in prop::collection::vec(trouble(member()), 0..8),
         network in network(),
         understudies in 0..3_usize,
         paper in any::<bool>(),
@@ -162,6 +167,16 @@ proptest! {
     ) {
         let mode = if paper { Mode::Paper } else { Mode::Full };
         check((mode, understudies, twins), &troubles, network, seed);
+    }
+
+    #[test]
+    fn nothing_wrong_is_driven_by_two_remote_ios(
+        troubles in prop::collection::vec(trouble(one_of_two()), 1..4),
+        network in network(),
+        take_over_after in 1..4_u32,
+        seed in any::<u64>(),
+    ) {
+        check((Mode::Full, 1, Some(take_over_after)), &troubles, network, seed);
     }
 }
 
@@ -196,4 +211,24 @@ fn a_state_whose_station_is_late_is_not_lost() {
         ..Network::default()
     };
     check((Mode::Full, 2, None), &troubles, network, 7891165348679592666);
+}
+
+/// The author receives everything more than two cycles late, and then on time again: the cycles that it skips are those in which the stations have
+/// followed the other one.
+#[test]
+fn an_author_that_was_late_does_not_go_back() {
+    let troubles = [Trouble {
+        member: Member::RemoteIo(ProgramId(0)),
+        begins: Action::Slow { by: Duration::from_micros(21_572) },
+        ends: Some(Action::Slow { by: Duration::ZERO }),
+        at_cycle: 100,
+        phase: 0.0,
+        cycles: 6,
+    }];
+    let network = Network {
+        latency: Duration::from_micros(100),
+        jitter: Duration::from_micros(583),
+        ..Network::default()
+    };
+    check((Mode::Paper, 2, Some(2)), &troubles, network, 8423444371132508279);
 }

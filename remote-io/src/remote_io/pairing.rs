@@ -119,10 +119,11 @@ impl Report {
         self.lacks = Some(lacks && self.lacks != Some(false));
     }
 
-    fn close_cycle(&mut self) {
+    /// The cycle is over; `skipped` where the next one was not received.
+    fn close_cycle(&mut self, skipped: bool) {
         self.lacked_for = match self.lacks.take() {
-            Some(true) => self.lacked_for.saturating_add(1),
-            Some(false) | None => 0,
+            Some(true) if !skipped => self.lacked_for.saturating_add(1),
+            _ => 0,
         };
     }
 

@@ -5,7 +5,7 @@ use understudy_wire::{
 };
 
 use super::super::RemoteIo;
-use super::{AWAITED_ANSWERS, Partner, Report};
+use super::{AWAITED_ANSWERS, Partner};
 use crate::event::Event;
 
 impl RemoteIo {
@@ -134,9 +134,10 @@ impl RemoteIo {
         }
     }
 
-    pub(in crate::remote_io) fn close_pair_cycle(&mut self) {
+    /// A cycle is over. A station may have followed the other one in a cycle that was skipped.
+    pub(in crate::remote_io) fn close_pair_cycle(&mut self, skipped: bool) {
         if let Some(pairing) = &mut self.pairing {
-            pairing.reports.iter_mut().for_each(Report::close_cycle);
+            pairing.reports.iter_mut().for_each(|report| report.close_cycle(skipped));
         }
     }
 
