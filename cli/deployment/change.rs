@@ -71,6 +71,9 @@ enum Step {
 /// Time limit for members that still need the other configuration: histories must leave the change behind.
 const PATIENCE: Duration = Duration::from_secs(20);
 
+/// Time limit for stations of which the remote I/O does not know yet what they have loaded: they say it in their next frame.
+const LOADING_PATIENCE: Duration = Duration::from_secs(2);
+
 const AGAIN: Duration = Duration::from_millis(200);
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
@@ -131,10 +134,18 @@ fn switch(members: &Members<'_>, texts: &ChangeTexts, is_forward: bool) -> Asked
         // Of two remote I/Os the author makes the change mark.
         let pair = [Member::RemoteIo(changed.program), Member::Twin(changed.program)];
         let mut of_pair = Asked::default();
-        for member in pair.into_iter().filter(|member| members.all().contains(member)) {
-            members.ask(member, &ChangeRequest::Switch { to }, &mut of_pair);
+        let begun = Instant::now();
+        loop {
+            for member in pair.into_iter().filter(|member| members.all().contains(member)) {
+                members.ask(member, &ChangeRequest::Switch { to }, &mut of_pair);
+            }
+            of_pair.keep_done();
+            if of_pair.of_code("U0636").is_empty() || begun.elapsed() >= LOADING_PATIENCE {
+                break;
+            }
+            of_pair.0.clear();
+            pause();
         }
-        of_pair.keep_done();
         asked.0.append(&mut of_pair.0);
     }
     asked

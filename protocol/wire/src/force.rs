@@ -217,9 +217,9 @@ impl OrderRefusal {
             Self::AnotherChange
             | Self::OtherConfiguration { .. }
             | Self::NotPrepared
-            | Self::StationsNotPrepared { .. }
             | Self::NotRunning => "U0632",
             Self::StillNeeded => "U0634",
+            Self::StationsNotPrepared { .. } => "U0636",
         }
     }
 }
