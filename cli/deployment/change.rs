@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use understudy_cluster::{ChangeTexts, Cluster, NeedsStop, Overrides, fates};
-use understudy_typed::Fate;
+use understudy_typed::{CarriedPath, Fate};
 use understudy_view::Run;
 use understudy_wire::{ChangeRequest, ConfigurationHash, Member};
 
@@ -272,7 +272,7 @@ impl Asked {
 
 /// What would change.
 struct Plan {
-    programs: Vec<(String, understudy_typed::CarriedState)>,
+    programs: Vec<(String, Vec<CarriedPath>)>,
 }
 
 impl Plan {
@@ -288,15 +288,15 @@ impl Plan {
     /// The way back, without the variables that only the new program has.
     fn back(before: &Cluster, after: &Cluster, texts: &ChangeTexts) -> Self {
         let mut plan = Self::of(after, before, texts);
-        for (_, state) in &mut plan.programs {
-            state.paths.retain(|path| path.now.is_some());
+        for (_, paths) in &mut plan.programs {
+            paths.retain(|path| path.now.is_some());
         }
         plan
     }
 
     fn drops(&self) -> bool {
         let is_lost = |fate| matches!(fate, Fate::Dropped | Fate::Narrowed);
-        self.programs.iter().any(|(_, state)| state.paths.iter().any(|path| is_lost(path.fate)))
+        self.programs.iter().any(|(_, paths)| paths.iter().any(|path| is_lost(path.fate)))
     }
 
     /// Refuses a change that drops values, unless the engineer says that it may; `what` says which values, and what becomes of them.
@@ -310,8 +310,8 @@ impl Plan {
 
     fn text(&self) -> String {
         let mut text = String::new();
-        for (name, state) in &self.programs {
-            let count = |fate| state.paths.iter().filter(|path| path.fate == fate).count();
+        for (name, paths) in &self.programs {
+            let count = |fate| paths.iter().filter(|path| path.fate == fate).count();
             let _ = writeln!(
                 text,
                 "{name}: {} variables kept, {} converted, {} narrowed, {} new, {} dropped",
@@ -321,7 +321,7 @@ impl Plan {
                 count(Fate::New),
                 count(Fate::Dropped)
             );
-            for path in state.paths.iter().filter(|path| path.fate != Fate::Kept) {
+            for path in paths.iter().filter(|path| path.fate != Fate::Kept) {
                 let types = match (&path.before, &path.now) {
                     (Some(before), Some(now)) if before != now => format!("{before} to {now}"),
                     (Some(of), _) | (None, Some(of)) => of.clone(),
@@ -334,8 +334,8 @@ impl Plan {
     }
 
     fn json(&self) -> Value {
-        let programs = self.programs.iter().map(|(name, state)| {
-            let paths = state.paths.iter().map(|path| {
+        let programs = self.programs.iter().map(|(name, paths)| {
+            let paths = paths.iter().map(|path| {
                 json!({
                     "path": path.path,
                     "fate": path.fate.name(),

@@ -82,6 +82,21 @@ impl Extent {
         }
     }
 
+    pub(crate) fn holds(self, number: i128) -> bool {
+        (self.low..=self.high).contains(&number) && number % self.unit.max(1) == 0
+    }
+
+    /// The number of it that is nearest to `number`, of two the one nearer to 0.
+    pub(crate) fn nearest(self, number: i128) -> i128 {
+        let number = number.clamp(self.low, self.high);
+        number - number % self.unit.max(1)
+    }
+
+    pub(crate) fn covers(self, other: Self) -> bool {
+        let unit = self.unit.max(1);
+        self.low <= other.low && other.high <= self.high && (unit == 1 || other.unit % unit == 0)
+    }
+
     fn is_natural(self) -> bool {
         self.low >= 0
     }

@@ -10,6 +10,7 @@ use understudy_typed::Program;
 use crate::System;
 use crate::circuit::Derivation;
 use crate::exact::registers;
+use crate::execute::timers::RUNNING;
 use crate::extent::Extent;
 use crate::program::together;
 use crate::system::Holds;
@@ -121,6 +122,15 @@ impl Layout {
         });
         for (address, mask, value) in own {
             put(address, mask, value as u64);
+        }
+        // One whose time is over in the next scan has the count of one that was over before.
+        for ((holds, _), &value) in self.cells.iter().zip(&values) {
+            if let Holds::Count(counted) = holds
+                && let Some((output, when_over, of)) = counted.over(value as u64)
+                && (state[(output / 64) as usize] >> (output % 64) & 1 == 1) != when_over
+            {
+                state[(of / 64) as usize] = RUNNING;
+            }
         }
         state
     }

@@ -115,7 +115,8 @@ pub fn circuit(typed: &Typed) -> Result<Exact, LowerError> {
 
 impl Program {
     /// The typed program that does what the scan of this program does, one scan a step, with `period` from one to the next. Its points and
-    /// variables have the names of the ladder; what sees the edges of `a` is named `a.rising` or `a.falling`.
+    /// variables have the names of the ladder; what sees the edges of `a` is named `a.rising` or `a.falling`, and what sees those of
+    /// the power of a coil `y` is named `y.power.rising` or `y.power.falling`.
     ///
     /// # Errors
     /// A period out of [`PERIODS`], or a program with errors. A preset that is not a multiple of the period is rounded up; see

@@ -106,7 +106,8 @@ impl Program {
     /// # Panics
     /// If `state` is shorter than a state of `before`.
     pub fn carried(&self, before: &Self, state: &[u64], told: Told<'_>) -> CarriedState {
-        self.carried_from(before, state, told, (&partners(before, self), true))
+        let partners = partners(before, self, &HashMap::new());
+        self.carried_from(before, state, told, (&partners, true))
     }
 
     /// As [`Self::carried`], with the variables that [`partners`] finds; the paths have names only where they are listed.
@@ -148,10 +149,15 @@ pub struct Successor {
 }
 
 impl Successor {
-    /// `new` in the place of `old`.
-    pub fn new(old: &Program, new: &Program) -> Self {
-        let partners = partners(old, new);
+    /// `new` in the place of `old`. Variables of `new` that `old` does not have take over those of other names in `old`, by their own.
+    pub fn new(old: &Program, new: &Program, others: &HashMap<String, String>) -> Self {
+        let partners = partners(old, new, others);
         Self { old: old.all_retentive(), new: new.all_retentive(), partners }
+    }
+
+    /// The new program, all of whose variables are retentive.
+    pub fn program(&self) -> &Program {
+        &self.new
     }
 
     /// The state with which the new program goes on from a state of the old one.
@@ -214,8 +220,15 @@ fn taken(conversion: &Conversion) -> Fate {
     }
 }
 
-/// For each variable of the new program the one of the old program that it takes over: of its name, or else of the same name in another case.
-fn partners(old: &Program, new: &Program) -> Vec<Option<usize>> {
+/// For each variable of the new program the one of the old program that it takes over: of its name, or else of the same name in another case, or else
+/// that of `others`.
+fn partners(old: &Program, new: &Program, others: &HashMap<String, String>) -> Vec<Option<usize>> {
+    let all: HashMap<&str, usize> = if others.is_empty() {
+        HashMap::new()
+    } else {
+        let names = old.variables.iter().map(|variable| variable.name.as_str());
+        names.zip(0..).collect()
+    };
     let mut known: HashMap<&str, usize> = HashMap::new();
     // The names of a ladder may differ in their case alone, those of all other languages do not.
     let mut folded: HashMap<String, &str> = HashMap::new();
@@ -226,10 +239,12 @@ fn partners(old: &Program, new: &Program) -> Vec<Option<usize>> {
     let names = new.variables.iter().map(|variable| variable.name.as_str());
     let exact: Vec<Option<usize>> = names.clone().map(|name| known.remove(name)).collect();
     let in_other_case = |(name, exact): (&str, Option<usize>)| {
-        exact.or_else(|| {
-            let name = folded.get(&name.to_ascii_lowercase())?;
-            known.remove(name)
-        })
+        exact
+            .or_else(|| {
+                let name = folded.get(&name.to_ascii_lowercase())?;
+                known.remove(name)
+            })
+            .or_else(|| all.get(others.get(name)?.as_str()).copied())
     };
     names.zip(exact).map(in_other_case).collect()
 }

@@ -10,6 +10,7 @@
 
 mod carried;
 mod cost;
+mod edges;
 mod fault;
 mod form;
 mod image;
@@ -28,6 +29,7 @@ mod visit;
 
 pub use self::carried::{CarriedPath, CarriedState, Fate, Successor, Told};
 pub use self::cost::Cost;
+pub use self::edges::EdgeMemory;
 pub use self::fault::{Cause, Fault};
 pub use self::form::{
     Argument, Branch, Call, Case, Expression, ExpressionKind, For, Index, Initial, Place, Program,

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use understudy_cycle::{Agreement, Conversion, OnlineChange, Program, ProgramChange};
-use understudy_typed::{CarriedState, Successor, Told};
+use understudy_typed::{CarriedPath, Successor};
 use understudy_wire::{ConfigurationHash, ProgramHash, ProgramId, RetainedProgram};
 
 use crate::cluster::Cluster;
-use crate::code::Code;
+use crate::code::{Code, Unnamed};
 use crate::configuration::with_programs;
 use crate::source_text::read_kept;
 
@@ -94,8 +94,8 @@ pub enum Unfit {
     Memory {
         /// Name of the controller.
         program: String,
-        /// Why, in words.
-        why: &'static str,
+        /// Why.
+        why: Unnamed,
     },
 }
 
@@ -342,26 +342,20 @@ struct Between {
 
 impl Between {
     fn new(from: &Code, to: &Code) -> Self {
-        let successor = Successor::new(from.typed(), to.typed());
+        let successor = to.successor(from);
         Self { from: from.clone(), to: to.clone(), successor }
     }
 }
 
 impl Conversion for Between {
     fn convert(&self, state: &[u64]) -> Vec<u64> {
-        let unlisted = |state: &[u64], told: Told<'_>| CarriedState {
-            state: self.successor.state(state, told),
-            paths: Vec::new(),
-        };
-        self.to.changed(&self.from, state, unlisted).state
+        self.to.changed(&self.from, state, &self.successor)
     }
 }
 
 /// What becomes of each variable of a program in an online change.
-pub fn fates(before: &Code, after: &Code) -> CarriedState {
-    let executable = before.executable();
-    let successor = Successor::new(before.typed(), after.typed());
-    after.changed(before, executable.initial(), |state, told| successor.carried(state, told))
+pub fn fates(before: &Code, after: &Code) -> Vec<CarriedPath> {
+    after.fates(before)
 }
 
 /// The canonical text of a cluster in which these programs stand in the place of its own: those before the change, or those after it.
@@ -439,22 +433,24 @@ mod tests {
         let between = |file: &str, before: &str, after: &str| {
             ChangeTexts::between(&cluster(file, before), &cluster(file, after))
         };
-        let rungs = [
-            "program one\ninput a\noutput y\nrung\n    a ( y )\n",
-            "program one\ninput a\noutput y\nrung\n    /a ( y )\n",
-        ];
+        let rungs = |rung: &str| {
+            let rest = "rung\n    +m ( z )\nrung\n    a ( m )\n";
+            format!("program one\ninput a\noutput y = 0\noutput z\nmemory m = 0\n{rest}{rung}")
+        };
+        let [one, other] = ["rung\n    +a ( y )\n", "rung\n    -a ( y )\n"].map(rungs);
+        assert!(between("one.ladder", &one, &other).is_ok());
+        // Which of the two contacts of `m` is that of before?
+        let several = rungs("rung\n    +m ( y )\n");
+        let found = between("one.ladder", &one, &several);
         assert!(matches!(
-            between("one.ladder", rungs[0], rungs[1]).as_ref().map_err(Vec::as_slice),
-            Err([NeedsStop::Unfit(Unfit::Memory { .. })])
+            found.as_ref().map_err(Vec::as_slice),
+            Err([NeedsStop::Unfit(Unfit::Memory { why: Unnamed::SeveralEdges(of), .. })]) if of == "m"
         ));
-        let [one, other] = ["y := a;", "y := NOT a;"].map(|body| program("a : BOOL R_EDGE", body));
-        assert!(matches!(
-            between("one.st", &one, &other).as_ref().map_err(Vec::as_slice),
-            Err([NeedsStop::Unfit(Unfit::Memory { .. })])
-        ));
-        let [one, other] =
-            ["y := a;", "t(IN := a); e(CLK := t.Q); IF e.Q THEN n := n + 1; END_IF; y := t.Q;"]
-                .map(|body| program("a : BOOL", body));
-        assert!(between("one.st", &one, &other).is_ok());
+        for input in ["a : BOOL", "a : BOOL R_EDGE"] {
+            let [one, other] =
+                ["y := a;", "t(IN := a); e(CLK := t.Q); IF e.Q THEN n := n + 1; END_IF; y := t.Q;"]
+                    .map(|body| program(input, body));
+            assert!(between("one.st", &one, &other).is_ok());
+        }
     }
 }

@@ -1,13 +1,16 @@
 //! What a controller runs.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use understudy_bits::{Exact, Inexact, Layout, exact};
 use understudy_executable::{Executable, Interface};
 use understudy_ladder::{LowerError, Program as LadderProgram, circuit};
 use understudy_logic::Circuit;
-use understudy_typed::{CarriedPath, CarriedState, Fate, Program as TypedProgram, Told};
+use understudy_typed::{
+    CarriedPath, CarriedState, EdgeMemory, Fate, Program as TypedProgram, Successor, Told,
+};
 use understudy_wire::ProgramHash;
 
 use crate::canonical::{circuit_text, typed_text};
@@ -28,6 +31,29 @@ enum Body {
     Rungs(Box<Rungs>),
     /// Statements, charts and networks. A program fault names lines of the text.
     Text,
+}
+
+/// Why the states of a program cannot be those of a changed one.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Unnamed {
+    /// Memory that has no name.
+    #[error("has memory without a name, such as that of a block without an instance")]
+    Memory,
+    /// Several memories of the same edges.
+    #[error("sees the same edges of `{0}` at several places")]
+    SeveralEdges(String),
+}
+
+/// What a state before tells, and what of it is read: see [`Told`].
+struct Held<'a> {
+    known: Box<dyn Fn(u64) -> bool + 'a>,
+    read: Box<dyn Fn(u64) -> bool + 'a>,
+}
+
+impl Held<'_> {
+    fn as_told(&self) -> Told<'_> {
+        Told { is_known: &*self.known, is_read: &*self.read }
+    }
 }
 
 /// Rungs and their circuit.
@@ -126,39 +152,10 @@ impl Code {
     /// # Panics
     /// If `state` is shorter than a state of `before`.
     pub fn carried(&self, before: &Self, state: &[u64]) -> CarriedState {
-        self.with_values_of(before, state, |state, told| {
-            self.typed.carried(&before.typed, state, told)
-        })
-    }
-
-    /// The state with which it goes on from a state of the program before it, in an online change; as [`Self::carried`], of all variables.
-    ///
-    /// # Panics
-    /// If `state` is shorter than a state of `before`.
-    pub(crate) fn changed(
-        &self,
-        before: &Self,
-        state: &[u64],
-        take: impl FnOnce(&[u64], Told<'_>) -> CarriedState,
-    ) -> CarriedState {
-        self.with_values_of(before, state, take)
-    }
-
-    fn with_values_of(
-        &self,
-        before: &Self,
-        state: &[u64],
-        take: impl FnOnce(&[u64], Told<'_>) -> CarriedState,
-    ) -> CarriedState {
-        let (old, new) = (before.layout(), self.layout());
-        let held =
-            |layout: Option<&Layout>, address| layout.is_none_or(|layout| layout.holds(address));
-        let told = Told {
-            is_known: &|address| held(old, address),
-            is_read: &|address| held(new, address),
-        };
-        let mut carried = take(&before.typed_state(state), told);
-        if let Some(layout) = new {
+        let told = self.told(before);
+        let mut carried =
+            self.typed.carried(&before.typed, &before.typed_state(state), told.as_told());
+        if let Some(layout) = self.layout() {
             let executable = self.executable();
             let registers = layout.registers(&self.typed, &carried.state, executable.initial());
             carried.paths.retain(|path| !registers.lost.contains(&path.path));
@@ -168,19 +165,111 @@ impl Code {
         carried
     }
 
+    /// The state with which it goes on from a state of the program before it, in an online change.
+    ///
+    /// # Panics
+    /// As [`Self::carried`].
+    pub(crate) fn changed(&self, before: &Self, state: &[u64], by: &Successor) -> Vec<u64> {
+        let changed = by.state(&before.typed_state(state), self.told(before).as_told());
+        match self.layout() {
+            Some(layout) => {
+                layout.nearest_registers(by.program(), &changed, self.executable().initial())
+            }
+            None => changed,
+        }
+    }
+
+    /// What becomes of each variable in an online change from the program before it.
+    pub(crate) fn fates(&self, before: &Self) -> Vec<CarriedPath> {
+        let successor = self.successor(before);
+        let executable = before.executable();
+        let state = before.typed_state(executable.initial());
+        let mut paths = successor.carried(&state, self.told(before).as_told()).paths;
+        // What no register holds is written before it is read: nothing of it begins anew, and nothing is lost.
+        paths.retain(|path| match path.fate {
+            Fate::New => self.holds(&path.path),
+            Fate::Dropped if path.now.is_none() => before.holds(&path.path),
+            _ => true,
+        });
+        let narrowed = self
+            .layout()
+            .map(|layout| layout.narrowed(successor.program(), (&before.typed, before.layout())));
+        for name in narrowed.into_iter().flatten() {
+            let within = |path: &CarriedPath| {
+                name.strip_prefix(&path.path)
+                    .is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+            };
+            for path in paths.iter_mut().filter(|path| within(path)) {
+                if matches!(path.fate, Fate::Kept | Fate::Converted) {
+                    path.fate = Fate::Narrowed;
+                }
+            }
+        }
+        paths
+    }
+
+    /// Whether the states that stations hold have any of what a path stands for.
+    fn holds(&self, path: &str) -> bool {
+        let (Some(layout), Some(part)) = (self.layout(), self.typed.part(path)) else {
+            return true;
+        };
+        (0..part.of.slots()).any(|slot| layout.holds(part.address + 64 * slot))
+    }
+
+    fn told<'a>(&'a self, before: &'a Self) -> Held<'a> {
+        let held = |layout: Option<&'a Layout>| {
+            move |address| layout.is_none_or(|layout| layout.holds(address))
+        };
+        Held { known: Box::new(held(before.layout())), read: Box::new(held(self.layout())) }
+    }
+
     /// Why the states of this program cannot be those of a changed one; nothing where they can.
-    pub(crate) fn why_not_changed(&self) -> Option<&'static str> {
-        if self.ladder().is_some() {
-            return Some("is written in rungs");
+    pub(crate) fn why_not_changed(&self) -> Option<Unnamed> {
+        let fields = self.typed.structures.iter().flat_map(|of| &of.fields);
+        let fields = fields.map(|field| field.name.as_str());
+        let variables = self.typed.variables.iter().map(|variable| variable.name.as_str());
+        let mut names = variables.chain(fields);
+        if let Some(edges) = names.clone().find_map(|name| self.several_edges(name)) {
+            return Some(Unnamed::SeveralEdges(edges.to_owned()));
         }
         // Parts of a chart have names that stay where other parts change.
         let stays = |name: &str| {
             let parts = ["begun.", "timer.", "stored.", "fires."];
-            !name.contains('.') || parts.iter().any(|part| name.starts_with(part))
+            !name.contains('.')
+                || parts.iter().any(|part| name.starts_with(part))
+                || EdgeMemory::named(name).is_some()
         };
-        let has_names = self.typed.variables.iter().all(|variable| stays(&variable.name));
-        let is_named = has_names && self.typed.has_names_for_all();
-        (!is_named).then_some("has memory without a name, such as that of an edge of an input")
+        // Of rungs, all other memory is that of their signals and blocks.
+        let is_named =
+            self.ladder().is_some() || names.all(stays) && self.typed.has_names_for_all();
+        (!is_named).then_some(Unnamed::Memory)
+    }
+
+    /// What has the edges that a memory sees, where several see the same ones at different places of a scan: which is which cannot be told from the
+    /// names. All contacts of an input of a ladder see the same.
+    fn several_edges<'n>(&self, name: &'n str) -> Option<&'n str> {
+        let edges = EdgeMemory::named(name).filter(|edges| edges.number > 1)?;
+        let is_of_input = self.ladder().is_some() && self.typed.inputs.find(edges.of).is_some();
+        (!is_of_input).then_some(edges.of)
+    }
+
+    /// Memories of edges that the program before has under another number, by their names in this one.
+    fn same_edges(&self, before: &Self) -> HashMap<String, String> {
+        if self.ladder().is_none() || before.ladder().is_none() {
+            return HashMap::new();
+        }
+        let names = self.typed.variables.iter().map(|variable| &variable.name);
+        let same = names.filter_map(|name| {
+            let edges = EdgeMemory::named(name).filter(|edges| edges.number > 1)?;
+            let first = name.strip_suffix(&format!("_{}", edges.number))?;
+            Some((name.clone(), first.to_owned()))
+        });
+        same.collect()
+    }
+
+    /// The way from the program before it to this one, by the names and types of its variables.
+    pub(crate) fn successor(&self, before: &Self) -> Successor {
+        Successor::new(&before.typed, &self.typed, &self.same_edges(before))
     }
 
     /// A state of the program in the order of its variables, for one as stations hold it.

@@ -40,7 +40,7 @@ pub use change::{
     ChangeError, ChangeTexts, ChangedText, NeedsStop, OnlineChanges, ProgramText, Unfit, fates,
 };
 pub use cluster::{Cluster, Controller, Link, PlantPlace, RemoteIo, Security, Understudy};
-pub use code::Code;
+pub use code::{Code, Unnamed};
 pub use device::{BAUD_RATES, Binding, Connection, FieldDevice, Parity, SerialLine, Side};
 pub use draft::{Draft, DraftProgram, MAXIMUM_PROGRAM_NAME};
 pub use notify::Notify;

@@ -14,6 +14,11 @@ use crate::term::Term;
 /// Most scans that are counted.
 const MOST: i64 = u32::MAX as i64;
 
+/// The states of a timer, as its body has them.
+const IDLE: u64 = 0;
+pub(crate) const RUNNING: u64 = 1;
+const OVER: u64 = 2;
+
 /// The timers of a program.
 #[derive(Debug)]
 pub(crate) struct Timers {
@@ -86,24 +91,28 @@ impl Counted {
         self.kept(0, 0, 0).iter().any(|(at, _)| *at == address)
     }
 
-    /// The count with which the timer keeps what `stored` has at each address; none where it keeps that with no count.
+    /// The count with which every later scan of the timer is that from what `stored` has at each address; none where it began in the future. One that is
+    /// over stays so, whatever its preset was.
     pub(crate) fn count(&self, stored: impl Fn(u64) -> u64, now: i64, period: i64) -> Option<u64> {
-        let runs = now.saturating_sub(stored(self.start()) as i64).checked_div(period).unwrap_or(0);
-        let runs = u64::try_from(runs).ok().filter(|runs| *runs <= self.scans);
-        // A timer that does not run has not started: its start and its elapsed time are of no meaning.
-        let counts = [Some(0), Some(self.scans), runs, runs.map(|runs| self.scans - runs)];
         let variables = self.variables;
-        let is_kept = |count: &u64| {
-            let kept = self.kept(*count, now, period);
-            let runs = kept[0].1 > 0;
-            let idle = [variables.start, variables.elapsed].map(|slot| self.at(slot));
-            // The output is that of the last scan, which has a register of its own where the next one reads it.
-            let output = self.at(variables.output);
-            kept.iter().all(|(at, value)| {
-                *at == output || !runs && idle.contains(at) || stored(*at) == *value
-            })
-        };
-        counts.into_iter().flatten().find(is_kept)
+        let at = |slot: u64| stored(self.at(slot));
+        let runs = now.saturating_sub(at(variables.start) as i64).checked_div(period);
+        let runs = || Some(u64::try_from(runs?).ok()?.min(self.scans));
+        match (variables.timer, at(variables.state)) {
+            (Timer::OnDelay | Timer::Pulse, RUNNING) => runs(),
+            (Timer::OnDelay | Timer::Pulse, OVER) => Some(self.scans),
+            (Timer::OffDelay, RUNNING) => Some(self.scans - runs()?),
+            (Timer::OffDelay, IDLE) if at(variables.last) == 1 => Some(self.scans),
+            _ => Some(0),
+        }
+    }
+
+    /// Where the timer keeps its output and whether that is TRUE once it is over, and where it keeps its state; nothing of one that keeps no such state.
+    pub(crate) fn over(&self, count: u64) -> Option<(u64, bool, u64)> {
+        let is_over = count >= self.scans && self.variables.timer != Timer::OffDelay;
+        let [output, state] =
+            [self.variables.output, self.variables.state].map(|slot| self.at(slot));
+        is_over.then_some((output, self.variables.timer == Timer::OnDelay, state))
     }
 
     /// What the timer keeps where its count is `count`, so that every later scan is the same: values by address. `now` is the `TIME()` of the next
@@ -112,19 +121,21 @@ impl Counted {
         let variables = self.variables;
         let time = |scans: u64| period.saturating_mul(scans as i64);
         // Scans that it runs, its input, its output, and the time that has elapsed where it does not run.
+        let is_full = count >= self.scans;
         let (runs, input, output, rest) = match variables.timer {
-            Timer::OnDelay => (count, count > 0, false, 0),
-            Timer::Pulse => (count, count > 0, count > 0, 0),
-            Timer::OffDelay if count >= self.scans => (0, true, true, 0),
+            Timer::OnDelay => (count, count > 0, is_full, 0),
+            Timer::Pulse => (count, count > 0, count > 0 && !is_full, 0),
+            Timer::OffDelay if is_full => (0, true, true, 0),
             Timer::OffDelay if count == 0 => (0, false, false, self.preset),
             Timer::OffDelay => (self.scans - count, false, true, 0),
         };
-        let elapsed = match runs {
-            0 => rest,
-            runs => time(runs - 1).min(self.preset),
+        let (state, elapsed) = match runs {
+            0 => (IDLE, rest),
+            _ if is_full => (OVER, self.preset),
+            runs => (RUNNING, time(runs - 1).min(self.preset)),
         };
         [
-            (variables.state, u64::from(runs > 0)),
+            (variables.state, state),
             (variables.last, u64::from(input)),
             (variables.start, now.saturating_sub(time(runs)) as u64),
             (variables.elapsed, elapsed as u64),

@@ -22,30 +22,78 @@ impl Layout {
     /// # Panics
     /// If `state` is shorter than a state of the program, or `initial` than the registers.
     pub fn registers(&self, program: &Program, state: &[u64], initial: &[u64]) -> Registers {
-        let mut packed = initial.to_vec();
         let mut lost = Vec::new();
-        let mut values: Vec<Option<i128>> = Vec::with_capacity(self.cells.len());
-        for (holds, extent) in &self.cells {
-            if !holds.is_retentive(program) {
-                values.push(None);
-                continue;
-            }
-            let value = self.value(holds, *extent, state);
-            if value.is_none() {
+        let packed = self.packed(program, initial, |holds, extent| {
+            let number = self.number(holds, *extent, state).filter(|it| extent.holds(*it));
+            if number.is_none() {
                 lost.extend(name(program, holds));
             }
-            values.push(value);
+            number
+        });
+        Registers { packed, lost }
+    }
+
+    /// The same for a state that the program may not reach: a value outside of those that it can reach becomes the nearest one of them, so that what is
+    /// proved of the program holds from then on.
+    ///
+    /// # Panics
+    /// As [`Self::registers`].
+    pub fn nearest_registers(&self, program: &Program, state: &[u64], initial: &[u64]) -> Vec<u64> {
+        self.packed(program, initial, |holds, extent| {
+            Some(extent.nearest(self.number(holds, *extent, state)?))
+        })
+    }
+
+    /// The variables that can have a value before a change which they cannot have in this program; `before` is the program before it, with the layout of
+    /// its circuit where stations execute that.
+    pub fn narrowed(&self, program: &Program, before: (&Program, Option<&Self>)) -> Vec<String> {
+        let (old, layout) = before;
+        let mut narrowed = Vec::new();
+        for (holds, extent) in &self.cells {
+            let (Holds::Value(..), Some(name)) = (holds, name(program, holds)) else {
+                continue;
+            };
+            let part = old.part(&name);
+            let known = part.and_then(|part| match layout {
+                None => part.of.elementary().map(Extent::of),
+                Some(layout) => layout.cells.iter().find_map(|(holds, extent)| match holds {
+                    Holds::Value(address, _) => (*address == part.address).then_some(*extent),
+                    _ => None,
+                }),
+            });
+            if known.is_some_and(|known| !extent.covers(known)) {
+                narrowed.push(name);
+            }
         }
+        narrowed
+    }
+
+    /// The registers `initial` with the numbers of the retentive cells, where they have one.
+    fn packed(
+        &self,
+        program: &Program,
+        initial: &[u64],
+        mut number: impl FnMut(&Holds, &Extent) -> Option<i128>,
+    ) -> Vec<u64> {
+        let mut packed = initial.to_vec();
+        let cells = self.cells.iter();
+        let numbers =
+            cells.map(
+                |(holds, extent)| {
+                    if holds.is_retentive(program) { number(holds, extent) } else { None }
+                },
+            );
+        let numbers: Vec<Option<i128>> = numbers.collect();
         for (place, &(cell, weight)) in self.registers.iter().enumerate() {
-            if let Some(value) = values[cell] {
+            if let Some(number) = numbers[cell] {
                 let unit = self.cells[cell].1.unit.max(1);
                 // Weights are the powers of two of a number in two's complement, times its unit.
-                let bit = (value / unit) >> (weight.abs() / unit).trailing_zeros() & 1;
+                let bit = (number / unit) >> (weight.abs() / unit).trailing_zeros() & 1;
                 let word = &mut packed[place / 64];
                 *word = *word & !(1 << (place % 64)) | (bit as u64) << (place % 64);
             }
         }
-        Registers { packed, lost }
+        packed
     }
 
     /// Whether registers hold what is at an address of the state.
@@ -57,14 +105,14 @@ impl Layout {
         })
     }
 
-    /// The number of a cell, where it is one that the circuit has.
-    fn value(&self, holds: &Holds, extent: Extent, state: &[u64]) -> Option<i128> {
+    /// The number of a cell in a state, which may be one that the program does not reach.
+    fn number(&self, holds: &Holds, extent: Extent, state: &[u64]) -> Option<i128> {
         let scans = state[SCANS];
         let now = self.period.saturating_mul(scans as i64);
         let stored = |address: u64, of: Elementary| {
             state[(address / 64) as usize] >> (address % 64) & of.mask()
         };
-        let number = match holds {
+        Some(match holds {
             Holds::Value(address, of) if of.is_real() => i128::from(stored(*address, *of)),
             Holds::Value(address, of) => of.signed(stored(*address, *of)),
             // What is longer ago than anything compares is as long ago as that.
@@ -80,9 +128,7 @@ impl Layout {
             Holds::Scans => i128::from(scans),
             Holds::Phase => i128::from(scans % self.together),
             Holds::Other => return None,
-        };
-        let is_within = (extent.low..=extent.high).contains(&number);
-        (is_within && number % extent.unit.max(1) == 0).then_some(number)
+        })
     }
 }
 

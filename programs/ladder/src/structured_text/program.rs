@@ -212,10 +212,11 @@ impl<'a> Writer<'a> {
         Power::Word(name)
     }
 
-    /// Calls an instance of its own that sees the edges of `power`, and gives its output; `of` is what the contact or coil is drawn with.
-    fn edge(&mut self, kind: &'static str, of: &str, power: &Power) -> Power {
+    /// Calls an instance of its own that sees the edges of `power`, and gives its output; `drawn` is what the contact or coil is drawn with, and `of` what
+    /// has the edges.
+    fn edge(&mut self, kind: &'static str, (drawn, of): (&str, &str), power: &Power) -> Power {
         let direction = if kind == "R_TRIG" { "rising" } else { "falling" };
-        let name = self.names.add(&format!("{}_{direction}", self.names.operand(of)));
+        let name = self.names.add(&format!("{}_{direction}", self.names.operand(drawn)));
         let mut words = vec![format!("{name}("), "CLK".into(), ":=".into()];
         power.words(0, &mut words);
         words.push(")".into());
@@ -224,6 +225,12 @@ impl<'a> Writer<'a> {
         let of = format!("{of}.{direction}");
         self.edges.push(Edge { name, block: kind, of });
         Power::Word(pulse)
+    }
+
+    /// The edges of the power of a coil, not those of its target.
+    fn coil_edge(&mut self, kind: &'static str, coil: &Coil, power: &Power) -> Power {
+        let power_of = format!("{}.power", coil.target);
+        self.edge(kind, (&coil.target, &power_of), power)
     }
 
     /// Keeps what is read here.
@@ -283,12 +290,12 @@ impl<'a> Writer<'a> {
                 self.state(&words);
             }
             CoilKind::Rising => {
-                let pulse = self.edge("R_TRIG", &coil.target, power);
+                let pulse = self.coil_edge("R_TRIG", coil, power);
                 self.assign(&target, &pulse);
                 self.tap("BOOL", &target);
             }
             CoilKind::Falling => {
-                let pulse = self.edge("F_TRIG", &coil.target, power);
+                let pulse = self.coil_edge("F_TRIG", coil, power);
                 self.assign(&target, &pulse);
                 self.tap("BOOL", &target);
             }
@@ -351,7 +358,8 @@ impl<'a> Writer<'a> {
             ContactKind::Rising => "R_TRIG",
             ContactKind::Falling => "F_TRIG",
         };
-        let pulse = self.edge(block, &contact.operand, &Power::Word(operand));
+        let drawn = (contact.operand.as_str(), contact.operand.as_str());
+        let pulse = self.edge(block, drawn, &Power::Word(operand));
         if let Power::Word(word) = &pulse {
             self.tap("BOOL", &word.clone());
         }

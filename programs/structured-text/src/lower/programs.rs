@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::rc::Rc;
 
 use understudy_text::spelling;
-use understudy_typed::{Root, Task, Type, Variable as Shown};
+use understudy_typed::{EdgeMemory, Elementary, Root, Task, Type, Variable as Shown};
 
 use crate::syntax::{
     Argument, Class, Declaration, Expression, File, Name, Retention, Span, Unit, UnitKind,
@@ -302,8 +302,8 @@ impl<'a> Lowering<'a> {
             let Symbol::Variable(variable) = &member.symbol else {
                 continue;
             };
-            // Memories that no person declared, as of charts.
-            if variable.name.contains('.') {
+            // Memories that no person declared, as of charts; what sees the edges of something is named by it.
+            if variable.name.contains('.') && EdgeMemory::named(&variable.name).is_none() {
                 continue;
             }
             let parameter = parameters.get(variable.name.as_str()).copied();
@@ -338,6 +338,19 @@ impl<'a> Lowering<'a> {
                 address: member.address.clone(),
                 description: member.description.clone(),
             });
+        }
+        for edge in &block.edges {
+            for (slot, what) in [(edge.seen, "edge"), (edge.last, "last")] {
+                let input = block.parameters.iter().find(|found| found.slot == edge.input);
+                let name = input.map_or("", |input| &input.name);
+                self.program.variables.push(Shown {
+                    name: format!("{prefix}{name}.{what}"),
+                    of: Type::Elementary(Elementary::Bool),
+                    slot: own + slot,
+                    address: None,
+                    description: None,
+                });
+            }
         }
     }
 

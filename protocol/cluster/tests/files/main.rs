@@ -7,6 +7,7 @@ mod findings;
 mod inputs;
 mod meeting;
 mod notify;
+mod online_change;
 mod plant_file;
 mod press_cell;
 mod retention;

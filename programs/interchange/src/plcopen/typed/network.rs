@@ -311,29 +311,42 @@ impl<'a> Network<'a> {
         values.strong(value)
     }
 
-    /// The power behind the sign of a coil or pin; an edge is that of a trigger of its own.
+    /// The power behind the sign of a coil or pin, of `of` where that has a name; an edge is that of a trigger of its own.
     fn changed(
         &mut self,
         value: Expression,
-        negated: bool,
-        edge: Option<Edge>,
+        (negated, edge): (bool, Option<Edge>),
+        of: Option<&str>,
         span: &Range<usize>,
     ) -> Expression {
         let value = if negated { make::not(value) } else { value };
         let Some(edge) = edge else {
             return value;
         };
-        let trigger = self.trigger(edge, span);
+        let of = of.map(|of| format!("{of}.power"));
+        let trigger = self.trigger(edge, of.as_deref(), span);
         self.call_trigger(&trigger, value, span);
         make::read(make::path(&trigger, Some("Q"), span))
     }
 
-    fn trigger(&mut self, edge: Edge, span: &Range<usize>) -> String {
-        let of = match edge {
-            Edge::Rising => "R_TRIG",
-            Edge::Falling => "F_TRIG",
+    /// Declares what sees the edges of `of`, under a name that stays where other parts of the network change: `start.rising`.
+    fn trigger(&mut self, edge: Edge, of: Option<&str>, span: &Range<usize>) -> String {
+        let (kind, direction) = match edge {
+            Edge::Rising => ("R_TRIG", "rising"),
+            Edge::Falling => ("F_TRIG", "falling"),
         };
-        self.declare("edge", make::named(of, span))
+        let Some(of) = of else {
+            return self.declare("edge", make::named(kind, span));
+        };
+        let wanted = format!("{of}.{direction}");
+        let mut name = wanted.clone();
+        let mut count = 2;
+        while self.made.iter().any(|made| made.name.is(&name)) {
+            name = format!("{wanted}_{count}");
+            count += 1;
+        }
+        self.declare_named(&name, make::named(kind, span));
+        name
     }
 
     fn call_trigger(&mut self, trigger: &str, value: Expression, span: &Range<usize>) {
@@ -356,7 +369,7 @@ impl<'a> Network<'a> {
             if self.triggers.contains_key(&read.object) {
                 continue;
             }
-            let trigger = self.trigger(edge, span);
+            let trigger = self.trigger(edge, Some(&read.text), span);
             let value = self.parsed(&read.text);
             self.call_trigger(&trigger, value, span);
             self.triggers.insert(read.object, trigger);

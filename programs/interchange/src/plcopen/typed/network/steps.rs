@@ -130,7 +130,7 @@ impl Network<'_> {
         self.certain_type_of(&make::read(target))
     }
 
-    fn declare_named(&mut self, name: &str, of: TypeName) {
+    pub(super) fn declare_named(&mut self, name: &str, of: TypeName) {
         let span = of.span.clone();
         let made: Declaration = make::declare(name, Class::Local, of, &span);
         self.made.push(made);
@@ -168,8 +168,8 @@ impl Network<'_> {
             }
             Action::Keep { object, power, edge, guard } => {
                 let value = self.prepared(power, span);
-                let value = self.changed(value, false, *edge, span);
                 let name = self.kept.get(object).cloned().unwrap_or_default();
+                let value = self.changed(value, (false, *edge), None, span);
                 let kept = make::assign(make::path(&name, None, span), value, span);
                 self.guarded(guard.as_ref(), vec![kept], span);
             }
@@ -214,7 +214,8 @@ impl Network<'_> {
             if self.is_unread(&written.to_uppercase()) {
                 continue;
             }
-            let value = self.changed(value.clone(), modifier.negated, modifier.edge, span);
+            let sign = (modifier.negated, modifier.edge);
+            let value = self.changed(value.clone(), sign, Some(written), span);
             let Some(target) = self.target(written) else {
                 continue;
             };
@@ -236,7 +237,10 @@ impl Network<'_> {
                 Some(preset) => preset,
                 None => self.prepared(&input.power, span),
             };
-            let value = self.changed(value, input.modifier.negated, input.modifier.edge, span);
+            let sign = (input.modifier.negated, input.modifier.edge);
+            // A block without an instance has no name that stays.
+            let pin = call.is_named.then(|| format!("{}.{}", call.instance, input.pin));
+            let value = self.changed(value, sign, pin.as_deref(), span);
             let known = unit(self.file, &call.type_name);
             let pin = BlockKind::of_word(&call.type_name)
                 .and_then(|kind| standard::input(kind, &input.pin))

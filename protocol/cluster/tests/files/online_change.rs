@@ -1,0 +1,185 @@
+//! Online changes of ladders: what did not change goes on as if nothing had happened.
+
+use proptest::prelude::*;
+use understudy_cluster::{ChangeTexts, Cluster, NeedsStop};
+use understudy_cycle::{OnlineChange, ProgramChange};
+use understudy_executable::{Executable, Scratch};
+use understudy_ladder::{Coil, CoilKind, Contact, ContactKind, Element, Rung, Signal, print};
+use understudy_testing::random::{Dice, random_program};
+
+use crate::common::{findings, load};
+
+fn cluster(file: &str, text: &str) -> Cluster {
+    let cluster = format!(
+        "[cluster]\nname = \"cell\"\nperiod = \"100ms\"\n[[controller]]\nname = \"one\"\nladder = \"{file}\"\n"
+    );
+    let loaded = load(&cluster, &[(file, text)]);
+    let found = findings(&loaded.reports);
+    loaded.cluster.unwrap_or_else(|| panic!("{found}\n{text}"))
+}
+
+fn change(file: &str, before: &str, after: &str) -> Result<OnlineChange, Vec<NeedsStop>> {
+    let [before, after] = [before, after].map(|text| cluster(file, text));
+    let texts = ChangeTexts::between(&before, &after)?;
+    Ok(texts.load(&before).expect("a change of this cluster"))
+}
+
+/// A program that runs.
+struct Running<'a> {
+    executable: &'a Executable,
+    state: Vec<u64>,
+}
+
+impl<'a> Running<'a> {
+    fn new(executable: &'a Executable) -> Self {
+        Self { executable, state: executable.initial().to_vec() }
+    }
+
+    /// Its outputs in a scan.
+    fn step(&mut self, inputs: &[u64]) -> Vec<u64> {
+        let mut outputs = vec![0; self.executable.output_count().div_ceil(64)];
+        let scratch = &mut Scratch::default();
+        self.executable.step(scratch, &mut self.state, inputs, &mut outputs);
+        outputs
+    }
+}
+
+/// One more rung at a random place, which no other rung reads.
+fn with_a_rung(seed: u64) -> (String, String) {
+    let mut program = random_program(seed, 6);
+    let before = print(&program);
+    let mut dice = Dice::new(!seed);
+    program.memory.push(Signal::new("extra"));
+    let operand = program.inputs[dice.below(program.inputs.len())].name.clone();
+    let kinds = [ContactKind::NormallyOpen, ContactKind::Rising, ContactKind::Falling];
+    let kind = kinds[dice.below(kinds.len())];
+    let rung = Rung {
+        network: vec![Element::Contact(Contact { kind, operand })],
+        coils: vec![Coil { kind: CoilKind::Set, target: "extra".into() }],
+        ..Rung::default()
+    };
+    let place = dice.below(program.rungs.len() + 1);
+    program.rungs.insert(place, rung);
+    (before, print(&program))
+}
+
+/// A program that changes there and back at random, beside one that does not: their outputs are equal.
+fn check(change: &ProgramChange, seed: u64, about: &str) {
+    let mut dice = Dice::new(seed);
+    let mut inputs = vec![0_u64; change.before.executable.input_count().div_ceil(64)];
+    let mut alone = Running::new(&change.before.executable);
+    let mut changed = Running::new(&change.before.executable);
+    let mut is_new = false;
+    for scan in 0..120 {
+        if dice.rarely(30) {
+            let conversion = if is_new { &change.back } else { &change.forward };
+            let to = if is_new { &change.before } else { &change.after };
+            is_new = !is_new;
+            let state = conversion.convert(&changed.state);
+            changed = Running { executable: &to.executable, state };
+        }
+        // Inputs that stay for a while let timers end.
+        if dice.rarely(3) {
+            let place = dice.below(change.before.executable.input_count());
+            inputs[place / 64] ^= 1 << (place % 64);
+        }
+        let (wanted, found) = (alone.step(&inputs), changed.step(&inputs));
+        assert_eq!(found, wanted, "scan {scan}, seed {seed}\n{about}");
+    }
+}
+
+/// Whether the program could change while it ran.
+fn goes_on(seed: u64) -> bool {
+    let (before, after) = with_a_rung(seed);
+    let change = match change("one.ladder", &before, &after) {
+        Ok(change) => change,
+        Err(reasons) => {
+            assert!(matches!(reasons[..], [NeedsStop::Unfit(_)]), "{reasons:?}\n{after}");
+            return false;
+        }
+    };
+    let [change] = &change.programs[..] else {
+        // A rung that has no effect makes no other program.
+        return false;
+    };
+    check(change, seed, &after);
+    true
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn rungs_that_did_not_change_go_on(seed: u64) {
+        goes_on(seed);
+    }
+}
+
+#[test]
+fn most_programs_can_change() {
+    let count = (0..60).filter(|&seed| goes_on(seed)).count();
+    assert!(count > 20, "{count} of 60");
+}
+
+/// What a contact for edges of a drawn ladder has seen is not seen again.
+#[test]
+fn a_drawn_ladder_goes_on() {
+    let before = include_str!("../../../../examples/plcopen/pump.xml");
+    let after = before.replace("<expression>100</expression>", "<expression>101</expression>");
+    let change = change("one.xml", before, &after).expect("an online change");
+    for seed in 0..20 {
+        check(&change.programs[0], seed, "pump");
+    }
+}
+
+/// The outputs of a ladder whose text changes after some scans.
+fn outputs(before: &str, after: &str, at: usize, inputs: &[u64]) -> Vec<u64> {
+    let change = change("one.ladder", before, after).expect("an online change");
+    let change = &change.programs[0];
+    let mut running = Running::new(&change.before.executable);
+    let mut outputs = Vec::new();
+    for (scan, &inputs) in inputs.iter().enumerate() {
+        if scan == at {
+            let state = change.forward.convert(&running.state);
+            running = Running { executable: &change.after.executable, state };
+        }
+        outputs.push(running.step(&[inputs])[0]);
+    }
+    outputs
+}
+
+/// As the timers of other systems: what is over stays over, and what runs is over where its time was longer than the new preset.
+#[test]
+fn a_timer_with_another_preset_goes_on() {
+    let text = |block: &str, preset: u32| {
+        format!("program one\ninput a\noutput y\nrung\n    a {{{block} t {preset}ms}} ( y )\n")
+    };
+    for (block, [before, after], at, inputs, wanted) in [
+        // Runs on, to the new preset.
+        ("TON", [500, 800], 3, [1; 10], [0, 0, 0, 0, 0, 0, 0, 0, 1, 1]),
+        // Is over at once.
+        ("TON", [800, 200], 4, [1; 10], [0, 0, 0, 0, 1, 1, 1, 1, 1, 1]),
+        // Was over.
+        ("TON", [200, 800], 4, [1; 10], [0, 0, 1, 1, 1, 1, 1, 1, 1, 1]),
+        // A pulse does not come back.
+        ("TP", [200, 800], 4, [1; 10], [1, 1, 0, 0, 0, 0, 0, 0, 0, 0]),
+        ("TP", [500, 200], 3, [1; 10], [1, 1, 1, 0, 0, 0, 0, 0, 0, 0]),
+        ("TOF", [500, 300], 3, [1, 0, 0, 0, 0, 0, 0, 0, 0, 0], [1, 1, 1, 1, 0, 0, 0, 0, 0, 0]),
+        ("TOF", [200, 800], 5, [1, 0, 0, 0, 0, 0, 0, 0, 0, 0], [1, 1, 1, 0, 0, 0, 0, 0, 0, 0]),
+    ] {
+        let found = outputs(&text(block, before), &text(block, after), at, &inputs);
+        assert_eq!(found, wanted, "{block} from {before} to {after} ms");
+    }
+}
+
+/// The counter had counted past the preset that the new program has.
+#[test]
+fn a_counter_with_a_lower_preset_is_full() {
+    let text = |preset: u32| {
+        format!(
+            "program one\ninput a\ninput r\noutput y\nrung\n    a {{CTU c {preset} R=r}} ( y )\n"
+        )
+    };
+    let found = outputs(&text(9), &text(3), 8, &[1, 0, 1, 0, 1, 0, 1, 0, 0, 1, 2, 0]);
+    assert_eq!(found, [0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 0, 0]);
+}
