@@ -8,7 +8,9 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
-use understudy_cluster::{ChangeTexts, Cluster, NeedsStop, Overrides, fates};
+use understudy_cluster::{
+    ChangeTexts, ChangedInitial, Cluster, NeedsStop, Overrides, changed_initials, fates,
+};
 use understudy_typed::{CarriedPath, Fate};
 use understudy_view::Run;
 use understudy_wire::{ChangeRequest, ConfigurationHash, Member};
@@ -272,7 +274,14 @@ impl Asked {
 
 /// What would change.
 struct Plan {
-    programs: Vec<(String, Vec<CarriedPath>)>,
+    programs: Vec<PlannedProgram>,
+}
+
+/// What would become of the variables of one program.
+struct PlannedProgram {
+    name: String,
+    paths: Vec<CarriedPath>,
+    initials: Vec<ChangedInitial>,
 }
 
 impl Plan {
@@ -280,7 +289,9 @@ impl Plan {
         let programs = texts.programs.iter().map(|changed| {
             let place = changed.program.index();
             let (old, new) = (&before.controllers()[place], &after.controllers()[place]);
-            (new.name.clone(), fates(&old.code, &new.code))
+            let paths = fates(&old.code, &new.code);
+            let initials = changed_initials(&old.code, &new.code, &paths);
+            PlannedProgram { name: new.name.clone(), paths, initials }
         });
         Self { programs: programs.collect() }
     }
@@ -288,15 +299,15 @@ impl Plan {
     /// The way back, without the variables that only the new program has.
     fn back(before: &Cluster, after: &Cluster, texts: &ChangeTexts) -> Self {
         let mut plan = Self::of(after, before, texts);
-        for (_, paths) in &mut plan.programs {
-            paths.retain(|path| path.now.is_some());
+        for program in &mut plan.programs {
+            program.paths.retain(|path| path.now.is_some());
         }
         plan
     }
 
     fn drops(&self) -> bool {
         let is_lost = |fate| matches!(fate, Fate::Dropped | Fate::Narrowed);
-        self.programs.iter().any(|(_, paths)| paths.iter().any(|path| is_lost(path.fate)))
+        self.programs.iter().any(|program| program.paths.iter().any(|path| is_lost(path.fate)))
     }
 
     /// Refuses a change that drops values, unless the engineer says that it may; `what` says which values, and what becomes of them.
@@ -310,7 +321,7 @@ impl Plan {
 
     fn text(&self) -> String {
         let mut text = String::new();
-        for (name, paths) in &self.programs {
+        for PlannedProgram { name, paths, initials } in &self.programs {
             let count = |fate| paths.iter().filter(|path| path.fate == fate).count();
             let _ = writeln!(
                 text,
@@ -329,12 +340,22 @@ impl Plan {
                 };
                 let _ = writeln!(text, "  {:<9}  {}  {types}", path.fate.name(), path.path);
             }
+            for initial in initials {
+                let values = initial.values.as_ref();
+                let values = values.map(|[one, other]| format!(" from {one} to {other}"));
+                let values = values.unwrap_or_default();
+                let _ = writeln!(
+                    text,
+                    "  {}: the initial value changes{values}, which counts at the next start only",
+                    initial.path
+                );
+            }
         }
         text.trim_end().to_owned()
     }
 
     fn json(&self) -> Value {
-        let programs = self.programs.iter().map(|(name, paths)| {
+        let programs = self.programs.iter().map(|PlannedProgram { name, paths, initials }| {
             let paths = paths.iter().map(|path| {
                 json!({
                     "path": path.path,
@@ -343,7 +364,18 @@ impl Plan {
                     "now": path.now,
                 })
             });
-            json!({ "program": name, "paths": paths.collect::<Vec<_>>() })
+            let initials = initials.iter().map(|initial| {
+                let [before, now] = match &initial.values {
+                    Some([one, other]) => [Some(one), Some(other)],
+                    None => [None, None],
+                };
+                json!({ "path": initial.path, "before": before, "now": now })
+            });
+            json!({
+                "program": name,
+                "paths": paths.collect::<Vec<_>>(),
+                "initial_values": initials.collect::<Vec<_>>(),
+            })
         });
         Value::Array(programs.collect())
     }

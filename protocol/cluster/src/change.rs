@@ -358,6 +358,44 @@ pub fn fates(before: &Code, after: &Code) -> Vec<CarriedPath> {
     after.fates(before)
 }
 
+/// An initial value that differs between two programs.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ChangedInitial {
+    /// The path.
+    pub path: String,
+    /// The two values, as they are written; nothing of what has parts.
+    pub values: Option<[String; 2]>,
+}
+
+/// Which of these paths, that go on with their values, begin with other ones in the program after: those count at its next start only.
+pub fn changed_initials(before: &Code, after: &Code, paths: &[CarriedPath]) -> Vec<ChangedInitial> {
+    let programs = [before, after].map(|code| code.typed());
+    let states = programs.map(|program| program.initial_state());
+    let goes_on = |path: &&CarriedPath| path.before.is_some() && path.now.is_some();
+    let changed = paths.iter().filter(goes_on).filter_map(|path| {
+        let [old, new] = programs.map(|program| program.part(&path.path));
+        let parts = [old?, new?];
+        let values = [0, 1].map(|side: usize| {
+            let (of, stored) = parts[side].stored(&states[side])?;
+            Some(of.text(stored))
+        });
+        let [slots, others] = [0, 1].map(|side: usize| {
+            let first = (parts[side].address / 64) as usize;
+            states[side].get(first..first + parts[side].of.slots() as usize)
+        });
+        let values = match values {
+            [Some(one), Some(other)] => Some([one, other]),
+            _ => None,
+        };
+        let is_equal = match &values {
+            Some([one, other]) => one == other,
+            None => slots == others,
+        };
+        (!is_equal).then(|| ChangedInitial { path: path.path.clone(), values })
+    });
+    changed.collect()
+}
+
 /// The canonical text of a cluster in which these programs stand in the place of its own: those before the change, or those after it.
 fn text_with(cluster: &Cluster, codes: &[(ProgramId, [Code; 2])], is_after: bool) -> String {
     let mut controllers = (0..).map(ProgramId).zip(cluster.controllers());

@@ -37,7 +37,8 @@ pub use address::{
 };
 pub use alarm::{AlarmCondition, AlarmDeclaration, MAXIMUM_ALARMS, Priority};
 pub use change::{
-    ChangeError, ChangeTexts, ChangedText, NeedsStop, OnlineChanges, ProgramText, Unfit, fates,
+    ChangeError, ChangeTexts, ChangedInitial, ChangedText, NeedsStop, OnlineChanges, ProgramText,
+    Unfit, changed_initials, fates,
 };
 pub use cluster::{Cluster, Controller, Link, PlantPlace, RemoteIo, Security, Understudy};
 pub use code::{Code, Unnamed};
