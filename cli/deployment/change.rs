@@ -1,12 +1,13 @@
 //! `understudy change`: an online change of programs, while the cluster runs.
 
 mod members;
+mod rehearsal;
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use clap::{Args, ValueEnum};
+use clap::{Args, ValueEnum, value_parser};
 use serde_json::{Value, json};
 use understudy_cluster::{
     ChangeTexts, ChangedInitial, Cluster, NeedsStop, Overrides, changed_initials, fates,
@@ -24,12 +25,14 @@ use crate::files;
 #[command(after_help = "\
 Example:
   understudy change examples/online-change/cluster.toml examples/online-change/new/cluster.toml
+  understudy change runs/latest new/cluster.toml rehearse
   understudy change runs/latest new/cluster.toml prepare
   understudy change runs/latest new/cluster.toml switch
   understudy change runs/latest new/cluster.toml accept
   understudy change cell/cluster.toml new/cluster.toml cancel --keys keys/members/engineer
 
-Without a step, and with `plan`, it says what would change and touches nothing. `prepare` loads the new programs at all members next to the old ones;
+Without a step, and with `plan`, it says what would change and touches nothing. `rehearse` computes what the new programs would have done with
+the samples of a run. `prepare` loads the new programs at all members next to the old ones;
 `switch` changes the programs between two cycles; `accept` ends the change with the new programs, `cancel` with the old ones. A step can be given again,
 also from another machine: it continues where the members are.")]
 pub(crate) struct Arguments {
@@ -51,6 +54,15 @@ pub(crate) struct Arguments {
     /// Continue although values are dropped
     #[arg(long)]
     drop: bool,
+    /// Cycles of a rehearsal: the newest recorded ones
+    #[arg(long, value_name = "CYCLES", default_value_t = 1000, value_parser = value_parser!(u64).range(1..=1_000_000))]
+    cycles: u64,
+    /// Rehearse with the next cycles of a run that goes on, in place of the recorded ones
+    #[arg(long)]
+    live: bool,
+    /// Scans after which a rehearsed program takes the state of the running one over anew
+    #[arg(long, value_name = "SCANS", default_value_t = 100, value_parser = value_parser!(u32).range(1..))]
+    renew: u32,
     /// Directory of runs
     #[arg(long, value_name = "DIR", default_value = "runs")]
     out: PathBuf,
@@ -60,6 +72,8 @@ pub(crate) struct Arguments {
 enum Step {
     /// Say what would change
     Plan,
+    /// Compute what the new programs would have done in a run
+    Rehearse,
     /// Load the new programs at all members, next to the old ones
     Prepare,
     /// Change the programs between two cycles
@@ -93,9 +107,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Answer, Answer> {
         let message = "the programs of the two files are equal: there is nothing to change";
         return Err(Answer::failed(Status::BadInput, "U0630", message.to_owned()));
     }
+    if arguments.step == Step::Rehearse {
+        return rehearsal::rehearse(arguments, &before, &texts);
+    }
     let members = Members::of(arguments, &before)?;
     match arguments.step {
-        Step::Plan | Step::Prepare => {
+        Step::Plan | Step::Rehearse | Step::Prepare => {
             plan.permit(
                 arguments.drop,
                 "values are dropped, so the new program begins with their initial values",

@@ -27,6 +27,7 @@ mod pasted;
 mod petri;
 mod program_faults;
 mod reconfigure;
+mod rehearsal;
 mod reliability;
 mod requirements;
 mod scan;

@@ -29,6 +29,7 @@ mod model;
 mod overview;
 mod process_alarm;
 mod protection;
+mod rehearsal;
 mod run;
 mod series;
 mod shown_text;
@@ -63,6 +64,7 @@ pub use overview::{
 };
 pub use process_alarm::{ProcessAlarm, Shelved};
 pub use protection::{LackingStation, LostState, Protection};
+pub use rehearsal::{FirstDifference, OutputDifference, Rehearsal, Rehearsed};
 pub use run::{Run, find_run, find_run_of, find_running, find_running_of};
 pub use series::Series;
 pub use shown_text::{NamedValue, ShownLine, Uses};
