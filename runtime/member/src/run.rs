@@ -103,7 +103,7 @@ pub fn run_remote_io(cluster: &Cluster, options: &MemberOptions) -> Result<(), M
         return run(cluster, options, member, machine, field, (retention, started));
     };
     let (notes, retention) =
-        retained_notes(cluster, folder, &options.name, &settings, |program, hash| {
+        retained_notes(cluster, folder, options, &settings, |program, hash| {
             started.has_loaded(program, hash)
         });
     let machine = machine.noting(notes.newest, notes.is_damaged);
