@@ -132,13 +132,13 @@ impl RetainedFiles {
 
     /// The notes that a remote I/O has made; those of every owner where none is given.
     pub fn notes(&self, owner: Option<Owner>) -> FoundNotes {
-        let mut readable = None;
+        let (mut readable, mut made) = (None, 0);
         let of_file = |records: Vec<Retained>, _| {
             let notes = records.into_iter().filter_map(|record| match record {
                 Retained::Note(note) => Some(note),
                 Retained::State(_) | Retained::Step(_) | Retained::Authority(_) => None,
             });
-            let newest = notes.max_by_key(|note| note.number);
+            let newest = notes.inspect(|_| made += 1).max_by_key(|note| note.number);
             let read = newest.as_ref().map(|note| (note.number, note.is_retentive));
             readable = readable.max(read);
             let is_own = |note: &Note| owner.is_none_or(|owner| note.cluster == owner.cluster);
@@ -150,8 +150,9 @@ impl RetainedFiles {
         let (notes, mut files) = self.read(owner, of_file);
         let is_there = |path: &PathBuf| files.iter().any(|file| file.path == *path);
         let missing = self.paths().into_iter().find(|path| !is_there(path));
-        // The first note was in both files.
-        if let Some(path) = missing.filter(|_| !files.is_empty()) {
+        // The very first note alone: the power failed before the other file was begun.
+        let is_first = made == 1 && readable.is_some_and(|(number, _)| number == 0);
+        if let Some(path) = missing.filter(|_| !files.is_empty() && !is_first) {
             let problem = "it is missing, and may have had the newest note".to_owned();
             files.push(FoundFile { path, problem: Some(problem) });
         }
@@ -386,16 +387,25 @@ impl Turn {
             self.damaged.clear();
             self.is_halved = false;
         }
+        let other = &self.files.paths()[1 - self.next];
+        let is_note = self.of.is_none();
+        let is_first = is_note && !path.exists() && !other.exists();
+        if is_first {
+            File::create(other)?.write_all(&content)?;
+            content.extend_from_slice(bytes);
+        }
         let mut file = OpenOptions::new().create(true).write(true).truncate(true).open(path)?;
         file.write_all(&content)?;
         let synced = file.try_clone()?;
         for damaged in self.damaged.drain(..).filter(|damaged| damaged != path) {
             std::fs::remove_file(damaged)?;
         }
-        let other = &self.files.paths()[1 - self.next];
-        if self.of.is_none() && !other.exists() {
-            // So that a file that is missing later is told from one that was not begun.
+        // A note that is there twice tells that both files were begun, so that one that is missing later is told from one that was not begun.
+        if is_note && !other.exists() {
+            content.extend_from_slice(bytes);
             File::create(other)?.write_all(&content)?;
+        } else if is_first {
+            OpenOptions::new().append(true).open(other)?.write_all(bytes)?;
         }
         self.current = Some(file);
         self.next = 1 - self.next;

@@ -146,11 +146,11 @@ fn a_missing_file_of_notes_leaves_none() {
     for (life, notes) in [1, 3, 1, 5].into_iter().enumerate() {
         let retainer = Retainer::start(vec![(None, files.clone())]).expect("threads");
         (0..notes).for_each(|_| {
-            made += 1;
             retainer.keep(note(made));
+            made += 1;
         });
         retainer.finish();
-        assert_eq!(newest_of(&files), Some(moment(made)), "life {life}");
+        assert_eq!(newest_of(&files), Some(moment(made - 1)), "life {life}");
         for path in files.paths() {
             let bytes = fs::read(&path).expect("both are there");
             fs::remove_file(&path).expect("removed");
@@ -161,6 +161,12 @@ fn a_missing_file_of_notes_leaves_none() {
             fs::write(&path, bytes).expect("written");
         }
     }
+    // The power fails before the other file is begun.
+    let early = RetainedFiles::new(&folder, "early-io".to_owned());
+    let mut bytes = Vec::new();
+    note(0).write(&mut bytes);
+    fs::write(&early.paths()[1], bytes).expect("written");
+    assert_eq!(newest_of(&early), Some(moment(0)));
     // The next life numbers its notes anew: what is left of the one before does not come back.
     for path in files.paths() {
         fs::remove_file(&path).expect("removed");
@@ -176,19 +182,14 @@ fn a_missing_file_of_notes_leaves_none() {
 #[test]
 fn what_was_kept_with_other_keys_is_told_apart() {
     let folder = Folder::new("retained-keys");
-    let files = |authority| {
-        let files = RetainedFiles::new(&folder, "robot.robot".to_owned());
-        files.with_authority(authority)
-    };
     let keys = [None, Some(AuthorityHash(5)), Some(AuthorityHash(6))];
-    for (life, kept_with) in (0..).zip(keys) {
-        let first = life * 100 + 1;
-        keep(&files(kept_with), first, first + 20);
+    for (number, kept_with) in (1..).zip(keys) {
+        let files = RetainedFiles::new(&folder, format!("robot.robot-{number}"));
+        keep(&files.clone().with_authority(kept_with), 1, number * 10);
         for authority in keys {
-            let owner = Owner { authority, ..OWNER };
-            let (runs, found) = files(authority).runs(Some(owner));
+            let (runs, found) = files.runs(Some(Owner { authority, ..OWNER }));
             let is_own = authority == kept_with;
-            assert_eq!(runs.iter().map(|run| run.stepped().cycle.0).max(), Some(first + 20));
+            assert_eq!(runs.iter().map(|run| run.stepped().cycle.0).max(), Some(number * 10));
             let is_whole = |run: &RetainedRun| run.carried.is_none_or(|carried| carried.is_whole);
             assert!(runs.iter().all(|run| is_whole(run) == is_own), "{kept_with:?} {authority:?}");
             assert_eq!(found.iter().any(|file| file.problem.is_some()), !is_own);
@@ -325,7 +326,7 @@ fn damage(path: &Path, damage: &Damage) -> Option<u64> {
         .map(|record| match record {
             Retained::State(state) => state.stepped.cycle.0,
             Retained::Step(step) => step.stepped.cycle.0,
-            Retained::Note(_) => 0,
+            Retained::Note(_) | Retained::Authority(_) => 0,
         })
         .collect();
     let mut ends = vec![0];
