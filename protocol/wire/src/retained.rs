@@ -14,7 +14,9 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::frame::Recalled;
-use crate::identifier::{AuthorityHash, ClusterHash, ConfigurationHash, Moment, ProgramHash, ProgramId};
+use crate::identifier::{
+    AuthorityHash, ClusterHash, ConfigurationHash, Moment, ProgramHash, ProgramId,
+};
 use crate::image::{Image, MAXIMUM_STATE_BITS};
 use crate::lineage::{Digest, Lineage};
 

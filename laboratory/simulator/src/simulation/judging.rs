@@ -41,9 +41,7 @@ impl Simulation {
             let with_state = self.with_state(program);
             let holders = self.received_both_ways(program, with_state);
             if matches!(source, Source::Direct | Source::Reconstructed) {
-                let runs = |station: &StationId| {
-                    self.stations[station.index()].running().is_some()
-                };
+                let runs = |station: &StationId| self.stations[station.index()].running().is_some();
                 let running = self.candidates(program).filter(runs).collect();
                 self.knowable.applied(program, with_state, running);
             }
