@@ -386,7 +386,7 @@ impl Simulation {
         for station in delivery.to.stations.iter() {
             let changed = self.links.take_in(station, &delivery.frame);
             let frame = changed.as_ref().unwrap_or(&delivery.frame);
-            self.knowable.reached(station, frame);
+            self.note_reached(station, frame);
             self.give(Member::Station(station), Input::Frame(frame), observe);
         }
         let remote_ios = Audience { stations: StationSet::EMPTY, ..delivery.to };

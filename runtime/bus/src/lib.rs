@@ -87,4 +87,4 @@ pub use rights::{Rights, keep_times};
 pub use wakefulness::Wakefulness;
 pub use watchdog::Watchdog;
 pub use writes::{WRITES_PER_SECOND, WriteLimiter};
-pub use zenoh_link::zenoh_runtime;
+pub use zenoh_link::{zenoh_runtime, zenoh_runtime_of_follower};

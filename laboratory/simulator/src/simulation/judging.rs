@@ -137,6 +137,13 @@ impl Simulation {
         self.lasting_holders(program).iter().next()
     }
 
+    /// A frame reaches a station. What a suspended one takes later tells nothing of the cycles since.
+    pub(super) fn note_reached(&mut self, station: StationId, frame: &Frame) {
+        if self.stations[station.index()].running().is_some() {
+            self.knowable.reached(station, frame);
+        }
+    }
+
     /// A frame reaches a remote I/O.
     pub(super) fn note_arrival(&mut self, member: Member, frame: &Frame) {
         if let (Member::Station(station), Some(program)) =
