@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::json;
-use understudy_bus::Peer;
+use understudy_bus::{LinkKind, Peer, zenoh_runtime};
 use understudy_cluster::{Cluster, MULTICAST_GROUPS, is_multicast_range};
 use understudy_member::{
     MemberError, MemberOptions, addressed_peers, find_member, link_kind, listed_peers,
@@ -113,7 +113,9 @@ fn run(
     member: fn(&Cluster, &MemberOptions) -> Result<(), MemberError>,
 ) -> Result<Answer, Answer> {
     let (cluster, _) = files::cluster(&arguments.cluster, arguments.overrides.overrides())?;
-    restart_for_zenoh(link_kind(&cluster), cluster.has_two_networks());
+    if link_kind(&cluster) == LinkKind::Zenoh {
+        restart_for_zenoh(zenoh_runtime(cluster.has_two_networks()));
+    }
     if !is_wanted(find(&cluster, &arguments.name)?) {
         return Err(failed(&MemberError::WrongKind {
             name: arguments.name.clone(),

@@ -7,7 +7,7 @@ use std::time::SystemTime;
 use clap::Args;
 use serde_json::json;
 use understudy_attach::AttachError;
-use understudy_bus::interruption;
+use understudy_bus::{interruption, zenoh_runtime_of_follower};
 use understudy_cluster::{PlantFile, PlantGroup, PlantSpare, Security, Serves};
 use understudy_keys::{Date, KeysError, MemberKeys, OperatorKeys};
 use understudy_member::{restart_for_zenoh, tls_keys};
@@ -55,8 +55,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, console: &mut Console) -> Result<Answer, Answer> {
-    // One thread for all groups: what it waits for comes once a second, and each further thread is woken in vain.
-    restart_for_zenoh(understudy_bus::LinkKind::Zenoh, false);
+    restart_for_zenoh(zenoh_runtime_of_follower());
     if arguments.ends_with_parent {
         understudy_bus::end_with_parent()
             .map_err(|error| Answer::failed(Status::Failed, error.code(), error))?;

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use understudy_bus::{RetainedFiles, free_addresses};
-use understudy_wire::{PointValue, Retained, Role, Write, WriteId};
+use understudy_wire::{AuthorityHash, PointValue, Retained, Role, Write, WriteId};
 
 use super::shared::deployed::{Running, text};
 use super::shared::{DEADLINE, answer, empty_folder, some_at_a_time, understudy};
@@ -288,6 +288,44 @@ fn a_renamed_member_is_a_question() {
         plant.kill();
         plant.start(&program);
         assert_eq!(plant.wait_for(remote_io, is("started-warm"))["lost"], 0, "{what}");
+    }
+}
+
+/// The files are of a copy of the cluster with other keys, or one of the two files of notes is missing: nothing starts by itself, the operator may choose
+/// the state, and the next life asks no more.
+#[test]
+fn files_of_other_keys_and_missing_notes_are_a_question() {
+    let _one = some_at_a_time();
+    let program = counter("VAR_OUTPUT RETAIN total : INT; END_VAR");
+    for (what, reason) in [("keys", "keys of another authority"), ("notes", "it is missing")] {
+        let mut plant = Plant::new(&format!("change-{what}"), "counter.st", "");
+        plant.start(&program);
+        plant.applied(16, |total| total > 20);
+        plant.kill();
+        for entry in fs::read_dir(plant.folder.join("kept")).expect("members have kept values") {
+            let path = entry.expect("a file").path();
+            let is_of = |ending: &str| path.to_str().is_some_and(|path| path.ends_with(ending));
+            if what == "keys" && is_of(".retained") {
+                let mut bytes = Vec::new();
+                Retained::Authority(AuthorityHash(5)).write(&mut bytes);
+                bytes.extend(fs::read(&path).expect("it is there"));
+                fs::write(&path, bytes).expect("it is ours");
+            } else if what == "notes" && is_of("change.counter-io.1.retained") {
+                fs::remove_file(&path).expect("it is ours");
+            }
+        }
+        plant.start(&program);
+        let asked = plant.wait_for("counter-io", is("state-lost"));
+        assert!(asked["asks"] == true && asked["newest"] != Value::Null, "{what}: {asked}");
+        let told = plant.wait_for("counter-io", is("retained-refused"));
+        assert!(told["reason"].as_str().is_some_and(|it| it.contains(reason)), "{told}");
+        assert!(!plant.events("counter-io").iter().any(is("started-cold")), "{what}");
+        plant.order("counter-io", r#"choose {"newest":{"cycle":null}}"#);
+        plant.wait_for("counter-io", is("started-warm"));
+        assert!(plant.applied(16, |_| true) > 20, "{what}");
+        plant.kill();
+        plant.start(&program);
+        assert_eq!(plant.wait_for("counter-io", is("started-warm"))["lost"], 0, "{what}");
     }
 }
 

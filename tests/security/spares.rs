@@ -14,7 +14,7 @@ use serde_json::Value;
 use understudy_bus::free_addresses;
 
 use super::shared::deployed::Deployed;
-use super::{DEADLINE, Running, empty_folder, one_at_a_time, text, understudy};
+use super::{DEADLINE, Running, codes, empty_folder, one_at_a_time, text, understudy};
 
 const GROUPS: [&str; 2] = ["line-1", "line-2"];
 
@@ -75,7 +75,11 @@ impl Plant {
     }
 
     fn spare(&self) -> Running {
-        let (plant, keys) = (self.folder.join("plant.toml"), self.folder.join("keys"));
+        self.spare_of("plant.toml")
+    }
+
+    fn spare_of(&self, plant: &str) -> Running {
+        let (plant, keys) = (self.folder.join(plant), self.folder.join("keys"));
         let journals = self.folder.join("journals");
         let spare = ["spare", text(&plant), "--name", "spare-1", "--keys", text(&keys)];
         let child = understudy(&[&spare[..], &["--no-real-time", "--journals"]].concat())
@@ -244,4 +248,28 @@ fn a_spare_reports_groups_that_it_cannot_watch_and_ends_with_sigterm() {
     let status = terminate(&mut spare);
     let said = fs::read_to_string(plant.folder.join("spare.out")).expect("its output");
     assert!(status.success() && said.contains("spare-1: woke 0 times"), "{status}: {said}");
+}
+
+/// Two plant files claim one machine: the second process ends with the reason, the first one goes on, and the second one may start when that has ended.
+#[test]
+fn a_spare_that_two_plant_files_claim_runs_once() {
+    let _alone = one_at_a_time();
+    let plant = Plant::new("claimed");
+    GROUPS.iter().for_each(|group| drop(plant.start(group)));
+    let other = "[[group]]\nname = \"line-2\"\ncluster = \"line-2/cluster.toml\"\n\n[[spare]]\nname = \"spare-1\"\ngroups = { line-2 = \"spare\" }\n";
+    fs::write(plant.folder.join("other.toml"), other).expect("it is ours");
+    let mut first = plant.spare();
+    plant.reported("line-1: cannot watch it, retrying: ");
+    let (file, keys) = (plant.folder.join("other.toml"), plant.folder.join("keys"));
+    let second = ["spare", text(&file), "--name", "spare-1", "--keys", text(&keys), "--json"];
+    let refused = understudy(&second).output().expect("it runs");
+    let said: Value = serde_json::from_slice(&refused.stdout).expect("one document");
+    assert_eq!(codes(&said), ["U0627"], "{said}");
+    assert_eq!(refused.status.code(), Some(2), "{said}");
+    let status = terminate(&mut first);
+    assert!(status.success(), "the first one has run until it was told to end: {status}");
+    let mut third = plant.spare_of("other.toml");
+    plant.reported("line-2: cannot watch it, retrying: ");
+    let status = terminate(&mut third);
+    assert!(status.success(), "{status}");
 }

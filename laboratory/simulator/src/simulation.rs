@@ -6,6 +6,7 @@
 mod disturbance;
 mod identity;
 mod judging;
+mod knowable;
 mod pairs;
 mod spares;
 
@@ -35,7 +36,8 @@ use crate::slot::{NEVER, Slot};
 use crate::spares::SpareBeside;
 use crate::tally::Tally;
 use crate::wakeups::Wakeups;
-use judging::{Misled, Synchronised};
+use judging::Misled;
+use knowable::Knowable;
 use pairs::twin_of;
 
 /// Something for the journal.
@@ -93,8 +95,8 @@ pub struct Simulation {
     arrived: Vec<[StationSet; 3]>,
     /// For each remote I/O, the stations that had the state of its program at its last deadline, and at the one before.
     holders: Vec<[StationSet; 2]>,
-    /// For each program, the stations that had its state when outputs were last applied.
-    synchronised: Vec<Synchronised>,
+    /// What the members can know of the stations that could have a state whose outputs were applied.
+    knowable: Knowable,
     /// For each remote I/O, what is known of it while it has a wrong program.
     misled: Vec<Option<Misled>>,
     /// Stations that have sent nothing since they were restarted: no member can know that they run.
@@ -173,7 +175,7 @@ impl Simulation {
             ready: ProgramSet::EMPTY,
             arrived: vec![[StationSet::EMPTY; 3]; parts.remote_ios.len()],
             holders: vec![[StationSet::EMPTY; 2]; parts.remote_ios.len()],
-            synchronised: vec![Synchronised::new(parts.stations.len()); parts.remote_ios.len()],
+            knowable: Knowable::new(parts.stations.len(), parts.remote_ios.len()),
             misled: vec![None; parts.remote_ios.len()],
             unannounced: StationSet::EMPTY,
             violations: Vec::new(),
@@ -384,16 +386,12 @@ impl Simulation {
         for station in delivery.to.stations.iter() {
             let changed = self.links.take_in(station, &delivery.frame);
             let frame = changed.as_ref().unwrap_or(&delivery.frame);
+            self.note_reached(station, frame);
             self.give(Member::Station(station), Input::Frame(frame), observe);
         }
         let remote_ios = Audience { stations: StationSet::EMPTY, ..delivery.to };
         for member in remote_ios.members() {
-            if let (Member::Station(station), Some(program)) =
-                (delivery.frame.header.sender, member.sampled_program())
-                && self.author(program) == Some(member)
-            {
-                self.arrived[program.index()][0].insert(station);
-            }
+            self.note_arrival(member, &delivery.frame);
             self.give(member, Input::Frame(&delivery.frame), observe);
         }
     }

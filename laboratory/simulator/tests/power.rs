@@ -273,3 +273,23 @@ fn a_damaged_note_is_a_question() {
         assert_eq!((starts, seen.asked, seen.applied.len()), (0, 1, 0), "{has_states}");
     }
 }
+
+/// The slot of a spare is empty, and no other member sends while the remote I/O restarts. Where both stations receive nothing for a cycle meanwhile, neither
+/// knows whether the program was started by the spare and the remote I/O: the operator is asked, and the referee finds that no needless question.
+#[test]
+fn two_isolated_stations_do_not_account_for_an_empty_slot() {
+    for (cycles, asks) in [(0, 0), (1, 1), (2, 1)] {
+        let mut simulation = simulation("\n[[understudy]]\nname = \"spare\"\nspare = true\n", 1);
+        for other in [UNDERSTUDY, REMOTE_IO] {
+            for (member, to) in [(CONTROLLER, other), (other, CONTROLLER)] {
+                simulation.schedule(fault((60, 0.0), member, Action::Cut { to }));
+                simulation.schedule(fault((60 + cycles, 0.0), member, Action::Heal { to }));
+            }
+        }
+        simulation.schedule(fault((60, 0.0), REMOTE_IO, Action::Crash));
+        simulation.schedule(fault((60, 0.0), REMOTE_IO, Action::Restart));
+        let seen = run(&mut simulation, 120);
+        assert_eq!(simulation.violations(), [], "{cycles}");
+        assert_eq!(seen.asked, asks, "{cycles}");
+    }
+}

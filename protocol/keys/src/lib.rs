@@ -49,6 +49,6 @@ mod revoked;
 pub use authority::{Authority, DEFAULT_PERSON, Issued, People};
 pub use date::Date;
 pub use error::KeysError;
-pub use member::{MemberKeys, OperatorKeys, TlsFiles, Validity};
+pub use member::{MemberKeys, OperatorKeys, TlsFiles, Validity, authority_of};
 pub use register::{Holder, Register, Revoked, Role};
 pub use revoked::RevocationWatch;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use understudy_cluster::Cluster;
 use understudy_seal::{FrameKey, KEY_BYTES, Opener, Revocations, Seal, TransferKey};
-use understudy_wire::{ClusterHash, ConfigurationHash, Member, StationId};
+use understudy_wire::{AuthorityHash, ClusterHash, ConfigurationHash, Member, StationId};
 
 use crate::certificate;
 use crate::date::Date;
@@ -361,6 +361,12 @@ impl Validity {
         }
         (now >= expires).then_some(KeysError::Expired { name, expires, now })
     }
+}
+
+/// The authority that issued the keys in the folder of a member; nothing where its certificate cannot be read.
+pub fn authority_of(folder: &Path) -> Option<AuthorityHash> {
+    let certificate = files::read(&folder.join("authority.pem")).ok()?;
+    Some(AuthorityHash::of(certificate.trim().as_bytes()))
 }
 
 fn tls(folder: &Path, file: &KeysFile, revoked: &RevokedFile) -> TlsFiles {

@@ -136,4 +136,6 @@ hashes! {
     ConfigurationHash;
     /// Identifies one program's circuit.
     ProgramHash;
+    /// Identifies the authority that issued the keys of a member, by its certificate.
+    AuthorityHash;
 }

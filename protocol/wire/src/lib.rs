@@ -32,8 +32,8 @@ pub use frame::{
     SamplesReceived, Source, Step, Transfer, Turn, Word,
 };
 pub use identifier::{
-    ClusterHash, ConfigurationHash, Cycle, Epoch, MAXIMUM_PROGRAMS, MAXIMUM_STATIONS, Member,
-    Moment, ProgramHash, ProgramId, StationId,
+    AuthorityHash, ClusterHash, ConfigurationHash, Cycle, Epoch, MAXIMUM_PROGRAMS,
+    MAXIMUM_STATIONS, Member, Moment, ProgramHash, ProgramId, StationId,
 };
 pub use image::{Image, ImageError, MAXIMUM_IMAGE_BITS, MAXIMUM_STATE_BITS};
 pub use lineage::{Digest, Lineage};

@@ -14,7 +14,9 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::frame::Recalled;
-use crate::identifier::{ClusterHash, ConfigurationHash, Moment, ProgramHash, ProgramId};
+use crate::identifier::{
+    AuthorityHash, ClusterHash, ConfigurationHash, Moment, ProgramHash, ProgramId,
+};
 use crate::image::{Image, MAXIMUM_STATE_BITS};
 use crate::lineage::{Digest, Lineage};
 
@@ -47,6 +49,8 @@ pub enum Retained {
     Step(RetainedStep),
     /// A remote I/O: the newest sample whose outputs were applied.
     Note(Note),
+    /// At the start of a file: the authority of the keys of its member; absent without keys.
+    Authority(AuthorityHash),
 }
 
 /// State of a program.
@@ -171,7 +175,7 @@ impl RetainedRun {
                         run.steps.push(step);
                     }
                 }
-                Retained::Note(_) => {}
+                Retained::Note(_) | Retained::Authority(_) => {}
             }
         }
         runs

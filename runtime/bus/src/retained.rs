@@ -19,7 +19,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{Builder, JoinHandle};
 
 use understudy_wire::{
-    ClusterHash, Moment, Note, ProgramId, Retained, RetainedProgram, RetainedRun,
+    AuthorityHash, Carried, ClusterHash, Moment, Note, ProgramId, Retained, RetainedProgram,
+    RetainedRun,
 };
 
 use crate::error::BusError;
@@ -39,6 +40,16 @@ pub struct RetainedFiles {
     folder: PathBuf,
     name: String,
     program: Option<RetainedProgram>,
+    authority: Option<AuthorityHash>,
+}
+
+/// To whom the records of a file belong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Owner {
+    /// The cluster.
+    pub cluster: ClusterHash,
+    /// The authority of its keys; nothing without keys. A cluster of the same name with other keys, such as a copy on a test bench, is another one.
+    pub authority: Option<AuthorityHash>,
 }
 
 /// What was found in one file.
@@ -79,7 +90,13 @@ pub struct Retention {
 impl RetainedFiles {
     /// Those of `name` in `folder`: a remote I/O, or a station and a program of it.
     pub fn new(folder: &Path, name: String) -> Self {
-        Self { folder: folder.to_owned(), name, program: None }
+        Self { folder: folder.to_owned(), name, program: None, authority: None }
+    }
+
+    /// Begins each file with the authority of the keys of this member.
+    #[must_use]
+    pub fn with_authority(self, authority: Option<AuthorityHash>) -> Self {
+        Self { authority, ..self }
     }
 
     /// Keeps the text of the program too, so that a changed program can take over its values.
@@ -92,41 +109,53 @@ impl RetainedFiles {
         ["1", "2"].map(|which| self.folder.join(format!("{}.{which}.retained", self.name)))
     }
 
-    /// The states that a station has kept, of this program and of others before it; those of every cluster where none is given.
-    pub fn runs(&self, cluster: Option<ClusterHash>) -> (Vec<RetainedRun>, Vec<FoundFile>) {
-        let of_file = |records| {
+    /// The states that a station has kept, of this program and of others before it; those of every owner where none is given. States that were kept
+    /// with the keys of another authority are not whole ([`Carried::is_whole`]), so that the operator decides, and are left out where there are others.
+    pub fn runs(&self, owner: Option<Owner>) -> (Vec<RetainedRun>, Vec<FoundFile>) {
+        let of_file = |records, is_of_others| {
             let mut runs = RetainedRun::of_records(records);
             let all = runs.len();
-            runs.retain(|run| cluster.is_none_or(|cluster| run.state.cluster == cluster));
-            let foreign = (runs.len() < all).then(|| "it is of another cluster".to_owned());
+            runs.retain(|run| owner.is_none_or(|owner| run.state.cluster == owner.cluster));
+            let foreign = runs.len() < all;
             let newest = runs.iter().map(RetainedRun::stepped).max();
+            for run in runs.iter_mut().filter(|_| is_of_others) {
+                run.carried = Some(Carried { from: run.state.hash, is_whole: false });
+            }
             (runs, newest, foreign)
         };
-        self.read(of_file)
+        let (mut runs, files) = self.read(owner, of_file);
+        if runs.iter().any(|run| run.carried.is_none()) {
+            runs.retain(|run| run.carried.is_none());
+        }
+        (runs, files)
     }
 
-    /// The notes that a remote I/O has made; those of every cluster where none is given.
-    pub fn notes(&self, cluster: Option<ClusterHash>) -> FoundNotes {
-        let mut readable = None;
-        let of_file = |records: Vec<Retained>| {
+    /// The notes that a remote I/O has made; those of every owner where none is given.
+    pub fn notes(&self, owner: Option<Owner>) -> FoundNotes {
+        let (mut readable, mut made) = (None, 0);
+        let of_file = |records: Vec<Retained>, _| {
             let notes = records.into_iter().filter_map(|record| match record {
                 Retained::Note(note) => Some(note),
-                Retained::State(_) | Retained::Step(_) => None,
+                Retained::State(_) | Retained::Step(_) | Retained::Authority(_) => None,
             });
-            let newest = notes.max_by_key(|note| note.number);
+            let newest = notes.inspect(|_| made += 1).max_by_key(|note| note.number);
             let read = newest.as_ref().map(|note| (note.number, note.is_retentive));
             readable = readable.max(read);
-            let is_own = |note: &Note| cluster.is_none_or(|cluster| note.cluster == cluster);
+            let is_own = |note: &Note| owner.is_none_or(|owner| note.cluster == owner.cluster);
             let foreign = newest.as_ref().is_some_and(|note| !is_own(note));
             let newest = newest.filter(|_| !foreign);
             let applied = newest.as_ref().map(Note::applied);
-            (
-                newest.into_iter().collect(),
-                applied,
-                foreign.then(|| "it is of another cluster".to_owned()),
-            )
+            (newest.into_iter().collect(), applied, foreign)
         };
-        let (notes, files) = self.read(of_file);
+        let (notes, mut files) = self.read(owner, of_file);
+        let is_there = |path: &PathBuf| files.iter().any(|file| file.path == *path);
+        let missing = self.paths().into_iter().find(|path| !is_there(path));
+        // The very first note alone: the power failed before the other file was begun.
+        let is_first = made == 1 && readable.is_some_and(|(number, _)| number == 0);
+        if let Some(path) = missing.filter(|_| !files.is_empty() && !is_first) {
+            let problem = "it is missing, and may have had the newest note".to_owned();
+            files.push(FoundFile { path, problem: Some(problem) });
+        }
         let is_damaged = files.iter().any(|file| file.problem.is_some());
         let newest = notes.into_iter().max_by_key(|note: &Note| note.number);
         let was_retentive = readable.map(|(_, was_retentive)| was_retentive);
@@ -135,7 +164,8 @@ impl RetainedFiles {
 
     fn read<T>(
         &self,
-        mut of_file: impl FnMut(Vec<Retained>) -> (Vec<T>, Option<Moment>, Option<String>),
+        owner: Option<Owner>,
+        mut of_file: impl FnMut(Vec<Retained>, bool) -> (Vec<T>, Option<Moment>, bool),
     ) -> (Vec<T>, Vec<FoundFile>) {
         let (mut all, mut files) = (Vec::new(), Vec::new());
         for path in self.paths() {
@@ -148,15 +178,28 @@ impl RetainedFiles {
                 }
             };
             let (records, error) = Retained::read(&bytes);
-            let (found, newest, foreign) = of_file(records);
-            // A file that was made and has no record of this member: its records did not reach the disk.
-            let empty = newest.is_none().then(|| "it has no whole record".to_owned());
-            let problem = foreign.or(error.map(|error| error.to_string())).or(empty);
+            let authority = authority_in(&records);
+            let is_of_others = owner.is_some_and(|owner| owner.authority != authority);
+            let (found, newest, is_foreign) = of_file(records, is_of_others);
+            let told = |is_so: bool, problem: &str| is_so.then(|| problem.to_owned());
+            let problem = told(is_foreign, "it is of another cluster")
+                .or(error.map(|error| error.to_string()))
+                // A file that was made and has no record of this member: its records did not reach the disk.
+                .or(told(newest.is_none(), "it has no whole record"))
+                .or(told(is_of_others, "its member had keys of another authority, or none"));
             all.extend(found);
             files.push(FoundFile { path, problem });
         }
         (all, files)
     }
+}
+
+/// The authority of the keys that the records of a file were written with.
+fn authority_in(records: &[Retained]) -> Option<AuthorityHash> {
+    records.iter().find_map(|record| match record {
+        Retained::Authority(authority) => Some(*authority),
+        Retained::State(_) | Retained::Step(_) | Retained::Note(_) => None,
+    })
 }
 
 fn read_bounded(path: &Path) -> io::Result<Vec<u8>> {
@@ -284,6 +327,8 @@ struct Turn {
     next: usize,
     /// Files of an earlier life that cannot be read to their end: they go once something newer is written.
     damaged: Vec<PathBuf>,
+    /// Whether one of two files of notes is missing: the numbers of new notes may be smaller than those in the other one.
+    is_halved: bool,
     current: Option<File>,
     /// Whether what begins the current file is on the disk: until then the other one is needed.
     is_synced: Arc<AtomicBool>,
@@ -294,20 +339,26 @@ struct Turn {
 
 impl Turn {
     fn new(of: Option<ProgramId>, files: RetainedFiles) -> Self {
+        let is_note = of.is_none();
         let is_damaged = |path: &&PathBuf| {
-            let bytes = read_bounded(path);
-            bytes.is_ok_and(|bytes| bytes.is_empty() || Retained::read(&bytes).1.is_some())
+            read_bounded(path).is_ok_and(|bytes| {
+                let (records, error) = Retained::read(&bytes);
+                let is_of_others = authority_in(&records) != files.authority;
+                bytes.is_empty() || error.is_some() || is_note && is_of_others
+            })
         };
         // The older one of an earlier life is begun first.
         let newest = |path: &PathBuf| std::fs::metadata(path).and_then(|of| of.modified()).ok();
         let paths = files.paths();
         let damaged = paths.iter().filter(is_damaged).cloned().collect();
         let next = usize::from(newest(&paths[0]) > newest(&paths[1]));
+        let is_halved = is_note && paths.iter().filter(|path| path.exists()).count() == 1;
         Self {
             of,
             files,
             next,
             damaged,
+            is_halved,
             current: None,
             is_synced: Arc::default(),
             has_program: false,
@@ -324,16 +375,49 @@ impl Turn {
             self.files.keep_program()?;
             self.has_program = true;
         }
+        let mut content = Vec::new();
+        if let Some(authority) = self.files.authority {
+            Retained::Authority(authority).write(&mut content);
+        }
+        content.extend_from_slice(bytes);
+        if self.is_halved {
+            for left in self.files.paths().iter().filter(|left| left.exists()) {
+                std::fs::remove_file(left)?;
+            }
+            self.damaged.clear();
+            self.is_halved = false;
+        }
+        let other = &self.files.paths()[1 - self.next];
+        let is_note = self.of.is_none();
+        let is_first = is_note && !path.exists() && !other.exists();
+        if is_first {
+            File::create(other)?.write_all(&content)?;
+            content.extend_from_slice(bytes);
+        }
         let mut file = OpenOptions::new().create(true).write(true).truncate(true).open(path)?;
-        file.write_all(bytes)?;
+        file.write_all(&content)?;
         let synced = file.try_clone()?;
         for damaged in self.damaged.drain(..).filter(|damaged| damaged != path) {
             std::fs::remove_file(damaged)?;
+        }
+        // A note that is there twice tells that both files were begun, so that one that is missing later is told from one that was not begun.
+        if is_note && !other.exists() {
+            content.extend_from_slice(bytes);
+            File::create(other)?.write_all(&content)?;
+        } else if is_first {
+            OpenOptions::new().append(true).open(other)?.write_all(bytes)?;
         }
         self.current = Some(file);
         self.next = 1 - self.next;
         self.is_synced = Arc::default();
         Ok((synced, Arc::clone(&self.is_synced)))
+    }
+
+    /// A note that is too old would prove what is not true; without one a person is asked. Files can be removed from a full disk.
+    fn remove_both(&self) {
+        for path in self.files.paths() {
+            let _ = std::fs::remove_file(path);
+        }
     }
 
     fn append(&mut self, bytes: &[u8]) -> io::Result<()> {
@@ -377,14 +461,14 @@ impl Writer {
         let of = match record {
             Retained::State(state) => Some(state.program),
             Retained::Step(step) => Some(step.program),
-            Retained::Note(_) => None,
+            Retained::Note(_) | Retained::Authority(_) => None,
         };
         let Some(turn) = self.turns.iter_mut().find(|turn| turn.of == of) else {
             return Ok(false);
         };
         let is_whole = match record {
             Retained::State(_) => true,
-            Retained::Step(_) => false,
+            Retained::Step(_) | Retained::Authority(_) => false,
             Retained::Note(_) => {
                 turn.notes = if turn.current.is_none() { 0 } else { turn.notes + 1 };
                 turn.notes.is_multiple_of(NOTES_IN_A_FILE)
@@ -402,10 +486,7 @@ impl Writer {
             Ok(Some(begun)) => drop(self.sync.send(begun)),
             Err(error) => {
                 if of.is_none() {
-                    // A note that is too old would prove what is not true; without one a person is asked. Files can be removed from a full disk.
-                    for path in turn.files.paths() {
-                        let _ = std::fs::remove_file(path);
-                    }
+                    turn.remove_both();
                 }
                 // Behind a torn record, or a gap in the steps, nothing would be read.
                 turn.current = None;

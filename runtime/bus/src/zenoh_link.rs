@@ -49,6 +49,9 @@ const QUEUE_FRAMES: usize = 1024;
 /// How often each member publishes something.
 const PULSE: Duration = Duration::from_millis(250);
 
+/// The variable of the environment that sets up Zenoh's own threads.
+const RUNTIME: &str = "ZENOH_RUNTIME";
+
 /// How Zenoh's own threads are to be set up, as a variable of the environment of every process that opens a Zenoh link. Zenoh
 /// reads it once, when its first session opens, and takes nothing else; without it there are six threads where two do. Over two networks there are
 /// two of each, so that what waits in the session of a network that has failed does not hold up the other one.
@@ -61,7 +64,13 @@ pub fn zenoh_runtime(has_two_networks: bool) -> (&'static str, &'static str) {
             "(rx: (worker_threads: 2), tx: (handover: rx), acc: (handover: rx), app: (handover: net), net: (worker_threads: 2))"
         }
     };
-    ("ZENOH_RUNTIME", threads)
+    (RUNTIME, threads)
+}
+
+/// The same for a process that only follows members, such as a spare: one thread for everything, since each packet wakes every thread that handles it.
+pub fn zenoh_runtime_of_follower() -> (&'static str, &'static str) {
+    let threads = "(rx: (handover: net), tx: (handover: net), acc: (handover: net), app: (handover: net), net: (worker_threads: 1))";
+    (RUNTIME, threads)
 }
 
 /// A session that closes is waited for so long, at most.

@@ -10,7 +10,7 @@
 
 use std::path::Path;
 
-use understudy_bus::{FoundFile, RetainedFiles};
+use understudy_bus::{FoundFile, Owner, RetainedFiles};
 use understudy_cluster::Cluster;
 use understudy_wire::{Member, ProgramHash, ProgramId, RetainedRun};
 
@@ -26,7 +26,12 @@ pub(crate) struct Former {
 }
 
 /// What stations kept under names that the cluster does not have any more: for `program`, or for a controller that is gone.
-pub(crate) fn states(cluster: &Cluster, folder: &Path, program: ProgramId) -> Vec<Former> {
+pub(crate) fn states(
+    cluster: &Cluster,
+    folder: &Path,
+    owner: Owner,
+    program: ProgramId,
+) -> Vec<Former> {
     let own = cluster.controllers()[program.index()].name.as_str();
     let is_controller = |name: &str| cluster.controllers().iter().any(|it| it.name == name);
     let is_station = |name: &str| has_member(cluster, name, |it| matches!(it, Member::Station(_)));
@@ -40,7 +45,7 @@ pub(crate) fn states(cluster: &Cluster, folder: &Path, program: ProgramId) -> Ve
         if of != cluster.name() || !is_former {
             continue;
         }
-        let (runs, found) = files.runs(Some(cluster.agreement().cluster));
+        let (runs, found) = files.runs(Some(owner));
         let Some(first) = found.into_iter().next().filter(|_| !runs.is_empty()) else {
             continue;
         };

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use understudy_bus::{CarriedOver, FoundFile, FoundNotes, RetainedFiles, Retention};
-use understudy_cluster::{Cluster, Code, read_kept};
+use understudy_bus::{CarriedOver, FoundFile, FoundNotes, Owner, RetainedFiles, Retention};
+use understudy_cluster::{Cluster, Code, Security, read_kept};
 use understudy_executable::Scratch;
+use understudy_keys::authority_of;
 use understudy_node::Settings;
 use understudy_typed::{CarriedState, Fate};
 use understudy_wire::{
@@ -32,12 +33,14 @@ pub(crate) fn retained_runs(
         return (runs, retention);
     };
     for program in retentive {
+        let owner = owner(cluster, options);
         let files = station_files(cluster, folder, &options.name, program);
+        let files = files.with_authority(owner.authority);
         let hash = settings.programs[program.index()].hash;
-        let (mut of_program, found) = files.runs(Some(cluster.agreement().cluster));
+        let (mut of_program, found) = files.runs(Some(owner));
         let mut former = None;
         if found.is_empty() {
-            let all = former::states(cluster, folder, program);
+            let all = former::states(cluster, folder, owner, program);
             retention.found.extend(all.iter().map(|it| it.found.clone()));
             former = former::candidate(all, hash);
         }
@@ -94,14 +97,21 @@ pub fn station_files(
     RetainedFiles::new(folder, name).with_program(controller.code.source().kept(hash))
 }
 
+/// Whose records a member takes up.
+fn owner(cluster: &Cluster, options: &MemberOptions) -> Owner {
+    let keys = options.keys.as_deref().filter(|_| cluster.security() == Security::Keys);
+    Owner { cluster: cluster.agreement().cluster, authority: keys.and_then(authority_of) }
+}
+
 /// What a remote I/O has noted, with the inputs in the image of its program, and the files.
 pub(crate) fn retained_notes(
     cluster: &Cluster,
     folder: &Path,
-    name: &str,
+    options: &MemberOptions,
     settings: &understudy_remote_io::Settings,
     is_loaded: impl Fn(ProgramId, ProgramHash) -> bool,
 ) -> (FoundNotes, Retention) {
+    let (name, owner) = (options.name.as_str(), owner(cluster, options));
     let program = settings.program;
     let code = &cluster.controllers()[program.index()].code;
     let hash = settings.hash;
@@ -110,8 +120,9 @@ pub(crate) fn retained_notes(
     let retained = settings.operator_inputs.iter().filter(|input| input.retains);
     let retained = retained.filter_map(|input| Some(input_at(input.place.bit)?.name.clone()));
     let kept = RetainedProgram { inputs: retained.collect(), ..code.source().kept(hash) };
-    let files = RetainedFiles::new(folder, format!("{}.{name}", cluster.name())).with_program(kept);
-    let mut notes = files.notes(Some(cluster.agreement().cluster));
+    let files = RetainedFiles::new(folder, format!("{}.{name}", cluster.name()));
+    let files = files.with_program(kept).with_authority(owner.authority);
+    let mut notes = files.notes(Some(owner));
     let is_retentive = settings.restart.is_some();
     // A program without retentive variables only waits for what the one before it has kept.
     notes.is_damaged &= notes.was_retentive.unwrap_or(is_retentive) || is_retentive;
@@ -175,7 +186,8 @@ fn carried_run(
     let restarted = executable.restarted(&carried.state);
     let state = Image::from_words(executable.state_count(), &restarted);
     let state = state.map_err(|_| refused("its program has another state".to_owned()))?;
-    let is_whole = carried.dropped().next().is_none();
+    let is_own = run.carried.is_none_or(|before| before.is_whole);
+    let is_whole = is_own && carried.dropped().next().is_none();
     let run = RetainedRun {
         state: RetainedState {
             hash,

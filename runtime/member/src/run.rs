@@ -10,7 +10,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use serde::Serialize;
 use understudy_bus::{
     Commands, Endpoints, FieldDriver, LinkKind, MemberSettings, NoField, Peer, Retention,
-    SimulatedField, run_member, zenoh_runtime,
+    SimulatedField, run_member,
 };
 use understudy_cluster::{Cluster, Link};
 use understudy_cycle::Machine;
@@ -103,7 +103,7 @@ pub fn run_remote_io(cluster: &Cluster, options: &MemberOptions) -> Result<(), M
         return run(cluster, options, member, machine, field, (retention, started));
     };
     let (notes, retention) =
-        retained_notes(cluster, folder, &options.name, &settings, |program, hash| {
+        retained_notes(cluster, folder, options, &settings, |program, hash| {
             started.has_loaded(program, hash)
         });
     let machine = machine.noting(notes.newest, notes.is_damaged);
@@ -220,9 +220,8 @@ pub fn link_kind(cluster: &Cluster) -> LinkKind {
 
 /// Starts this program again with the environment that Zenoh needs: it takes the number of its threads from there, and only when a process
 /// starts. To be called before anything else is started, which would be lost.
-pub fn restart_for_zenoh(link: LinkKind, has_two_networks: bool) {
-    let (variable, value) = zenoh_runtime(has_two_networks);
-    if link == LinkKind::Udp || std::env::var_os(variable).is_some() {
+pub fn restart_for_zenoh((variable, value): (&str, &str)) {
+    if std::env::var_os(variable).is_some() {
         return;
     }
     if let Ok(program) = std::env::current_exe() {

@@ -22,7 +22,7 @@ impl Hash for Simulation {
             referees,
             // They only judge.
             signals: _,
-            synchronised: _,
+            knowable: _,
             tallies: _,
             ready,
             arrived,

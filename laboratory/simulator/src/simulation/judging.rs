@@ -1,8 +1,9 @@
 //! What the referees are shown of a remote I/O, and what they say.
 
 use understudy_remote_io::{Event, RemoteIo};
-use understudy_wire::{Lineage, Member, ProgramId, Source, StationId, StationSet};
+use understudy_wire::{Frame, Lineage, Member, Moment, ProgramId, Source, StationId, StationSet};
 
+use super::knowable::CYCLES_TO_TELL;
 use super::{Observe, Record, Simulation};
 use crate::referee::Violation;
 
@@ -15,56 +16,6 @@ pub(super) struct Misled {
     /// Whether the wrong program may run: the operator has chosen its cold start, or it has started where the remote I/O can receive more
     /// stations with its configuration than with another one. No member can tell then which of the two is right.
     is_permitted: bool,
-}
-
-/// Cycles in which the last samples tell all members that a station is gone, at most.
-const CYCLES_TO_TELL: u32 = 6;
-
-/// Stations that had the state of a program when outputs of it were last applied.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(super) struct Synchronised {
-    /// For each station, the deadlines with proved outputs since it last had the state, or ran without it.
-    absent_for: Vec<u32>,
-    /// Stations that have crashed since.
-    crashed: StationSet,
-}
-
-impl Synchronised {
-    pub(super) fn new(stations: usize) -> Self {
-        Self { absent_for: vec![u32::MAX; stations], crashed: StationSet::EMPTY }
-    }
-
-    /// Proved outputs were applied while `holders` had the state, and `running` ran, with it or without.
-    fn applied(&mut self, holders: StationSet, running: StationSet) {
-        for (rank, absent_for) in (0..).zip(&mut self.absent_for) {
-            let station = StationId(rank);
-            // It has received a sample since it started.
-            if holders.contains(station) && *absent_for == 0 {
-                self.crashed.remove(station);
-            }
-            *absent_for = match (holders.contains(station), running.contains(station)) {
-                (true, _) => 0,
-                // The others do not know that it has no state.
-                (false, true) => 1,
-                (false, false) => absent_for.saturating_add(1),
-            };
-        }
-    }
-
-    fn crash(&mut self, station: StationId, has_state: bool) {
-        self.crashed.insert(station);
-        if has_state {
-            self.absent_for[station.index()] = 1;
-        }
-    }
-
-    /// The stations that could have a state whose outputs were applied, as far as the others know; none where one of them has lost its memory.
-    fn in_doubt(&self, known_after: u32) -> StationSet {
-        let stations = (0..).map(StationId).zip(&self.absent_for);
-        let stations = stations.filter(|(_, absent_for)| **absent_for < known_after);
-        let stations: StationSet = stations.map(|(station, _)| station).collect();
-        if stations.and(self.crashed).is_empty() { stations } else { StationSet::EMPTY }
-    }
 }
 
 impl Simulation {
@@ -90,10 +41,9 @@ impl Simulation {
             let with_state = self.with_state(program);
             let holders = self.received_both_ways(program, with_state);
             if matches!(source, Source::Direct | Source::Reconstructed) {
-                let running = (0..).map(StationId).zip(&self.stations);
-                let running = running.filter(|(_, slot)| slot.running().is_some());
-                let running = running.map(|(station, _)| station).collect();
-                self.synchronised[program.index()].applied(with_state, running);
+                let runs = |station: &StationId| self.stations[station.index()].running().is_some();
+                let running = self.candidates(program).filter(runs).collect();
+                self.knowable.applied(program, with_state, running);
             }
             let [last, earlier] = &mut self.holders[program.index()];
             *earlier = std::mem::replace(last, holders);
@@ -109,7 +59,7 @@ impl Simulation {
             found = Some(Violation::NeedlessColdStart { moment, station });
         }
         if let Event::StateLost { moment, asks: true, .. } = event
-            && let Some(station) = self.holder_in_doubt(program)
+            && let Some(station) = self.holder_in_doubt(program, *moment)
         {
             found = Some(Violation::NeedlessQuestion { moment: *moment, station });
         }
@@ -187,20 +137,42 @@ impl Simulation {
         self.lasting_holders(program).iter().next()
     }
 
+    /// A frame reaches a station. What a suspended one takes later tells nothing of the cycles since.
+    pub(super) fn note_reached(&mut self, station: StationId, frame: &Frame) {
+        if self.stations[station.index()].running().is_some() {
+            self.knowable.reached(station, frame);
+        }
+    }
+
+    /// A frame reaches a remote I/O.
+    pub(super) fn note_arrival(&mut self, member: Member, frame: &Frame) {
+        if let (Member::Station(station), Some(program)) =
+            (frame.header.sender, member.sampled_program())
+            && self.author(program) == Some(member)
+        {
+            self.arrived[program.index()][0].insert(station);
+        }
+    }
+
     /// A station loses its memory: outputs of a state that it has now may be applied yet.
     pub(super) fn note_crash(&mut self, station: StationId) {
         for program in (0..self.remote_ios.len()).map(|index| ProgramId(index as u8)) {
             let has_state = self.with_state(program).contains(station);
-            self.synchronised[program.index()].crash(station, has_state);
+            self.knowable.crash(program, station, has_state);
         }
     }
 
     /// A station that has the state of a program, where all stations that could have another one whose outputs were applied have it too, and
-    /// receive each other.
-    fn holder_in_doubt(&self, program: ProgramId) -> Option<StationId> {
-        let agreement = &self.parts.remote_ios[program.index()].agreement;
+    /// receive each other. What two remote I/Os of a program know of each other is not followed: none is named there.
+    fn holder_in_doubt(&self, program: ProgramId, moment: Moment) -> Option<StationId> {
+        let settings = &self.parts.remote_ios[program.index()];
+        if settings.pair.is_some() {
+            return None;
+        }
+        let agreement = &settings.agreement;
         let known_after = agreement.flag_after + agreement.history as u32 + CYCLES_TO_TELL;
-        let in_doubt = self.synchronised[program.index()].in_doubt(known_after);
+        let candidates = self.candidates(program).collect();
+        let in_doubt = self.knowable.in_doubt(program, candidates, (moment, known_after));
         let holders = self.lasting_holders(program);
         let pairs = in_doubt.iter().flat_map(|from| in_doubt.iter().map(move |to| (from, to)));
         let mut pairs = pairs.filter(|(from, to)| from != to);
@@ -242,10 +214,13 @@ impl Simulation {
             let state = admitted.and_then(|it| it.state_of(program));
             state.is_some_and(|(lineage, _)| referee.would_be_lost(lineage))
         };
-        // The others do not run the program.
+        self.candidates(program).filter(holds).collect()
+    }
+
+    /// The stations that can run a program: its controller and every understudy.
+    fn candidates(&self, program: ProgramId) -> impl Iterator<Item = StationId> + use<> {
         let understudies = self.remote_ios.len()..self.stations.len();
         let understudies = understudies.map(|rank| StationId(rank as u8));
-        let candidates = [StationId(program.0)].into_iter().chain(understudies);
-        candidates.filter(holds).collect()
+        [StationId(program.0)].into_iter().chain(understudies)
     }
 }

@@ -109,7 +109,7 @@ impl RetainedFiles {
             hashes.extend(Retained::read(&bytes).0.iter().filter_map(|record| match record {
                 Retained::State(state) => Some(state.hash),
                 Retained::Note(note) => Some(note.hash),
-                Retained::Step(_) => None,
+                Retained::Step(_) | Retained::Authority(_) => None,
             }));
         }
         Ok(hashes.into_iter().map(|hash| self.program_path(hash)).collect())

@@ -11,6 +11,7 @@ use understudy_wire::{
 use super::*;
 
 const CLUSTER: ClusterHash = ClusterHash(1);
+const OWNER: Owner = Owner { cluster: CLUSTER, authority: None };
 const HASH: understudy_wire::ProgramHash = understudy_wire::ProgramHash(2);
 const PROGRAM: ProgramId = ProgramId(0);
 
@@ -83,7 +84,7 @@ fn keep(files: &RetainedFiles, first: u64, last: u64) {
 
 /// The newest cycle that is read.
 fn newest(files: &RetainedFiles) -> Option<u64> {
-    let (runs, _) = files.runs(Some(CLUSTER));
+    let (runs, _) = files.runs(Some(OWNER));
     runs.iter().map(|run| run.stepped().cycle.0).max()
 }
 
@@ -98,12 +99,12 @@ fn the_newest_cycle_comes_back_over_several_lives() {
         last += life;
         assert_eq!(newest(&files), Some(last));
     }
-    let (_, found) = files.runs(Some(CLUSTER));
+    let (_, found) = files.runs(Some(OWNER));
     assert!(found.iter().all(|file| file.problem.is_none()), "{found:?}");
 }
 
 fn newest_of(files: &RetainedFiles) -> Option<Moment> {
-    files.notes(Some(CLUSTER)).newest.map(|note| note.applied())
+    files.notes(Some(OWNER)).newest.map(|note| note.applied())
 }
 
 /// A note that may not be the newest proves nothing: a file that is damaged, cut or emptied leaves none.
@@ -136,6 +137,103 @@ fn a_damaged_note_leaves_none() {
     }
 }
 
+/// One that is missing may have had the newest note: the other one proves nothing then.
+#[test]
+fn a_missing_file_of_notes_leaves_none() {
+    let folder = Folder::new("retained-missing-notes");
+    let files = RetainedFiles::new(&folder, "robot-io".to_owned());
+    let mut made = 0;
+    for (life, notes) in [1, 3, 1, 5].into_iter().enumerate() {
+        let retainer = Retainer::start(vec![(None, files.clone())]).expect("threads");
+        (0..notes).for_each(|_| {
+            retainer.keep(note(made));
+            made += 1;
+        });
+        retainer.finish();
+        assert_eq!(newest_of(&files), Some(moment(made - 1)), "life {life}");
+        for path in files.paths() {
+            let bytes = fs::read(&path).expect("both are there");
+            fs::remove_file(&path).expect("removed");
+            let found = files.notes(Some(OWNER));
+            assert!(found.newest.is_none() && found.is_damaged, "life {life}: {found:?}");
+            let problem = found.files.iter().find(|file| file.path == path);
+            assert!(problem.is_some_and(|file| file.problem.is_some()), "{found:?}");
+            fs::write(&path, bytes).expect("written");
+        }
+    }
+    // The power fails before the other file is begun.
+    let early = RetainedFiles::new(&folder, "early-io".to_owned());
+    let mut bytes = Vec::new();
+    note(0).write(&mut bytes);
+    fs::write(&early.paths()[1], bytes).expect("written");
+    assert_eq!(newest_of(&early), Some(moment(0)));
+    // The next life numbers its notes anew: what is left of the one before does not come back.
+    for path in files.paths() {
+        fs::remove_file(&path).expect("removed");
+        let retainer = Retainer::start(vec![(None, files.clone())]).expect("threads");
+        retainer.keep(note(2));
+        retainer.finish();
+        assert_eq!(newest_of(&files), Some(moment(2)));
+    }
+}
+
+/// A copy of the cluster on a test bench has its name and its programs, and other keys: the operator decides about its values, and its notes prove
+/// nothing.
+#[test]
+fn what_was_kept_with_other_keys_is_told_apart() {
+    let folder = Folder::new("retained-keys");
+    let keys = [None, Some(AuthorityHash(5)), Some(AuthorityHash(6))];
+    for (number, kept_with) in (1..).zip(keys) {
+        let files = RetainedFiles::new(&folder, format!("robot.robot-{number}"));
+        keep(&files.clone().with_authority(kept_with), 1, number * 10);
+        for authority in keys {
+            let (runs, found) = files.runs(Some(Owner { authority, ..OWNER }));
+            let is_own = authority == kept_with;
+            assert_eq!(runs.iter().map(|run| run.stepped().cycle.0).max(), Some(number * 10));
+            let is_whole = |run: &RetainedRun| run.carried.is_none_or(|carried| carried.is_whole);
+            assert!(runs.iter().all(|run| is_whole(run) == is_own), "{kept_with:?} {authority:?}");
+            assert_eq!(found.iter().any(|file| file.problem.is_some()), !is_own);
+        }
+    }
+    for (life, kept_with) in (1..).zip(keys) {
+        let named = |authority| {
+            let files = RetainedFiles::new(&folder, format!("robot-io-{life}"));
+            files.with_authority(authority)
+        };
+        let retainer = Retainer::start(vec![(None, named(kept_with))]).expect("threads");
+        (1..=life).for_each(|cycle| retainer.keep(note(cycle)));
+        retainer.finish();
+        for authority in keys {
+            let found = named(authority).notes(Some(Owner { authority, ..OWNER }));
+            let newest = found.newest.map(|note| note.applied());
+            let is_own = authority == kept_with;
+            assert_eq!(newest, is_own.then(|| moment(life)));
+            assert_eq!(found.is_damaged, !is_own);
+        }
+        // Once it has a note of its own keys, however it is numbered, it asks no more.
+        let next = named(Some(AuthorityHash(7)));
+        let retainer = Retainer::start(vec![(None, next.clone())]).expect("threads");
+        retainer.keep(note(0));
+        retainer.finish();
+        let owner = Owner { authority: Some(AuthorityHash(7)), ..OWNER };
+        let found = next.notes(Some(owner));
+        assert_eq!(found.newest.map(|note| note.applied()), Some(moment(0)), "{:?}", found.files);
+    }
+}
+
+/// States of a member with other keys are left out once there are own ones, however many the others were.
+#[test]
+fn own_states_come_before_those_of_other_keys() {
+    let folder = Folder::new("retained-own-keys");
+    let files = RetainedFiles::new(&folder, "robot.robot".to_owned());
+    let other = files.clone().with_authority(Some(AuthorityHash(5)));
+    keep(&other, 500, 540);
+    keep(&files, 3, 3);
+    let (runs, found) = files.runs(Some(OWNER));
+    assert_eq!(runs.iter().map(|run| run.stepped().cycle.0).max(), Some(3));
+    assert!(found.iter().any(|file| file.problem.is_some()), "{found:?}");
+}
+
 #[test]
 fn the_newest_note_comes_back() {
     let folder = Folder::new("retained-notes");
@@ -161,10 +259,10 @@ fn the_newest_note_comes_back() {
         }
     }
     retainer.finish();
-    let found = files.notes(Some(CLUSTER));
+    let found = files.notes(Some(OWNER));
     assert_eq!(found.newest.map(|note| note.applied()), Some(moment(cycle)));
     assert!(!found.is_damaged, "{:?}", found.files);
-    let foreign = files.notes(Some(ClusterHash(9)));
+    let foreign = files.notes(Some(Owner { cluster: ClusterHash(9), ..OWNER }));
     assert!(foreign.newest.is_none() && foreign.is_damaged, "{:?}", foreign.files);
 }
 
@@ -228,7 +326,7 @@ fn damage(path: &Path, damage: &Damage) -> Option<u64> {
         .map(|record| match record {
             Retained::State(state) => state.stepped.cycle.0,
             Retained::Step(step) => step.stepped.cycle.0,
-            Retained::Note(_) => 0,
+            Retained::Note(_) | Retained::Authority(_) => 0,
         })
         .collect();
     let mut ends = vec![0];
@@ -278,7 +376,7 @@ proptest! {
         let files = RetainedFiles::new(&folder, "robot.robot".to_owned());
         keep(&files, 1, last);
         let intact = files.paths().iter().zip(&both).filter_map(|(path, of)| damage(path, of)).max();
-        let (runs, found) = files.runs(Some(CLUSTER));
+        let (runs, found) = files.runs(Some(OWNER));
         for run in &runs {
             let cycle = run.stepped().cycle.0;
             prop_assert_eq!(run.steps.last().map_or(run.state.lineage, |step| step.after), lineage(cycle));
@@ -373,7 +471,7 @@ fn a_slow_disk_leaves_records_out_and_says_so() {
     assert_eq!(changed(&mut retainer, room + 60), None);
     retainer.finish();
     writer.join().expect("it ends");
-    let (runs, _) = files.runs(Some(CLUSTER));
+    let (runs, _) = files.runs(Some(OWNER));
     let cycles = runs.iter().flat_map(|run| run.steps.iter().map(|step| step.stepped.cycle.0));
     assert_eq!(cycles.max(), Some(room));
     assert_eq!(newest(&files), Some(room + 60));
@@ -411,7 +509,7 @@ fn what_the_program_before_has_left_does_not_come_back() {
         retainer.finish();
     };
     let hashes = || {
-        let (runs, _) = of(0).runs(Some(CLUSTER));
+        let (runs, _) = of(0).runs(Some(OWNER));
         let newest = runs.iter().max_by_key(|run| run.state.number).map(|run| run.state.hash.0);
         (newest, [8, 9].map(|hash| of(0).program(understudy_wire::ProgramHash(hash)).is_ok()))
     };
@@ -424,7 +522,7 @@ fn what_the_program_before_has_left_does_not_come_back() {
     run(9, 21..40);
     run(9, 40..41);
     assert_eq!(hashes(), (Some(9), [false, true]));
-    let (runs, _) = of(0).runs(Some(CLUSTER));
+    let (runs, _) = of(0).runs(Some(OWNER));
     assert!(runs.iter().all(|run| run.state.hash.0 == 9));
 }
 
