@@ -63,9 +63,7 @@ impl FromStr for crate::parts::SharedPart {
     fn from_str(text: &str) -> Result<Self, ReliabilityError> {
         let parts = text.split_once('=').map(|(name, time)| (name.trim(), time.trim()));
         match parts {
-            Some((name, mtbf)) if !name.is_empty() => {
-                Ok(Self::single(name, mtbf.parse()?))
-            }
+            Some((name, mtbf)) if !name.is_empty() => Ok(Self::single(name, mtbf.parse()?)),
             _ => Err(ReliabilityError::BoxText {
                 text: text.to_owned(),
                 why: "expected NAME=MTBF".to_owned(),

@@ -94,7 +94,11 @@ fn redundant(options: &Options, networks: u32, has_twins: bool) -> Options {
     changed
 }
 
-fn row(name: &str, options: &Options, stations: Stations) -> Result<CellRow, Vec<ReliabilityError>> {
+fn row(
+    name: &str,
+    options: &Options,
+    stations: Stations,
+) -> Result<CellRow, Vec<ReliabilityError>> {
     let mut options = options.clone();
     let count = match stations {
         Stations::Single => {

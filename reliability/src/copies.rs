@@ -87,7 +87,8 @@ impl System {
         });
         let mut kinds: Vec<Positions> = Vec::new();
         for kind in controllers {
-            let known = kinds.iter_mut().find(|known| Positions { count: kind.count, ..**known } == kind);
+            let known =
+                kinds.iter_mut().find(|known| Positions { count: kind.count, ..**known } == kind);
             match known {
                 Some(known) => known.count += kind.count,
                 None => kinds.push(kind),

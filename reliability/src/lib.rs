@@ -64,8 +64,7 @@ pub use sensitivity::{
 };
 pub use shared_spares::{MAXIMUM_SHARED_GROUPS, MAXIMUM_SHARED_SPARES, SharedSpares};
 pub use system::{
-    BoxKind, CommonCause, CommonCauseConvention, MAXIMUM_BOXES, MAXIMUM_MODEL_STATES, Rule,
-    System,
+    BoxKind, CommonCause, CommonCauseConvention, MAXIMUM_BOXES, MAXIMUM_MODEL_STATES, Rule, System,
 };
 pub use transient::{AfterFailure, Transient};
 

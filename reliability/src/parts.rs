@@ -11,9 +11,10 @@
 
 use serde::Serialize;
 
+use crate::chain::{Chain, explore};
 use crate::error::ReliabilityError;
 use crate::quantity::{Hours, Probability};
-use crate::system::MAXIMUM_BOXES;
+use crate::system::{MAXIMUM_BOXES, MAXIMUM_MODEL_STATES};
 
 /// Parts that are alike, of which the system needs each one: its power supply, its remote I/Os, its networks.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -99,8 +100,7 @@ impl Networks {
         within(errors, "the number of networks", self.count, 1, 2);
         // Every frame is sent over both, so nothing is switched over.
         let pair = pair(self.mttr, Ok(Probability::ONE), self.beta, errors);
-        let (name, pair) =
-            if self.count > 1 { ("network pair", pair) } else { ("network", None) };
+        let (name, pair) = if self.count > 1 { ("network pair", pair) } else { ("network", None) };
         SharedPart { name: name.to_owned(), count: groups, mtbf: self.mtbf, pair }
     }
 }
@@ -178,6 +178,25 @@ pub(crate) struct Positions {
 
 /// By kind: positions that lack a box, not detected and detected.
 pub(crate) type Lacking = Vec<(u32, u32)>;
+
+/// Chain of parts alone, with a crew for each box.
+pub(crate) fn chain_of(parts: &[SharedPart]) -> Result<Chain, Vec<ReliabilityError>> {
+    let pairs: Vec<Positions> = parts.iter().filter_map(SharedPart::positions).collect();
+    let lethal: f64 = parts.iter().map(SharedPart::lethal_rate).sum();
+    let first = vec![(0, 0); pairs.len()];
+    let (chain, _) = explore(
+        first,
+        MAXIMUM_MODEL_STATES,
+        |_| String::new(),
+        |state, found| {
+            if lethal > 0.0 {
+                found.push((None, lethal));
+            }
+            steps(&pairs, state, 1.0, None, found);
+        },
+    )?;
+    Ok(chain)
+}
 
 /// Boxes of positions that wait for a repair or are repaired.
 pub(crate) fn detected(state: &Lacking) -> u32 {

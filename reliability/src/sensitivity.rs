@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use crate::error::ReliabilityError;
-use crate::quantity::{Hours, Probability, stated};
 use crate::parts::Pair;
+use crate::quantity::{Hours, Probability, stated};
 use crate::system::System;
 
 /// One bar of the tornado.

@@ -275,9 +275,11 @@ impl System {
         let attended = self.attended(stations + detected(lacking));
         let mut of_pairs = Vec::new();
         steps(pairs, lacking, attended, None, &mut of_pairs);
-        found.extend(of_pairs.into_iter().map(|(to, rate)| {
-            (to.map(|lacking| (of_groups.clone(), lacking)), rate)
-        }));
+        found.extend(
+            of_pairs
+                .into_iter()
+                .map(|(to, rate)| (to.map(|lacking| (of_groups.clone(), lacking)), rate)),
+        );
         for &(number, count) in of_groups {
             let group = groups.states[number as usize].clone();
             for index in 0..groups.kinds.len() {

@@ -19,6 +19,19 @@ struct Row {
     mttf_hours: f64,
 }
 
+/// Mean time to failure of the groups with their spares, in series with remote I/Os and networks. All of them fail rarely compared with their repair,
+/// so the times to failure are exponential.
+fn in_series(plant: &SharedSpares, options: &Options) -> Result<f64, Vec<ReliabilityError>> {
+    let groups = plant.mttf()?;
+    match options.parts_chain()? {
+        None => Ok(groups),
+        Some(parts) => {
+            let parts = parts.mttf().map_err(|error| vec![error])?;
+            Ok(1.0 / (1.0 / groups + 1.0 / parts))
+        }
+    }
+}
+
 /// The pairs, and 0 to `most` shared spares.
 pub(super) fn compared(
     arguments: &Arguments,
@@ -43,7 +56,7 @@ pub(super) fn compared(
     let pairs = pairs.map_err(|errors| refused(&errors))?;
     let mut rows = vec![Row {
         name: "hot-standby pairs".to_owned(),
-        boxes: 2 * options.controllers,
+        boxes: 2 * options.controllers + options.other_boxes(),
         mttf_hours: pairs.mttf().map_err(|error| refused(&[error]))?,
     }];
     // From the largest number down, so that one out of its bounds is refused at once.
@@ -62,8 +75,8 @@ pub(super) fn compared(
             1,
             Row {
                 name: format!("{spares} shared spare{}", if spares == 1 { "" } else { "s" }),
-                boxes: options.controllers + options.groups + spares,
-                mttf_hours: plant.mttf().map_err(|errors| refused(&errors))?,
+                boxes: options.controllers + options.groups + spares + options.other_boxes(),
+                mttf_hours: in_series(&plant, options).map_err(|errors| refused(&errors))?,
             },
         );
     }

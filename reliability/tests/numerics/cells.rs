@@ -64,11 +64,13 @@ fn a_cell_is_the_product_of_its_parts() {
     let twin = RemoteIos { count: 1, twins: 1, ..them };
     for t in [10.0, 500.0, 20_000.0] {
         let r = |chain: &understudy_reliability::Chain| chain.reliability(t).expect("R");
+        let parts = options.parts_chain().expect("parts").expect("some");
         let stations = system(4, 1, Rule::AsBuilt, 10_000.0, 24.0).chain().expect("a chain");
         let wanted = r(&stations)
             * r(&alone(&|one| one.remote_ios = Some(twin))).powi(3)
             * r(&alone(&|one| one.remote_ios = Some(single)))
             * r(&alone(&|one| one.networks = options.networks));
+        check_within(r(&stations) * r(&parts), wanted, 1e-9, "the parts alone");
         let system = options.system().expect("a system");
         check_within(r(&system.chain().expect("a chain")), wanted, 1e-9, "the cell");
         let pairs = r(&system.copies_chain(2).expect("a chain"));
@@ -81,7 +83,8 @@ fn a_cell_is_the_product_of_its_parts() {
 fn single_parts_end_the_cell_with_their_first_failure() {
     let options = cell(0, 1);
     let mut plain = Options::new(4, hours(10_000.0), hours(24.0));
-    plain.shared = vec![SharedPart::single("all of them", hours(1.0 / (4.0 / 20_000.0 + 1.0 / 50_000.0)))];
+    plain.shared =
+        vec![SharedPart::single("all of them", hours(1.0 / (4.0 / 20_000.0 + 1.0 / 50_000.0)))];
     let mean = |options: &Options| {
         options.system().expect("a system").chain().expect("a chain").mttf().expect("a mean")
     };
@@ -178,7 +181,8 @@ fn simulated(options: &Options, runs: u32, seed: u64) -> f64 {
                 2 => networks[place] = !networks[place],
                 _ => break,
             }
-            let failed_stations = !stations[controllers] && stations[..controllers].contains(&false);
+            let failed_stations =
+                !stations[controllers] && stations[..controllers].contains(&false);
             let failed_io = ios.iter().any(|pair| !pair.contains(&true));
             if failed_stations || failed_io || !networks.contains(&true) {
                 break;
