@@ -54,7 +54,7 @@ pub use measured::{
     Stopped, acceleration_bias, fit, mean_time, outlook, proportion, rare_event, times_to_failure,
 };
 pub use options::Options;
-pub use parts::{Networks, Pair, RemoteIos, SharedPart};
+pub use parts::{Networks, Pair, REMOTE_IO_PAIR, RemoteIos, SharedPart};
 pub use quantity::{
     Hours, MAXIMUM_HOURS, MINIMUM_HOURS, MINIMUM_PROBABILITY, Probability, grouped,
 };

@@ -40,6 +40,9 @@ pub struct Pair {
     pub beta: Probability,
 }
 
+/// Name of the part that is all remote I/Os with a twin.
+pub const REMOTE_IO_PAIR: &str = "remote I/O pair";
+
 /// Remote I/Os of a cell, each for one program.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RemoteIos {
@@ -85,7 +88,7 @@ impl RemoteIos {
         let pair = pair(self.mttr, switchover, self.beta, errors);
         let single = self.count.saturating_sub(self.twins);
         let part = |name: &str, count, pair| (count > 0).then(|| self.part(name, count, pair));
-        let parts = [part("remote I/O", single, None), part("remote I/O pair", self.twins, pair)];
+        let parts = [part("remote I/O", single, None), part(REMOTE_IO_PAIR, self.twins, pair)];
         parts.into_iter().flatten().collect()
     }
 

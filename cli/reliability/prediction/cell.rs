@@ -49,20 +49,16 @@ pub(super) struct CellArguments {
 
 /// Times of remote I/Os and networks.
 pub(super) struct CellTimes {
-    remote_io: Option<(Hours, Hours)>,
-    network: Option<(Hours, Hours)>,
+    remote_io: Option<MeanTimes>,
+    network: Option<MeanTimes>,
 }
 
 impl CellArguments {
     /// Reads the times; errors are noted in `times`.
     pub(super) fn read(&self, times: &mut Times) -> CellTimes {
-        let mut read = |name: &'static str, text: &Option<String>| {
-            let texts: Vec<String> = text.iter().cloned().collect();
-            times.parsed::<MeanTimes>(name, &texts).first().map(|found| (found.mtbf, found.mttr))
-        };
         CellTimes {
-            remote_io: read("remote-io", &self.remote_io),
-            network: read("network", &self.network),
+            remote_io: times.parsed("remote-io", self.remote_io.as_slice()).pop(),
+            network: times.parsed("network", self.network.as_slice()).pop(),
         }
     }
 }
@@ -79,7 +75,7 @@ impl CellTimes {
         let twins = cluster.map_or(arguments.twins, |cluster| count(cluster.twins().len()));
         let networks =
             cluster.map_or(arguments.networks, |cluster| 1 + u32::from(cluster.has_two_networks()));
-        options.remote_ios = self.remote_io.map(|(mtbf, mttr)| RemoteIos {
+        options.remote_ios = self.remote_io.map(|MeanTimes { mtbf, mttr }| RemoteIos {
             count: options.controllers,
             twins,
             mtbf,
@@ -87,7 +83,7 @@ impl CellTimes {
             switchover: arguments.switchover,
             beta: arguments.pair_beta,
         });
-        options.networks = self.network.map(|(mtbf, mttr)| Networks {
+        options.networks = self.network.map(|MeanTimes { mtbf, mttr }| Networks {
             count: networks,
             mtbf,
             mttr,
@@ -97,9 +93,10 @@ impl CellTimes {
 }
 
 /// `MTBF,MTTR`
-struct MeanTimes {
-    mtbf: Hours,
-    mttr: Hours,
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct MeanTimes {
+    pub(crate) mtbf: Hours,
+    pub(crate) mttr: Hours,
 }
 
 impl std::str::FromStr for MeanTimes {

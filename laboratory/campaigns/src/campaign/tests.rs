@@ -2,7 +2,7 @@ use understudy_cycle::Mode;
 use understudy_reliability::Hours;
 use understudy_simulator::{Action, SpareTimes};
 use understudy_testing::press_cell;
-use understudy_wire::{ProgramId, StationId, Time};
+use understudy_wire::{Member, ProgramId, StationId, Time};
 
 use super::lives::{Lives, Order};
 use super::seen::Seen;
@@ -18,6 +18,8 @@ fn plan(failures: u64, threads: usize) -> CampaignPlan {
         seed: 3,
         maximum_cycles: 1_000_000,
         threads,
+        remote_io: None,
+        network: None,
     }
 }
 
@@ -69,6 +71,8 @@ fn the_model_with_the_protocols_own_time_lies_in_the_interval() {
         let question = Question {
             mtbf: hours(300.0),
             mttr: hours(50.0),
+            remote_io: None,
+            network: None,
             crews,
             failures: 60,
             seed: 1,
@@ -97,8 +101,8 @@ fn orders(lives: &mut Lives<'_>) -> Vec<(StationId, Action)> {
     let orders = lives.take_orders().into_iter();
     orders
         .filter_map(|order| match order {
-            Order::Do { station, action, .. } => Some((station, action)),
-            Order::Forget(_) => None,
+            Order::Do { member: Member::Station(station), action, .. } => Some((station, action)),
+            Order::Do { .. } | Order::Forget(_) => None,
         })
         .collect()
 }
@@ -151,7 +155,7 @@ fn one_crew_works_on_one_station_at_a_time() {
     let ordered = lives.take_orders();
     let forgotten = ordered.iter().filter(|order| matches!(order, Order::Forget(_)));
     assert_eq!(forgotten.count(), 2, "{ordered:?}");
-    let Some(Order::Do { station, .. }) = ordered.last() else {
+    let Some(Order::Do { member: Member::Station(station), .. }) = ordered.last() else {
         panic!("{ordered:?}");
     };
     lives.see(Time(3), Seen::Restarted(*station));
@@ -187,6 +191,8 @@ fn groups_that_share_a_spare_live_as_long_as_the_model_says() {
     let question = Question {
         mtbf: hours(1500.0),
         mttr: hours(300.0),
+        remote_io: None,
+        network: None,
         crews: None,
         failures: 40,
         seed: 1,
