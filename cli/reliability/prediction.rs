@@ -24,6 +24,7 @@ use crate::console::Console;
 use crate::files;
 use crate::run::outcome::command_line;
 use cell::CellArguments;
+pub(crate) use cell::MeanTimes;
 
 /// Calculate the MTTF of a cluster and compare other redundancy
 #[derive(Debug, Args)]

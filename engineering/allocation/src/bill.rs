@@ -65,7 +65,7 @@ impl Part {
 }
 
 /// The boxes of a plan with `networks` networks; the same with a twin for each remote I/O and two networks; and hot-standby pairs with redundant remote
-/// I/Os and two networks. Nothing for programs whose terminals are on their own controllers.
+/// I/Os and two networks. Nothing without networks, and for programs whose terminals are on their own controllers.
 pub(crate) fn bill(items: &[Placed], boxes: &[BoxOnPlan], networks: usize) -> Vec<BillRow> {
     let role = |name: &String| items.iter().find(|item| item.name == *name).map(|item| item.role);
     let (mut controllers, mut understudies) = (Part::default(), Part::default());
@@ -84,7 +84,7 @@ pub(crate) fn bill(items: &[Placed], boxes: &[BoxOnPlan], networks: usize) -> Ve
         }
     }
     let is_complete = items.iter().all(|item| item.left_over.is_none());
-    if firsts.boxes == 0 || !is_complete {
+    if firsts.boxes == 0 || networks == 0 || !is_complete {
         return Vec::new();
     }
     let currencies = boxes.iter().filter_map(|taken| taken.controller.text(Statement::Currency));

@@ -27,8 +27,7 @@ use understudy_simulator::NotReady;
 pub use found::{Found, hold_against_model};
 pub use parts::{PartTimes, PartsFound};
 pub use question::{
-    Planned, Question, QuestionError, Speed, networks_of, options_of, plan_campaign, remote_ios_of,
-    set_unequal,
+    Planned, Question, QuestionError, Speed, options_of, plan_campaign, set_unequal,
 };
 pub use real::{RealCampaign, RealCampaignRun, run_real_campaign};
 pub use shared::{SharedFound, measure_shared};

@@ -252,7 +252,7 @@ fn a_bill_counts_every_box() {
     let mut priced = Catalogue::default();
     for model in three_sizes().controllers() {
         let mut model = model.clone();
-        let price = if model.model == "S" { 100_00 } else { 1000_00 };
+        let price = if model.model == "S" { 10_000 } else { 100_000 };
         let source = "a list".to_owned();
         model.numbers.insert(Quantity::Price, Figure { value: price, source: source.clone() });
         model.texts.insert(Statement::Currency, Figure { value: "EUR".to_owned(), source });

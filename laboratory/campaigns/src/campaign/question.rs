@@ -208,14 +208,14 @@ pub fn set_unequal(
 }
 
 /// The remote I/Os of a cluster with their twins.
-pub fn remote_ios_of(cluster: &Cluster, (mtbf, mttr): (Hours, Hours)) -> RemoteIos {
+fn remote_ios_of(cluster: &Cluster, (mtbf, mttr): (Hours, Hours)) -> RemoteIos {
     let count = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
     let (all, twins) = (count(cluster.remote_ios().len()), count(cluster.twins().len()));
     RemoteIos { count: all, twins, mtbf, mttr, switchover: 1.0, beta: 0.0 }
 }
 
 /// The networks of a cluster.
-pub fn networks_of(cluster: &Cluster, (mtbf, mttr): (Hours, Hours)) -> Networks {
+fn networks_of(cluster: &Cluster, (mtbf, mttr): (Hours, Hours)) -> Networks {
     Networks { count: 1 + u32::from(cluster.has_two_networks()), mtbf, mttr, beta: 0.0 }
 }
 

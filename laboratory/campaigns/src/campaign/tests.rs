@@ -212,3 +212,35 @@ fn groups_that_share_a_spare_live_as_long_as_the_model_says() {
     assert!(one.joined_cycles.is_some_and(|cycles| cycles < 20.0), "{}", one.to_text());
     assert_eq!(one.mttf_hours, two.mttf_hours, "on any number of threads");
 }
+
+/// The press cell without a single point of failure above its devices: two networks, an understudy, twins.
+const WHOLE_CELL: &str = include_str!("../../../../examples/twin-remote-io/cluster.toml");
+
+/// Stations, remote I/Os and networks fail: the cell lives as long as the model of all of them says, by each of its causes.
+#[test]
+fn a_whole_cell_lives_as_long_as_the_model_says() {
+    let cell = understudy_testing::cluster(WHOLE_CELL, Mode::Full);
+    let times = |mtbf, mttr| Some((hours(mtbf), hours(mttr)));
+    let question = Question {
+        mtbf: hours(1500.0),
+        mttr: hours(150.0),
+        remote_io: times(1500.0, 150.0),
+        network: times(1500.0, 150.0),
+        crews: None,
+        failures: 60,
+        seed: 1,
+        speed: Speed::Factor(1.0),
+        forced: false,
+    };
+    let planned = plan_campaign(&cell, &question).expect("a campaign");
+    let measured = run_campaign(&cell, &planned.plan, &mut |_| {}).expect("synchronised");
+    let found = hold_against_model(&cell, &planned, measured).expect("an assessment");
+    let text = found.to_text();
+    println!("{text}");
+    assert!(found.is_met(), "{text}");
+    let parts = found.parts.expect("they fail");
+    assert!(parts.remote_ios > 60 && parts.networks > 30 && parts.switchovers > 30, "{text}");
+    for cause in ["both networks", "after its twin", "understudy"] {
+        assert!(found.assessment.causes.keys().any(|it| it.contains(cause)), "{cause}: {text}");
+    }
+}
