@@ -138,7 +138,11 @@ fn a_whole_cell_has_its_remote_ios_twins_and_networks() {
     let wrong = ["--controllers", "2", "--twins", "3", "--remote-io", "1h", "--network", "1h,0h"];
     let refused = reliability(&[&wrong[..], &RATES[..]].concat());
     assert_eq!(refused.status, 2);
-    assert!(refused.errors.contains("--remote-io") && refused.errors.contains("--network"), "{}", refused.errors);
+    assert!(
+        refused.errors.contains("--remote-io") && refused.errors.contains("--network"),
+        "{}",
+        refused.errors
+    );
 }
 
 #[test]

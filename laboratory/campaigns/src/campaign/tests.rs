@@ -236,7 +236,6 @@ fn a_whole_cell_lives_as_long_as_the_model_says() {
     let measured = run_campaign(&cell, &planned.plan, &mut |_| {}).expect("synchronised");
     let found = hold_against_model(&cell, &planned, measured).expect("an assessment");
     let text = found.to_text();
-    println!("{text}");
     assert!(found.is_met(), "{text}");
     let parts = found.parts.expect("they fail");
     assert!(parts.remote_ios > 60 && parts.networks > 30 && parts.switchovers > 30, "{text}");
